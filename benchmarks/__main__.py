@@ -86,7 +86,8 @@ def _real_frames(quick: bool) -> dict[str, Any]:
         )
         return {"cold_frame_ms": None, "warm_frame_ms": None, "convergence": []}
     clips = frames.load_clips(names)
-    rows, figures = [], {}
+    rows = []
+    figures = {}
     settings = [(tolerance, 0.0) for tolerance in frames.TOLERANCES] + [(frames.REPORTED, 0.9)]
     for tolerance, triggs in settings:
         for kind, outcome in frames.measure(

@@ -132,7 +132,8 @@ def ablation(quick: bool) -> dict[str, Any]:
     if not DATA.is_dir():
         print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
-    body, rows = load_body("scope"), dict(list(ROWS.items())[: QUICK_ROWS if quick else None])
+    body = load_body("scope")
+    rows = dict(list(ROWS.items())[: QUICK_ROWS if quick else None])
     clips: dict[str, dict[str, People]] = {}
     for path, truth in _clips():
         print(f"observing {path.stem}", file=sys.stderr, flush=True)

@@ -84,7 +84,8 @@ def median_s(
 def fresh() -> None:
     """Open an empty file at 30 frames per second."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 30, 1.0
+    bpy.context.scene.render.fps = 30
+    bpy.context.scene.render.fps_base = 1.0
 
 
 def writing(motion: Motion, rounds: int) -> dict[str, float]:
@@ -117,7 +118,8 @@ def writing(motion: Motion, rounds: int) -> dict[str, float]:
         channels = Channels(made["mesh"].data.shape_keys, made["action"])
         key_expressions(made["mesh"], channels, facing, frames)
 
-    keys, both = median_s(rounds, write, prepare), median_s(rounds, write_both, prepare_face)
+    keys = median_s(rounds, write, prepare)
+    both = median_s(rounds, write_both, prepare_face)
     scene = median_s(
         rounds, lambda: build_scene([long], body, None, BuildOptions(start_frame=1.0)), fresh
     )
@@ -126,13 +128,15 @@ def writing(motion: Motion, rounds: int) -> dict[str, float]:
 
 def working_again(motion: Motion, rounds: int, folder: Path) -> dict[str, dict[str, float]]:
     """Time the panel's operators on a capture whose motion is in the cache."""
-    body, figures = load_body("scope"), {}
+    body = load_body("scope")
+    figures = {}
     for name, count in LENGTHS.items():
         fresh()
         long = longer(motion, count)
         long.save(folder / "person1.npz")
         rig = build_scene([long], body, None, BuildOptions(start_frame=1.0)).people[0].armature
-        rig["scope_motion"], rig["scope_body_file"] = str(folder / "person1.npz"), "scope"
+        rig["scope_motion"] = str(folder / "person1.npz")
+        rig["scope_body_file"] = "scope"
         own = bpy.data.objects.new("own", rig.data.copy())
         bpy.context.scene.collection.objects.link(own)
         own.scale = (1.2, 1.2, 1.2)

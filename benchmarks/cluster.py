@@ -26,9 +26,13 @@ from distributed import Client
 from ..scope_addon.cli import SAMPLE
 from ..scope_addon.motion import Motion
 
-CLIPS, KILLED, WORKERS = 200, 2, 4
+CLIPS = 200
+KILLED = 2
+WORKERS = 4
 FEW = 20  # clips for one worker and for two
-FRAMES, FPS = 15, 30  # of a clip
+# of a clip
+FRAMES = 15
+FPS = 30
 
 
 def cluster(quick: bool) -> dict[str, Any]:
@@ -77,7 +81,8 @@ def _run(clips: Path, workers: int, kills: int = 0) -> dict[str, Any]:
     """
     with ExitStack() as stack:
         place = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        out, file = place / "out", place / "scheduler.json"
+        out = place / "out"
+        file = place / "scheduler.json"
         dask = [sys.executable, "-m", "dask"]
         with (place / "dask.log").open("w") as log:
             for command in (
@@ -95,7 +100,8 @@ def _run(clips: Path, workers: int, kills: int = 0) -> dict[str, Any]:
                     time.sleep(0.1)
         client = stack.enter_context(Client(scheduler_file=str(file), set_as_default=False))
         client.wait_for_workers(workers)
-        start, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        start = time.monotonic()
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         command = [
             sys.executable,
             "-m",

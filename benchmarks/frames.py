@@ -37,7 +37,8 @@ from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_
 from ..solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
 
 ROOT = Path(__file__).resolve().parent.parent
-DATA, CACHE = ROOT.parent / "shared" / "data", ROOT / "build" / "bench"
+DATA = ROOT.parent / "shared" / "data"
+CACHE = ROOT / "build" / "bench"
 CLIPS = (
     *(f"pose2sim/cam{k}.mp4" for k in (1, 2, 3, 4)),
     *(
@@ -48,7 +49,8 @@ CLIPS = (
 QUICK_CLIPS = CLIPS[:1]
 TOLERANCES = (1e-4, 1e-5, 1e-6)  # relative decrease at which the last stage stops
 REPORTED = 1e-6  # the solver's own
-COST_SHARE, JOINTS_M = 1e-3, 1e-3
+COST_SHARE = 1e-3
+JOINTS_M = 1e-3
 KEYS = ("pixels", "confidence2d", "points", "confidence3d", "directions", "confidence_directions")
 FIXED = ("intrinsics", "indices", "starts", "ends", "joint_weights")
 
@@ -78,7 +80,8 @@ def load_clips(names: Sequence[str]) -> list[Clip]:
 
 def _record(video: Path, body: Body, path: Path) -> None:
     """Find the person in a clip and keep what the first pass over it hands to the solver."""
-    tracker, times = PeopleTracker("best", os.cpu_count() or 1, None), list[float]()
+    tracker = PeopleTracker("best", os.cpu_count() or 1, None)
+    times = list[float]()
     tracklets: defaultdict[int, Tracklet] = defaultdict(Tracklet)
     with open_video(video, VideoRange()) as footage:
         camera = choose_camera(footage.width, footage.height, metadata_focal_mm=footage.focal_35mm)
@@ -225,7 +228,8 @@ def throughput(clips: Sequence[Clip], repeats: int = 5) -> dict[str, float]:
             start = time.perf_counter()
             fit_batch(body, frames, priors=priors, options=options, threads=threads)
             found.append(len(frames) / (time.perf_counter() - start))
-    one, all_cores = float(np.median(rates[1])), float(np.median(rates[0]))
+    one = float(np.median(rates[1]))
+    all_cores = float(np.median(rates[0]))
     return {
         "one_thread": one,
         "all_cores": all_cores,

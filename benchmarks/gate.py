@@ -46,7 +46,8 @@ MIN_NOISE = {
     "flipped": 0.02,
 }
 # by which a ratio of times may differ between machines, of its value
-MACHINES, MACHINES_OF_NETWORKS = 0.35, 0.6
+MACHINES = 0.35
+MACHINES_OF_NETWORKS = 0.6
 TRIES = 3
 JPEG_QUALITIES = (80, 88, 96)  # of the copies
 

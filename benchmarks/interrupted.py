@@ -43,7 +43,9 @@ from .live.observed import there_and_back
 ROOT = Path(__file__).resolve().parents[1]
 CLIP = ROOT.parent / "shared" / "data" / "clips" / "walk_side_static.mp4"
 WHOLE = 150  # frames of it before one of the two people jumps off a roof
-WIDTH, HEIGHT, FPS = 1920, 1080, 30
+WIDTH = 1920
+HEIGHT = 1080
+FPS = 30
 # So that packets can be repeated: no frame is predicted from a later one, and a round begins with a
 # key frame.
 OPTIONS = {
@@ -86,7 +88,8 @@ def _append(target: Any, stream: Any, round_: Any, numbers: range) -> None:
     """
     packets = (packet for packet in round_.demux(video=0) if packet.size)
     for number, packet in zip(numbers, packets, strict=False):
-        packet.stream, packet.time_base = stream, Fraction(1, FPS)
+        packet.stream = stream
+        packet.time_base = Fraction(1, FPS)
         packet.pts = packet.dts = number
         packet.duration = 1
         target.mux(packet)
@@ -101,8 +104,11 @@ class Run:
     def __init__(
         self, command: list[str], environment: dict[str, str], kill_at: float = np.inf
     ) -> None:
-        self._kill_at, self.seen = kill_at, dict[str, tuple[float, int]]()
-        self.peak_mib, self.said = 0.0, ""  # what was said besides the progress
+        self._kill_at = kill_at
+        self.seen = dict[str, tuple[float, int]]()
+        # what was said besides the progress
+        self.peak_mib = 0.0
+        self.said = ""
         self._began = time.monotonic()
         main, terminal = pty.openpty()
         before_s = _children_s()
@@ -116,7 +122,8 @@ class Run:
             self.status = self._process.wait()
             watcher.join()
         os.close(main)
-        self.seconds, self.processor_s = time.monotonic() - self._began, _children_s() - before_s
+        self.seconds = time.monotonic() - self._began
+        self.processor_s = _children_s() - before_s
 
     def _read(self, terminal: int) -> None:
         """Note when each stage began and how far it came, until the terminal is closed."""
@@ -131,7 +138,8 @@ class Run:
                 self._note(stage, int(done), int(total))
             text = _PROGRESS.sub("", text)
             at = max(text.rfind("\r"), 0)  # the last line may not be complete
-            self.said, text = self.said + text[:at], text[at:]
+            self.said = self.said + text[:at]
+            text = text[at:]
 
     def _note(self, stage: str, done: int, total: int) -> None:
         place = time.monotonic() - self._began, done
@@ -170,7 +178,8 @@ def _children_s() -> float:
 
 def checked(path: Path, frames: int) -> dict[str, Any]:
     """Return what is right or wrong with a motion file."""
-    motion, body = Motion.load(path), load_body("scope")
+    motion = Motion.load(path)
+    body = load_body("scope")
     clip = clip_from_motion(body, motion, raw=False)
     lowest = np.empty(len(motion))
     for begin in range(0, len(motion), _BLOCK):

@@ -71,7 +71,8 @@ def target_lines(figures: dict[str, Any]) -> str:
     """Return the target table, from whatever of it was measured."""
     rows: list[list[object]] = []
     for name, (_, _, _, _, target) in TARGETS.items():
-        ratio, called = figures["dense_over_sparse"][name], figures["dense_over_called"][name]
+        ratio = figures["dense_over_sparse"][name]
+        called = figures["dense_over_called"][name]
         text = f"dense: {ratio:.1f} x, {called:.1f} x if both are called from Python"
         rows.append([_step_name(name), figures["gn_step"][name], target, text])
     for name, target in (FRAME_TARGETS | STARTUP_TARGETS).items():
@@ -88,11 +89,13 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
     by_place = {(row["K"], row[key]): row for row in rows}
     lines: list[list[object]] = []
     for at in sorted({row[key] for row in rows}):
-        a, b = by_place[23, at], by_place[51, at]
+        a = by_place[23, at]
+        b = by_place[51, at]
         speedups = [a["dense"] / a["sparse"], b["dense"] / b["sparse"]]
         ratios = [b["sparse"] / a["sparse"], b["dense"] / a["dense"]]
         lines.append([at, a["sparse"], a["dense"], b["sparse"], b["dense"], *speedups, *ratios])
-    small, large = BODIES[23], BODIES[51]
+    small = BODIES[23]
+    large = BODIES[51]
     head = (key, f"{small} "
                  "sparse", f"{small} "
                            "dense", f"{large} sparse", f"{large} dense", f"speedup {small}",

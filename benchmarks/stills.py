@@ -33,7 +33,9 @@ from .scenes.scene import FOLDER, SPLITS
 from .scenes.statistics import mean_over_people
 
 # images, evenly spaced in time, none of them the first or the last
-PER_CLIP, PER_SCENE, QUICK = 5, 1, 1
+PER_CLIP = 5
+PER_SCENE = 1
+QUICK = 1
 Pair = tuple[float, float]  # MPJPE-root and PA-MPJPE in mm; NaN of people who are not found
 
 
@@ -55,7 +57,8 @@ def stills(quick: bool) -> dict[str, Any]:
     if not DATA.is_dir():
         print(f"{DATA} does not exist: nothing was measured; put the clips there", file=sys.stderr)
         return {}
-    body, figures = load_body("scope"), dict[str, dict[str, dict[str, list[Pair]]]]()
+    body = load_body("scope")
+    figures = dict[str, dict[str, dict[str, list[Pair]]]]()
     for quality in (CaptureOptions().quality,) if quick else PRESETS[::-1]:  # best first
         figures[quality] = {}
         for group, clips in list(_groups().items())[: 2 if quick else None]:

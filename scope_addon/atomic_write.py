@@ -77,7 +77,8 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool =
 
     import numpy as np
 
-    packed, method = _MovedFile(), zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
+    packed = _MovedFile()
+    method = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         with zipfile.ZipFile(packed, "w", method) as archive:
             for name, array in arrays.items():

@@ -24,7 +24,10 @@ import errno
 
 from ..solver.errors import InputError, ScopeError
 
-FAILED, BAD_ARGUMENTS, NO_PERSON = 1, 2, 3  # exit statuses
+# exit statuses
+FAILED = 1
+BAD_ARGUMENTS = 2
+NO_PERSON = 3
 
 
 class VideoError(InputError):

@@ -85,7 +85,8 @@ def numbered_from(first: Path) -> list[Path]:
     number = LAST_NUMBER.search(first.stem)
     if number is None:
         return []
-    before, after = first.stem[: number.start()], first.stem[number.end() :] + first.suffix
+    before = first.stem[: number.start()]
+    after = first.stem[number.end() :] + first.suffix
     return numbered(first.parent, before, after, int(number.group()))
 
 

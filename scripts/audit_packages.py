@@ -76,7 +76,8 @@ def _sentence(entry: dict[str, Any]) -> str:
 
 def main(ask: Ask = ask) -> int:
     """Print what is known; return the exit status."""
-    found, unknown = False, False
+    found = False
+    unknown = False
     for name, version in sorted(locked_versions()):
         try:
             known, latest = audit(name, version, ask)

@@ -93,7 +93,8 @@ def libraries(package: str, files: Iterable[tuple[str, bytes]]) -> list[Library]
     by_file = {
         name: project for project, entry in PROJECTS.items() for name in entry.get("files", ())
     }
-    found, stated = [], {}
+    found = []
+    stated = {}
     for file, content in files:
         digest = hashlib.sha256(content).hexdigest()
         found += [
@@ -189,7 +190,8 @@ def wheel_libraries(wheel: Path) -> tuple[Message, list[Library]]:
 def wheel_component(wheel: Path) -> tuple[Component, list[Library]]:
     """Describe a wheel; return its component and the libraries in it."""
     metadata, inside = wheel_libraries(wheel)
-    package, version = metadata["Name"], metadata["Version"]
+    package = metadata["Name"]
+    version = metadata["Version"]
     licence = metadata["License-Expression"] or TABLE["licences"][package]
     purl = PackageURL("pypi", name=package, version=version, qualifiers={"file_name": wheel.name})
     component = Component(
@@ -238,7 +240,8 @@ def bill_of_materials(folder: Path, wheels: Iterable[Path], platform: str, made:
         bom_ref="scope",
         licenses=[LicenseExpression("GPL-3.0-or-later")],
     )
-    parts, problems = [], []
+    parts = []
+    problems = []
     for wheel in sorted(wheels):
         component, inside = wheel_component(wheel)
         parts.append(component)
@@ -270,7 +273,8 @@ def check_third_party(
     :param text: of THIRD_PARTY.md.
     :return: what differs.
     """
-    short, letter = _SHORT.get(package, package), platform[0].upper()
+    short = _SHORT.get(package, package)
+    letter = platform[0].upper()
     stated: dict[str, str] = {}
     for name, licence, places in re.findall(
         r"^\| ([^|]+) \| ([^|]+) \| ((?:\S+ [LMW]+(?:, )?)+) \|$", text, flags=re.M

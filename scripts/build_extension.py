@@ -32,12 +32,10 @@ from shipped_kernels import add_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
-WHEELS, STAGING, DIST, OTHER_DIST = (
-    BUILD / "wheels",
-    BUILD / "staging",
-    BUILD / "dist",
-    BUILD / "dist_any_blender",
-)
+WHEELS = BUILD / "wheels"
+STAGING = BUILD / "staging"
+DIST = BUILD / "dist"
+OTHER_DIST = BUILD / "dist_any_blender"
 
 # pip's platform tags, newest first, down to the oldest systems that onnxruntime and llvmlite
 # support.
@@ -66,7 +64,8 @@ LEFT_OUT = (
     *SENDERS,
 )
 BILL = "bill_of_materials.cdx.json"  # in the zip; a copy with the zip's name lies beside it
-GOAL_MB, LIMIT_MB = 200, 240
+GOAL_MB = 200
+LIMIT_MB = 240
 _OLDEST = 315532800  # 1980-01-01, the first time that a zip can state
 
 
@@ -159,7 +158,8 @@ def build(target: Target, folder: Path, website: str = "", *, kernels: bool = Tr
     if kernels:
         add_kernels(STAGING, target.platform, target.python, wheels)
     version = tomllib.loads((STAGING / "blender_manifest.toml").read_text("utf-8"))["version"]
-    archive, made = folder / target.file_name(version), source_time()
+    archive = folder / target.file_name(version)
+    made = source_time()
     bill = bill_of_materials(STAGING, wheels, target.platform, made)
     (STAGING / BILL).write_text(bill, "utf-8")
     archive.with_suffix(".cdx.json").write_text(bill, "utf-8")
@@ -199,7 +199,8 @@ def write_zip(folder: Path, archive: Path, made: datetime) -> None:
             entry.compress_type = (
                 zipfile.ZIP_STORED if path.suffix == ".whl" else zipfile.ZIP_DEFLATED
             )
-            entry.create_system, entry.external_attr = 3, 0o644 << 16
+            entry.create_system = 3
+            entry.external_attr = 0o644 << 16
             file.writestr(entry, path.read_bytes(), compresslevel=9)
     temporary.replace(archive)
 
@@ -270,7 +271,8 @@ def stage(target: Target, wheels: list[Path], website: str = "") -> None:
     shutil.rmtree(STAGING, ignore_errors=True)
     (STAGING / "wheels").mkdir(parents=True)
     for name in CONTENT:
-        source, goal = ROOT / name, STAGING / name
+        source = ROOT / name
+        goal = STAGING / name
         if source.is_dir():
             shutil.copytree(source, goal, ignore=shutil.ignore_patterns(*LEFT_OUT))
         else:

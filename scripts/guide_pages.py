@@ -28,14 +28,12 @@ _STYLE = (
     "table{border-collapse:collapse}td,th{border:1px solid #ccc;padding:.3em "
     ".6em;text-align:left;vertical-align:top}"
 )
-_FENCE, _ITEM, _HEADING = (
-    re.compile(r"^```"),
-    re.compile(
-        r"^( *)(-|\d+\.) "
-        r"+(.*)"
-    ),
-    re.compile(r"^(#+) (.*)"),
+_FENCE = re.compile(r"^```")
+_ITEM = re.compile(
+    r"^( *)(-|\d+\.) "
+    r"+(.*)"
 )
+_HEADING = re.compile(r"^(#+) (.*)")
 _RULE = re.compile(r"^\|[\s:|-]+\|$")
 Resolve = Callable[[str], str]
 
@@ -85,7 +83,8 @@ def _blocks(lines: list[str], resolve: Resolve) -> Iterator[str]:
     """Convert lines of Markdown, block by block."""
     k = 0
     while k < len(lines):
-        first, k = k, _end_of_block(lines, k)
+        first = k
+        k = _end_of_block(lines, k)
         if lines[first].strip():
             yield _block(lines[first:k], resolve)
 
@@ -117,7 +116,8 @@ def _block(lines: list[str], resolve: Resolve) -> str:
     if _FENCE.match(lines[0]):
         return f"<pre>{html.escape(chr(10).join(lines[1:-1]))}</pre>"
     if heading := _HEADING.match(lines[0]):
-        level, text = len(heading[1]), heading[2]
+        level = len(heading[1])
+        text = heading[2]
         return f'<h{level} id="{anchor_of(text)}">{_inline(text, resolve)}</h{level}>'
     if lines[0].startswith("|"):
         return _table(lines, resolve)
@@ -141,7 +141,8 @@ def _list(lines: list[str], resolve: Resolve) -> str:
     """Convert the lines of one list, whose items may contain other blocks."""
     first = _ITEM.match(lines[0])
     assert first is not None
-    kind, items = ("ul" if first[2] == "-" else "ol"), []
+    kind = "ul" if first[2] == "-" else "ol"
+    items = []
     for line in lines:
         item = _ITEM.match(line)
         if item and len(item[1]) == len(first[1]):

@@ -43,7 +43,8 @@ def add_kernels(staging: Path, target: str, python: str, wheels: Iterable[Path])
     :param wheels: the extension's wheels for this platform and Python.
     """
     wheels = [w for w in wheels if "abi3" in w.name or f"cp{python.replace('.', '')}" in w.name]
-    kept, wanted = KEPT / target / python, _digest(staging, wheels)
+    kept = KEPT / target / python
+    wanted = _digest(staging, wheels)
     stated = kept / MADE_FROM
     if not stated.is_file() or stated.read_text("utf-8") != wanted:
         is_here = _THIS.get((platform.system(), platform.machine())) == target
@@ -107,7 +108,8 @@ def _compile(staging: Path, target: str, python: str, wheels: list[Path], kept: 
         flush=True,
     )
     with tempfile.TemporaryDirectory(prefix="scope-kernels-") as name:
-        packages, job = Path(name) / "packages", Path(name) / "job"
+        packages = Path(name) / "packages"
+        job = Path(name) / "job"
         job.mkdir()
         for wheel in [*wheels, _numpy_wheel(python)]:
             with zipfile.ZipFile(wheel) as file:
@@ -126,7 +128,8 @@ def _compile(staging: Path, target: str, python: str, wheels: list[Path], kept: 
         }
         command = _command(python, [staging, Path(name)], variables)
         command += ["-I", "-B", str(start), str(staging), str(job), str(packages)]
-        environment, pipe = os.environ | variables, subprocess.PIPE
+        environment = os.environ | variables
+        pipe = subprocess.PIPE
         with subprocess.Popen(
             command, env=environment, stdin=pipe, stdout=pipe, text=True
         ) as process:

@@ -215,7 +215,8 @@ class Body:
         :return: (V, 3) vertices in the frame of R and t.
         :raises ShapeError: an array has another shape.
         """
-        R, t = as_array(R, (self.K + 1, 3, 3), "R"), as_array(t, (self.K + 1, 3), "t")
+        R = as_array(R, (self.K + 1, 3, 3), "R")
+        t = as_array(t, (self.K + 1, 3), "t")
         offset = t - np.einsum("kij,kj->ki", R, self.rest_joints(betas))
         A = np.concatenate([R, offset[..., None]], axis=2).reshape(len(R), 12)
         blended = np.einsum("vs,vsa->va", self.skin_weights, A[self.skin_joints]).reshape(-1, 3, 4)
@@ -241,7 +242,8 @@ class Body:
         :raises ShapeError: an array has another shape, or the body has no keypoint of such a
             number.
         """
-        R, t = as_arrays(R, (self.K + 1, 3, 3), "R"), as_arrays(t, (self.K + 1, 3), "t")
+        R = as_arrays(R, (self.K + 1, 3, 3), "R")
+        t = as_arrays(t, (self.K + 1, 3), "t")
         if R.shape[:-3] != t.shape[:-2]:
             raise ShapeError(
                 f"R and t must be of the same frames, but got shapes {R.shape} and {t.shape}."

@@ -303,7 +303,8 @@ def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     ints, floats = pose_prior.pack(parts, R, t, w_R, w_t)
     if not _all_weigh(w_R, w_t):
         weigh = (w_R > 0.0) | (w_t > 0.0)
-        ints, floats = ints[weigh], floats[weigh]
+        ints = ints[weigh]
+        floats = floats[weigh]
     return _usable_rows((ints, floats))
 
 

@@ -60,7 +60,10 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # t
     Near pi, where the antisymmetric part vanishes, the axis is the largest column of the symmetric
     part; exactly at pi the sign is arbitrary.
     """
-    x, y, z = 0.5 * (r21 - r12), 0.5 * (r02 - r20), 0.5 * (r10 - r01)  # sin(th) axis
+    # sin(th) axis
+    x = 0.5 * (r21 - r12)
+    y = 0.5 * (r02 - r20)
+    z = 0.5 * (r10 - r01)
     c = 0.5 * (r00 + r11 + r22 - 1.0)
     s2 = x * x + y * y + z * z
     if c > 0.9:
@@ -80,11 +83,17 @@ def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # t
     # R + R^T = 2 cos(th) I + 2 (1 - cos(th)) a a^T: take the column of the largest diagonal entry
     # of a a^T
     if r00 >= r11 and r00 >= r22:
-        ax, ay, az = r00 - c, 0.5 * (r01 + r10), 0.5 * (r02 + r20)
+        ax = r00 - c
+        ay = 0.5 * (r01 + r10)
+        az = 0.5 * (r02 + r20)
     elif r11 >= r22:
-        ax, ay, az = 0.5 * (r01 + r10), r11 - c, 0.5 * (r12 + r21)
+        ax = 0.5 * (r01 + r10)
+        ay = r11 - c
+        az = 0.5 * (r12 + r21)
     else:
-        ax, ay, az = 0.5 * (r02 + r20), 0.5 * (r12 + r21), r22 - c
+        ax = 0.5 * (r02 + r20)
+        ay = 0.5 * (r12 + r21)
+        az = r22 - c
     k = th / math.sqrt(ax * ax + ay * ay + az * az)
     if ax * x + ay * y + az * z < 0.0:
         k = -k
@@ -102,7 +111,9 @@ def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
     else:
         h = 0.5 * math.sqrt(s)
         k = (1.0 - h * math.cos(h) / math.sin(h)) / s
-    hx, hy, hz = 0.5 * x, 0.5 * y, 0.5 * z
+    hx = 0.5 * x
+    hy = 0.5 * y
+    hz = 0.5 * z
     return (
         1.0 - k * (y * y + z * z), k * x * y + hz, k * x * z - hy,
         k * x * y - hz, 1.0 - k * (x * x + z * z), k * y * z + hx,
@@ -117,7 +128,9 @@ def hat(phi: ArrayLike) -> Array:
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
     out = np.zeros((*phi.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -phi[..., 2], phi[..., 1], -phi[..., 0]
+    out[..., 0, 1] = -phi[..., 2]
+    out[..., 0, 2] = phi[..., 1]
+    out[..., 1, 2] = -phi[..., 0]
     return out - np.swapaxes(out, -1, -2)
 
 
@@ -155,7 +168,8 @@ def exp(phi: ArrayLike) -> Array:
     :raises ShapeError: the vectors have another shape.
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
-    angles, cross = _squares_and_angles(phi), hat(phi)
+    angles = _squares_and_angles(phi)
+    cross = hat(phi)
     return np.eye(3) + _sine(*angles) * cross + _versine(*angles) * (cross @ cross)
 
 
@@ -165,7 +179,8 @@ def log(rotation: ArrayLike) -> Array:
     :raises ShapeError: the matrices have another shape.
     """
     quaternion = quaternion_from_matrix(rotation)
-    w, v = quaternion[..., :1], quaternion[..., 1:]
+    w = quaternion[..., :1]
+    v = quaternion[..., 1:]
     n = np.linalg.norm(v, axis=-1, keepdims=True)
     small = n < 1e-6
     # w >= 0, so a small n means w = 1 to rounding: 2 atan(n / w) / n = 2 - 2 n^2 / 3
@@ -181,7 +196,8 @@ def left_jacobian(phi: ArrayLike) -> Array:
     :raises ShapeError: the vectors have another shape.
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
-    angles, cross = _squares_and_angles(phi), hat(phi)
+    angles = _squares_and_angles(phi)
+    cross = hat(phi)
     return np.eye(3) + _versine(*angles) * cross + _lag(*angles) * (cross @ cross)
 
 
@@ -263,7 +279,9 @@ def orthonormalize(R) -> bool:  # type: ignore[no-untyped-def]
         if not (worst < 1e-7 and det > 0.0):
             return False
         for r in range(3):
-            a, b, c = 0.5 * M[r, 0], 0.5 * M[r, 1], 0.5 * M[r, 2]
+            a = 0.5 * M[r, 0]
+            b = 0.5 * M[r, 1]
+            c = 0.5 * M[r, 2]
             M[r, 0] -= a * n00 + b * n01 + c * n02
             M[r, 1] -= a * n01 + b * n11 + c * n12
             M[r, 2] -= a * n02 + b * n12 + c * n22
@@ -292,10 +310,12 @@ def shortest_turn(a: Array, b: Array) -> Array:
 
     :raises ShapeError: the directions have another shape.
     """
-    a, b = as_arrays(a, (3,), "A direction"), as_arrays(b, (3,), "A direction")
+    a = as_arrays(a, (3,), "A direction")
+    b = as_arrays(b, (3,), "A direction")
     a = a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
     b = b / np.maximum(np.linalg.norm(b, axis=-1, keepdims=True), 1e-12)
-    axis, cosine = np.cross(a, b), (a * b).sum(axis=-1)
+    axis = np.cross(a, b)
+    cosine = (a * b).sum(axis=-1)
     sine = np.linalg.norm(axis, axis=-1)
     # for opposite directions any perpendicular axis
     aside = np.cross(a, np.eye(3)[np.abs(a).argmin(axis=-1)])

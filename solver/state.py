@@ -65,13 +65,15 @@ class State:
         :raises InvalidValueError: R_camera_root, or a matrix of Omega, is not a rotation.
         """
         check_type(tree, Tree, "tree")
-        K, P = len(tree.parents) - 1, tree.shape
+        K = len(tree.parents) - 1
+        P = tree.shape
         R = as_array(self.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(self.t_camera_root, (3,), "t_camera_root")
         Omega = as_array(self.Omega, (K, 3, 3), "Omega")
         check_state_rotations(R, Omega)
         pose = make_pose(tree)
-        pose.R[0], pose.t[0] = nearest_rotation(R), t
+        pose.R[0] = nearest_rotation(R)
+        pose.t[0] = t
         pose.Omega[1:] = nearest_rotation(Omega)
         pose.beta[:P] = as_array(self.beta, (P,), "beta")
         place_parts(tree, pose)

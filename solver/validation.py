@@ -271,7 +271,8 @@ def _first_not_rotation(R: Array, weights: Array, every: bool) -> int:
     for k in range(R.shape[0]):
         if not every and not weights[k] > 0.0:
             continue
-        M, off = R[k], 0.0
+        M = R[k]
+        off = 0.0
         for r in range(3):
             for c in range(3):
                 e = (
@@ -301,7 +302,8 @@ def _definiteness(A: Array) -> int:
 
     By the pivots of Cholesky's decomposition, with a millionth of the largest diagonal entry added.
     """
-    n, largest = A.shape[0], 0.0
+    n = A.shape[0]
+    largest = 0.0
     for i in range(n):
         for j in range(n):
             largest = max(largest, abs(A[i, j]))
@@ -351,7 +353,9 @@ def _far_apart(points: Array, most: float) -> bool:
     """Whether more than half of the steps from one finite point of (n, 3) to the next are longer
     than `most`.
     """
-    steps, far, before = 0, 0, -1
+    steps = 0
+    far = 0
+    before = -1
     for k in range(points.shape[0]):
         total = 0.0 * points[k, 0] + 0.0 * points[k, 1] + 0.0 * points[k, 2]
         if total != 0.0:

@@ -19,7 +19,8 @@ def made_motion(
 
     :param given: other fields of `Motion`, in place of what stands below.
     """
-    T, K1 = len(poses), body.K + 1
+    T = len(poses)
+    K1 = body.K + 1
     poses = poses.reshape(T, 3 * K1)
     fields: dict[str, Any] = {
         "poses": poses,

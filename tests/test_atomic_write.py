@@ -84,7 +84,8 @@ def test_a_file_has_the_permissions_of_any_new_one_and_the_umask_is_left_alone(
     tmp_path, monkeypatch, mask, replaces
 ):
     """Every change of the umask affects the files that other threads create meanwhile."""
-    before, changes = os.umask(mask), []
+    before = os.umask(mask)
+    changes = []
     try:
         with monkeypatch.context() as patch:
             patch.setattr(os, "umask", changes.append)

@@ -42,7 +42,8 @@ def test_each_frame_has_one_reason():
 
 
 def test_feet_under_the_floor_are_a_reason_of_their_own():
-    m, under = motion(), np.zeros(30, bool)
+    m = motion()
+    under = np.zeros(30, bool)
     m.valid[:3] = False
     under[2:6] = True
     assert find_review_spans(m, under_floor=under) == [Span("unseen", 0, 2), Span("floor", 2, 5)]

@@ -61,7 +61,8 @@ def not_executed(text: str) -> list[tuple[Position, Position]]:
 
 def mutations_of(path: Path) -> list[Any]:
     """Return cosmic-ray's descriptions of the mutants of a module that can be sampled."""
-    ranges, found = not_executed(path.read_text(encoding="utf-8")), []
+    ranges = not_executed(path.read_text(encoding="utf-8"))
+    found = []
     for item in _all_work_items([path], {}):
         mutation = item.mutations[0]
         name = mutation.operator_name
@@ -78,7 +79,9 @@ def sample(folder: str, count: int, seed: int) -> list[tuple[str, Any]]:
     """
     files = [path.relative_to(ROOT).as_posix() for path in sorted((ROOT / folder).rglob("*.py"))]
     found = {file: mutations_of(ROOT / file) for file in files if not file.startswith(LEFT_OUT)}
-    total, rng, drawn = sum(map(len, found.values())), random.Random(seed), []
+    total = sum(map(len, found.values()))
+    rng = random.Random(seed)
+    drawn = []
     for file, mutations in sorted(found.items()):
         share = min(len(mutations), max(1, round(count * len(mutations) / total)))
         drawn += [(file, mutation) for mutation in rng.sample(mutations, share)]
@@ -158,7 +161,8 @@ def main() -> None:
                 original, get_operator(mutation.operator_name)(), mutation.occurrence
             )
             (copy / file).write_text(mutant, encoding="utf-8")
-            outcome, line = outcome_of(copy, file, args.limit), mutation.start_pos[0]
+            outcome = outcome_of(copy, file, args.limit)
+            line = mutation.start_pos[0]
             (copy / file).write_text(original, encoding="utf-8")
             record = {
                 "file": file,

@@ -101,7 +101,9 @@ _SECTIONS = {
     ),
     "Results": ("Fit", "ClipFit", "MotionFit", "State", "Status"),
 }
-_ERRORS, _ROTATIONS, _OTHER = "Errors", "Rotations", "Other names"
+_ERRORS = "Errors"
+_ROTATIONS = "Rotations"
+_OTHER = "Other names"
 
 
 def reference() -> str:

@@ -53,7 +53,8 @@ def climbs(quick: bool) -> dict[str, Any]:
     if not videos:
         print(f"{FOLDER} has no clips: run ./scripts/bench climbs without --quick", file=sys.stderr)
         return {}
-    body, figures = load_body("scope"), dict[str, Any]()
+    body = load_body("scope")
+    figures = dict[str, Any]()
     for way, uneven in WAYS.items():
         rows = {video.stem: measure(body, video, uneven) for video in videos}
         rows["mean"] = {
@@ -90,7 +91,8 @@ def measure(body: Body, video: Path, uneven: bool) -> dict[str, float]:
 
 def compare(body: Body, motion: Motion, clip: str, truth: Truth) -> dict[str, float]:
     """Return the figures of one captured person: `SHOWN`."""
-    result, true = score_people(body, [motion], clip, truth)[0], truth["limbs"][0]
+    result = score_people(body, [motion], clip, truth)[0]
+    true = truth["limbs"][0]
     R = exp(motion.poses.reshape(len(motion.poses), -1, 3).astype(float))
     joints = body.forward_kinematics(R, motion.trans.astype(float), motion.betas.astype(float))[1]
     limbs = joints[:, [body.joint_names.index(name) for name in LIMB_JOINTS]]
@@ -108,7 +110,8 @@ def world_mm(limbs: Points, true: Points) -> float:
     """Return the mean distance of joints (T, J, 3), both z up, after one turn about z and one shift
     of the clip.
     """
-    x, y = limbs - limbs.mean((0, 1)), true - true.mean((0, 1))
+    x = limbs - limbs.mean((0, 1))
+    y = true - true.mean((0, 1))
     H = np.einsum("tji,tjk->ik", x[..., :2], y[..., :2])
     angle = np.arctan2(H[0, 1] - H[1, 0], H[0, 0] + H[1, 1])
     return float(mpjpe(x @ exp(np.array([0.0, 0.0, angle])).T, y).mean())

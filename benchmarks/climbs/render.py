@@ -26,10 +26,8 @@ def render_missing(body: Body) -> None:
     for number in range(len(DRAWS)):
         scene = draw_climb(body, takes, number)
         video = FOLDER / f"climb_{number}.mp4"
-        write, render = (
-            partial(write_truth, body=body, scene=scene),
-            partial(render_scene, body, scene, 0),
-        )
+        write = partial(write_truth, body=body, scene=scene)
+        render = partial(render_scene, body, scene, 0)
         render_if_changed(video, truth_of(video), COMPARED, write, render)
 
 

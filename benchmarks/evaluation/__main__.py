@@ -127,9 +127,11 @@ def _evaluate(
     clips: list[Clip], body: Body, models: Models, settings: Settings, results: Path, again: bool
 ) -> tuple[dict[str, Scores], list[str]]:
     """Return the scores by protocol, and what went wrong, in sentences."""
-    regressor, program = models.regressor_for(body), code_version(_ROOT)
+    regressor = models.regressor_for(body)
+    program = code_version(_ROOT)
     scores: dict[str, Scores] = {name: Scores() for clip in clips for name in clip.protocols}
-    problems, other = [], 0
+    problems = []
+    other = 0
     for number, clip in enumerate(clips, 1):
         truth = clip.truth()  # before the capture, which takes long
         folder = results_of(results, clip)
@@ -180,12 +182,14 @@ def _lines(
     """Return the table of a protocol: ours, the published rows, and what has to be known to compare
     them.
     """
-    means, rows = figures["figures"], PUBLISHED.get(name, [])
+    means = figures["figures"]
+    rows = PUBLISHED.get(name, [])
     keys = [
         key for key in protocol.measures if key in means or any(key in row.figures for row in rows)
     ]
     head = ["", *(MEASURES[key] for key in keys), "source"]
-    table, sources = [head, ["---"] * len(head)], list(dict.fromkeys(row.source for row in rows))
+    table = [head, ["---"] * len(head)]
+    sources = list(dict.fromkeys(row.source for row in rows))
     for row in rows:
         figures_of = [_cell(row.figures.get(key)) for key in keys]
         table.append([row.method, *figures_of, f"[{sources.index(row.source) + 1}]"])

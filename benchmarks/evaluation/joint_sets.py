@@ -77,8 +77,10 @@ def on_body(
     :param betas: (P,) shape of the body.
     :raises KeyError: the body has no such joint.
     """
-    rest, at = body.rest_joints(betas), {name: k for k, name in enumerate(body.joint_names)}
-    parts, offsets = np.zeros(len(names), np.intp), np.zeros((len(names), 3))
+    rest = body.rest_joints(betas)
+    at = {name: k for k, name in enumerate(body.joint_names)}
+    parts = np.zeros(len(names), np.intp)
+    offsets = np.zeros((len(names), 3))
     for i, name in enumerate(names):
         if name == "head_top":
             vertices = body.rest_vertices(betas)

@@ -31,7 +31,8 @@ MM = 1000.0
 PCK_MM = 150.0
 AUC_MM = np.arange(0.0, 151.0, 5.0)
 # of 3DPW's challenge, which ends below 200
-CHALLENGE_PCK_MM, CHALLENGE_AUC_MM = 50.0, np.arange(0.0, 200.0)
+CHALLENGE_PCK_MM = 50.0
+CHALLENGE_AUC_MM = np.arange(0.0, 200.0)
 SEGMENT = 100  # frames
 STILL_M = 0.01  # per frame; a true foot point that moves less counts as standing
 
@@ -49,8 +50,10 @@ def similarity(
     :param with_scale: False for s = 1.
     :return: s (...), R (..., 3, 3), t (..., 3).
     """
-    mean_source, mean_target = source.mean(axis=-2), target.mean(axis=-2)
-    x, y = source - mean_source[..., None, :], target - mean_target[..., None, :]
+    mean_source = source.mean(axis=-2)
+    mean_target = target.mean(axis=-2)
+    x = source - mean_source[..., None, :]
+    y = target - mean_target[..., None, :]
     U, D, Vt = np.linalg.svd(np.swapaxes(y, -1, -2) @ x)
     sign = np.ones(D.shape)
     sign[..., 2] = np.sign(np.linalg.det(U) * np.linalg.det(Vt))
@@ -164,7 +167,8 @@ def w_mpjpe(captured: Points, true: Points) -> NDArray[np.float64]:
 def _segment_errors(captured: Points, true: Points, aligned_frames: int) -> NDArray[np.float64]:
     errors = [np.zeros(0)]
     for start in range(0, len(true), SEGMENT):
-        x, y = captured[start : start + SEGMENT], true[start : start + SEGMENT]
+        x = captured[start : start + SEGMENT]
+        y = true[start : start + SEGMENT]
         transform = similarity(x[:aligned_frames].reshape(-1, 3), y[:aligned_frames].reshape(-1, 3))
         errors.append(mpjpe(aligned(x.reshape(-1, 3), transform).reshape(x.shape), y))
     return np.concatenate(errors)

@@ -15,7 +15,8 @@ _HMR_P2 = (
     "table 2"
 )
 _GVHMR = "Shen et al., GVHMR, SIGGRAPH Asia 2024 (arXiv:2409.06662)"
-_GVHMR_CAMERA, _GVHMR_WORLD = f"{_GVHMR}, table 2", f"{_GVHMR}, table 1"
+_GVHMR_CAMERA = f"{_GVHMR}, table 2"
+_GVHMR_WORLD = f"{_GVHMR}, table 1"
 _HUMAN3R = "Chen et al., Human3R (arXiv:2510.06219), table of 3DPW and EMDB-1"
 _ONLINE_CAMERA = "OnlineHMR, table of EMDB-1 (there PHMR, offline, is PromptHMR-Vid)"
 _ONLINE_WORLD = "OnlineHMR, table of EMDB-2 (there PHMR, offline, is PromptHMR-Vid)"

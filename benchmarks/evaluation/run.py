@@ -86,7 +86,8 @@ def captured_clip(
         raise OutputError(
             f"cannot write in {folder}: {reason(error)}; choose another with --results"
         ) from error
-    problem, motions = "", []
+    problem = ""
+    motions = []
     try:
         motions = _capture(clip, intrinsics if settings.camera else None, body, settings)
     except NoPersonError:
@@ -157,9 +158,11 @@ def _capture(
     rate = Fraction(clip.rate).limit_denominator(1000)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        footage, wanted = clip.pictures[0], VideoRange()
+        footage = clip.pictures[0]
+        wanted = VideoRange()
         if len(clip.pictures) > 1:
-            footage, wanted = _numbered(clip.pictures, folder / "frames"), VideoRange(fps=rate)
+            footage = _numbered(clip.pictures, folder / "frames")
+            wanted = VideoRange(fps=rate)
         options = CaptureOptions(
             quality=settings.quality,
             people="largest" if clip.alone else "all",

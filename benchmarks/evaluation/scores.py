@@ -45,8 +45,10 @@ class Scores:
         """Add the values of another clip."""
         for key, arrays in other.values.items():
             self.values.setdefault(key, []).extend(arrays)
-        self.frames, self.seen = self.frames + other.frames, self.seen + other.seen
-        self.people, self.missed = self.people + other.people, self.missed + other.missed
+        self.frames = self.frames + other.frames
+        self.seen = self.seen + other.seen
+        self.people = self.people + other.people
+        self.missed = self.missed + other.missed
 
     def means(self) -> dict[str, float]:
         """Return the mean over all frames of each measure; NaN where no frame has a value."""
@@ -74,7 +76,8 @@ def score_clip(
     """
     scores = Scores()
     for person, motion in zip(truth.people, assign(clip, truth, motions), strict=True):
-        scores.frames, scores.people = scores.frames + len(person.rows), scores.people + 1
+        scores.frames = scores.frames + len(person.rows)
+        scores.people = scores.people + 1
         if motion is None:
             scores.missed += 1
             continue
@@ -108,7 +111,8 @@ def assign(clip: Clip, truth: Truth, motions: Sequence[Motion]) -> list[Motion |
 def _distance(person: Person, motion: Motion, K: NDArray[np.float64]) -> float:
     true_rows, captured_rows = _common(person, motion)
     valid = motion.valid[captured_rows]
-    true_rows, captured_rows = true_rows[valid], captured_rows[valid]
+    true_rows = true_rows[valid]
+    captured_rows = captured_rows[valid]
     if not len(true_rows):
         return np.inf
     limbs = [SMPL24.index(name) for name in LIMBS]
@@ -188,7 +192,8 @@ def _same_mesh(captured: PosedBody, true: PosedBody) -> bool:
 def _vertex_errors(
     captured: PosedBody, true: PosedBody, roots: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    errors, start = [], 0
+    errors = []
+    start = 0
     for x, y in zip(captured.vertex_blocks(), true.vertex_blocks(), strict=True):
         some = slice(start, start + len(x))
         errors.append(
@@ -203,7 +208,8 @@ def _vertex_errors(
 def _in_world(
     captured: PosedBody, true: Subject, protocol: Protocol, rate: float
 ) -> Mapping[str, NDArray[np.float64]]:
-    x, y = captured.joints(protocol.joints), true.joints(protocol.joints)
+    x = captured.joints(protocol.joints)
+    y = true.joints(protocol.joints)
     pelvis = [subject.joints(("pelvis",))[:, 0] for subject in (captured, true)]
     found = {
         "wa_mpjpe": metrics.wa_mpjpe(x, y),

@@ -85,7 +85,8 @@ class PosedBody:
         """Return the person in another frame of reference; T (T, 4, 4) or (4, 4) rigid
         transforms.
         """
-        R, t = T[..., :3, :3], T[..., :3, 3]
+        R = T[..., :3, :3]
+        t = T[..., :3, 3]
         rotations = self.rotations.copy()
         rotations[:, 0] = R @ rotations[:, 0]
         return replace(

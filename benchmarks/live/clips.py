@@ -36,7 +36,8 @@ def there_and_back_clip(
     if target.exists():
         return target
     with open_video(source) as video:
-        pictures, fps = [frame.image_rgb for frame in video], video.fps
+        pictures = [frame.image_rgb for frame in video]
+        fps = video.fps
     if size is not None:
         pictures = [
             cv2.resize(picture, size, interpolation=cv2.INTER_CUBIC).astype(np.uint8)
@@ -62,10 +63,8 @@ def there_and_back_truth(truth: Path, count: int, frames: int, target: Path) -> 
     """
     with np.load(truth) as file:
         values = {key: file[key] for key in file.files}
-    row_of, order = (
-        {int(frame): row for row, frame in enumerate(values["frame_index"])},
-        there_and_back(count),
-    )
+    row_of = {int(frame): row for row, frame in enumerate(values["frame_index"])}
+    order = there_and_back(count)
     rows = {
         k: row_of[order[k % len(order)]] for k in range(frames) if order[k % len(order)] in row_of
     }
@@ -99,12 +98,15 @@ class RepeatedFile:
     focal_35mm: float | None = None
 
     def __init__(self, path: Path, seconds: float) -> None:
-        self._path, self._seconds, self.name = path, seconds, path.name
+        self._path = path
+        self._seconds = seconds
+        self.name = path.name
         self.fps = Fraction(FPS)
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:
         """See `Source`."""
-        began_s, index = clock.now(), 0
+        began_s = clock.now()
+        index = 0
         while True:
             with open_video(self._path) as video:
                 for frame in video:

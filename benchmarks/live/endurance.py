@@ -49,7 +49,8 @@ class World:
     """
 
     def __init__(self, body: Body, say: Callable[[dict[str, float]], None]) -> None:
-        self._body, self._say = body, say
+        self._body = body
+        self._say = say
         self.people: LivePeople | None = None
         self.rows: list[dict[str, float]] = []
         self._all: list[dict[str, float]] = []
@@ -115,7 +116,9 @@ def memory_mb() -> float:
 def played(body: Body, minutes: float, say: Callable[[dict[str, float]], None]) -> dict[str, Any]:
     """Play the sample clip there and back in real time, and return the figures."""
     source = RepeatedFile(there_and_back_clip(len(there_and_back(150)) / FPS), 60 * minutes)
-    world, told, load = World(body, say), [], []
+    world = World(body, say)
+    told = []
+    load = []
 
     def progress(state: LiveProgress) -> None:
         told.append(state)
@@ -150,13 +153,16 @@ def observed(
     """
     with open_video(SAMPLE) as video:
         pictures = [frame.image_rgb for frame in video]
-    order, observing = there_and_back(len(pictures)), Observing(QUALITY, os.cpu_count() or 1)
+    order = there_and_back(len(pictures))
+    observing = Observing(QUALITY, os.cpu_count() or 1)
     for k in range(2 * len(order)):
         observing.step(pictures[order[k % len(order)]], time_s=k / FPS)
     tracker = Repeating(observing.found)
     size = pictures[0].shape[1], pictures[0].shape[0]
     people = LivePeople(body, cast(PeopleTracker, tracker), choose_camera(*size), size)
-    world, random, frame = World(body, say), np.random.default_rng(1), 0
+    world = World(body, say)
+    random = np.random.default_rng(1)
+    frame = 0
     world.begin(people, size)
     began_s = time.process_time()
     while frame < 60 * minutes * FPS:

@@ -40,7 +40,8 @@ WORLD = (
 
 def live(quick: bool, parts: Sequence[str] = (), minutes: float = 60.0) -> dict[str, Any]:
     """Measure the parts, print their tables as they come, and return the figures."""
-    body, figures = load_body("scope"), {}
+    body = load_body("scope")
+    figures = {}
     measurements = {
         "rate": _rate,
         "offline": _offline,

@@ -68,7 +68,8 @@ def jerk(joints: NDArray[np.floating[Any]], times_s: NDArray[np.floating[Any]]) 
 
 def lowest_sole_m(motion: Motion, rows: Rows, body: Body) -> float:
     """Return the height of the lowest point of the soles over the floor in some rows, metres."""
-    with_points, lowest = with_contact_points(body, motion.betas), np.inf
+    with_points = with_contact_points(body, motion.betas)
+    lowest = np.inf
     for row in rows:
         R = rotations.exp(motion.poses[row].reshape(-1, 3).astype(float))
         R_parts, t_parts = with_points.forward_kinematics(

@@ -51,7 +51,8 @@ class Repeating:
     """
 
     def __init__(self, found: list[Found]) -> None:
-        self._found, self._next = found, 0
+        self._found = found
+        self._next = 0
 
     def seek(self, frame: int) -> None:
         """Continue with this frame, counted from the beginning of the first round: those before it
@@ -61,7 +62,8 @@ class Repeating:
 
     def step(self, *_: Any) -> Found:
         """See `PeopleTracker.step`."""
-        k, per_round = self._next, len(self._found) // 2
+        k = self._next
+        per_round = len(self._found) // 2
         self._next += 1
         return self._found[k] if k < per_round else self._found[per_round + k % per_round]
 

@@ -38,7 +38,9 @@ from .paced import EveryFrame, simulated
 
 QUALITY = "fast"
 FEWEST = 10  # poses of which anything can be said
-SHORT_S, LONG_S = 4.0, 10.0  # a clip that is played there and back as well, and for how long
+# a clip that is played there and back as well, and for how long
+SHORT_S = 4.0
+LONG_S = 10.0
 
 
 def against_offline(body: Body, quick: bool, say: Callable[[str], None]) -> dict[str, Any]:
@@ -92,7 +94,8 @@ def in_real_time(body: Body, video: Path) -> tuple[Motion, dict[str, Any]]:
     poses there were.
     """
     source = FileSource(video)
-    recording, load = Recording(Path(), body, source), os.getloadavg()[0]
+    recording = Recording(Path(), body, source)
+    load = os.getloadavg()[0]
     listeners = Listeners(camera=lambda people, size: recording.begin(people.sessions[0], size))
     report = run_live(source, body, LiveOptions(quality=QUALITY), [recording], listeners)
     assert recording.camera is not None
@@ -127,10 +130,8 @@ def _there_and_back(
     to the folder.
     """
     clip = there_and_back_clip(LONG_S, source=video)
-    offline, looped = (
-        capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0],
-        folder / "truth.npz",
-    )
+    offline = capture(clip, body, CaptureOptions(quality=QUALITY)).motions[0]
+    looped = folder / "truth.npz"
     there_and_back_truth(truth, count, len(offline), looped)
     return clip, offline, looped
 

@@ -63,7 +63,8 @@ class _Later(Future[Any]):
 
     def __init__(self, machine: _Machine, due_s: float, result: Any) -> None:
         super().__init__()
-        self._machine, self._due_s = machine, due_s
+        self._machine = machine
+        self._due_s = due_s
         self.set_result(result)
 
     def done(self) -> bool:
@@ -74,9 +75,11 @@ class _Machine(Executor):
     """The simulated clock, and the executor of the estimates, whose results come later."""
 
     def __init__(self, costs: Costs) -> None:
-        self._costs, self._random = costs, np.random.default_rng(1)
+        self._costs = costs
+        self._random = np.random.default_rng(1)
         self.now_s = self._busy_until_s = 0.0
-        self._largest_calls, self._is_first = 0, True
+        self._largest_calls = 0
+        self._is_first = True
 
     def submit(self, function: Any, /, *args: Any, **named: Any) -> Future[Any]:
         return self.later(self._costs.estimate_s, function(*args, **named))
@@ -97,7 +100,8 @@ class _Machine(Executor):
         seconds += costs.largest_s * self._largest_calls
         seconds *= costs.shared if self.now_s < self._busy_until_s else 1.0
         seconds += costs.first_estimate_s if self._is_first else 0.0
-        self._largest_calls, self._is_first = 0, False
+        self._largest_calls = 0
+        self._is_first = False
         self.now_s += seconds
         return seconds
 
@@ -106,7 +110,8 @@ class _Counted:
     """The largest network, whose calls count."""
 
     def __init__(self, network: LandmarkNetwork, machine: _Machine) -> None:
-        self._network, self._machine = network, machine
+        self._network = network
+        self._machine = machine
 
     def estimate(
         self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]
@@ -123,7 +128,9 @@ class _Tracker:
         if networks.fallback is not None:
             counted = cast(LandmarkNetwork, _Counted(networks.fallback, machine))
             tracker._networks = replace(networks, fallback=counted)
-        self._tracker, self._machine, self._costs = tracker, machine, costs
+        self._tracker = tracker
+        self._machine = machine
+        self._costs = costs
 
     def step(
         self, image_rgb: NDArray[np.uint8], upcoming_rgb: None, time_s: float
@@ -153,7 +160,10 @@ def simulated(
     :param make_pace: of the frames.
     """
     costs = costs or Costs()
-    machine, pace, statistics, received = _Machine(costs), make_pace(), Statistics(), 0
+    machine = _Machine(costs)
+    pace = make_pace()
+    statistics = Statistics()
+    received = 0
     source = FileSource(video)
     recording = Recording(Path(), body, source)
     tracker = cast(PeopleTracker, _Tracker(PeopleTracker(quality, 1), machine, costs))

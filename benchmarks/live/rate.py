@@ -18,16 +18,22 @@ from typing import Any
 
 from .clips import there_and_back_clip
 
-SIZE, SECONDS = (1280, 720), 20.0
+SIZE = (1280, 720)
+SECONDS = 20.0
 PRESETS = ("fast", "balanced")
 # poses/s where the file is captured at the second rate; else a share
-FULL_RATE, OFFLINE_RATE, SHARE = 28.0, 45.0, 0.6
-BALANCED_RATE, MEDIAN_MS, P95_MS = 20.0, 90.0, 140.0
+FULL_RATE = 28.0
+OFFLINE_RATE = 45.0
+SHARE = 0.6
+BALANCED_RATE = 20.0
+MEDIAN_MS = 90.0
+P95_MS = 140.0
 
 
 def rate(quick: bool) -> dict[str, Any]:
     """Measure, and return the figures."""
-    video, rounds = there_and_back_clip(SECONDS, SIZE), 1 if quick else 3
+    video = there_and_back_clip(SECONDS, SIZE)
+    rounds = 1 if quick else 3
     offline: list[float] = []
     live: dict[str, list[dict[str, Any]]] = {preset: [] for preset in PRESETS}
     load = []

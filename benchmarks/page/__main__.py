@@ -158,7 +158,8 @@ def report_page(folder: Path, done: Run, curves: Curves) -> str:
             "without --resume"
         )
     body = load_body("scope")
-    (motion,), video = shown, done.captured[0][1]
+    (motion,) = shown
+    video = done.captured[0][1]
     rows = shown_rows([motion])
     pictures = overlay_pictures(video, [motion], body, rows)
     captions = [
@@ -281,7 +282,9 @@ def capture_section(
             page.paragraph(said[0]),
             note=note,
         )
-    motions, report, truth = motions_of(folder, name), outcome.figures, truth_of(video)
+    motions = motions_of(folder, name)
+    report = outcome.figures
+    truth = truth_of(video)
     shown = {
         "People": str(len(motions)),
         "Frames": f"{report['frames']} at {report['frame_rate'][0] / report['frame_rate'][1]:.6g} "

@@ -230,7 +230,8 @@ def timed(command: Command, arguments: Sequence[str]) -> Outcome:
     """Run Python with arguments, from the root folder, as a command; return its outcome, without
     figures.
     """
-    since, before = time.monotonic(), _processor_seconds()
+    since = time.monotonic()
+    before = _processor_seconds()
     loads: list[float] = []
     with subprocess.Popen(
         [sys.executable, *arguments],
@@ -250,7 +251,8 @@ def timed(command: Command, arguments: Sequence[str]) -> Outcome:
             process.kill()
             raise
     loads += _load()
-    spent, load = _processor_seconds() - before, sum(loads) / len(loads) if loads else None
+    spent = _processor_seconds() - before
+    load = sum(loads) / len(loads) if loads else None
     return Outcome(
         command,
         printed,

@@ -39,7 +39,9 @@ DETAILS = {  # benchmarks of many tables: which of them are folded, by their fir
 }
 # What a benchmark has written to files, as it says.
 _PICTURE = re.compile(r"^(\S+\.jpg: |Plots are in ).*\n?", re.MULTILINE)
-LEFT, RIGHT = 0.06, 0.02  # what a plot's x axis is longer than its curves, over their length
+# what a plot's x axis is longer than its curves, over their length
+LEFT = 0.06
+RIGHT = 0.02
 _RULE = re.compile(r"\|(\s*:?-+:?\s*\|)+")
 
 
@@ -84,7 +86,8 @@ def plots(outcome: Outcome, curves: Curves) -> list[Markup]:
 
     :param curves: digitized speedups of others, see `read_curves`.
     """
-    figures, parts = outcome.figures, []
+    figures = outcome.figures
+    parts = []
     if experiments := figures.get("experiments"):
         parts += [stated_table(figures), convergence_plot(figures)]
         if not curves:
@@ -168,11 +171,10 @@ def experiment_plots(
     :param number: such as 3, or 3_N600 with another number of terms.
     :param digitized: speedups of others, see `read_curves`.
     """
-    key, title = (
-        "P" if number.startswith("3") else "N",
-        f"Experiment {number.replace('_N', ', N = ')}",
-    )
-    times, speedups = [], []
+    key = "P" if number.startswith("3") else "N"
+    title = f"Experiment {number.replace('_N', ', N = ')}"
+    times = []
+    speedups = []
     for n, (K, body) in enumerate(BODIES):
         chosen = [row for row in rows if row["K"] == K]
         x = np.array([row[key] for row in chosen], float)
@@ -205,7 +207,8 @@ def plot(title: str, curves: Sequence[Curve]) -> Markup:
     """
     x = np.concatenate([curve.x for curve in curves])
     y = np.concatenate([curve.y for curve in curves])
-    first, last = float(x.min()), float(x.max()) if x.max() > x.min() else float(x.min()) + 1
+    first = float(x.min())
+    last = float(x.max()) if x.max() > x.min() else float(x.min()) + 1
     x_axis = Axis(first - LEFT * (last - first), last + RIGHT * (last - first))
     y_axis = Axis(float(y.min()) / 1.3, float(y.max()) * 1.3, logarithmic=True)
     svg = line_plot(curves, x_axis, y_axis, label=title, timed=False)

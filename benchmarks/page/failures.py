@@ -23,9 +23,13 @@ from ...tools.readme_pictures.shapes import joints, posed, true_joints
 from ...tools.readme_pictures.view import View, from_around, from_the_camera
 from .shots import figures
 
-MOMENTS, APART_S = 2, 0.5  # how many are shown, and how far they are apart
+# how many are shown, and how far they are apart
+MOMENTS = 2
+APART_S = 0.5
 # of a panel, in pixels; height of the view from the side; share of it
-SIZE, SHOWN_M, FILL = (320, 380), 2.35, 0.76
+SIZE = (320, 380)
+SHOWN_M = 2.35
+FILL = 0.76
 _BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
 
 
@@ -98,15 +102,14 @@ def worst_moments(motion: Motion, truth: Path, body: Body) -> Markup:
 
 def captioned(pictures: Sequence[tuple[NDArray[np.uint8], str]], note: str) -> Markup:
     """Return pictures with a caption each, below a note about all of them."""
-    images, captions = (
-        [small_picture(0, image) for image, _ in pictures],
-        [text for _, text in pictures],
-    )
+    images = [small_picture(0, image) for image, _ in pictures]
+    captions = [text for _, text in pictures]
     return Markup(page.paragraph(note) + figures(images, captions, large=True))
 
 
 def _panel(motion: Motion, row: int, truth: Path, body: Body, side: bool) -> NDArray[np.uint8]:
-    vertices, true = posed(motion, body, row), true_joints(motion, row, truth)
+    vertices = posed(motion, body, row)
+    true = true_joints(motion, row, truth)
     panel = Panel(
         _view(motion, row, np.concatenate([vertices, list(true.values())]), side),
         joints(motion, row)[0],

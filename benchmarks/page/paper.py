@@ -22,7 +22,8 @@ from ..solver.steps import growth, growth_in_joints
 SOURCE = "the paper's abstract (arXiv:2105.13965)"
 FRAME_MS = 4.0  # on average, until one frame has converged; the computer is not stated there
 # exponents of time in joints and measurements: the paper's, and earlier work's as it says
-LINEAR, CUBIC = 1.0, 3.0
+LINEAR = 1.0
+CUBIC = 3.0
 _KINDS = {"cold": "cold: no earlier estimate", "warm": "warm: from the frame before"}
 
 
@@ -60,7 +61,8 @@ def convergence_plot(figures: Mapping[str, Any]) -> Markup:
     """Return milliseconds of a frame by the relative decrease at which it stops, below the paper's
     time; or nothing.
     """
-    rows, curves = _frames(figures), []
+    rows = _frames(figures)
+    curves = []
     for n, (kind, name) in enumerate(_KINDS.items()):
         chosen = sorted(
             (row["tolerance"], row["milliseconds"]) for row in rows if row["kind"] == kind

@@ -22,10 +22,15 @@ from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
 
 # of a strip; of a picture; height of what the view from the side shows
-SHOTS, SIDE_PX, SHOWN_M = 6, 360, 2.4
+SHOTS = 6
+SIDE_PX = 360
+SHOWN_M = 2.4
 # share of the picture that may be covered; what is nearer is not looked at
-_FILLED, _NEAREST_M = 0.95, 0.3
-_GROUND, _FAINT = 236, 0.35  # grey behind the body; opacity of a pose that is filled in
+_FILLED = 0.95
+_NEAREST_M = 0.3
+# grey behind the body; opacity of a pose that is filled in
+_GROUND = 236
+_FAINT = 0.35
 
 Image = NDArray[np.uint8]
 
@@ -93,7 +98,8 @@ def side_view(motions: Sequence[Motion], body: Body, row: int) -> Image:
     People who were not seen are faint. What is shown is `SHOWN_M` high, more where that does not
     hold everybody.
     """
-    world, roots = [], []
+    world = []
+    roots = []
     for motion in motions:
         betas = motion.betas.astype(float)
         R, t = body.forward_kinematics(

@@ -108,9 +108,11 @@ def choices(quick: bool) -> dict[str, Any]:
     shipped = errors()
     print(f"As shipped, MPJPE-root / PA-MPJPE mm: {_each(shipped)}\n", flush=True)
     figures: dict[str, dict[str, Any]] = {"shipped": {"errors": shipped.tolist()}}
-    rows, summary = [], []
+    rows = []
+    summary = []
     for choice in CHOICES[:3] if quick else CHOICES:
-        values, found = [choice.shipped, *choice.others], [shipped]
+        values = [choice.shipped, *choice.others]
+        found = [shipped]
         for value in choice.others:
             with choice.set_to(value):
                 found.append(errors())

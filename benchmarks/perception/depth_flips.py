@@ -25,7 +25,8 @@ from ...solver.rotations import exp
 from ..report import table
 
 Points = NDArray[np.float64]
-OUT_DEG, BRIEF_S = 15.0, 1.0
+OUT_DEG = 15.0
+BRIEF_S = 1.0
 FITS = ("clip", "alone")  # the fit of the clip, and of every frame alone
 CHAINS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
 BONES = tuple(
@@ -66,7 +67,8 @@ def out_of_plane_deg(starts: Points, ends: Points) -> NDArray[np.float64]:
     """Return φ in degrees, (...); positive away from the camera. Points (..., 3) in the camera
     frame.
     """
-    bone, middle = ends - starts, (starts + ends) / 2
+    bone = ends - starts
+    middle = (starts + ends) / 2
     sine = (bone * middle).sum(-1) / (
         np.linalg.norm(bone, axis=-1) * np.linalg.norm(middle, axis=-1)
     )
@@ -113,7 +115,8 @@ def depth_flips(body: Body, motion: Motion, true: dict[str, Points]) -> dict[str
         footage.
     """
     rows = np.flatnonzero(motion.valid & (motion.frames < len(true[BONES[0][0]])))
-    frames, rate = motion.frames[rows], float(motion.mocap_framerate)
+    frames = motion.frames[rows]
+    rate = float(motion.mocap_framerate)
     true_deg = np.stack(
         [out_of_plane_deg(true[a][frames], true[b][frames]) for a, b in BONES], axis=1
     )

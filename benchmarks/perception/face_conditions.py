@@ -30,7 +30,8 @@ CONDITIONS: tuple[tuple[str, str, float], ...] = (  # label, set, face in pixels
     ("dark glasses", "talk_dark_glasses", 0.0),
     ("beard", "talk_beard", 0.0),
 )
-LONG, PIECE_S = "talk_half_minute", 5.0
+LONG = "talk_half_minute"
+PIECE_S = 5.0
 
 
 def faces_and_conditions(quick: bool) -> dict[str, Any]:
@@ -79,11 +80,9 @@ def _capture(rows: NDArray[np.float64], times: NDArray[np.float64]) -> Found:
 
 def _confidence(seen: SeenFaces, scale: float) -> dict[str, float]:
     """Return the mean confidence, and the mean size of the box of the landmarks in pixels."""
-    person, sure, size = (
-        seen.truth["person"],
-        np.empty(len(seen.presence)),
-        np.empty(len(seen.presence)),
-    )
+    person = seen.truth["person"]
+    sure = np.empty(len(seen.presence))
+    size = np.empty(len(seen.presence))
     for p in np.unique(person):
         rows = np.flatnonzero(person == p)
         found = rows_of(seen, rows, scale)

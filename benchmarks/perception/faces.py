@@ -28,12 +28,15 @@ from ...tools.calibrate_face.observe import SeenFaces, seen_faces
 from ...tools.render_faces.truth import FOLDER
 from ..report import table
 
-HELD_OUT, CALIBRATION = "talk_held_out", "shaded_talk"
+HELD_OUT = "talk_held_out"
+CALIBRATION = "shaded_talk"
 SMALL = 0.4  # of the pictures: faces of about 55 pixels
-ACTIVE, CLOSED = 0.2, 0.5
+ACTIVE = 0.2
+CLOSED = 0.5
 LARGEST_SHIFT = 4  # frames, in which a blink may be early or late
 BLINKS = [EXPRESSIONS.index(f"eyeBlink{side}") for side in ("Left", "Right")]
-JAW, TONGUE = EXPRESSIONS.index("jawOpen"), EXPRESSIONS.index("tongueOut")
+JAW = EXPRESSIONS.index("jawOpen")
+TONGUE = EXPRESSIONS.index("tongueOut")
 SHOWN = {
     "all": "all 51",
     "jaw": "jawOpen",
@@ -87,8 +90,10 @@ def measure(seen: SeenFaces, scale: float, way: Callable[..., Found]) -> dict[st
     """Return the figures of one way: mean absolute errors of weights, timing of closed eyes, and
     error of the gaze.
     """
-    truth, person = seen.truth["weights"], seen.truth["person"]
-    gaze, weights = np.empty((len(truth), 2, 3)), np.empty_like(truth)
+    truth = seen.truth["weights"]
+    person = seen.truth["person"]
+    gaze = np.empty((len(truth), 2, 3))
+    weights = np.empty_like(truth)
     for p in np.unique(person):
         rows = np.flatnonzero(person == p)
         weights[rows], gaze[rows] = way(rows_of(seen, rows, scale), seen.truth["seconds"][rows])
@@ -113,14 +118,18 @@ def closures(
 
     An eye closes where its weight rises over `CLOSED`.
     """
-    found, false, count = 0, 0, 0
+    found = 0
+    false = 0
+    count = 0
     off: list[float] = []
     for p in np.unique(person):
         for blink in BLINKS:
             true, seen = (_rises(w[person == p, blink]) for w in (truth, weights))
             nearest = [np.abs(seen - float(t)).min(initial=np.inf) for t in true]
             hits = [d for d in nearest if d <= LARGEST_SHIFT]
-            found, count, off = found + len(hits), count + len(true), off + hits
+            found = found + len(hits)
+            count = count + len(true)
+            off = off + hits
             false += sum(np.abs(true - float(t)).min(initial=np.inf) > LARGEST_SHIFT for t in seen)
     return {
         "closed_found": found / count,
@@ -191,10 +200,8 @@ def _gaze_from_rest(seen: SeenFaces) -> NDArray[np.float64]:
     """Return the true gaze (T, 2, 3), from where each person's eyes point at weights of 0:
     ahead.
     """
-    gaze, turning = (
-        seen.truth["gaze"],
-        [k for k, name in enumerate(EXPRESSIONS) if name.startswith("eyeLook")],
-    )
+    gaze = seen.truth["gaze"]
+    turning = [k for k, name in enumerate(EXPRESSIONS) if name.startswith("eyeLook")]
     tangents = gaze[..., :2] / gaze[..., 2:]
     for p in np.unique(seen.truth["person"]):
         rows = seen.truth["person"] == p
@@ -214,10 +221,8 @@ def _rises(weight: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def _fit_ms(seen: SeenFaces, scale: float) -> float:
-    rows, times = (
-        rows_of(seen, np.arange(len(seen.presence)), scale),
-        np.arange(len(seen.presence)) / 30,
-    )
+    rows = rows_of(seen, np.arange(len(seen.presence)), scale)
+    times = np.arange(len(seen.presence)) / 30
     begin = time.perf_counter()
     fitted(rows, times)
     return 1000 * (time.perf_counter() - begin) / len(rows)

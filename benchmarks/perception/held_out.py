@@ -23,20 +23,26 @@ from ...tools.train_lifter.split import is_held_out
 
 SEED = 7
 SIZE = (640, 480)
-SECONDS, MIN_SECONDS = 1.5, 0.7
+SECONDS = 1.5
+MIN_SECONDS = 0.7
 # under the recorded floor: the fit left a hand there, which the performer's model lacks
 SUNK_M = 0.12
 MAX_BETA = 2.5  # of a standard normal distribution
 # 0.73 to 1.56 of the width: a phone's main camera to twice its focal length
 FOCAL_PX = (470.0, 1000.0)
-HEIGHT_M, DISTANCE_M, TILT_DEG = (0.8, 2.0), (3.0, 6.5), (0.0, 15.0)  # of the camera; it looks down
+# of the camera; it looks down
+HEIGHT_M = (0.8, 2.0)
+DISTANCE_M = (3.0, 6.5)
+TILT_DEG = (0.0, 15.0)
 MIN_FILL = 0.45  # longer side of the person's box over the image height, median of the frames
 MARGIN_PX = 12.0  # around the person in all frames
 FARTHEST_M = 1.7  # bench and wall are behind it
 NEAREST_M = 1.2  # to the camera
 FEW = 40  # every 40th point of the skin is tested first
 FLOOR_QUANTILE = 0.05  # of the frames, ordered by the height of the lowest point of the feet's skin
-STILL_M_PER_S, STANDS_BELOW_M = 0.15, 0.1  # middle of heel and toe
+# middle of heel and toe
+STILL_M_PER_S = 0.15
+STANDS_BELOW_M = 0.1
 TRIES = 20000
 
 
@@ -99,7 +105,8 @@ def draw_shot(body: Body, take: Take, seed: int = SEED) -> Shot:
     trans = pelvis - body.rest_joints(betas)[0]
     shot = Shot(states, trans, betas, np.eye(3), np.eye(4), SIZE, take.fps, stands)
     skin = np.array([shot.vertices_world(body, k) for k in range(len(shot))])
-    low, high = skin.min((0, 1)), skin.max((0, 1))
+    low = skin.min((0, 1))
+    high = skin.max((0, 1))
     floor = floor_under(body, skin)
     offset = np.append(-(low + high)[:2] / 2, -floor)
     shot, R_heading = _draw_camera(rng, shot, skin + offset)
@@ -192,10 +199,8 @@ def _draw_camera(
     """
     few = skin[:, ::FEW]
     for _ in range(TRIES):
-        R_heading, tilt = (
-            exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)])),
-            np.radians(rng.uniform(*TILT_DEG)),
-        )
+        R_heading = exp(np.array([0.0, 0.0, rng.uniform(0, 2 * np.pi)]))
+        tilt = np.radians(rng.uniform(*TILT_DEG))
         focal, height, distance = (
             rng.uniform(*limits) for limits in (FOCAL_PX, HEIGHT_M, DISTANCE_M)
         )

@@ -17,8 +17,12 @@ import mediapipe
 
 def main() -> None:
     """Run the command line."""
-    path, complexity, most = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
-    video, count, since = cv2.VideoCapture(path), 0, 0.0
+    path = sys.argv[1]
+    complexity = int(sys.argv[2])
+    most = int(sys.argv[3])
+    video = cv2.VideoCapture(path)
+    count = 0
+    since = 0.0
     with mediapipe.solutions.pose.Pose(model_complexity=complexity) as pose:
         while count <= most:
             ok, image = video.read()

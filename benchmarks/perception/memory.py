@@ -40,13 +40,17 @@ APART_PX = 400.0  # from one person to the next
 def replay(frames: int, people: int) -> dict[str, float]:
     """Return the highest memory so far, MiB, after each stage."""
     peaks: dict[str, float] = {}
-    body, seen, size = load_body("scope"), [], (0, 0)
+    body = load_body("scope")
+    seen = []
+    size = (0, 0)
     tracker = PeopleTracker(CaptureOptions().quality, 2)
     with open_video(SAMPLE) as video:
-        camera, size = choose_camera(video.width, video.height), (video.width, video.height)
+        camera = choose_camera(video.width, video.height)
+        size = (video.width, video.height)
         for frame in video:
             seen.append([o for _, o in tracker.step(frame.image_rgb, time_s=frame.timestamp_s)][0])
-    tracklets, fps = [Tracklet() for _ in range(people)], 30
+    tracklets = [Tracklet() for _ in range(people)]
+    fps = 30
     peaks["networks"] = peak_mib()
     for k in range(frames):
         for p, tracklet in enumerate(tracklets):

@@ -141,11 +141,9 @@ def true_iou(body: Body, truth: Path, seen: Seen) -> float:
             key: data[key]
             for key in ("poses", "trans", "betas", "intrinsics", "frame_index", "world_from_camera")
         }
-    T, betas, rows = (
-        np.linalg.inv(true["world_from_camera"].astype(float)),
-        true["betas"].astype(float),
-        [],
-    )
+    T = np.linalg.inv(true["world_from_camera"].astype(float))
+    betas = true["betas"].astype(float)
+    rows = []
     for index, (region, mask, _) in seen.masks.items():
         row = int(np.searchsorted(true["frame_index"], index))
         if row >= len(true["frame_index"]) or true["frame_index"][row] != index:
@@ -193,7 +191,8 @@ def silhouette(
 
 def overlap(shape: NDArray[np.uint8], mask: NDArray[np.bool_]) -> dict[str, float] | None:
     """Return the `FIGURES` of a silhouette and a mask; None if one of them is empty."""
-    body, person = shape == 2, mask & (shape > 0)
+    body = shape == 2
+    person = mask & (shape > 0)
     if not body.any() or not person.any():
         return None
     both = float(np.count_nonzero(body & person))

@@ -14,7 +14,8 @@ from ..report import table
 from .accuracy import CAMERAS, SHOWN, calibration, evaluate_all
 from .throughput import decoding, end_to_end, looped, side_by_side, warm_up
 
-LONG_CLIP, TWO_PEOPLE = "clips/run_moving_camera.mp4", "clips/two_people_portrait.mp4"
+LONG_CLIP = "clips/run_moving_camera.mp4"
+TWO_PEOPLE = "clips/two_people_portrait.mp4"
 PRESETS = ("fast", "balanced", "best")
 SPEED_TARGETS = {"fast": 60.0, CaptureOptions().quality: 30.0}
 

@@ -26,7 +26,8 @@ from ...tools.render_sample.truth import Shot, write_truth
 from ..frames import CACHE, DATA, ROOT
 from .held_out import draw_shot, held_out_takes
 
-RENDERS, MOTIONS = CACHE / "renders", ROOT / "build" / "mocap" / "motions.npz"
+RENDERS = CACHE / "renders"
+MOTIONS = ROOT / "build" / "mocap" / "motions.npz"
 NEW_PERFORMERS = MOTIONS.with_name("new_performers.npz")
 # between two versions of a clip's ground truth
 SAME = ("joints_cam", "betas", "intrinsics", "frame_index")

@@ -87,7 +87,8 @@ def _measure(split: str, clips: list[Path], quick: bool) -> dict[str, Any]:
     """Capture the clips of one split with every variant, print the tables and return the
     figures.
     """
-    body, by_variant = load_body("scope"), dict[str, list[Result]]()
+    body = load_body("scope")
+    by_variant = dict[str, list[Result]]()
     for name, options in VARIANTS[:1] if quick else VARIANTS:
         results = by_variant[name] = []
         for truth in clips:
@@ -107,10 +108,8 @@ def _measure(split: str, clips: list[Path], quick: bool) -> dict[str, Any]:
 def _tables(split: str, by_variant: dict[str, list[Result]]) -> dict[str, Any]:
     """Print the tables of one split and return their figures, and those of every person."""
     default, *others = by_variant.items()
-    found, variants = (
-        groups(default[1]),
-        {name: groups(results)["all"] for name, results in by_variant.items()},
-    )
+    found = groups(default[1])
+    variants = {name: groups(results)["all"] for name, results in by_variant.items()}
     for head, rows in ((split, found), (f"{split}: variants", variants)):
         columns: tuple[str, ...] = (
             f"{head}: people",
@@ -198,7 +197,8 @@ def _heights(truth: Truth) -> tuple[float, ...]:
 
 def _result(body: Body, clip: str, motion: Motion | None, truth: Truth, k: int) -> Result:
     true = truth["limbs_cam"][k]
-    T, names = len(true), [body.joint_names.index(name) for name in LIMB_JOINTS]
+    T = len(true)
+    names = [body.joint_names.index(name) for name in LIMB_JOINTS]
     frames = {"view_deg": truth["view_deg"][k], "hidden": truth["hidden"][k].sum(axis=1)}
     frames["distance_m"] = np.linalg.norm(true[:, HIPS].mean(axis=1), axis=1)
     pelvis = truth["limbs"][k][:, HIPS].mean(axis=1)
@@ -376,5 +376,6 @@ def _figures(result: Result) -> dict[str, Any]:
 
 
 def _row(name: str, row: dict[str, Estimate]) -> list[object]:
-    people, share = row["found"].people, f"{100 * row['found'].mean:.0f} %"
+    people = row["found"].people
+    share = f"{100 * row['found'].mean:.0f} %"
     return [name, people, row["mpjpe_root"].text, row["pa_mpjpe"].text, share, row["size_off"].text]

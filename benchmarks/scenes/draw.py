@@ -23,24 +23,40 @@ from .kinds import CHILDREN, CLOTHES, SEED, Kind, kind_of, split_of
 from .people import Person, Points
 from .scene import NEW_PERFORMERS, STATIC, TEST, TRAVELLING, Block, Scene
 
-SCENES, SCENES_OF_NEW_PERFORMERS = 60, 24
+SCENES = 60
+SCENES_OF_NEW_PERFORMERS = 24
 NEW_SEED = 12  # of scenes of new performers
-FPS, SECONDS = 15.0, 1.2
+FPS = 15.0
+SECONDS = 1.2
 STRIDE = 2  # frames of a recording between two of the clip
-MAX_BETA, BETA_SPREAD = 4.0, 1.5  # wider than the default body's population
+# wider than the default body's population
+MAX_BETA = 4.0
+BETA_SPREAD = 1.5
 # a child of 0.62 has a head 1 + 0.6 * 0.38 times as large, relatively
-CHILD_SCALE, HEAD_GROWTH = (0.62, 0.85), 0.6
-LOOSE_M, HAIR_M = (0.008, 0.03), (0.0, 0.05)
+CHILD_SCALE = (0.62, 0.85)
+HEAD_GROWTH = 0.6
+LOOSE_M = (0.008, 0.03)
+HAIR_M = (0.0, 0.05)
 FOCAL = (0.7, 1.7)  # over the longer side of the picture
-HEIGHT_M, DISTANCE_M = (0.5, 2.3), (2.2, 8.0)
-SHAKE_DEG, PAN_LAG = 0.3, 0.8  # of a held camera; the share of the person's way that it follows
+HEIGHT_M = (0.5, 2.3)
+DISTANCE_M = (2.2, 8.0)
+# of a held camera; the share of the person's way that it follows
+SHAKE_DEG = 0.3
+PAN_LAG = 0.8
 # of the picture's height; of its shorter side, what the person's stature appears as
-MARGIN, MIN_TALL = 0.01, 0.6
+MARGIN = 0.01
+MIN_TALL = 0.6
 MAX_HIDDEN = 0.5  # of the first person's limb joints, in all frames together, behind the block
-NEAREST_M, APART_M = 0.9, 0.35  # skin to camera; people from each other and from the block
-EVERY_VERTEX, EVERY_FRAME = 40, 4  # that a camera is tested with
+# skin to camera; people from each other and from the block
+NEAREST_M = 0.9
+APART_M = 0.35
+# that a camera is tested with
+EVERY_VERTEX = 40
+EVERY_FRAME = 4
 # of all recordings, of each, and of each drawn person
-TRIES, TRIES_EACH, CAMERAS_EACH = 400, 20, 20
+TRIES = 400
+TRIES_EACH = 20
+CAMERAS_EACH = 20
 
 
 def draw_scene(body: Body, takes: Sequence[Take], number: int, split: str | None = None) -> Scene:
@@ -119,7 +135,8 @@ def draw_person(
     pelvis = pelvis @ R_heading.T
     pelvis[:, :2] -= pelvis[len(pelvis) // 2, :2]
     loose = rng.uniform(*LOOSE_M) if wears_loose else 0.0
-    hair, seed = rng.uniform(*HAIR_M), int(rng.integers(1 << 31))
+    hair = rng.uniform(*HAIR_M)
+    seed = int(rng.integers(1 << 31))
     head = 1.0 + HEAD_GROWTH * (1.0 - scale)
     person = Person(
         take.name,
@@ -150,7 +167,9 @@ def _moved(person: Person, by: Points) -> Person:
 
 def _beside(rng: np.random.Generator, body: Body, first: Person, second: Person) -> Person:
     """Return the second person somewhere around the first, as near as they keep apart."""
-    angle, a, b = rng.uniform(0, 2 * np.pi), first.joints(body), second.joints(body)
+    angle = rng.uniform(0, 2 * np.pi)
+    a = first.joints(body)
+    b = second.joints(body)
     toward = np.array([np.cos(angle), np.sin(angle), 0.0])
     for distance in np.arange(0.6, 6.0, 0.2):
         gap = np.linalg.norm(a[:, :, None, :2] - b[:, None, :, :2] - distance * toward[:2], axis=-1)
@@ -170,15 +189,18 @@ def film(
     """Draw a camera, and what stands in front of the first person; None if the person is not well
     in the picture.
     """
-    first, frames = people[0], len(people[0])
+    first = people[0]
+    frames = len(people[0])
     width, height = kind.size
     focal = rng.uniform(*FOCAL) * max(width, height)
-    angle, eye_m = rng.uniform(0, 2 * np.pi), rng.uniform(*HEIGHT_M)
+    angle = rng.uniform(0, 2 * np.pi)
+    eye_m = rng.uniform(*HEIGHT_M)
     distance = first.scale * rng.uniform(*DISTANCE_M)
     pelvis = first.joints(body)[:, 0]
     target = pelvis.mean(axis=0) + rng.normal(0, 0.15, 3)
     eye = np.array([*(target[:2] + distance * np.array([np.cos(angle), np.sin(angle)])), eye_m])
-    eyes, targets = np.tile(eye, (frames, 1)), np.tile(target, (frames, 1))
+    eyes = np.tile(eye, (frames, 1))
+    targets = np.tile(target, (frames, 1))
     follows = PAN_LAG * (_smooth(pelvis) - pelvis.mean(axis=0)) * [1, 1, 0]
     if kind.camera != STATIC:
         targets = targets + follows

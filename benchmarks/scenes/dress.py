@@ -11,11 +11,21 @@ from ...solver import Body
 from ...tools.render_sample.stage import add_person, make_material
 from .people import Person
 
-SKIN, HAIR, SUIT, ACCENT, TROUSERS = "skin", "hair", "suit", "suit_accent", "trousers"
-MANY_COLORS, WITH_TROUSERS, STRIPED = 0.6, 0.7, 0.3  # shares of the people
+SKIN = "skin"
+HAIR = "hair"
+SUIT = "suit"
+ACCENT = "suit_accent"
+TROUSERS = "trousers"
+# shares of the people
+MANY_COLORS = 0.6
+WITH_TROUSERS = 0.7
+STRIPED = 0.3
 TROUSERS_BELOW_M = 0.05  # over the pelvis, at rest
-FABRIC_WAVES, FABRIC_PER_M, FABRIC_CONTRAST = 24, 9.0, 0.1
-STRIPE_M, STRIPE_DARK = (0.05, 0.12), 0.55
+FABRIC_WAVES = 24
+FABRIC_PER_M = 9.0
+FABRIC_CONTRAST = 0.1
+STRIPE_M = (0.05, 0.12)
+STRIPE_DARK = 0.55
 
 
 def dressed(body: Body, person: Person) -> bpy.types.Object:
@@ -59,7 +69,8 @@ def _shade(rng: np.random.Generator, points: NDArray[np.float64]) -> NDArray[np.
         axis=1
     ) / np.sqrt(FABRIC_WAVES / 2)
     shade = np.clip(1.0 + FABRIC_CONTRAST * noise, 0.5, 1.5)
-    width, striped = rng.uniform(*STRIPE_M), rng.random() < STRIPED
+    width = rng.uniform(*STRIPE_M)
+    striped = rng.random() < STRIPED
     return shade * np.where(striped & (points[:, 1] % width < width / 2), STRIPE_DARK, 1.0)
 
 
@@ -69,12 +80,15 @@ def _fabric(name: str, color: NDArray[np.float64], patterned: bool) -> bpy.types
     """
     r, g, b = color.tolist()
     material = make_material(name, (r, g, b))
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
     surface = nodes["Principled BSDF"]
     surface.inputs["Roughness"].default_value = 0.6
     if patterned:
-        shade, product = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeVectorMath")
-        shade.attribute_name, product.operation = "shade", "MULTIPLY"
+        shade = nodes.new("ShaderNodeAttribute")
+        product = nodes.new("ShaderNodeVectorMath")
+        shade.attribute_name = "shade"
+        product.operation = "MULTIPLY"
         product.inputs[0].default_value = (r, g, b)
         links.new(shade.outputs["Fac"], product.inputs[1])
         links.new(product.outputs["Vector"], surface.inputs["Base Color"])

@@ -20,12 +20,15 @@ from numpy.typing import NDArray
 from ...solver import Body
 from .people import DENSITY, Points
 
-COLUMNS, ROWS = 48, 12
+COLUMNS = 48
+ROWS = 12
 BAND_M = 0.015  # half of the height of the slice of skin whose girth is measured
 # left out of the trunk
 LIMBS = ("shoulder", "elbow", "wrist", "hand", "thumb", "index", "middle", "ring", "pinky")
 COAT_OPEN_DEG = 60.0  # to either side of the front
-SKIRT_M, COAT_M = (0.01, 0.15), (0.03, 0.12)  # off the body at the upper edge and at the hem
+# off the body at the upper edge and at the hem
+SKIRT_M = (0.01, 0.15)
+COAT_M = (0.03, 0.12)
 
 
 @dataclass(frozen=True)
@@ -84,18 +87,19 @@ def _around(
     knees = body.rest_joints(betas)[
         [body.joint_names.index(f"{side}_knee") for side in ("left", "right")], 1
     ].mean()
-    waist, hips = _waist(body, betas), _hips(body, betas)
+    waist = _waist(body, betas)
+    hips = _hips(body, betas)
     angles = np.linspace(opening, 2 * np.pi - opening, COLUMNS)  # from the front, which is z
     rows = []
     for share in np.linspace(0.0, 1.0, ROWS):
         height = top + share * (float(knees) - top)
         level = _slice(body, betas, float(np.clip(height, hips, max(waist, top - 0.1))))
-        low, high = level.min(axis=0), level.max(axis=0)
-        radius, middle = (
-            (high - low) / 2 + off_m[0] + share * (off_m[1] - off_m[0]),
-            (high + low) / 2,
-        )
-        x, z = middle[0] + radius[0] * np.sin(angles), middle[1] + radius[1] * np.cos(angles)
+        low = level.min(axis=0)
+        high = level.max(axis=0)
+        radius = (high - low) / 2 + off_m[0] + share * (off_m[1] - off_m[0])
+        middle = (high + low) / 2
+        x = middle[0] + radius[0] * np.sin(angles)
+        z = middle[1] + radius[1] * np.cos(angles)
         rows.append(np.column_stack([x, np.full(COLUMNS, height), z]))
     first = (np.arange(ROWS - 1)[:, None] * COLUMNS + np.arange(COLUMNS - 1)).ravel()
     corners = [first, first + 1, first + COLUMNS], [first + 1, first + COLUMNS + 1, first + COLUMNS]
@@ -105,12 +109,14 @@ def _around(
 
 
 def _waist(body: Body, betas: Points) -> float:
-    joints, names = body.rest_joints(betas), body.joint_names
+    joints = body.rest_joints(betas)
+    names = body.joint_names
     return float(joints[names.index("spine1"), 1])
 
 
 def _hips(body: Body, betas: Points) -> float:
-    joints, names = body.rest_joints(betas), body.joint_names
+    joints = body.rest_joints(betas)
+    names = body.joint_names
     return float(joints[[names.index("left_hip"), names.index("right_hip")], 1].mean())
 
 

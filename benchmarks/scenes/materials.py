@@ -65,7 +65,8 @@ def _diffuse(name: str) -> tuple[bpy.types.Material, bpy.types.Node]:
     """Return a new material, and the node that scatters its light."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
     nodes.remove(nodes["Principled BSDF"])
     diffuse = nodes.new("ShaderNodeBsdfDiffuse")
     links.new(diffuse.outputs["BSDF"], nodes["Material Output"].inputs["Surface"])

@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 Picture = NDArray[np.float64]  # (SIDE, SIDE, 3) linear RGB
 SIDE = 256  # pixels
 JOINT_PX = 3  # between tiles and bricks
-BOARDS, TILES, BRICK_ROWS = 12, 4, 16  # along one side
+# along one side
+BOARDS = 12
+TILES = 4
+BRICK_ROWS = 16
 
 
 def noise(rng: np.random.Generator, exponent: float, stretch: float = 1.0) -> NDArray[np.float64]:
@@ -52,7 +55,8 @@ def tiles(rng: np.random.Generator, color: NDArray[np.float64]) -> Picture:
 
 def bricks(rng: np.random.Generator, color: NDArray[np.float64]) -> Picture:
     """Return courses of bricks along the second axis."""
-    high, wide = SIDE // BRICK_ROWS, 4 * SIDE // BRICK_ROWS
+    high = SIDE // BRICK_ROWS
+    wide = 4 * SIDE // BRICK_ROWS
     row, column = np.mgrid[:SIDE, :SIDE]
     along = (column + row // high % 2 * wide // 2) % SIDE
     shade = 0.15 * rng.standard_normal((BRICK_ROWS, SIDE // wide))[

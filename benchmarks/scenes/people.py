@@ -15,7 +15,8 @@ from ...tools.render_sample.truth import LIMBS
 Points = NDArray[np.float64]
 DENSITY = 1010.0  # kg/m³ of a human body, with air in the lungs
 # of the noise that clothes stand off by, and its spatial frequency
-CLOTHES_WAVES, CLOTHES_PER_M = 24, 3.0
+CLOTHES_WAVES = 24
+CLOTHES_PER_M = 3.0
 SIDES = ("left", "right")
 LIMB_JOINTS = tuple(f"{side}_{joint}" for joint in LIMBS.values() for side in SIDES)
 

@@ -30,7 +30,8 @@ from .kinds import split_of
 from .scene import FOLDER, NEW_PERFORMERS, STATIC, TEST, Scene, write_truth
 from .surroundings import build_scene, move_camera
 
-SAMPLES, SAMPLES_EMPTY = 2, 8
+SAMPLES = 2
+SAMPLES_EMPTY = 8
 # of width and height that are rendered, before the picture is enlarged: as soft as most footage
 PERCENT = 75
 KBIT_PER_S = 4000
@@ -69,10 +70,8 @@ def render_missing(
     takes = all_takes(fitted_new_performers() if split == NEW_PERFORMERS else fitted_motions())
     for number in numbers:
         scene = draw_scene(body, takes, number, split)
-        write, render = (
-            partial(write_truth, body=body, scene=scene),
-            partial(render_scene, body, scene, threads),
-        )
+        write = partial(write_truth, body=body, scene=scene)
+        render = partial(render_scene, body, scene, threads)
         render_if_changed(*video_and_truth(scene.name), COMPARED, write, render)
 
 
@@ -90,10 +89,13 @@ def _pictures(body: Body, scene: Scene, folder: Path, threads: int) -> list[Path
     shadows are.
     """
     meshes, lamps = build_scene(scene, body)
-    cycles, settings = bpy.context.scene.cycles, bpy.context.scene.render
+    cycles = bpy.context.scene.cycles
+    settings = bpy.context.scene.render
     settings.resolution_percentage = PERCENT
-    settings.threads_mode, settings.threads = "FIXED" if threads else "AUTO", threads
-    pictures, empty = [folder / f"{f:04d}.png" for f in range(len(scene))], None
+    settings.threads_mode = "FIXED" if threads else "AUTO"
+    settings.threads = threads
+    pictures = [folder / f"{f:04d}.png" for f in range(len(scene))]
+    empty = None
     if scene.camera == STATIC:
         cycles.samples = SAMPLES_EMPTY
         for mesh in meshes:

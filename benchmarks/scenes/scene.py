@@ -16,9 +16,12 @@ from ..frames import CACHE
 from .people import LIMB_JOINTS, Person, Points
 
 FOLDER = CACHE / "scenes"  # of the clips and their ground truth
-STATIC, PANNING, TRAVELLING = "static", "panning", "travelling"
+STATIC = "static"
+PANNING = "panning"
+TRAVELLING = "travelling"
 SKIN_SPACING_M = 0.03  # between vertices: a ray that passes all of them farther away meets no skin
-INDOORS, OUTDOORS = "indoors", "outdoors"
+INDOORS = "indoors"
+OUTDOORS = "outdoors"
 DEVELOPMENT, TEST, NEW_PERFORMERS = SPLITS = ("development", "test", "new_performers")
 
 
@@ -33,7 +36,8 @@ class Block:
         """Return (...,) bool: whether the box is between the eye (3,) and the points (..., 3)."""
         way = points - eye
         with np.errstate(divide="ignore", invalid="ignore"):
-            to_low, to_high = (self.low - eye) / way, (self.high - eye) / way
+            to_low = (self.low - eye) / way
+            to_high = (self.high - eye) / way
         enters = np.nanmax(np.minimum(to_low, to_high), axis=-1)
         leaves = np.nanmin(np.maximum(to_low, to_high), axis=-1)
         hidden: NDArray[np.bool_] = (enters < leaves) & (leaves > 0.0) & (enters < 1.0)

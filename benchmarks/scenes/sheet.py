@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 
 from .scene import FOLDER
 
-COLUMNS, ROWS = 6, 2
-WIDTH, HEIGHT = 200, 200  # of each picture
+COLUMNS = 6
+ROWS = 2
+# of each picture
+WIDTH = 200
+HEIGHT = 200
 QUALITY = 70
 
 
@@ -37,7 +40,8 @@ def _middle(clip: Path) -> NDArray[Any]:
         raise ValueError(f"{clip} cannot be read: render it again")
     high, wide = frame.shape[:2]
     side = min(high, wide)
-    top, left = (high - side) // 2, (wide - side) // 2
+    top = (high - side) // 2
+    left = (wide - side) // 2
     return cv2.resize(
         frame[top : top + side, left : left + side], (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA
     )

@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-RESAMPLES, SEED, CONFIDENCE = 4000, 5, 0.95
+RESAMPLES = 4000
+SEED = 5
+CONFIDENCE = 0.95
 
 
 class Estimate(NamedTuple):
@@ -59,12 +61,15 @@ def mean_over_performers(
 
     :param values: (n,), NaN where a person has no value; ``performers``: n names.
     """
-    found, names = np.asarray(values, float), np.asarray(performers)
-    names, found = names[np.isfinite(found)], found[np.isfinite(found)]
+    found = np.asarray(values, float)
+    names = np.asarray(performers)
+    names = names[np.isfinite(found)]
+    found = found[np.isfinite(found)]
     of = [found[names == name] for name in np.unique(names)]
     if len(of) < 2:
         return Estimate(float(found.mean()) if len(found) else np.nan, np.nan, np.nan, len(found))
-    sums, counts = np.array([each.sum() for each in of]), np.array([len(each) for each in of])
+    sums = np.array([each.sum() for each in of])
+    counts = np.array([len(each) for each in of])
     drawn = np.random.default_rng(SEED).integers(len(of), size=(RESAMPLES, len(of)))
     means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
     low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])

@@ -15,7 +15,8 @@ from .materials import Surface, add_surfaced_box, pictured, plain
 from .patterns import boards, bricks, mottled, painting, stripes, tiles
 from .scene import INDOORS, Scene
 
-WALL_M, ROOM_HEIGHT_M = 0.1, 2.7
+WALL_M = 0.1
+ROOM_HEIGHT_M = 2.7
 FREE_M = 0.6  # around people and camera
 FAR_M = 40.0  # of the ground outdoors
 SHARED = {"glass": (0.06, 0.08, 0.10), "bark": (0.12, 0.08, 0.05), "leaves": (0.05, 0.13, 0.03)}
@@ -46,8 +47,11 @@ def _limit_light_paths(scene: bpy.types.Scene) -> None:
     nothing is near.
     """
     cycles = scene.cycles
-    cycles.use_light_tree, scene.world.cycles.sampling_method = False, "NONE"
-    cycles.use_fast_gi, cycles.fast_gi_method, cycles.ao_bounces_render = True, "REPLACE", 1
+    cycles.use_light_tree = False
+    scene.world.cycles.sampling_method = "NONE"
+    cycles.use_fast_gi = True
+    cycles.fast_gi_method = "REPLACE"
+    cycles.ao_bounces_render = 1
     scene.world.light_settings.distance = AMBIENT_M
 
 
@@ -70,9 +74,15 @@ def _occupied(scene: Scene, body: Body) -> tuple[NDArray[np.float64], NDArray[np
 
 def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     """Build four walls, floor, ceiling, pictures, furniture along the walls, and lamps."""
-    low, high = low - rng.uniform(0, 2.0, 2), high + rng.uniform(0, 2.0, 2)
-    (x0, y0), (x1, y1) = low, high
-    cx, cy, wide, deep, tall = (x0 + x1) / 2, (y0 + y1) / 2, x1 - x0, y1 - y0, ROOM_HEIGHT_M
+    low = low - rng.uniform(0, 2.0, 2)
+    high = high + rng.uniform(0, 2.0, 2)
+    (x0, y0) = low
+    (x1, y1) = high
+    cx = (x0 + x1) / 2
+    cy = (y0 + y1) / 2
+    wide = x1 - x0
+    deep = y1 - y0
+    tall = ROOM_HEIGHT_M
     wall = _wall(rng)
     dark = plain("skirting", np.full(3, rng.uniform(0.05, 0.6)))
     add_surfaced_box("floor", (cx, cy, -0.05), (wide, deep, 0.1), _floor(rng))
@@ -96,9 +106,13 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
         length = float(np.array(size) @ along)
         for k in range(rng.integers(1, 4)):  # pictures, doors, shelves
             at = face + along * rng.uniform(-0.4, 0.4) * length
-            w, h, z = rng.uniform(0.4, 1.2), rng.uniform(0.4, 1.0), rng.uniform(1.2, 1.8)
+            w = rng.uniform(0.4, 1.2)
+            h = rng.uniform(0.4, 1.0)
+            z = rng.uniform(1.2, 1.8)
             if rng.random() < 0.3:
-                w, h, z = 0.9, 2.0, 1.0
+                w = 0.9
+                h = 2.0
+                z = 1.0
             thick = 0.04 if rng.random() < 0.6 else rng.uniform(0.15, 0.35)
             extent = (*(along * w + (1 - along) * thick), h)
             add_surfaced_box(f"on wall {side} {k}", (*at, z), extent, _on_wall(rng, w, h))
@@ -112,10 +126,8 @@ def _room(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDAr
     )
     for k, lamp in enumerate(lamps):
         data = bpy.data.lights.new(f"lamp {k}", "AREA")
-        data.energy, data.size = (
-            rng.uniform(120, 260) * (wide * deep / 30) ** 0.5,
-            rng.uniform(0.6, 1.8),
-        )
+        data.energy = rng.uniform(120, 260) * (wide * deep / 30) ** 0.5
+        data.size = rng.uniform(0.6, 1.8)
         data.color = (1.0, rng.uniform(0.8, 1.0), rng.uniform(0.6, 1.0))
         _link(bpy.data.objects.new(f"lamp {k}", data)).location = lamp.tolist()
     _sky((0.9, 0.95, 1.0), rng.uniform(0.3, 0.6))
@@ -129,7 +141,8 @@ def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> ND
     glass, bark, leaves = (plain(name, np.array(color)) for name, color in SHARED.items())
     reach = (high - low) / 2
     for k in range(rng.integers(1, 4)):  # houses to some sides
-        axis, sign = k % 2, 1 if rng.random() < 0.5 else -1
+        axis = k % 2
+        sign = 1 if rng.random() < 0.5 else -1
         away = np.zeros(2)
         away[axis] = sign * (reach[axis] + rng.uniform(2.0, 9.0) + 3.0)
         size = np.array([6.0, 6.0, rng.uniform(3.0, 8.0)])
@@ -140,7 +153,8 @@ def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> ND
         face[axis] -= sign * (3.0 + 0.02)
         for row in np.arange(0.9, size[2] - 1.2, 2.6):
             for column in np.arange(-size[1 - axis] / 2 + 1.2, size[1 - axis] / 2 - 1.0, 2.2):
-                place, extent = np.array([*face, row + 0.7]), np.array([0.05, 0.05, 1.4])
+                place = np.array([*face, row + 0.7])
+                extent = np.array([0.05, 0.05, 1.4])
                 place[1 - axis] += column
                 extent[1 - axis] = 1.0
                 add_surfaced_box("window", _triple(place), _triple(extent), glass)
@@ -163,7 +177,8 @@ def _street(rng: Rng, low: NDArray[np.float64], high: NDArray[np.float64]) -> ND
                 bpy.context.object.data.materials.append(leaves.material)
         else:
             add_surfaced_box(f"post {k}", (*at, tall / 2), (0.12, 0.12, tall), glass)
-    elevation, azimuth = np.radians(rng.uniform(35, 75)), rng.uniform(0, 2 * np.pi)
+    elevation = np.radians(rng.uniform(35, 75))
+    azimuth = rng.uniform(0, 2 * np.pi)
     toward = np.array(
         [
             np.cos(azimuth) * np.cos(elevation),

@@ -30,7 +30,9 @@ from ..perception.render_shots import fitted_motions
 from ..report import table
 from .objective import Frame, Objective, PosePrior
 
-EVERY, QUICK = 10, 40  # of the frames
+# of the frames
+EVERY = 10
+QUICK = 40
 PRIOR_EVERY = 10  # of the recordings' frames
 SHOWN_PX = 220
 SIDES = {"L": "left", "R": "right"}
@@ -68,10 +70,12 @@ def _clip(
     whole = capture(video, body, CaptureOptions())
     motion = raw.motions[0]
     with np.load(truth) as data:
-        true, names = data["joints"].astype(float), [str(name) for name in data["names"]]
+        true = data["joints"].astype(float)
+        names = [str(name) for name in data["names"]]
         rows = np.flatnonzero(motion.valid & np.isin(motion.frames, data["frame_index"]))[::every]
         true = true[np.searchsorted(data["frame_index"], motion.frames[rows])]
-    fits, took = [], []
+    fits = []
+    took = []
     for row in rows:
         since = time.process_time()
         objective = Objective(body, prior, frame_of(motion, int(row)))
@@ -112,9 +116,11 @@ def errors(body: Body, joints: Points, true: Points, names: list[str]) -> dict[s
     """
     limbs = [side + limb for limb in LIMBS for side in SIDES]
     at = [body.joint_names.index(f"{SIDES[limb[0]]}_{LIMBS[limb[1:]]}") for limb in limbs]
-    captured, wanted = joints[:, at], true[:, [names.index(limb) for limb in limbs]]
+    captured = joints[:, at]
+    wanted = true[:, [names.index(limb) for limb in limbs]]
     known = np.isfinite(wanted).all(axis=(1, 2))
-    captured, wanted = captured[known], wanted[known]
+    captured = captured[known]
+    wanted = wanted[known]
     hips = [limbs.index("LHip"), limbs.index("RHip")]
     relative = [relative_to(points, points[:, hips].mean(axis=1)) for points in (captured, wanted)]
     return {
@@ -169,8 +175,10 @@ def turned(skin: Points) -> Points:
 
 def _cropped(image: NDArray[np.uint8], pixels: Points) -> NDArray[np.uint8]:
     """Return the square around the person, all at one size."""
-    low, high = pixels.min(axis=0), pixels.max(axis=0)
-    half, (x, y) = 0.6 * float((high - low).max()), (low + high) / 2
+    low = pixels.min(axis=0)
+    high = pixels.max(axis=0)
+    half = 0.6 * float((high - low).max())
+    (x, y) = (low + high) / 2
     M = np.array([[1, 0, half - x], [0, 1, half - y]]) * (SHOWN_PX / (2 * half))
     cropped = cv2.warpAffine(
         image, M, (SHOWN_PX, SHOWN_PX), flags=cv2.INTER_AREA, borderValue=(236, 236, 236)

@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 STEP = 1e-6  # of the forward differences
-DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-9, 1e9  # relative to the diagonal of JᵀJ
+# relative to the diagonal of JᵀJ
+DAMPING = 1e-3
+MIN_DAMPING = 1e-9
+MAX_DAMPING = 1e9
 Vector = NDArray[np.float64]
 Residuals = Callable[[Vector], Vector]  # (B, n) -> (B, m): B points at a time
 
@@ -38,14 +41,16 @@ def minimize(
     :param free: (n,) the unknowns that may change.
     :param tolerance: ends at a smaller relative decrease.
     """
-    damping, at = DAMPING, np.flatnonzero(free)
+    damping = DAMPING
+    at = np.flatnonzero(free)
     r = residuals(x[None])[0]
     cost = 0.5 * float(r @ r)
     for iteration in range(limit):
         moved = np.repeat(x[None], len(at), axis=0)
         moved[np.arange(len(at)), at] += STEP
         J = (residuals(moved) - r).T / STEP
-        JTJ, gradient = J.T @ J, J.T @ r
+        JTJ = J.T @ J
+        gradient = J.T @ r
         while True:
             d = np.linalg.solve(JTJ + np.diag(damping * np.diag(JTJ) + 1e-12), -gradient)
             trial = x.copy()
@@ -57,13 +62,11 @@ def minimize(
             damping *= 10
             if damping > MAX_DAMPING:
                 return Minimum(x, cost, iteration)
-        decrease, x, r, cost, damping = (
-            (cost - lower) / cost,
-            trial,
-            r_trial,
-            lower,
-            max(damping / 10, MIN_DAMPING),
-        )
+        decrease = (cost - lower) / cost
+        x = trial
+        r = r_trial
+        cost = lower
+        damping = max(damping / 10, MIN_DAMPING)
         if decrease < tolerance:
             return Minimum(x, cost, iteration + 1)
     return Minimum(x, cost, limit)

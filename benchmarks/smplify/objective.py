@@ -24,7 +24,8 @@ from .dense import Minimum, minimize
 SIGMA_PX = 100.0
 STAGES = ((404.0, 100.0), (404.0, 50.0), (57.4, 10.0), (4.78, 5.0))  # λ_θ, λ_β
 BEND = 15.0  # λ_a
-LIMIT, TOLERANCE = 60, 1e-4
+LIMIT = 60
+TOLERANCE = 1e-4
 START_LIMIT = 30
 ROOT = 6  # rotation vector and translation of the root
 TRUNK = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
@@ -62,7 +63,9 @@ class Objective:
     """
 
     def __init__(self, body: Body, prior: PosePrior, frame: Frame) -> None:
-        self.body, self.prior, self.frame = body, prior, frame
+        self.body = body
+        self.prior = prior
+        self.frame = frame
         points = body.keypoint_set("blazepose")
         self.at = np.array([points[name] for name in frame.names])
         self.trunk = np.array([frame.names.index(name) for name in TRUNK])
@@ -82,11 +85,13 @@ class Objective:
         """Return the minimum of the last stage, from the best of four headings."""
         starts = [self._place(np.radians(heading)) for heading in (0, 90, 180, 270)]
         found = min(starts, key=lambda start: start.cost)
-        x, iterations = found.x, sum(start.iterations for start in starts)
+        x = found.x
+        iterations = sum(start.iterations for start in starts)
         for pose_weight, shape_weight in STAGES:
             residuals = partial(self.residuals, pose_weight=pose_weight, shape_weight=shape_weight)
             found = minimize(residuals, x, np.ones(self.n, bool), LIMIT, TOLERANCE)
-            x, iterations = found.x, iterations + found.iterations
+            x = found.x
+            iterations = iterations + found.iterations
         return Minimum(x, found.cost, iterations)
 
     def pose(self, x: Vector) -> tuple[Vector, Vector, Vector]:
@@ -110,7 +115,8 @@ class Objective:
     def residuals(self, x: Vector, pose_weight: float, shape_weight: float) -> Vector:
         """Return the residuals (B, m) of unknowns (B, n)."""
         K = self.body.K
-        theta, betas = x[:, ROOT : ROOT + 3 * K], x[:, ROOT + 3 * K :]
+        theta = x[:, ROOT : ROOT + 3 * K]
+        betas = x[:, ROOT + 3 * K :]
         off = self._offsets(x)
         squared = (off**2).sum(axis=-1, keepdims=True)
         robust = (
@@ -147,8 +153,10 @@ class Objective:
         rest = self.body.keypoints(
             *self.body.forward_kinematics(*(each[0] for each in self.pose(x[None])))
         )[self.at]
-        shoulders, hips = self.trunk[:2], self.trunk[2:]
-        pixels, K = self.frame.pixels, self.frame.intrinsics
+        shoulders = self.trunk[:2]
+        hips = self.trunk[2:]
+        pixels = self.frame.pixels
+        K = self.frame.intrinsics
         tall_px = np.linalg.norm(pixels[shoulders].mean(axis=0) - pixels[hips].mean(axis=0))
         tall_m = np.linalg.norm(rest[shoulders].mean(axis=0) - rest[hips].mean(axis=0))
         depth = K[0, 0] * tall_m / max(float(tall_px), 1.0)

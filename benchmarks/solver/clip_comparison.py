@@ -42,9 +42,11 @@ def against_dense(rounds: int) -> list[dict[str, float]]:
     rows = []
     for frames in DENSE_LENGTHS:
         problem, poses = make_clip(23, frames, contacts=0)
-        system, scale = problem.make_system(), problem.settings.root_scale
+        system = problem.make_system()
+        scale = problem.settings.root_scale
         problem.linearize(0, poses, system)
-        factor, parts = make_factor(system), len(problem.tree.parents)
+        factor = make_factor(system)
+        parts = len(problem.tree.parents)
         H, g = dense_equations(system, frames, parts, problem.tree.globals, 1.0, scale)
         J = np.random.default_rng(0).standard_normal(
             (frames * RESIDUALS_PER_FRAME + 3 * (frames - 2) * parts, len(g))
@@ -71,7 +73,8 @@ def dense_equations(
     and Jᵀr (n,).
     """
     m = 3 + 3 * parts
-    H, g = np.zeros((frames * m + count, frames * m + count)), np.zeros(frames * m + count)
+    H = np.zeros((frames * m + count, frames * m + count))
+    g = np.zeros(frames * m + count)
     slots = [0, *range(6, m, 3), 3]
     for f in range(frames):
         here = slice(f * m, (f + 1) * m)
@@ -99,7 +102,8 @@ def against_frames(rounds: int) -> list[dict[str, float]]:
     """
     problem, seen, states = _noisy_clip(FRAMES)
     options, clip_options = (Options(stages=[Stage(Weights(), stop, 50)]) for stop in (1e-4, 1e-3))
-    beta, times = states[0].beta, np.arange(FRAMES) / RATE
+    beta = states[0].beta
+    times = np.arange(FRAMES) / RATE
     tree = with_fixed_shape(make_tree(problem.body), beta)
 
     def together() -> None:
@@ -159,7 +163,8 @@ def _with_outline(measurements: Measurements, f: int, every: int) -> Measurement
     rng = np.random.default_rng(f)
     assert measurements.keypoints2d is not None
     points = np.resize(np.asarray(measurements.keypoints2d.indices), OUTLINE_ROWS)
-    angle, ones = rng.uniform(0.0, 2 * np.pi, OUTLINE_ROWS), np.ones(OUTLINE_ROWS)
+    angle = rng.uniform(0.0, 2 * np.pi, OUTLINE_ROWS)
+    ones = np.ones(OUTLINE_ROWS)
     normal = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     contour = rng.uniform(-0.1, 0.1, (OUTLINE_ROWS, 2))
     rows = pack(
@@ -177,8 +182,10 @@ def _noisy_clip(frames: int) -> tuple[Problem, list[Measurements], list[State]]:
     """Return a benchmark problem, its measurements with noise of each frame's own, and states near
     the truth.
     """
-    problem, rng = make_problem(23, 10, 120), np.random.default_rng(2)
-    seen, states = [], []
+    problem = make_problem(23, 10, 120)
+    rng = np.random.default_rng(2)
+    seen = []
+    states = []
     bank = problem.bank
     for f in range(frames):
         points = problem.measurements.keypoints2d

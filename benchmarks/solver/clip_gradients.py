@@ -31,10 +31,16 @@ def apply_frame(tree, pose, blocks, damping, root_scale, x, d, out) -> None:  # 
     for r in range(6):
         x[0, r] = d[r]
     for i in range(1, n):
-        u0, u1, u2 = d[3 + 3 * i], d[4 + 3 * i], d[5 + 3 * i]
-        sx, sy, sz = pose.t[i, 0] - o[0], pose.t[i, 1] - o[1], pose.t[i, 2] - o[2]
+        u0 = d[3 + 3 * i]
+        u1 = d[4 + 3 * i]
+        u2 = d[5 + 3 * i]
+        sx = pose.t[i, 0] - o[0]
+        sy = pose.t[i, 1] - o[1]
+        sz = pose.t[i, 2] - o[2]
         z = x[tree.parents[i]]
-        x[i, 0], x[i, 1], x[i, 2] = z[0] + u0, z[1] + u1, z[2] + u2
+        x[i, 0] = z[0] + u0
+        x[i, 1] = z[1] + u1
+        x[i, 2] = z[2] + u2
         x[i, 3] = z[3] + sy * u2 - sz * u1
         x[i, 4] = z[4] + sz * u0 - sx * u2
         x[i, 5] = z[5] + sx * u1 - sy * u0
@@ -46,8 +52,12 @@ def apply_frame(tree, pose, blocks, damping, root_scale, x, d, out) -> None:  # 
                 A[r, 0] * a + A[r, 1] * b + A[r, 2] * c + A[r, 3] * e + A[r, 4] * f + A[r, 5] * g
             )
     for i in range(n - 1, 0, -1):
-        y, H, at = x[i], blocks.H_uu[i], 3 + 3 * i
-        sx, sy, sz = pose.t[i, 0] - o[0], pose.t[i, 1] - o[1], pose.t[i, 2] - o[2]
+        y = x[i]
+        H = blocks.H_uu[i]
+        at = 3 + 3 * i
+        sx = pose.t[i, 0] - o[0]
+        sy = pose.t[i, 1] - o[1]
+        sz = pose.t[i, 2] - o[2]
         turned = (sy * y[5] - sz * y[4], sz * y[3] - sx * y[5], sx * y[4] - sy * y[3])
         for r in range(3):
             own = H[r, 0] * d[at] + H[r, 1] * d[at + 1] + H[r, 2] * d[at + 2]
@@ -70,13 +80,22 @@ def precondition_frame(tree, pose, work, m, q, r, z) -> None:  # type: ignore[no
         for k in range(6):
             m[i, k] = 0.0
     for i in range(n - 1, 0, -1):
-        y, at, F, T = m[i], 3 + 3 * i, work.L[i], work.Y[i]
-        sx, sy, sz = pose.t[i, 0] - o[0], pose.t[i, 1] - o[1], pose.t[i, 2] - o[2]
+        y = m[i]
+        at = 3 + 3 * i
+        F = work.L[i]
+        T = work.Y[i]
+        sx = pose.t[i, 0] - o[0]
+        sy = pose.t[i, 1] - o[1]
+        sz = pose.t[i, 2] - o[2]
         a = r[at] + y[0] - (sy * y[5] - sz * y[4])
         b = r[at + 1] + y[1] - (sz * y[3] - sx * y[5])
         c = r[at + 2] + y[2] - (sx * y[4] - sy * y[3])
-        q0, q1, q2 = F[0] * a, F[1] * a + F[2] * b, F[3] * a + F[4] * b + F[5] * c
-        q[i, 0], q[i, 1], q[i, 2] = q0, q1, q2
+        q0 = F[0] * a
+        q1 = F[1] * a + F[2] * b
+        q2 = F[3] * a + F[4] * b + F[5] * c
+        q[i, 0] = q0
+        q[i, 1] = q1
+        q[i, 2] = q2
         up = m[tree.parents[i]]
         for k in range(6):
             up[k] += y[k] - T[0, k] * q0 - T[1, k] * q1 - T[2, k] * q2
@@ -94,16 +113,29 @@ def precondition_frame(tree, pose, work, m, q, r, z) -> None:  # type: ignore[no
     for k in range(6):
         m[0, k] = z[k]
     for i in range(1, n):
-        x, T, F, at = m[tree.parents[i]], work.Y[i], work.L[i], 3 + 3 * i
-        s0, s1, s2 = q[i, 0], q[i, 1], q[i, 2]
+        x = m[tree.parents[i]]
+        T = work.Y[i]
+        F = work.L[i]
+        at = 3 + 3 * i
+        s0 = q[i, 0]
+        s1 = q[i, 1]
+        s2 = q[i, 2]
         for k in range(6):
             s0 -= T[0, k] * x[k]
             s1 -= T[1, k] * x[k]
             s2 -= T[2, k] * x[k]
-        u0, u1, u2 = F[0] * s0 + F[1] * s1 + F[3] * s2, F[2] * s1 + F[4] * s2, F[5] * s2
-        z[at], z[at + 1], z[at + 2] = u0, u1, u2
-        sx, sy, sz = pose.t[i, 0] - o[0], pose.t[i, 1] - o[1], pose.t[i, 2] - o[2]
-        m[i, 0], m[i, 1], m[i, 2] = x[0] + u0, x[1] + u1, x[2] + u2
+        u0 = F[0] * s0 + F[1] * s1 + F[3] * s2
+        u1 = F[2] * s1 + F[4] * s2
+        u2 = F[5] * s2
+        z[at] = u0
+        z[at + 1] = u1
+        z[at + 2] = u2
+        sx = pose.t[i, 0] - o[0]
+        sy = pose.t[i, 1] - o[1]
+        sz = pose.t[i, 2] - o[2]
+        m[i, 0] = x[0] + u0
+        m[i, 1] = x[1] + u1
+        m[i, 2] = x[2] + u2
         m[i, 3] = x[3] + sy * u2 - sz * u1
         m[i, 4] = x[4] + sz * u0 - sx * u2
         m[i, 5] = x[5] + sx * u1 - sy * u0
@@ -140,8 +172,11 @@ class ConjugateGradients:
         self, problem: ClipProblem, poses: Pose, damping: float, root_scale: float
     ) -> None:
         """Linearize and factorize every frame."""
-        tree, T = problem.tree, problem.frames
-        self.tree, self.damping, self.root_scale = tree, damping, root_scale
+        tree = problem.tree
+        T = problem.frames
+        self.tree = tree
+        self.damping = damping
+        self.root_scale = root_scale
         temporal = make_system(tree, T)
         self.poses = [pose_of(poses, f) for f in range(T)]
         self.blocks = [make_blocks(tree) for _ in range(T)]
@@ -164,7 +199,8 @@ class ConjugateGradients:
         at = [0, *(3 + 3 * k for k in range(1, K + 1)), 3]
         pick = [np.ix_(range(a, a + 3), range(a, a + 3)) for a in at]
         self.D = np.array([[temporal.D[f][p] for p in pick] for f in range(T)])
-        self.B1, self.B2 = temporal.B1, temporal.B2
+        self.B1 = temporal.B1
+        self.B2 = temporal.B2
         for f in range(T):  # the diagonal goes to the preconditioner
             added = [a.copy() for a in (self.blocks[f].H_uu, self.blocks[f].A)]
             self.blocks[f].H_uu[1:] += self.D[f, 1:-1]
@@ -172,7 +208,8 @@ class ConjugateGradients:
             self.blocks[f].A[0, 3:6, 3:6] += self.D[f, -1]
             eliminate(tree, self.poses[f], self.blocks[f], damping, root_scale, self.work[f])
             self.blocks[f].H_uu[:], self.blocks[f].A[:] = added
-        self.x, self.q = np.zeros((K + 1, 6)), np.zeros((K + 1, 3))
+        self.x = np.zeros((K + 1, 6))
+        self.q = np.zeros((K + 1, 3))
 
     def multiply(self, d: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the product with the clip's damped matrix."""
@@ -197,9 +234,11 @@ class ConjugateGradients:
         """Return the step (T, n) and the number of iterations until |residual| <= tolerance
         |gradient|.
         """
-        d, r = np.zeros_like(gradient), -gradient
+        d = np.zeros_like(gradient)
+        r = -gradient
         z = self.precondition(r)
-        p, rz = z.copy(), float(np.vdot(r, z))
+        p = z.copy()
+        rz = float(np.vdot(r, z))
         wanted = tolerance * np.linalg.norm(gradient)
         for k in range(1, most + 1):
             Hp = self.multiply(p)

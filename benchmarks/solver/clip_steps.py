@@ -72,10 +72,8 @@ def make_clip(
     poses = make_poses(tree, frames)
     for f in range(frames):
         swing = 0.1 * np.sin(3.0 * f / RATE)
-        poses.R[f, 0], poses.t[f, 0] = (
-            p.bank[0][0] @ rotations.exp([0.0, swing, 0.0]),
-            p.bank[1][0] + [swing, 0.0, 0.0],
-        )
+        poses.R[f, 0] = p.bank[0][0] @ rotations.exp([0.0, swing, 0.0])
+        poses.t[f, 0] = p.bank[1][0] + [swing, 0.0, 0.0]
         poses.Omega[f] = p.bank[2][0] @ rotations.exp([swing, 0.0, swing])
     if not fixed:
         poses.beta[:] = p.bank[3][0]
@@ -99,7 +97,8 @@ def clip_table(rounds: int) -> list[dict[str, float]]:
             with ThreadPoolExecutor(2) as pool:
                 problem, poses = make_clip(K, frames, pool=pool)
                 system = problem.make_system()
-                factor, scale = make_factor(system), problem.settings.root_scale
+                factor = make_factor(system)
+                scale = problem.settings.root_scale
                 linearize = _least(rounds, partial(problem.linearize, 0, poses, system))
                 solve = partial(solve_clip, problem.tree, system, 1.0, scale, factor, pool)
                 step = _least(rounds, solve)
@@ -121,9 +120,11 @@ def against_gradients(rounds: int, frames: int = 300) -> list[dict[str, float]]:
     rows = []
     for gap in (0, GAP):
         problem, poses = make_clip(23, frames, gap, fixed=True, contacts=0)
-        system, scale = problem.make_system(), problem.settings.root_scale
+        system = problem.make_system()
+        scale = problem.settings.root_scale
         problem.linearize(0, poses, system)
-        factor, used = make_factor(system), 3 + 3 * len(problem.tree.parents)
+        factor = make_factor(system)
+        used = 3 + 3 * len(problem.tree.parents)
         eliminated = _least(rounds, partial(solve_clip, problem.tree, system, 1.0, scale, factor))
         gradients = ConjugateGradients(problem, poses, 1.0, scale)
         gradient = np.ascontiguousarray(system.N[:, :used, 0])

@@ -34,7 +34,8 @@ from .loops import put
 from .problem import Problem
 
 # the problem's one prior
-FLOW, FLOW_COLUMN = list(RESIDUALS).index("joint_flow"), column_of("joint_flow")
+FLOW = list(RESIDUALS).index("joint_flow")
+FLOW_COLUMN = column_of("joint_flow")
 
 
 @kernel
@@ -45,18 +46,24 @@ def _write_row(tree, pose, J, row, i, p, o, gx, gy, gz, moved, part_moves) -> No
     With `part_moves` = 0 the residual depends on the lever's direction only, which translations do
     not change.
     """
-    ex, ey, ez = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+    ex = p[0] - o[0]
+    ey = p[1] - o[1]
+    ez = p[2] - o[2]
     k = i
     while k >= 0:
         at = 0 if k == 0 else 3 + 3 * k
         if part_moves:
-            ex, ey, ez = p[0] - pose.t[k, 0], p[1] - pose.t[k, 1], p[2] - pose.t[k, 2]
+            ex = p[0] - pose.t[k, 0]
+            ey = p[1] - pose.t[k, 1]
+            ez = p[2] - pose.t[k, 2]
         J[row, at] = ey * gz - ez * gy
         J[row, at + 1] = ez * gx - ex * gz
         J[row, at + 2] = ex * gy - ey * gx
         k = tree.parents[k]
     if part_moves:
-        J[row, 3], J[row, 4], J[row, 5] = gx, gy, gz
+        J[row, 3] = gx
+        J[row, 4] = gy
+        J[row, 5] = gz
     first = 3 + 3 * tree.parents.shape[0]
     for a in range(tree.shape):
         J[row, first + a] = gx * moved[0, a] + gy * moved[1, a] + gz * moved[2, a]
@@ -66,14 +73,18 @@ def _write_row(tree, pose, J, row, i, p, o, gx, gy, gz, moved, part_moves) -> No
 def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-untyped-def]
     """Write J and r at `pose`, weighted, with the robust kernel by first-order reweighting."""
     place_parts(tree, pose)
-    weights, inv_sigma = stage[0], stage[1]
+    weights = stage[0]
+    inv_sigma = stage[1]
     row = 0
     for i in range(tree.parents.shape[0]):
-        R, t = pose.R[i], pose.t[i]
+        R = pose.R[i]
+        t = pose.t[i]
         for j in range(terms.starts[i], terms.starts[i + 1]):
             flags = terms.flags[j]
             v = terms.rest[j]
-            x, y, z = v[0], v[1], v[2]
+            x = v[0]
+            y = v[1]
+            z = v[2]
             for a in range(tree.shape):
                 x += terms.V[j, 0, a] * pose.beta[a]
                 y += terms.V[j, 1, a] * pose.beta[a]
@@ -96,7 +107,8 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
             if flags & HAS_2D:
                 m = terms.image[j]
                 iz = 1.0 / max(p[2], keypoint2d.Z_MIN)
-                rx, ry = p[0] * iz - m[0], p[1] * iz - m[1]
+                rx = p[0] * iz - m[0]
+                ry = p[1] * iz - m[1]
                 _, w = geman_mcclure(rx * rx + ry * ry, inv_sigma[KEYPOINT2D])
                 w = np.sqrt(w * weights[KEYPOINT2D] * m[2])
                 _write_row(
@@ -105,7 +117,8 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
                 _write_row(
                     tree, pose, J, row + 1, i, p, t, 0.0, w * iz, -w * p[1] * iz * iz, moved[1], 1
                 )
-                r[row], r[row + 1] = w * rx, w * ry
+                r[row] = w * rx
+                r[row + 1] = w * ry
                 row += 2
             if flags & HAS_3D:
                 m = terms.point[j]
@@ -115,7 +128,9 @@ def fill(tree, terms, stage, pose, J, r, moved) -> None:  # type: ignore[no-unty
                 _write_row(tree, pose, J, row, i, p, t, w, 0.0, 0.0, moved[1], 1)
                 _write_row(tree, pose, J, row + 1, i, p, t, 0.0, w, 0.0, moved[1], 1)
                 _write_row(tree, pose, J, row + 2, i, p, t, 0.0, 0.0, w, moved[1], 1)
-                r[row], r[row + 1], r[row + 2] = w * e[0], w * e[1], w * e[2]
+                r[row] = w * e[0]
+                r[row + 1] = w * e[1]
+                r[row + 2] = w * e[2]
                 row += 3
             if flags & HAS_DIRECTION:
                 m = terms.direction[j]
@@ -163,12 +178,10 @@ def _add_priors(tree, terms, stage, pose, blocks, H, g) -> None:  # type: ignore
     equations.
     """
     clear_blocks(blocks)
-    ints, floats, weight, inv_sigma = (
-        terms.ints[FLOW],
-        terms.floats[FLOW],
-        stage[0, FLOW_COLUMN],
-        stage[1, FLOW_COLUMN],
-    )
+    ints = terms.ints[FLOW]
+    floats = terms.floats[FLOW]
+    weight = stage[0, FLOW_COLUMN]
+    inv_sigma = stage[1, FLOW_COLUMN]
     joint_flow.accumulate(tree, ints, floats, weight, inv_sigma, 0.0, pose, blocks)
     for i in range(1, tree.parents.shape[0]):
         at = 3 + 3 * i
@@ -193,14 +206,17 @@ class Dense:
 
     def __post_init__(self) -> None:
         """Make room for J."""
-        terms, tree = self.problem.terms, self.problem.tree
+        terms = self.problem.terms
+        tree = self.problem.tree
         counts = [np.count_nonzero(terms.flags & bit) for bit in (HAS_2D, HAS_3D, HAS_DIRECTION)]
-        K, P = len(tree.parents) - 1, tree.shape
+        K = len(tree.parents) - 1
+        P = tree.shape
         self.J = np.zeros((2 * counts[0] + 3 * counts[1] + 3 * counts[2] + P, 6 + 3 * K + P))
         self.r = np.zeros(len(self.J))
         self.moved = np.zeros((2, 3, max(P, 1)))
         self.pose, self.direction = make_pose(tree), np.zeros(self.J.shape[1])
-        self.blocks, self.priors = make_blocks(tree), len(terms.ints[FLOW]) > 0
+        self.blocks = make_blocks(tree)
+        self.priors = len(terms.ints[FLOW]) > 0
         damped = np.ones(self.J.shape[1])
         damped[3:6] = self.problem.root_scale**2
         damped[6 + 3 * K :] = 0.0

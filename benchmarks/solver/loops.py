@@ -12,7 +12,8 @@ from ...solver.residuals.registry import accumulate_tables
 def put(bank, k, pose):  # type: ignore[no-untyped-def]
     """Set the unknowns of `pose` to state k of the bank."""
     b = k % bank[0].shape[0]
-    n, W = pose.Omega.shape[0], pose.beta.shape[0]
+    n = pose.Omega.shape[0]
+    W = pose.beta.shape[0]
     for r in range(3):
         pose.t[0, r] = bank[1][b, r]
         for c in range(3):

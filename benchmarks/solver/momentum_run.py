@@ -18,7 +18,8 @@ import time
 
 import numpy as np
 
-REPEATS, ITERATIONS = 30, 10
+REPEATS = 30
+ITERATIONS = 10
 
 
 def main(path: str) -> float:
@@ -28,7 +29,8 @@ def main(path: str) -> float:
 
     with np.load(path) as data:
         d = {key: data[key] for key in data}
-    n, P = len(d["parents"]), d["S"].shape[2]
+    n = len(d["parents"])
+    P = d["S"].shape[2]
     identity = np.array([0, 0, 0, 1], np.float32)
     joints = [
         geometry.Joint(f"joint{i}", int(d["parents"][i]), identity, d["l"][i].astype(np.float32))
@@ -72,9 +74,12 @@ def main(path: str) -> float:
     function = solver.SkeletonSolverFunction(character, [positions, projections, axes, shape])
     options = solver.GaussNewtonSolverOptions()
     options.min_iterations = options.max_iterations = ITERATIONS
-    options.regularization, options.do_line_search, options.threshold = 0.05, False, 0.0
+    options.regularization = 0.05
+    options.do_line_search = False
+    options.threshold = 0.0
     optimizer = solver.GaussNewtonSolver(function, options)
-    rng, times = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    times = []
     for _ in range(REPEATS):
         start = (0.1 * rng.standard_normal(len(names))).astype(np.float32)
         start[:3] += d["root"].astype(np.float32)

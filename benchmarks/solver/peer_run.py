@@ -23,7 +23,8 @@ from .dense import Dense, fill
 from .loops import put
 from .problem import make_problem
 
-REPEATS, ITERATIONS = 30, 10
+REPEATS = 30
+ITERATIONS = 10
 
 
 class Residuals:
@@ -34,7 +35,9 @@ class Residuals:
         self.problem = make_problem(23, 10, 120)
         self.dense = Dense(self.problem)
         tree = self.problem.tree
-        self.base, self.trial, self.work = make_pose(tree), make_pose(tree), make_workspace(tree)
+        self.base = make_pose(tree)
+        self.trial = make_pose(tree)
+        self.work = make_workspace(tree)
         self.size = len(self.dense.direction)
 
     def start(self, k: int) -> None:
@@ -44,7 +47,8 @@ class Residuals:
 
     def at(self, d: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return r and J at d."""
-        p, work = self.problem, self.work
+        p = self.problem
+        work = self.work
         n = len(work.u)
         work.x[0] = d[:6]
         work.u[1:] = d[6 : 3 + 3 * n].reshape(-1, 3)
@@ -99,10 +103,13 @@ def run_ceres(residuals: Residuals) -> float:
     times = []
     for k in range(REPEATS):
         residuals.start(k)
-        d, problem, options = np.zeros(residuals.size), pyceres.Problem(), pyceres.SolverOptions()
+        d = np.zeros(residuals.size)
+        problem = pyceres.Problem()
+        options = pyceres.SolverOptions()
         problem.add_residual_block(Cost(), None, [d])
         options.linear_solver_type = pyceres.LinearSolverType.DENSE_NORMAL_CHOLESKY
-        options.max_num_iterations, options.num_threads = ITERATIONS, 1
+        options.max_num_iterations = ITERATIONS
+        options.num_threads = 1
         options.logging_type = pyceres.LoggingType.SILENT
         summary = pyceres.SolverSummary()
         start = time.perf_counter()

@@ -55,7 +55,8 @@ def _run_momentum() -> float:
     """Run Meta's momentum, whose packages exist for Python 3.12 only."""
     python = make_environment("momentum", MOMENTUM, interpreter=_python312())
     problem = make_problem(23, 10, 120)
-    body, measured = problem.body, problem.measurements
+    body = problem.body
+    measured = problem.measurements
     assert measured.keypoints3d is not None
     assert measured.orientation_field is not None
     directions = np.asarray(measured.orientation_field.directions)
@@ -99,7 +100,8 @@ def _python312() -> str:
 def make_environment(name: str, *packages: str, interpreter: str = sys.executable) -> Path:
     """Return the interpreter of an environment with these packages, made on first use."""
     folder = CACHE / name
-    python, stamp = folder / "bin" / "python", folder / "installed"
+    python = folder / "bin" / "python"
+    stamp = folder / "installed"
     if not stamp.exists():
         print(f"installing {packages[-1]} in {folder}, once", file=sys.stderr)
         subprocess.run(

@@ -11,9 +11,12 @@ import numpy as np
 
 from .problem import BODIES
 
-SIZE, MARGIN = (720, 480), (80, 40, 30, 60)  # width, height; left, top, right, bottom
+# width, height; left, top, right, bottom
+SIZE = (720, 480)
+MARGIN = (80, 40, 30, 60)
 COLOURS = ((180, 90, 20), (40, 110, 220), (60, 150, 60), (150, 60, 150))
-FONT, INK = cv2.FONT_HERSHEY_SIMPLEX, (40, 40, 40)
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+INK = (40, 40, 40)
 
 Lines = Mapping[str, tuple[Sequence[float], Sequence[float]]]
 
@@ -25,8 +28,10 @@ def plot(path: Path, title: str, x_label: str, y_label: str, lines: Lines) -> No
     picture = np.full((height, width, 3), 255, np.uint8)
     xs = np.concatenate([np.asarray(x, float) for x, _ in lines.values()])
     ys = np.log10(np.concatenate([np.asarray(y, float) for _, y in lines.values()]))
-    x0, x1 = float(xs.min()), float(xs.max())
-    y0, y1 = float(np.floor(ys.min() * 2) / 2), float(np.ceil(ys.max() * 2) / 2)
+    x0 = float(xs.min())
+    x1 = float(xs.max())
+    y0 = float(np.floor(ys.min() * 2) / 2)
+    y1 = float(np.ceil(ys.max() * 2) / 2)
 
     def place(x: float, log_y: float) -> tuple[int, int]:
         across = left + (x - x0) / (x1 - x0) * (width - left - right)
@@ -82,7 +87,8 @@ def plot_experiment(
     ``suffix``.
     """
     key = "P" if number == 3 else "N"
-    times, speedups = {}, {}
+    times = {}
+    speedups = {}
     for K, name in BODIES.items():
         chosen = [row for row in rows if row["K"] == K]
         x = [row[key] for row in chosen]

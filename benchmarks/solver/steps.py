@@ -27,12 +27,15 @@ TARGETS = {  # name: K, P, N, with the joint prior, target in microseconds
 }
 SIZES = (120, 240, 360, 480, 600)
 SHAPES = tuple(range(11))
-SPARSE_BATCH, DENSE_BATCH = 40, 4
+SPARSE_BATCH = 40
+DENSE_BATCH = 4
 
 
 def sparse_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n steps of the solver, each linearized at another state."""
-    pose, blocks, work = make_pose(p.tree), make_blocks(p.tree), make_workspace(p.tree)
+    pose = make_pose(p.tree)
+    blocks = make_blocks(p.tree)
+    work = make_workspace(p.tree)
     return lambda n: loops.steps(
         n, p.tree, p.terms, p.stage, p.damping, p.root_scale, p.bank, pose, blocks, work
     )
@@ -54,11 +57,10 @@ def dense_run(p: Problem) -> Callable[[int], object]:
 
 def iteration_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n whole iterations: step, move, linearize at the trial point."""
-    poses, blocks = (
-        (make_pose(p.tree), make_pose(p.tree)),
-        (make_blocks(p.tree), make_blocks(p.tree)),
-    )
-    curvature, work = make_curvature(p.tree), make_workspace(p.tree)
+    poses = (make_pose(p.tree), make_pose(p.tree))
+    blocks = (make_blocks(p.tree), make_blocks(p.tree))
+    curvature = make_curvature(p.tree)
+    work = make_workspace(p.tree)
     return lambda n: loops.iterations(
         n,
         p.tree,
@@ -76,7 +78,8 @@ def iteration_run(p: Problem) -> Callable[[int], object]:
 
 def prior_run(p: Problem) -> Callable[[int], object]:
     """Return run(n): n evaluations of the joint prior of all joints, with Jacobian and sums."""
-    pose, blocks = make_pose(p.tree), make_blocks(p.tree)
+    pose = make_pose(p.tree)
+    blocks = make_blocks(p.tree)
     return lambda n: loops.priors(n, p.tree, p.terms, p.stage, p.bank, pose, blocks)
 
 
@@ -88,11 +91,15 @@ def compare(
 
     Microseconds, measured in turns. The dense step is called from Python.
     """
-    runs, counts = {}, {}
+    runs = {}
+    counts = {}
     for name, p in problems.items():
-        runs[f"s {name}"], counts[f"s {name}"] = sparse_run(p), SPARSE_BATCH
-        runs[f"c {name}"], counts[f"c {name}"] = called_run(p), SPARSE_BATCH
-        runs[f"d {name}"], counts[f"d {name}"] = dense_run(p), DENSE_BATCH
+        runs[f"s {name}"] = sparse_run(p)
+        counts[f"s {name}"] = SPARSE_BATCH
+        runs[f"c {name}"] = called_run(p)
+        counts[f"c {name}"] = SPARSE_BATCH
+        runs[f"d {name}"] = dense_run(p)
+        counts[f"d {name}"] = DENSE_BATCH
     times = take_turns(runs, counts, rounds)
     sparse, called, dense = ({n: times[f"{kind} {n}"] for n in problems} for kind in "scd")
     return sparse, called, dense

@@ -57,7 +57,8 @@ LIMBS = tuple(
 _KEYPOINTS = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]  # the same of the landmark network
 # of a true person's height in the image: captured people who are farther off are somebody else
 _FAR = 0.5
-_MASK_STRIDE, _SOLE_STRIDE = 5, 10
+_MASK_STRIDE = 5
+_SOLE_STRIDE = 10
 _CIRCLE = 1.1
 # rows' frames (T,), pixels of LIMBS (T, 12, 2)
 True2D = dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
@@ -78,7 +79,8 @@ def two_people(quick: bool) -> dict[str, Any]:
         truth_file(person, camera).is_file() for person in truths.PEOPLE for camera in CAMERAS
     )
     figures: dict[str, Any] = {} if quick and made else {"truth": make_truth(videos)}
-    body, network = load_body("scope"), LandmarkNetwork("pose_landmark_heavy", truths.THREADS)
+    body = load_body("scope")
+    network = LandmarkNetwork("pose_landmark_heavy", truths.THREADS)
     for quality in (CaptureOptions().quality,) if quick else PRESETS[::-1]:  # best first
         rows: dict[str, dict[str, Any]] = {}
         for camera in CAMERAS:
@@ -153,7 +155,8 @@ def differences(people: dict[str, dict[str, truths.TruePerson]]) -> dict[str, An
 
 def _difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:
     known = np.isfinite(a).all(-1) & np.isfinite(b).all(-1)
-    a, b = a[known], b[known]
+    a = a[known]
+    b = b[known]
     moved = aligned(b, similarity(b, a))
     return 1000 * float(np.linalg.norm(a - b, axis=1).mean()), 1000 * float(
         np.linalg.norm(a - moved, axis=1).mean()
@@ -242,7 +245,8 @@ def owner(motion: Motion, true: True2D) -> str | None:
 def exchanged(motion: Motion, person: str, true: True2D) -> float:
     """Return the share of frames in which the other true person is nearer."""
     (other,) = set(true) - {person}
-    own, others = distances(motion, person, true), distances(motion, other, true)
+    own = distances(motion, person, true)
+    others = distances(motion, other, true)
     known = np.isfinite(own) & np.isfinite(others)
     return float((others < own)[known].mean()) if known.any() else 0.0
 
@@ -288,7 +292,8 @@ def region_around(points: NDArray[np.float64]) -> Region:
     """Return the region of a person whose `LIMBS` (12, 2) are known in the image; NaN where they
     are not.
     """
-    hips, shoulders = np.nanmean(points[6:8], axis=0), np.nanmean(points[:2], axis=0)
+    hips = np.nanmean(points[6:8], axis=0)
+    shoulders = np.nanmean(points[:2], axis=0)
     radius = _CIRCLE * float(np.nanmax(np.linalg.norm(points - hips, axis=1)))
     return region_from_points(
         hips, hips + radius * (shoulders - hips) / np.linalg.norm(shoulders - hips)
@@ -310,7 +315,9 @@ def distance_ratio(motions: dict[str, Motion], camera: str) -> float:
     """Return the distance between the people's hips over the true one, median over the frames in
     which both were.
     """
-    captured, true, frames = {}, {}, None
+    captured = {}
+    true = {}
+    frames = None
     for person, motion in motions.items():
         at = {
             int(f): motion.joints_cam[k, 1:3].mean(0)

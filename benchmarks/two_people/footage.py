@@ -94,11 +94,9 @@ def load_cameras(videos: dict[str, Path]) -> dict[str, Camera]:
             np.load(DATA / "pose2sim" / f"truth_{CAMERAS[0]}.npz") as first,
             np.load(man_alone(name)) as truth,
         ):
-            world, here, up = (
-                first["joints"].reshape(-1, 3),
-                truth["joints"].reshape(-1, 3),
-                truth["up"],
-            )
+            world = first["joints"].reshape(-1, 3)
+            here = truth["joints"].reshape(-1, 3)
+            up = truth["up"]
         known = np.isfinite(world).all(1) & np.isfinite(here).all(1)
         _, T[:3, :3], T[:3, 3] = similarity(world[known], here[known], with_scale=False)
         size = _size(video)
@@ -119,18 +117,23 @@ def register(alone: Path, together: Path) -> tuple[float, NDArray[np.float64], i
     Also how many SIFT features agree, and their median distance in pixels.
     """
     sift, matcher = cv2.SIFT_create(3000), cv2.BFMatcher(crossCheck=True)  # type: ignore[attr-defined]
-    old, new = _images(alone, [k - LATER for k in _COMPARED]), _images(together, list(_COMPARED))
-    here, there = [], []
+    old = _images(alone, [k - LATER for k in _COMPARED])
+    new = _images(together, list(_COMPARED))
+    here = []
+    there = []
     for a, b in zip(old, new, strict=True):
         (points, values), (others, their) = (sift.detectAndCompute(image, None) for image in (a, b))
         for match in matcher.match(values, their):
             here.append(points[match.queryIdx].pt)
             there.append(others[match.trainIdx].pt)
     cv2.setRNGSeed(0)
-    p, q = np.array(here), np.array(there)
+    p = np.array(here)
+    q = np.array(there)
     inliers = cv2.estimateAffinePartial2D(p, q, ransacReprojThreshold=_INLIER_PX)[1].ravel() > 0
-    p, q = p[inliers], q[inliers]
-    a, b = p - p.mean(0), q - q.mean(0)
+    p = p[inliers]
+    q = q[inliers]
+    a = p - p.mean(0)
+    b = q - q.mean(0)
     scale = float((a * b).sum() / (a * a).sum())
     shift = q.mean(0) - scale * p.mean(0)
     off = np.linalg.norm(scale * p + shift - q, axis=1)

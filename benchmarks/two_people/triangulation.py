@@ -61,7 +61,8 @@ def triangulate(
         X = from_views(x[list(pair)], T_camera_world[list(pair)])
         cost = seen.cost(X)
         better = (weight[list(pair)] > 0).all(0) & (cost < least)
-        best[better], least[better] = X[better], cost[better]
+        best[better] = X[better]
+        least[better] = cost[better]
     for _ in range(_STEPS):
         best = seen.step(best)
     error_px = seen.error_px(best)
@@ -120,7 +121,8 @@ class _Views:
     def step(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the points after one Gauss-Newton step."""
         R = self.T[:, None, :3, :3]
-        q, depth = project(X, self.T), np.maximum(_in_cameras(X, self.T)[..., 2, None, None], 1e-6)
+        q = project(X, self.T)
+        depth = np.maximum(_in_cameras(X, self.T)[..., 2, None, None], 1e-6)
         r = self.focal_px[:, None, None] * (q - self.x)
         J = (
             self.focal_px[:, None, None, None]
@@ -178,14 +180,16 @@ def adjust_cameras(
     :param sigma_m: σ_t, that of its position along each axis, metres.
     """
     C = len(x)
-    start, T = T_camera_world, T_camera_world.copy()
+    start = T_camera_world
+    T = T_camera_world.copy()
     weight = _weight(confidence)
     inverse_variance = np.tile([sigma_rad**-2.0] * 3 + [sigma_m**-2.0] * 3, C) * SCALE_PX**2
     for _ in range(steps):
         X = triangulate(x, confidence, T, focal_px, views=2).points
         known = np.isfinite(X).all(-1) & ((weight > 0).sum(0) >= GOOD_VIEWS)
         p = _in_cameras(X[known], T)
-        q, f = p[..., :2] / p[..., 2:], focal_px[:, None, None]
+        q = p[..., :2] / p[..., 2:]
+        f = focal_px[:, None, None]
         r = f * (q - x[:, known])
         J_camera = (
             f[..., None]

@@ -37,11 +37,13 @@ from .footage import FPS, LATER, Camera, man_alone
 from .triangulation import Triangulated, adjust_cameras, project, triangulate
 
 PEOPLE = ("man", "woman")
-NETWORK, SECOND_NETWORK = "pose_landmark_heavy", "pose_landmark_full"
+NETWORK = "pose_landmark_heavy"
+SECOND_NETWORK = "pose_landmark_full"
 THREADS = 2
 DRAWN = ("woman",)
 # by which the cameras that she was drawn with may differ, each axis
-SIGMA_RAD, SIGMA_M = np.radians(1.0), 0.1
+SIGMA_RAD = np.radians(1.0)
+SIGMA_M = 0.1
 FIRST_REGIONS = {  # in frame 0: centre of the hips x, y; side; rotation
     ("man", "cam1"): (390, 720, 900, 0.1), ("woman", "cam1"): (773, 1250, 1100, 0.35),
     ("man", "cam2"): (560, 750, 900, 0.0), ("woman", "cam2"): (203, 1080, 1000, 0.0),
@@ -56,7 +58,8 @@ NAMES = {  # of the evaluation tool, by the network's
     **{f"{side}_{joint}": f"{side[0].upper()}{joint.title()}" for joint in
        ("shoulder", "elbow", "wrist", "hip", "knee", "ankle") for side in ("left", "right")},
 }  # fmt: skip
-_SHOULDERS, _HIPS = [11, 12], [23, 24]
+_SHOULDERS = [11, 12]
+_HIPS = [23, 24]
 # radius of the body circle over the distance of the keypoint that is farthest from the hips
 _CIRCLE = 1.1
 _MIRRORED_PX = 15.0  # difference of the two views of a keypoint that halves its confidence
@@ -162,10 +165,8 @@ def solve(keypoints: Keypoints, cameras: dict[str, Camera], adjusts: bool) -> Tr
         cv2.undistortPoints(seen[..., :2].reshape(-1, 1, 2), camera.K, camera.dist).reshape(-1, 2)
         for seen, camera in zip(keypoints, listed, strict=True)
     ])  # fmt: skip
-    poses, focal = (
-        np.stack([c.T_camera_world for c in listed]),
-        np.array([c.K[0, 0] for c in listed]),
-    )
+    poses = np.stack([c.T_camera_world for c in listed])
+    focal = np.array([c.K[0, 0] for c in listed])
     confidence = keypoints[..., 2].reshape(C, -1)
     if adjusts:
         poses = adjust_cameras(x, confidence, poses, focal, SIGMA_RAD, SIGMA_M)
@@ -178,7 +179,8 @@ def regions_of(joints: NDArray[np.float64], camera: Camera) -> list[Region]:
     """Return the region of a person in every frame; joints (T, 33, 3) that are not known are
     interpolated.
     """
-    filled, rows = joints.copy(), np.arange(len(joints))
+    filled = joints.copy()
+    rows = np.arange(len(joints))
     for j in range(KEYPOINT_COUNT):
         known = np.isfinite(joints[:, j, 0])
         for axis in range(3):
@@ -186,7 +188,8 @@ def regions_of(joints: NDArray[np.float64], camera: Camera) -> list[Region]:
                 filled[:, j, axis] = np.interp(rows, rows[known], joints[known, j, axis])
     regions = []
     for points in pixels(filled.reshape(-1, 3), camera).reshape(len(joints), -1, 2):
-        hips, shoulders = points[_HIPS].mean(0), points[_SHOULDERS].mean(0)
+        hips = points[_HIPS].mean(0)
+        shoulders = points[_SHOULDERS].mean(0)
         radius = _CIRCLE * float(np.nanmax(np.linalg.norm(points - hips, axis=1)))
         up = (shoulders - hips) / np.linalg.norm(shoulders - hips)
         regions.append(region_from_points(hips, hips + radius * up))
@@ -219,7 +222,9 @@ def save(folder: Path, name: str, truth: TruePerson) -> None:
 def save_man(folder: Path, cameras: dict[str, Camera]) -> None:
     """Write the man's truth of the clips of him alone for these videos: ``man_CAMERA.npz``."""
     with np.load(man_alone(CAMERAS[0])) as truth:
-        joints, names, frames = truth["joints"], truth["names"], truth["frame_index"] + LATER
+        joints = truth["joints"]
+        names = truth["names"]
+        frames = truth["frame_index"] + LATER
     kept = frames < 100  # the last one is not in these videos
     for name, camera in cameras.items():
         _write(folder / f"man_{name}.npz", joints[kept], names, frames[kept], camera)

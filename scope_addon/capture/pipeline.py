@@ -77,7 +77,8 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
     """Assemble what is known of observed footage; the camera's path so far contains only its
     rotation.
     """
-    frames, motion = len(footage.timestamps), footage.camera_motion
+    frames = len(footage.timestamps)
+    motion = footage.camera_motion
     path = (
         CameraPath.static(frames)
         if motion.is_static

@@ -66,9 +66,13 @@ class DaskRunner:
         program: Sequence[str] | None,
         say: Callable[[str], None],
     ) -> None:
-        self._client, self._folder, self._out, self._jobs = client, folder, out, jobs
+        self._client = client
+        self._folder = folder
+        self._out = out
+        self._jobs = jobs
         self._program = None if program is None else tuple(program)
-        self._say, self._workers = say, Workers(say)
+        self._say = say
+        self._workers = Workers(say)
         self._staging: Staging | RemoteStaging | None = None
         self._attempts: dict[str, _Attempt] = {}  # by Dask's key
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()  # keys
@@ -105,7 +109,8 @@ class DaskRunner:
         """See `Runner.stop`; workers end what nobody waits for, and what is not published is not
         finished.
         """
-        attempts, self._attempts = list(self._attempts.values()), {}
+        attempts = list(self._attempts.values())
+        self._attempts = {}
         self._cancel([attempt.future for attempt in attempts])
         self._client.close(timeout=5)
         return {}

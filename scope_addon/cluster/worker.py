@@ -38,7 +38,9 @@ from . import remote
 from .staging import TOKEN
 
 PROGRAM = (sys.executable, "-m", __name__.rpartition(".cluster")[0])
-LOST, REFUSED = "lost", "refused"  # statuses of an attempt, in addition to those of a clip
+# statuses of an attempt, in addition to those of a clip
+LOST = "lost"
+REFUSED = "refused"
 
 
 def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
@@ -55,14 +57,16 @@ def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
 
 
 def _problem(wanted: dict[str, Any]) -> str:
-    ours, theirs = program_version(ROOT), wanted["program"]
+    ours = program_version(ROOT)
+    theirs = wanted["program"]
     if ours != theirs:
         return (
             f"it runs another version of Scope ({ours[:8]}, and not {theirs[:8]}); install the "
             f"same version there"
         )
     check_installed(CAPTURE + (("bpy",) if wanted["bpy"] else ()))
-    folder, attempts = wanted["folder"], wanted["attempts"]
+    folder = wanted["folder"]
+    attempts = wanted["attempts"]
     with remote.store_errors(InputError, folder):
         if not (remote.is_folder(folder) if is_url(folder) else Path(folder).is_dir()):
             return f"it has no folder {folder}; all machines need the footage under the same path"

@@ -10,7 +10,11 @@ from typing import Any
 
 from ..job.clips.task import Entry
 
-CHECKED, READY, REFUSED, LOST = "being checked", "ready", "refused", "left"  # states of a worker
+# states of a worker
+CHECKED = "being checked"
+READY = "ready"
+REFUSED = "refused"
+LOST = "left"
 
 
 @dataclass
@@ -53,7 +57,8 @@ class Workers:
     """
 
     def __init__(self, say: Callable[[str], None]) -> None:
-        self._say, self._start = say, time.monotonic()
+        self._say = say
+        self._start = time.monotonic()
         self.records: dict[str, WorkerRecord] = {}
         self.log: list[dict[str, Any]] = []
 
@@ -86,7 +91,8 @@ class Workers:
 
     def checked(self, address: str, found: dict[str, Any]) -> None:
         """Record the result of a worker's check."""
-        record, problem = self.records[address], found.get("problem")
+        record = self.records[address]
+        problem = found.get("problem")
         record.host, record.threads = (
             str(found.get("host", record.host)),
             int(found.get("threads", record.threads)),

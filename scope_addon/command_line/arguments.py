@@ -58,7 +58,8 @@ def with_bare_values(argv: Sequence[str]) -> list[str]:
 
 
 def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:
-    argument, default = option.argument, _default(option)
+    argument = option.argument
+    default = _default(option)
     text = argument.default_text or (str(default) if default else "")
     parser.add_argument(
         option.flag,

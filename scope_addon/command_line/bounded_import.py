@@ -21,8 +21,10 @@ from ..errors import FAILED
 _INTERVAL_S = 0.1
 # A file may take these, and in addition as many seconds for a megabyte, and as many bytes for a
 # byte.
-BASE_S, S_PER_MB = 30.0, 1.0
-BASE_BYTES, BYTES_PER_BYTE = 2 << 30, 20
+BASE_S = 30.0
+S_PER_MB = 1.0
+BASE_BYTES = 2 << 30
+BYTES_PER_BYTE = 20
 
 
 @contextmanager

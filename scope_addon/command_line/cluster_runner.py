@@ -50,7 +50,8 @@ def local_folders(args: argparse.Namespace, stack: ExitStack) -> tuple[Path, Pat
     :raises UsageError: there is a URL, but no cluster.
     :raises ScopeError: a store cannot be read.
     """
-    folder, out = args.folder, args.out
+    folder = args.folder
+    out = args.out
     if is_url(folder) or is_url(out):
         if args.scheduler is None:
             raise UsageError(

@@ -62,7 +62,8 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     written = write_outputs(outputs, [imported.motion], imported.body, args.motion, args, rig)
     for note in imported.notes:
         print_message(f"warning: {note}")
-    frames, rate = len(imported.motion), imported.motion.mocap_framerate
+    frames = len(imported.motion)
+    rate = imported.motion.mocap_framerate
     if not args.json and not args.quiet:
         print(
             f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote "

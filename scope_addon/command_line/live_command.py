@@ -60,7 +60,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
 
-    source, body = open_source(args.source), load_body(chosen_body(values))
+    source = open_source(args.source)
+    body = load_body(chosen_body(values))
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
         recording = PeopleRecording(_paths(values), body, source) if values["record"] else None

@@ -10,7 +10,8 @@ from .address_space import address_space_limit
 
 # Of addresses, most of which are never used: 1.6 to 2.1 GB were measured without a scene, 2.8 GB
 # with one.
-_NEEDED_BYTES, _NEEDED_WITH_SCENE = 2_500_000_000, 3_200_000_000
+_NEEDED_BYTES = 2_500_000_000
+_NEEDED_WITH_SCENE = 3_200_000_000
 
 
 def check_memory_limit(*, with_scene: bool) -> None:

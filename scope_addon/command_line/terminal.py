@@ -44,7 +44,8 @@ class ProgressLine:
     """
 
     def __init__(self, stream: TextIO, *, show: bool) -> None:
-        self._stream, self._show = stream, show and stream.isatty()
+        self._stream = stream
+        self._show = show and stream.isatty()
 
     def write(self, text: str) -> None:
         """Show a text.

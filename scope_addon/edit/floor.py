@@ -69,7 +69,8 @@ def _levelling(
     :param weight: (T, 4) standing probabilities.
     :return: rotation (3, 3), and the point (3,) about which it rotates.
     """
-    points, w = soles[weight > 0.5], weight[weight > 0.5]
+    points = soles[weight > 0.5]
+    w = weight[weight > 0.5]
     if len(points) < 3:
         return np.eye(3), np.zeros(3)
     middle = (w[:, None] * points).sum(0) / w.sum()

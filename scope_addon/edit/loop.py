@@ -114,7 +114,8 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     """
     chosen = slice(cycle.first, cycle.last + 1)
     times = clip.times[chosen] - clip.times[cycle.first]
-    rotations, root = clip.rotations[chosen].copy(), clip.root[chosen].copy()
+    rotations = clip.rotations[chosen].copy()
+    root = clip.root[chosen].copy()
     s = np.clip((times - (times[-1] - max(blend, 1e-6))) / max(blend, 1e-6), 0.0, 1.0)
     s = s * s * (3 - 2 * s)
     heading = np.arctan2(*_vertical_turn(rotations[0, 0], rotations[-1, 0]))

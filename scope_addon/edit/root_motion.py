@@ -29,7 +29,8 @@ def floor_trajectory(
         return positions, np.zeros(len(clip))
     # The model faces +z, so R_world_root maps z to the heading, and R_WORLD_MODEL maps it to that
     # of the rest pose.
-    facing, rest = clip.rotations[:, 0] @ [0.0, 0.0, 1.0], R_WORLD_MODEL @ [0.0, 0.0, 1.0]
+    facing = clip.rotations[:, 0] @ [0.0, 0.0, 1.0]
+    rest = R_WORLD_MODEL @ [0.0, 0.0, 1.0]
     angle = np.unwrap(np.arctan2(facing[:, 1], facing[:, 0]) - np.arctan2(rest[1], rest[0]))
     return positions, gaussian_smooth(angle, clip.times, _HEADING_CUTOFF_HZ)
 
@@ -67,7 +68,9 @@ def about_z(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
     :param angles: of any shape with T entries, radians.
     """
-    c, s = np.cos(angles), np.sin(angles)
-    zero, one = np.zeros_like(c), np.ones_like(c)
+    c = np.cos(angles)
+    s = np.sin(angles)
+    zero = np.zeros_like(c)
+    one = np.ones_like(c)
     rows: NDArray[np.float64] = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1)
     return rows.reshape(-1, 3, 3)

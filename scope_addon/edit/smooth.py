@@ -64,7 +64,8 @@ def _smoothed(motion: Motion, body: Body, raw: Clip, finished: Clip, strength: f
             Clip(finished.times, finished.rotations, finished.root - center), strength
         )
         return _with_resting_feet(replace(calm, root=calm.root + center), finished, motion, body)
-    plain, wanted = _filtered(raw, motion, 1.0), _filtered(raw, motion, strength)
+    plain = _filtered(raw, motion, 1.0)
+    wanted = _filtered(raw, motion, strength)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
     none = np.broadcast_to(np.eye(3), correction.shape)
     correction = interpolate_rotations(none, correction, np.full(correction.shape[:2], strength))
@@ -94,9 +95,12 @@ def _smoothed_further(clip: Clip, strength: float) -> Clip:
     each of them as its reflection in that frame's pose, direction, and logarithm of the distance.
     """
     beyond = float(np.sqrt(strength * strength - 1.0))
-    times, R, T = clip.times, clip.rotations, len(clip)
+    times = clip.times
+    R = clip.rotations
+    T = len(clip)
     first, last = (int(np.sum(abs(times - end) <= _REACH_S * beyond)) - 1 for end in times[[0, -1]])
-    before, after = slice(first, 0, -1), np.arange(T - 2, T - 2 - last, -1)
+    before = slice(first, 0, -1)
+    after = np.arange(T - 2, T - 2 - last, -1)
     times = np.concatenate([2 * times[0] - times[before], times, 2 * times[-1] - times[after]])
     root = np.concatenate(
         [

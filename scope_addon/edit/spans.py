@@ -41,7 +41,8 @@ def interpolate(clip: Clip, start: float, end: float) -> Clip:
     :raises UsageError: when the span has no key, or no key is left on one side of it.
     """
     span = keys_within(clip, start, end)
-    a, b = span[0] - 1, span[-1] + 1
+    a = span[0] - 1
+    b = span[-1] + 1
     if a < 0 or b >= len(clip):
         raise UsageError(
             "the span reaches the motion's end and has nothing to interpolate to; leave a frame on "
@@ -51,13 +52,16 @@ def interpolate(clip: Clip, start: float, end: float) -> Clip:
     s = ((clip.times[span] - clip.times[a]) / length)[:, None, None]
     base = clip.rotations[a]
     target = log(np.swapaxes(base, -1, -2) @ clip.rotations[b])
-    before, after = _velocities(clip, a, -1), _velocities(clip, b, +1)
-    v0, v1 = _limited(before[0] * length, target), _limited(after[0] * length, target)
+    before = _velocities(clip, a, -1)
+    after = _velocities(clip, b, +1)
+    v0 = _limited(before[0] * length, target)
+    v1 = _limited(after[0] * length, target)
     turn = _hermite(s, np.zeros_like(target), target, v0, v1)
     out = clip.copy()
     out.rotations[span] = base @ exp(turn)
     step = clip.root[b] - clip.root[a]
-    v0, v1 = _limited(before[1] * length, step), _limited(after[1] * length, step)
+    v0 = _limited(before[1] * length, step)
+    v1 = _limited(after[1] * length, step)
     out.root[span] = clip.root[a] + _hermite(s[:, 0], np.zeros(3), step, v0, v1)
     return out
 
@@ -103,7 +107,8 @@ def _hermite(
     v1: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Evaluate the cubic from p0 to p1 with derivatives v0, v1 with respect to s, 0 to 1."""
-    s2, s3 = s * s, s * s * s
+    s2 = s * s
+    s3 = s * s * s
     value: NDArray[np.float64]
     value = (
         (2 * s3 - 3 * s2 + 1) * p0

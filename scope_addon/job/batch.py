@@ -57,7 +57,8 @@ class Batch:
     ) -> None:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder; give the folder with the footage")
-        self.folder, self.out = folder.resolve(), out.resolve()
+        self.folder = folder.resolve()
+        self.out = out.resolve()
         self.report_file = out / REPORT_NAME
         self.settings = CaptureSettings(options, tuple(suffixes), extras)
         self._program = list(program)
@@ -134,7 +135,8 @@ class Batch:
     ) -> Iterator[ClipTask]:
         """Yield the task of each clip."""
         for name, path in clips.items():
-            file, entry = path.relative_to(self.folder).as_posix(), previous.get(name)
+            file = path.relative_to(self.folder).as_posix()
+            entry = previous.get(name)
             known = entry if entry and self._is_finished(entry) else None
             yield ClipTask(
                 name, file, str(path), str(self.out), self._basis, self.settings, known, again=again

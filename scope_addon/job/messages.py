@@ -58,7 +58,8 @@ def _are_names(value: object) -> bool:
 def _is_report(value: object) -> bool:
     if not isinstance(value, dict):
         return False
-    warnings, rates = value.get("warnings", []), value.get("fps", {})
+    warnings = value.get("warnings", [])
+    rates = value.get("fps", {})
     if not isinstance(warnings, list) or not isinstance(rates, dict):
         return False
     are_finite = all(

@@ -38,7 +38,9 @@ FILE = "preview.rgba"
 OPACITY = 0.75
 _SUPERSAMPLE = 2  # scale at which lines and bodies are drawn, for antialiasing
 
-_LEFT, _RIGHT, _MIDDLE = (255, 140, 40), (40, 150, 255), (235, 235, 235)
+_LEFT = (255, 140, 40)
+_RIGHT = (40, 150, 255)
+_MIDDLE = (235, 235, 235)
 _LIMBS = (
     "shoulder elbow",
     "elbow wrist",
@@ -63,12 +65,14 @@ class PreviewWriter:
     """
 
     def __init__(self, folder: Path, send: Callable[..., None]) -> None:
-        self._path, self._send = folder / FILE, send
+        self._path = folder / FILE
+        self._send = send
         self._last = -np.inf
         self._pool = ThreadPoolExecutor(2, "scope-preview")
         self._rasterizer = self._pool.submit(load_rasterizer)
         self._drawing: Future[None] | None = None
-        self._open, self._writing = True, threading.Lock()
+        self._open = True
+        self._writing = threading.Lock()
 
     def __enter__(self) -> PreviewWriter:
         return self
@@ -162,7 +166,8 @@ def draw(
 
 
 def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArray[np.uint8]:
-    intrinsics, colors = scaled_intrinsics(pose.camera.intrinsics, scale), body_colors(pose.body, 0)
+    intrinsics = scaled_intrinsics(pose.camera.intrinsics, scale)
+    colors = body_colors(pose.body, 0)
     return draw_overlay(
         image, pose.vertices_cam, pose.body.faces, intrinsics, pose.camera.dist, colors, OPACITY
     )
@@ -172,7 +177,8 @@ def _draw_skeleton(image: NDArray[np.uint8], observation: Observation, scale: fl
     """Draw the limbs between confident keypoints into the image, in place."""
     pixels = np.round((observation.keypoints_px + 0.5) * scale).astype(int)
     for a, b, color in _LINES:
-        i, j = KEYPOINT_NAMES.index(a), KEYPOINT_NAMES.index(b)
+        i = KEYPOINT_NAMES.index(a)
+        j = KEYPOINT_NAMES.index(b)
         if min(observation.keypoints_confidence[[i, j]]) > 0.3:
             cv2.line(
                 image, pixels[i].tolist(), pixels[j].tolist(), color, 2 * _SUPERSAMPLE, cv2.LINE_AA

@@ -52,7 +52,8 @@ class LineRequest:
 class JobRequest(LineRequest):
     """One capture: the footage, and a value for each option of `Place.WORKER`."""
 
-    called, first_key = "a capture request", "footage"
+    called = "a capture request"
+    first_key = "footage"
 
     def __init__(self, footage: str, **values: Any) -> None:
         """Check the values, and fill in the defaults of the others.

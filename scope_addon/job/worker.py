@@ -35,7 +35,8 @@ class Reporter:
 
     def __init__(self, stream: IO[str]) -> None:
         self._stream = stream
-        self._last_stage, self._last_time = "", 0.0
+        self._last_stage = ""
+        self._last_time = 0.0
         self._lock = threading.Lock()
 
     def send(self, event: str, **values: object) -> None:
@@ -52,7 +53,8 @@ class Reporter:
         now = time.monotonic()
         if stage == self._last_stage and done != total and now - self._last_time < _MIN_INTERVAL_S:
             return
-        self._last_stage, self._last_time = stage, now
+        self._last_stage = stage
+        self._last_time = now
         self.send("progress", stage=stage, done=done, total=total)
 
 
@@ -119,7 +121,8 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
 
     with unfinished_capture(_caches(job_folder), Path(request.footage)) as unfinished:
         with PreviewWriter(job_folder, reporter.send) as watch:
-            body, options = load_body(request.values["body"]), capture_options(request.values)
+            body = load_body(request.values["body"])
+            options = capture_options(request.values)
             result = capture(request.footage, body, options, reporter.progress, watch, unfinished)
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)

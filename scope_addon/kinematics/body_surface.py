@@ -39,7 +39,9 @@ def with_arm_points(body: Body) -> Body:
     """Add four keypoints to a body: on each forearm, at a third and two thirds of the way from
     elbow to wrist.
     """
-    parts, template, shapedirs = [], [], []
+    parts = []
+    template = []
+    shapedirs = []
     for side in ("left", "right"):
         elbow, wrist = (body.joint_names.index(f"{side}_{joint}") for joint in ("elbow", "wrist"))
         for share in (1 / 3, 2 / 3):
@@ -76,19 +78,19 @@ class BodySurface:
             if it has them.
         :param betas: (P,) shape coefficients.
         """
-        v, J, normals = (
-            body.rest_vertices(betas),
-            body.rest_joints(betas),
-            _vertex_normals(body, betas),
-        )
+        v = body.rest_vertices(betas)
+        J = body.rest_joints(betas)
+        normals = _vertex_normals(body, betas)
         sampled = [
             k for k, name in enumerate(body.joint_names) if name in _TRUNK or name.endswith(_LEGS)
         ]
         rows = np.flatnonzero(np.isin(body.strongest_joints, sampled) & normals.any(axis=1))
         rows = rows[one_per_cell(v[rows], SPACING_M)]
         arms = v[np.isin(body.strongest_joints, _arm_parts(body))]
-        self._body, self._betas = body, betas
-        self._count, self._skin = len(rows), list(_skin(body, rows, v[rows], J, normals[rows]))
+        self._body = body
+        self._betas = betas
+        self._count = len(rows)
+        self._skin = list(_skin(body, rows, v[rows], J, normals[rows]))
         self.indices = _points_on_arms(body) if len(rows) and len(arms) else np.zeros(0, np.intp)
         points = (body.keypoint_template + body.keypoint_shapedirs @ betas)[self.indices]
         self._room = np.linalg.norm(points[:, None] - arms, axis=-1).min(axis=1, initial=np.inf)
@@ -187,7 +189,8 @@ def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.
     In plain numpy, unlike the rasterizer's, because motions are also edited where nothing is
     compiled.
     """
-    v, triangles = body.rest_vertices(betas), body.triangles()
+    v = body.rest_vertices(betas)
+    triangles = body.triangles()
     a, b, c = (v[triangles[:, corner]] for corner in range(3))
     areas = np.cross(b - a, c - a)
     volume = (a * areas).sum()

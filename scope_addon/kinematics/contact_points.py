@@ -30,7 +30,8 @@ def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
 
     :param betas: (P,) shape coefficients.
     """
-    v, J = body.rest_vertices(betas), body.rest_joints(betas)
+    v = body.rest_vertices(betas)
+    J = body.rest_joints(betas)
     # The palms are on the hands, or on the wrists of a body with fingers.
     kind = "hand" if "left_hand" in body.joint_names else "wrist"
     names = (*FOOT_PARTS, f"left_{kind}", f"right_{kind}")

@@ -40,7 +40,8 @@ class FootSkin:
 
         :param betas: (P,) shape coefficients.
         """
-        v, J = body.rest_vertices(betas), body.rest_joints(betas)
+        v = body.rest_vertices(betas)
+        J = body.rest_joints(betas)
         self.parts = [body.joint_names.index(name) for name in FOOT_PARTS]
         self.points: list[NDArray[np.float64]] = []  # of each part, (n, 3) from its joint
         for part in self.parts:
@@ -132,7 +133,8 @@ def lower_floors(
     :param times: (T,) seconds.
     :return: the first row and the row after the last one of each span.
     """
-    lowest, rests = heights.min(axis=1), ((contact > 0.5) & (heights < -LEVEL_M)).any(axis=1)
+    lowest = heights.min(axis=1)
+    rests = ((contact > 0.5) & (heights < -LEVEL_M)).any(axis=1)
     found = []
     for first, end in runs(lowest < -LEVEL_M):
         if (
@@ -197,6 +199,7 @@ def _duration(mask: NDArray[np.bool_], times: NDArray[np.float64]) -> float:
 def _directions() -> NDArray[np.float64]:
     """Return unit vectors (n, 3) that are spread evenly over the sphere, by a Fibonacci spiral."""
     k = np.arange(_DIRECTIONS) + 0.5
-    z, turn = 1 - 2 * k / _DIRECTIONS, np.pi * (1 + np.sqrt(5)) * k
+    z = 1 - 2 * k / _DIRECTIONS
+    turn = np.pi * (1 + np.sqrt(5)) * k
     flat = np.sqrt(1 - z * z)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)

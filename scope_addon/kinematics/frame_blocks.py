@@ -29,7 +29,8 @@ def by_blocks(
     :param frames: of a block; by default `BLOCK_FRAMES`.
     :return: arrays (T, ...).
     """
-    T, frames = len(arrays[0]), frames or BLOCK_FRAMES
+    T = len(arrays[0])
+    frames = frames or BLOCK_FRAMES
     out: list[NDArray[Any]] = []
     for start in range(0, max(T, 1), frames):
         block = slice(start, start + frames)

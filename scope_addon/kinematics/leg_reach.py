@@ -50,7 +50,8 @@ def move_feet(
         moved = np.flatnonzero(np.linalg.norm(shift[:, side], axis=1) > 1e-6)
         if not len(moved):
             continue
-        upper, lower = t[moved, knee] - t[moved, hip], t[moved, ankle] - t[moved, knee]
+        upper = t[moved, knee] - t[moved, hip]
+        lower = t[moved, ankle] - t[moved, knee]
         goal = upper + lower + shift[moved, side]
         length = np.linalg.norm(upper, axis=1) + np.linalg.norm(lower, axis=1)
         now = np.linalg.norm(upper + lower, axis=1)
@@ -60,7 +61,8 @@ def move_feet(
         bend = knee_turn(upper, lower, R[moved, hip, :, 0], np.clip(wanted, shortest, longest))
         reached = upper + np.einsum("tij,tj->ti", bend, lower)
         swing = shortest_turn(reached, goal)
-        thigh, shin = swing @ R[moved, hip], swing @ bend @ R[moved, knee]
+        thigh = swing @ R[moved, hip]
+        shin = swing @ bend @ R[moved, knee]
         parent = R[moved, body.parents[hip]]
         out[moved, hip] = np.swapaxes(parent, 1, 2) @ thigh
         out[moved, knee] = np.swapaxes(thigh, 1, 2) @ shin
@@ -83,10 +85,12 @@ def knee_turn(
     :param sideways: (n, 3) the thigh's unit axis about which a knee bends.
     :param wanted: (n,) distance between hip and ankle, metres.
     """
-    a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
+    a = np.linalg.norm(upper, axis=1)
+    b = np.linalg.norm(lower, axis=1)
     axis = cross(upper, lower) / (a * b)[:, None] + HINGE * sideways
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-9)
-    along_u, along_l = (upper * axis).sum(1), (lower * axis).sum(1)
+    along_u = (upper * axis).sum(1)
+    along_l = (lower * axis).sum(1)
     fixed = along_u * along_l
     cosine = (upper * lower).sum(1) - fixed
     sine = (upper * cross(axis, lower)).sum(1)
@@ -101,5 +105,6 @@ def cross(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray
 
     :param a, b: (n, 3).
     """
-    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    (ax, ay, az) = a.T
+    (bx, by, bz) = b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)

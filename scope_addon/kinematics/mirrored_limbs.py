@@ -72,7 +72,8 @@ def mirrored_limb(
     :return: (T, 2, 3, 3) Ω of the parts of both bones.
     """
     first, second, end = limb
-    R_first, R_second = R_part[:, first], R_part[:, second]
+    R_first = R_part[:, first]
+    R_second = R_part[:, second]
     if upper:
         R_first = _mirrored(R_first, joints[:, first], joints[:, second], center)
     if lower:
@@ -89,7 +90,8 @@ def _mirrored(
     ends: NDArray[np.floating[Any]],
     center: NDArray[np.floating[Any]],
 ) -> NDArray[np.floating[Any]]:
-    bone, sight = ends - starts, line_of_sight(ends - center)
+    bone = ends - starts
+    sight = line_of_sight(ends - center)
     other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
     turned: NDArray[np.floating[Any]] = shortest_turn(bone, other) @ R
     return turned

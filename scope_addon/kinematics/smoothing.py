@@ -108,12 +108,11 @@ def gaussian_smooth(
     near = np.searchsorted(times, times + 4 * sigma, side="right") - np.arange(T)
     reach = min(int(near.max()), T - 1)
     flat = values.reshape(T, -1)
-    total, weight = np.zeros_like(flat, float), np.zeros(T)
+    total = np.zeros_like(flat, float)
+    weight = np.zeros(T)
     for shift in range(-reach, reach + 1):
-        to, start = (
-            slice(max(0, -shift), T - max(0, shift)),
-            slice(max(0, shift), T - max(0, -shift)),
-        )
+        to = slice(max(0, -shift), T - max(0, shift))
+        start = slice(max(0, shift), T - max(0, -shift))
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w

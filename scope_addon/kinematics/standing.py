@@ -24,7 +24,9 @@ CONTACT_CUTOFF_HZ = 4.0
 FALL_M_S2 = 6.0
 # A foot in the air does not stay still. If one does for about a second, it may be higher than the
 # lowest point because its depth is wrong: it is then displaced up or down along its line of sight.
-STILL_M_S, STILL_CUTOFF_HZ = 0.12, 0.6  # v₁, and of the mean of the speed
+# v₁, and of the mean of the speed
+STILL_M_S = 0.12
+STILL_CUTOFF_HZ = 0.6
 WRONG_DEPTH_M = 0.4  # d
 UNEVEN_M = 0.6  # h_u, by which one foot may rest higher than the other on stairs or boxes
 LEVEL_M = 0.25  # h_l: feet standing farther above or below stand on something else

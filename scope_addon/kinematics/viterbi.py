@@ -20,7 +20,8 @@ def least_cost_path(costs: NDArray[np.float64], switching: NDArray[np.float64]) 
     :return: (T,) states.
     """
     T, S = costs.shape
-    path, came_from = np.zeros(T, int), np.zeros((T, S), np.int8)
+    path = np.zeros(T, int)
+    came_from = np.zeros((T, S), np.int8)
     if T == 0:
         return path
     total = costs[0]

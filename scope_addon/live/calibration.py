@@ -33,7 +33,9 @@ from ..kinematics.contact_points import SOLES
 STAGES = 3  # of the approach to an estimate
 # relative difference of focal lengths, for which the lines of the background point alike
 SAME_FOCAL = 0.02
-SAME_HEIGHT_M, SAME_UP_COS = 0.015, np.cos(np.radians(1.0))  # of two estimates of one floor
+# of two estimates of one floor
+SAME_HEIGHT_M = 0.015
+SAME_UP_COS = np.cos(np.radians(1.0))
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,8 @@ class GradualCalibration:
     """
 
     def __init__(self, start: Calibration, settling_s: float) -> None:
-        self._stages, self._settling_s = [start] * STAGES, settling_s
+        self._stages = [start] * STAGES
+        self._settling_s = settling_s
 
     def step(self, target: Calibration, step_s: float, world_s: float) -> Calibration:
         """Let time pass, and return the calibration.
@@ -118,7 +121,10 @@ class Calibrator:
     def __init__(
         self, body: Body, camera: Camera, size: tuple[int, int], height_m: float | None = None
     ) -> None:
-        self._body, self._given, self._size, self._height_m = body, camera, size, height_m
+        self._body = body
+        self._given = camera
+        self._size = size
+        self._height_m = height_m
         self._fits = FocalFits(body)
         self._costs: list[NDArray[np.float64]] = []
         self._longer_px = float(max(size))
@@ -129,7 +135,8 @@ class Calibrator:
 
     def observe(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
         """Find the edges of the background in a frame (H, W, 3) in which somebody is seen."""
-        people, bars = [observation.keypoints_px], find_bars(image_rgb)
+        people = [observation.keypoints_px]
+        bars = find_bars(image_rgb)
         self._segments = find_segments(image_rgb, people, bars=bars)
         if self._given.focal_deviation > 0.0:
             self._longer_px = longer_content_side(bars, *self._size)
@@ -192,7 +199,8 @@ class Calibrator:
             ).up
             self._focal_of_lines = float(focal_px)
         if self._up_of_lines is not None:
-            up, valid = self._up_of_lines, placed.valid
+            up = self._up_of_lines
+            valid = placed.valid
             contact = placed.contact(up)[valid, : len(SOLES)]
             T = world_from_level_camera(up, -floor_height(placed.soles[valid], contact, up))
             T[:2, 3] -= transform_points(T, placed.joints[valid.argmax(), :1])[0, :2]

@@ -38,7 +38,8 @@ _SOLE_KEYPOINTS = [
 # clip's squat, the distance is wrong by up to 37 cm without them, and by 12 cm with them. Ten times
 # the first lets feet slide no less, and tilts bodies whose feet were first seen at a wrong
 # distance.
-_RESTING, _FLOOR = 1e4, 1e5
+_RESTING = 1e4
+_FLOOR = 1e5
 SAME_SHAPE = 1e-3  # difference of shape coefficients below which the contact points stay the same
 
 
@@ -65,7 +66,8 @@ class CausalFit:
     ) -> None:
         self._shape_of_points: NDArray[np.floating[Any]] | None = None
         prepared = prepare_track(body, single_frame_track(observation), camera, height_m=height_m)
-        self._prepared, self._camera = prepared, camera
+        self._prepared = prepared
+        self._camera = camera
         weights = replace(prepared.weights, floor=_FLOOR, foot_contact=_RESTING)
         self._cold, self._warm = (
             replace(ROBUST, stages=stages(weights)) for stages in (cold_stages, warm_stages)
@@ -97,10 +99,8 @@ class CausalFit:
         ):
             self._shape_of_points = betas
             body = with_contact_points(self._prepared.body, betas)
-            self._measurer, self._solver = (
-                Measurer(body, self._camera.intrinsics),
-                FrameSolver(body),
-            )
+            self._measurer = Measurer(body, self._camera.intrinsics)
+            self._solver = FrameSolver(body)
             self._contact_points = (
                 np.arange(len(CONTACT_POINTS)) + len(body.keypoint_names) - len(CONTACT_POINTS)
             )
@@ -131,7 +131,8 @@ class CausalFit:
         if initial is not None and self._measurer.contradicts(measurements, found.t_camera_part):
             restarted = self._solve(measurements, initial, self._cold)
             found = restarted if restarted.cost < found.cost else found
-        self._last, self._last_s = found, time_s
+        self._last = found
+        self._last_s = time_s
         state = found.state
         return FittedFrame(
             np.concatenate([state.R_camera_root[None], state.Omega]),
@@ -165,10 +166,8 @@ class CausalFit:
         confidence = np.array([o.keypoints_confidence for o in seen])
         pixels = self._camera.undistort(np.array([o.keypoints_px for o in seen]))
         world = np.array([o.world_landmarks for o in seen])
-        windows, rays = (
-            windows_around(times, np.ones(len(times), bool)),
-            self._measurer.rays(pixels),
-        )
+        windows = windows_around(times, np.ones(len(times), bool))
+        rays = self._measurer.rays(pixels)
         lifted = default_lifter().lift_mixture(
             rays, confidence, world, windows, rows=np.array([len(seen) - 1])
         )

@@ -50,7 +50,8 @@ class _Frame:
         """Add the cost of the reference network's answer if it is there."""
         if self.reference is None or not (wait or self.reference.done()):
             return
-        landmarks, self.reference = self.reference.result(), None
+        landmarks = self.reference.result()
+        self.reference = None
         if landmarks is not None:
             self.costs = self.costs + mean_distance(self.readings, landmarks[LIMBS])
 

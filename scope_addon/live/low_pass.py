@@ -71,10 +71,12 @@ class VectorFilter:
         """
         x: NDArray[np.float64] = np.array(value, float)
         if not self._values or not 0.0 < step_s <= LONGEST_STEP_S:
-            self._values, self._age_s = [x] * self._response.stages, 0.0
+            self._values = [x] * self._response.stages
+            self._age_s = 0.0
             return x
         self._age_s += step_s
-        share, before = self._response.share(step_s), self._values[-1]
+        share = self._response.share(step_s)
+        before = self._values[-1]
         for k, state in enumerate(self._values):
             self._values[k] = x = self._between(state, x, share)
         return self._beyond(before, x, self._response.lead(self._age_s) / step_s)

@@ -53,7 +53,8 @@ class _FollowedPerson:
     def update(self, tracklet: int, observation: Observation, time_s: float) -> None:
         """Note that the person was seen."""
         before = self.end if self.tracklet == tracklet else None
-        self.tracklet, self.end = tracklet, _end(observation, time_s, before)
+        self.tracklet = tracklet
+        self.end = _end(observation, time_s, before)
         if observation.appearance is not None:
             self.appearance = self.appearance + observation.appearance
 
@@ -86,7 +87,8 @@ class LivePeople:
         count: int = 1,
         executor: Executor | None = None,
     ) -> None:
-        self._tracker, self._exposure = tracker, AutoExposure()
+        self._tracker = tracker
+        self._exposure = AutoExposure()
         heights = [*heights_m, *[None] * count][:count]
         first = LiveSession(body, camera, size, heights[0], executor)
         others = [
@@ -153,7 +155,8 @@ def _end(observation: Observation, time_s: float, before: End | None = None) -> 
     """Return where somebody is seen, and how fast they move if it is known where they were
     before.
     """
-    center, velocity = trunk_px(observation.keypoints_px), np.zeros(2)
+    center = trunk_px(observation.keypoints_px)
+    velocity = np.zeros(2)
     if before is not None:
         velocity = before.velocity_px
         if time_s > before.time:

@@ -178,8 +178,12 @@ class _Poses:
         executor: ThreadPoolExecutor,
         listeners: Listeners,
     ) -> None:
-        self._source, self._body, self._options = source, body, options
-        self._tracker, self._executor, self._listeners = tracker, executor, listeners
+        self._source = source
+        self._body = body
+        self._options = options
+        self._tracker = tracker
+        self._executor = executor
+        self._listeners = listeners
         self._size: tuple[int, int] | None = None
         self._people: LivePeople | None = None
 
@@ -235,7 +239,8 @@ def _loop(
         if now_s - shown_s >= PROGRESS_S:
             shown_s = now_s
             median_ms, p95_ms = statistics.latency_ms()
-            rate, counts = statistics.recent_rate, (reader.dropped, reader.received, reader.damaged)
+            rate = statistics.recent_rate
+            counts = (reader.dropped, reader.received, reader.damaged)
             # of whoever is seen best
             presence = min((pose.presence for pose in found), key=list(Presence).index)
             listeners.progress(LiveProgress(presence, rate, median_ms, p95_ms, *counts))

@@ -29,7 +29,8 @@ from .smoothing import PoseFilter
 CALIBRATED_S = 2.0  # after the person was first seen
 CALIBRATE_AT_S = (0.0, 0.3, 0.7, 1.2, CALIBRATED_S)
 # between two estimates of the world afterwards, and how much each of them sees
-FOLLOW_S, FOLLOWED_S = 1.0, 4.0
+FOLLOW_S = 1.0
+FOLLOWED_S = 4.0
 # Time constants towards the estimates, see `GradualCalibration`.
 SETTLING_S = 0.1
 FOLLOWING_S = 10.0  # at least
@@ -93,15 +94,14 @@ class LiveSession:
         executor: Executor | None = None,
         first_person: LiveSession | None = None,
     ) -> None:
-        self._body, self._size, self._height_m, self._first_person = (
-            body,
-            size,
-            height_m,
-            first_person,
-        )
+        self._body = body
+        self._size = size
+        self._height_m = height_m
+        self._first_person = first_person
         self._start: Start = executor.submit if executor else start_at_once
         self._calibrator = Calibrator(body, camera, size, height_m)
-        self._filter, self._feet = PoseFilter(), FootHold(body)
+        self._filter = PoseFilter()
+        self._feet = FootHold(body)
         self._left_right = CausalLeftRight(wait=executor is None)
         self._fit: CausalFit | None = None
         self._current: Calibration | None = None
@@ -150,7 +150,8 @@ class LiveSession:
             self._gradual = GradualCalibration(self._target, SETTLING_S)
             self._fit = CausalFit(self._body, observation, self._current.camera, self._height_m)
             self._fit.set_shape(self._current.betas)
-            self._first_s, self._calibrations = time_s, 1
+            self._first_s = time_s
+            self._calibrations = 1
         fitted = self._fit.fit(
             time_s, observation, self._root_of_feet(time_s), self._support(time_s, observation)
         )
@@ -192,7 +193,8 @@ class LiveSession:
         ):
             return
         if self._pending is not None and self._pending.done():
-            self._target, self._pending = self._pending.result(), None
+            self._target = self._pending.result()
+            self._pending = None
         if self._pending is None:
             self._start_estimate(time_s)
         step_s = (
@@ -220,7 +222,8 @@ class LiveSession:
         )
 
     def _start_estimate(self, time_s: float) -> None:
-        times, observations = [s.time_s for s in self._seen], [s.observation for s in self._seen]
+        times = [s.time_s for s in self._seen]
+        observations = [s.observation for s in self._seen]
         if not times or self._target is None:
             return
         if self._calibrations < len(CALIBRATE_AT_S):
@@ -232,8 +235,10 @@ class LiveSession:
                 self._next_follow_s = time_s + FOLLOW_S
         elif time_s >= self._next_follow_s and self._first_person is None:
             self._next_follow_s = time_s + FOLLOW_S
-            track, fitted = track_of(times, observations), self._fitted_track()
-            known, now = self._target, self._current
+            track = track_of(times, observations)
+            fitted = self._fitted_track()
+            known = self._target
+            now = self._current
             # estimates that agree with the world as it is leave it so
             if self.is_settled(time_s) and now is not None:
                 known = replace(known, up=now.up, camera_position=now.camera_position)
@@ -265,7 +270,9 @@ class LiveSession:
 
     def _pose(self, frame: Frame, observation: Observation, fitted: FittedFrame) -> LivePose:
         assert self._current is not None
-        time_s, now, T = frame.timestamp_s, self._current, self._current.T_world_camera
+        time_s = frame.timestamp_s
+        now = self._current
+        T = self._current.T_world_camera
         if time_s - self._last_seen_s > HOLD_S:
             self._filter.reset()
             self._feet.reset()
@@ -308,7 +315,8 @@ class LiveSession:
         )
 
     def _rest(self) -> LivePose:
-        body, state = self._body, State.rest(self._body.K, self._body.P)
+        body = self._body
+        state = State.rest(self._body.K, self._body.P)
         rotations = np.concatenate([state.R_camera_root[None], state.Omega])
         height = float(body.stature(state.beta)) / 2
         level = Calibration(
@@ -317,7 +325,8 @@ class LiveSession:
             np.array([0, -1.0, 0]),
             np.array([0, -3.0, height]),
         )
-        T, root = level.T_world_camera, state.t_camera_root
+        T = level.T_world_camera
+        root = state.t_camera_root
         joints = self._joints(state.beta, rotations, root, T)
         nothing: tuple[NDArray[Any], ...] = np.zeros(4), np.zeros((33, 3)), np.zeros(body.K + 1)
         contact, keypoints, confidence = nothing

@@ -21,7 +21,8 @@ class PoseFilter:
 
     def __init__(self) -> None:
         self._rotations = RotationFilter(MOTION)
-        self._direction, self._distance = VectorFilter(MOTION), VectorFilter(DISTANCE)
+        self._direction = VectorFilter(MOTION)
+        self._distance = VectorFilter(DISTANCE)
         self._last_s = -np.inf
 
     def reset(self) -> None:
@@ -40,7 +41,8 @@ class PoseFilter:
         :param rotations: (K+1, 3, 3).
         :param root_cam: (3,) camera frame, metres.
         """
-        step_s, self._last_s = time_s - self._last_s, time_s
+        step_s = time_s - self._last_s
+        self._last_s = time_s
         distance = max(float(np.linalg.norm(root_cam)), 1e-6)
         ray = self._direction(root_cam / distance, step_s)
         log_distance = self._distance(np.array([np.log(distance)]), step_s)

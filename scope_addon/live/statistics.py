@@ -26,7 +26,8 @@ class Statistics:
         :param arrived_s: when its frame came, or was due.
         :param now_s: when the pose was known.
         """
-        self._first_s, self._last_s = self._first_s if self.poses else now_s, now_s
+        self._first_s = self._first_s if self.poses else now_s
+        self._last_s = now_s
         self.poses += 1
         self._given.append(now_s)
         while self._given[0] < now_s - RECENT_S:

@@ -10,8 +10,13 @@ from typing import Any
 
 from .record import Argument, Choice, Option, Place, Property
 
-LARGEST, ALL = "largest", "all"  # people
-OFF, AUTO, ON = "off", "auto", "on"  # hands
+# people
+LARGEST = "largest"
+ALL = "all"
+# hands
+OFF = "off"
+AUTO = "auto"
+ON = "on"
 
 _EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PANEL
 _LIVE = Place.LIVE | Place.LIVE_WORKER

@@ -86,7 +86,8 @@ def capture_page(
     :param rows: (n,) rows of the motions that the page shows.
     :param pictures: of the overlay.
     """
-    name, first = Path(clip.video).name, clip.motions[0]
+    name = Path(clip.video).name
+    first = clip.motions[0]
     captions = [
         f"frame {first.frames[rows[p.row]]}, {first.timestamps[rows[p.row]]:.2f} s"
         for p in pictures
@@ -131,7 +132,8 @@ def capture_page(
 
 def header_facts(clip: CapturedClip) -> dict[str, str]:
     """Return the facts at the head of the page."""
-    report, motion = clip.report, clip.motions[0]
+    report = clip.report
+    motion = clip.motions[0]
     rate = report["frame_rate"][0] / report["frame_rate"][1]
     width, height = motion.image_size.tolist()
     return {
@@ -245,7 +247,8 @@ def marked_spans(
 
 def time_axis(times: NDArray[np.float64]) -> Axis:
     """Return the axis of frames at times (T,), in seconds."""
-    first, last = float(times[0]), float(times[-1])
+    first = float(times[0])
+    last = float(times[-1])
     return Axis(first, last if last > first else first + 1.0, unit="s")
 
 
@@ -255,7 +258,8 @@ def warning_list(warnings: Sequence[str]) -> list[Markup]:
         return [Markup('<p class="none">None.</p>\n')]
     items = []
     for text in warnings:
-        parts, end = [], 0
+        parts = []
+        end = 0
         for match in _AT_TIME.finditer(text):
             parts += [
                 escape(text[end : match.start()]),
@@ -271,7 +275,8 @@ def review_table(motions: Sequence[Motion], spans: Sequence[Sequence[Span]]) -> 
     rows: list[list[str | Markup]] = []
     for n, (motion, of_one) in enumerate(zip(motions, spans, strict=True)):
         for span in of_one:
-            first, last = float(motion.timestamps[span.first]), float(motion.timestamps[span.last])
+            first = float(motion.timestamps[span.first])
+            last = float(motion.timestamps[span.last])
             frames = f"{motion.frames[span.first]} to {motion.frames[span.last]}"
             rows.append(
                 [

@@ -18,7 +18,8 @@ from ..capture.overlay.overlay_video import painted_frames
 from ..errors import OutputError
 from ..motion import Motion
 
-PICTURES, LONGEST_SIDE = 40, 800
+PICTURES = 40
+LONGEST_SIDE = 800
 MAX_BYTES = 5_000_000  # of all pictures of a page
 _QUALITY = 74  # of WebP
 

@@ -61,6 +61,7 @@ def highest_speed(points: NDArray[np.float64], times: NDArray[np.float64]) -> fl
     ends = np.searchsorted(times, times + _SPEED_WINDOW_S - 1e-6)
     first = np.flatnonzero(ends < len(times))
     if not len(first):
-        first, ends = np.array([0]), np.array([len(times) - 1])
+        first = np.array([0])
+        ends = np.array([len(times) - 1])
     distance = np.linalg.norm(points[ends[first]] - points[first], axis=1)
     return float((distance / np.maximum(times[ends[first]] - times[first], 1e-9)).max())

@@ -92,7 +92,8 @@ def table(
         cells = [cell if n in markup_columns else escape(cell) for n, cell in enumerate(row)]
         first = f'<th scope="row">{cells[0]}</th>'
         lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in cells[1:])}</tr>")
-    kind, below = ' class="numbers"' if numbers else "", "".join(lines[1:])
+    kind = ' class="numbers"' if numbers else ""
+    below = "".join(lines[1:])
     return Markup(
         f'<div class="wide">'
         f"<table{kind}><thead>{lines[0]}</thead><tbody>{below}</tbody></table>"

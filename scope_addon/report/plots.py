@@ -16,9 +16,12 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-WIDTH, HEIGHT = 1000.0, 100.0
+WIDTH = 1000.0
+HEIGHT = 100.0
 # heights of the plot area, of the space above it, and of the axis below it
-_AREA_PX, _TOP_PX, _AXIS_PX = 120, 10, 24
+_AREA_PX = 120
+_TOP_PX = 10
+_AXIS_PX = 24
 _ROW_PX = 22  # of a band
 _MAX_POINTS = 1200  # of a curve; of more, the smallest and the largest of each interval are drawn
 
@@ -132,7 +135,8 @@ def band_plot(
     :param color: of CSS.
     """
     height = HEIGHT / max(len(rows), 1)
-    drawn, texts = [], []
+    drawn = []
+    texts = []
     for number, (name, values) in enumerate(rows):
         bottom = (number + 0.92) * height
         drawn.append(_horizontal(bottom, "grid"))
@@ -153,7 +157,8 @@ def line_path(x: Array, y: Array, x_axis: Axis, y_axis: Axis) -> str:
     u = WIDTH * x_axis.share(x)
     v = np.full(len(y), np.nan)
     v[shown] = HEIGHT * (1 - y_axis.share(np.clip(y[shown], y_axis.low, y_axis.high)))
-    parts, pen = [], "M"
+    parts = []
+    pen = "M"
     for at, to, drawn in zip(u.tolist(), v.tolist(), shown.tolist(), strict=True):
         if drawn:
             parts.append(f"{pen}{at:.1f} {to:.2f}")

@@ -29,7 +29,8 @@ def shown_rows(motions: Sequence[Motion]) -> NDArray[np.int64]:
     very long clip.
     """
     frames = len(motions[0])
-    of_camera, of_root = 12 * 4 + 8, 3 * 4 + 1
+    of_camera = 12 * 4 + 8
+    of_root = 3 * 4 + 1
     size = frames * (of_camera + sum(8 * motion.joint_count + of_root for motion in motions))
     return np.arange(0, frames, max(1, -(-size // MAX_BYTES)))
 

@@ -203,7 +203,8 @@ def load_expression_map(path: str | Path) -> ExpressionMap:
     """
     path = Path(path)
     content = load_map(path, _KIND)
-    keys, controls = content.get("shape_keys", {}), content.get("controls", {})
+    keys = content.get("shape_keys", {})
+    controls = content.get("controls", {})
     if not _are_named(keys) or not all(map(_are_factors, keys.values())):
         raise InputError(
             f"{path}: 'shape_keys' must be an object that maps each shape key to expressions and "

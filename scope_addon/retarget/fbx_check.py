@@ -20,7 +20,8 @@ _HEADER_BYTES = 27
 _SCALAR_BYTES = {"C": 1, "B": 1, "Y": 2, "I": 4, "F": 4, "D": 8, "L": 8}
 _ELEMENT_BYTES = {"b": 1, "c": 1, "i": 4, "f": 4, "d": 8, "l": 8}
 _LARGEST_UNPACKED = 1 << 30  # bytes of all arrays together
-_MAX_NODES, _DEEPEST = 5_000_000, 64
+_MAX_NODES = 5_000_000
+_DEEPEST = 64
 _STEP = 1 << 20
 
 
@@ -100,7 +101,9 @@ class _Checker:
         if not compressed:
             size = end - start
         else:
-            unpack, size, rest = zlib.decompressobj(), 0, bytes(self._data[start:end])
+            unpack = zlib.decompressobj()
+            size = 0
+            rest = bytes(self._data[start:end])
             while rest and not unpack.eof and size <= wanted:
                 size += len(unpack.decompress(rest, _STEP))
                 rest = unpack.unconsumed_tail

@@ -67,9 +67,12 @@ def ankle_goal(
     :return: (..., 3) metres.
     """
     yaw = _heading(turn)
-    goals, heights, rolled = [], [], []
+    goals = []
+    heights = []
+    rolled = []
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
-        point, rig_point = ankle + rotated(turn, s), rotated(turn, q)
+        point = ankle + rotated(turn, s)
+        rig_point = rotated(turn, q)
         # height above its rest position on the floor
         above = point[..., 2] - floor - (source.height + s[..., 2])
         place = scales * point

@@ -15,7 +15,9 @@ from .feet import FootRest, ankle_goal, flat_toes, pelvis_drop
 from .legs import solve_leg
 from .skeleton import Skeleton, head_positions, rotated
 
-_SOLE_M, _HEEL_M = 0.015, 0.02  # thickness of the sole, and length of the heel region
+# thickness of the sole, and length of the heel region
+_SOLE_M = 0.015
+_HEEL_M = 0.02
 _REACH = 0.9995  # of a leg's length; beyond it the pelvis is lowered
 _SIDES = ("left", "right")
 
@@ -114,7 +116,8 @@ def _body_feet(
     feet = []
     for side in sides:
         part = body.joint_names.index(f"{side}_ankle")
-        ankle, ball = J[part], J[body.joint_names.index(f"{side}_foot")]
+        ankle = J[part]
+        ball = J[body.joint_names.index(f"{side}_foot")]
         sole = v[(body.strongest_joints == part) & (v[:, 2] < low + _SOLE_M)]
         heel = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0) if len(sole) else ankle
         feet.append(FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, ankle[2] - low))
@@ -135,7 +138,8 @@ def _rig_foot(
     length = float(np.linalg.norm(source.ball[:2]))
     share = float(np.linalg.norm(ball[:2])) / length
     if not 0.3 * scale < share < 3 * scale or ball @ source.ball < 0:
-        share, ball = scale, np.array([*(scale * source.ball[:2]), -0.8 * height])
+        share = scale
+        ball = np.array([*(scale * source.ball[:2]), -0.8 * height])
     # no bone ends at the heel: proportional to the body's
     heel = np.array([*(share * source.heel[:2]), -height])
     return FootRest(heel, ball, height)
@@ -164,7 +168,8 @@ def place_feet(
     :param one_floor: keep feet and toes above the floor; False on uneven ground.
     :return: the changed rotations (T, B, 3, 3) and heads (T, B, 3).
     """
-    world, heads = motion.rotations.copy(), motion.heads.copy()
+    world = motion.rotations.copy()
+    heads = motion.heads.copy()
     turns = motion.turns[:, legs.ankles]
     goals = ankle_goal(
         legs.body, legs.rig, legs.scales, turns, joints[:, legs.joints], one_floor=one_floor
@@ -177,7 +182,8 @@ def place_feet(
     heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
     at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
     left = _rows(motion.turns[:, legs.hips, :, 0])  # about which the body's knees bend
-    thighs, shins = _rows(world[:, legs.hips]), _rows(world[:, legs.knees])
+    thighs = _rows(world[:, legs.hips])
+    shins = _rows(world[:, legs.knees])
     solved = solve_leg(thighs, shins, at, _rows(goals), left)
     world[:, legs.hips], world[:, legs.knees] = (R.reshape(len(world), -1, 3, 3) for R in solved)
     placed = head_positions(rig, world)

@@ -21,7 +21,8 @@ from ...solver.loaders.regular_file import check_regular
 
 _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_LARGEST_JSON, _LARGEST_FILE = 200_000_000, 2 << 30
+_LARGEST_JSON = 200_000_000
+_LARGEST_FILE = 2 << 30
 _MAX_ELEMENTS = 50_000_000  # of an accessor without data, whose elements are all zero
 _DAMAGED = (
     KeyError,
@@ -67,7 +68,8 @@ def _read(path: Path) -> tuple[dict[str, Any], int]:
     check_regular(path, InputError, "rig", _LARGEST_FILE)
     with path.open("rb") as file:
         if path.suffix.lower() == ".gltf":
-            text, binary_bytes = file.read(_LARGEST_JSON), 0
+            text = file.read(_LARGEST_JSON)
+            binary_bytes = 0
         else:
             length = struct.unpack("<4xII", file.read(12))[1]
             json_bytes, kind = struct.unpack("<I4s", file.read(8))
@@ -134,7 +136,9 @@ def _check_accessor(accessor: dict[str, Any], views: list[dict[str, Any]]) -> No
         _require(count <= _MAX_ELEMENTS)
     if "sparse" in accessor:
         sparse = accessor["sparse"]
-        index, values, changed = sparse["indices"], sparse["values"], _natural(sparse["count"])
+        index = sparse["indices"]
+        values = sparse["values"]
+        changed = _natural(sparse["count"])
         index_bytes = _COMPONENT_BYTES[index["componentType"]]
         _check_within(views[index["bufferView"]], index.get("byteOffset", 0), changed, index_bytes)
         _check_within(views[values["bufferView"]], values.get("byteOffset", 0), changed, item_bytes)

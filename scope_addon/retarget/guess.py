@@ -61,7 +61,8 @@ def guess(bones: RestBones) -> BoneMap:
     Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone.
     """
     rigify = _rigify(bones)
-    named, shaped = rigify or by_name(bones), by_geometry(bones)
+    named = rigify or by_name(bones)
+    shaped = by_geometry(bones)
     shaped |= _fingers(bones, shaped)
     if len(set(named.values())) < 8:
         return BoneMap(shaped, dict.fromkeys(shaped, 0.5))
@@ -196,7 +197,8 @@ def by_geometry(bones: RestBones) -> dict[str, str]:
 
     :return: bone name -> body part; empty if no pair of legs is found.
     """
-    heads, parents = bones.heads, bones.parents
+    heads = bones.heads
+    parents = bones.parents
     leaves = [i for i in range(len(parents)) if i not in set(parents.tolist())]
     height = max(float(np.ptp(heads[:, 2])), 1e-9)
     z = (heads[:, 2] - heads[:, 2].min()) / height

@@ -34,8 +34,10 @@ def solve_leg(
     :return: the new rotations of thigh and shin.
     """
     hip, knee, ankle = joints
-    upper, lower = knee - hip, ankle - knee
-    a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
+    upper = knee - hip
+    lower = ankle - knee
+    a = np.linalg.norm(upper, axis=1)
+    b = np.linalg.norm(lower, axis=1)
     distance = np.clip(
         np.linalg.norm(goal - hip, axis=1), np.abs(a - b) + 1e-6, _MAX_STRETCH * (a + b)
     )

@@ -83,7 +83,8 @@ def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
     """Return the turn (3, 3) about the vertical from one direction (3,) to another; none of a steep
     one.
     """
-    flat, goal = along * [1, 1, 0], wanted * [1, 1, 0]
+    flat = along * [1, 1, 0]
+    goal = wanted * [1, 1, 0]
     if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
         return np.eye(3)
     angle = np.arctan2(goal[1], goal[0]) - np.arctan2(flat[1], flat[0])
@@ -107,7 +108,8 @@ def _palm_alignment(
     palms = []
     for points, rows in ((heads, row), (rest, index)):
         wrist, first, last = (points[rows[part]] for part in parts)
-        across, along = first - last, (first + last) / 2 - wrist
+        across = first - last
+        along = (first + last) / 2 - wrist
         normal = np.cross(along, across)
         if np.linalg.norm(normal) < 1e-9:
             return None

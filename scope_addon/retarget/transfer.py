@@ -65,7 +65,10 @@ class Transfer:
             heights are scaled in any case. Rigs that share it keep the distances between the people
             in proportion.
         """
-        self._body, self._betas, self._rig, self._one_floor = body, betas, rig, one_floor
+        self._body = body
+        self._betas = betas
+        self._rig = rig
+        self._one_floor = one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
         row = {
@@ -96,7 +99,9 @@ class Transfer:
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
-        body, betas, rig = self._body, self._betas, self._rig
+        body = self._body
+        betas = self._betas
+        rig = self._rig
         R, joints = body.forward_kinematics(
             clip.rotations, clip.root - body.rest_joints(betas)[0], betas
         )
@@ -131,7 +136,8 @@ def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
     """
     total = 0.0
     for side in ("left", "right"):
-        hip, knee = points[rows[f"{side}_hip"]], points[rows[f"{side}_knee"]]
+        hip = points[rows[f"{side}_hip"]]
+        knee = points[rows[f"{side}_knee"]]
         ankle = rows.get(f"{side}_ankle")
         end = points[ankle] if ankle is not None else knee + (knee - hip)
         total += float(np.linalg.norm(knee - hip) + np.linalg.norm(end - knee))
@@ -147,12 +153,15 @@ def _between(
     Bones turn with the joint of their own part, except those of spine and neck.
     """
     first = np.array([index[part] for part in part_of])
-    second, shares = first.copy(), np.zeros(len(first))
+    second = first.copy()
+    shares = np.zeros(len(first))
     for chain, parts in ((("pelvis", *SPINE), SPINE), (("spine3", "neck"), ("neck",))):
         bones = [b for b, part in enumerate(part_of) if part in parts]
         for k, b in enumerate(bones):
             place = (len(chain) - 1) * (k + 1) / len(bones)
-            low, last = int(place), len(chain) - 1
-            first[b], second[b] = index[chain[low]], index[chain[min(low + 1, last)]]
+            low = int(place)
+            last = len(chain) - 1
+            first[b] = index[chain[low]]
+            second[b] = index[chain[min(low + 1, last)]]
             shares[b] = place - low
     return first, second, shares

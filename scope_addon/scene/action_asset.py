@@ -24,7 +24,9 @@ _ID = re.compile(r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII | re.I
 _SIZE = 256  # pixels of Blender's large previews
 _MAX_BONES = 200
 # of a bone without a ring: share of its length, and limits in metres
-_THICKNESS, _THIN, _THICK = 0.12, 0.012, 0.07
+_THICKNESS = 0.12
+_THIN = 0.012
+_THICK = 0.07
 _RING_TO_LIMB = 0.7  # a ring lies around the surface; a thinner capsule shows the limbs apart
 
 
@@ -53,7 +55,8 @@ def mark_action(action: bpy.types.Action, details: AssetDetails) -> None:
     data = action.asset_data
     for tag in TAGS:
         data.tags.new(tag, skip_if_exists=True)
-    data.author, data.description = details.author, details.description
+    data.author = details.author
+    data.description = details.description
     if catalog is not None:
         data.catalog_id = catalog
 

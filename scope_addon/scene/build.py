@@ -203,7 +203,8 @@ def _set_frame_range(
     if [each for each in scene.collection.children_recursive if CAPTURE_TAG in each] != [
         collection
     ]:
-        first, last = min(first, scene.frame_start), max(last, scene.frame_end)
+        first = min(first, scene.frame_start)
+        last = max(last, scene.frame_end)
     timing.set_frame_range(scene, first, last)
 
 

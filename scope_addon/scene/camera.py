@@ -46,7 +46,8 @@ def pixel_aspect(motion: Motion) -> tuple[float, float]:
     """Return the scene's ``pixel_aspect_x, pixel_aspect_y`` for the intrinsics; Blender requires at
     least 1.
     """
-    fx, fy = motion.intrinsics[0, 0], motion.intrinsics[1, 1]
+    fx = motion.intrinsics[0, 0]
+    fy = motion.intrinsics[1, 1]
     ratio = fy / fx
     if abs(ratio - 1.0) < 1e-6:
         return 1.0, 1.0
@@ -66,9 +67,11 @@ def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     if len(picture) != 4 or min(picture) <= 0:
         return
     width, height, aspect_x, aspect_y = picture
-    scene.render.resolution_x, scene.render.resolution_y = int(width), int(height)
+    scene.render.resolution_x = int(width)
+    scene.render.resolution_y = int(height)
     scene.render.resolution_percentage = 100
-    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect_x, aspect_y
+    scene.render.pixel_aspect_x = aspect_x
+    scene.render.pixel_aspect_y = aspect_y
 
 
 def build_camera(
@@ -111,7 +114,8 @@ def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
     data.lens = SENSOR_WIDTH * fx / width
     data.shift_x = 0.5 - cx / width
     data.shift_y = (cy - 0.5 * height) / width * fx / fy
-    data.clip_start, data.clip_end = 0.01, 1000.0
+    data.clip_start = 0.01
+    data.clip_end = 1000.0
 
 
 def same_camera(a: Motion, b: Motion) -> bool:
@@ -223,7 +227,8 @@ def show_footage_again(
     path = Path(bpy.path.abspath(shown.filepath))
     if not path.is_file():
         return []
-    opacity, visible = former.alpha, former.show_background_image
+    opacity = former.alpha
+    visible = former.show_background_image
     action = camera.data.animation_data.action if camera.data.animation_data else None
     if action is not None and all(
         c.data_path.startswith("background_images[0].image_user") for c in fcurves_of(action)
@@ -237,7 +242,8 @@ def show_footage_again(
     camera.data.background_images.remove(former)
     warnings = show_footage(camera, path, motion, frames)
     again = camera.data.background_images[0]
-    again.alpha, again.show_background_image = opacity, visible
+    again.alpha = opacity
+    again.show_background_image = visible
     return warnings
 
 
@@ -268,7 +274,9 @@ def _show_video(
     :return: the size in pixels, and no warnings.
     """
     clip = bpy.data.movieclips.load(str(path))
-    size, rate = tuple(clip.size), clip.fps  # at which Blender counts the video's frames
+    # at which Blender counts the video's frames
+    size = tuple(clip.size)
+    rate = clip.fps
     bpy.data.movieclips.remove(clip)  # which was never shown
     background.source = "IMAGE"
     background.image = image = bpy.data.images.load(str(path), check_existing=True)
@@ -336,8 +344,11 @@ def _show_frames(user: bpy.types.ImageUser, start: int) -> None:
 
     At scene frame s Blender shows frame s − frame_start + frame_offset of a video, counted from 0.
     """
-    user.frame_start, user.frame_offset, user.frame_duration = start, 0, _MAX_DURATION
-    user.use_auto_refresh, user.use_cyclic = True, False
+    user.frame_start = start
+    user.frame_offset = 0
+    user.frame_duration = _MAX_DURATION
+    user.use_auto_refresh = True
+    user.use_cyclic = False
 
 
 def _set_lens_distortion(
@@ -357,6 +368,10 @@ def _set_lens_distortion(
     lens.principal_point_pixels = motion.intrinsics[0, 2], height - motion.intrinsics[1, 2]
     lens.distortion_model = "BROWN"
     k1, k2, k3, p1, p2 = blender_brown_distortion(motion.dist)
-    lens.brown_k1, lens.brown_k2, lens.brown_k3, lens.brown_k4 = k1, k2, k3, 0.0
-    lens.brown_p1, lens.brown_p2 = p1, p2
+    lens.brown_k1 = k1
+    lens.brown_k2 = k2
+    lens.brown_k3 = k3
+    lens.brown_k4 = 0.0
+    lens.brown_p1 = p1
+    lens.brown_p2 = p2
     background.clip_user.use_render_undistorted = True

@@ -35,7 +35,8 @@ def add_footage_strips(
             f"the footage {path} does not exist; choose the video or image again and "
             "repeat the capture"
         )
-    had_editor, sounds = scene.sequence_editor is not None, set(bpy.data.sounds)
+    had_editor = scene.sequence_editor is not None
+    sounds = set(bpy.data.sounds)
     editor = scene.sequence_editor or scene.sequence_editor_create()
     strips = strips_of(editor)
     if present := _added_before(strips, path):

@@ -212,7 +212,8 @@ def _retime_markers(
             for end in found.groups()[1:]
             if end is not None
         ]
-        marker.name, marker.frame = f"{found.group(1)} {'-'.join(ends)}", int(ends[0])
+        marker.name = f"{found.group(1)} {'-'.join(ends)}"
+        marker.frame = int(ends[0])
 
 
 def _show_footage(

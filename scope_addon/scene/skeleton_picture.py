@@ -63,8 +63,10 @@ def _on_screen(
     right = np.linalg.eigh(flat.T @ flat)[1][:, -1]
     right *= 1.0 if right[np.abs(right).argmax()] > 0 else -1.0
     axes = np.array([[*right, 0.0], [0.0, 0.0, 1.0], [right[1], -right[0], 0.0]])
-    seen, twice = points @ axes.T, np.concatenate([radii, radii])[:, None]
-    low, high = (seen[:, :2] - twice).min(axis=0), (seen[:, :2] + twice).max(axis=0)
+    seen = points @ axes.T
+    twice = np.concatenate([radii, radii])[:, None]
+    low = (seen[:, :2] - twice).min(axis=0)
+    high = (seen[:, :2] + twice).max(axis=0)
     scale = (1.0 - 2.0 * _MARGIN) * size / max(float((high - low).max()), 1e-6)
     seen[:, :2] -= 0.5 * (low + high)
     seen *= scale
@@ -94,11 +96,13 @@ def _draw_capsule(
         float(along @ along), 1e-9
     )
     share = np.clip(share, 0.0, 1.0)
-    dx, dy = x - start[0] - share * along[0], y - start[1] - share * along[1]
+    dx = x - start[0] - share * along[0]
+    dy = y - start[1] - share * along[1]
     inside = dx**2 + dy**2 < radius**2
     height = np.sqrt(np.maximum(radius**2 - dx**2 - dy**2, 0.0))
     z = start[2] + share * (end[2] - start[2]) + height
-    rows, columns = slice(low[1], high[1]), slice(low[0], high[0])
+    rows = slice(low[1], high[1])
+    columns = slice(low[0], high[0])
     nearer = inside & (z > depth[rows, columns])
     light = np.maximum(
         (dx * _LIGHT[0] + dy * _LIGHT[1] + height * _LIGHT[2]) / max(radius, 1e-9), 0.0

@@ -10,7 +10,8 @@ from .datablock_names import is_in_layer
 # Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value
 # says whether the object stays hidden or is only shown temporarily.
 _HIDDEN = "scope_hidden"
-_STAYS, _COMES_BACK = 1, 2
+_STAYS = 1
+_COMES_BACK = 2
 
 
 def hide(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> None:

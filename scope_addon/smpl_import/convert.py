@@ -149,7 +149,8 @@ def convert(
             "floor by its feet"
         )
     motion = _motion(body, betas, poses, root - J0, contact, frames_per_second)
-    motion.gender, motion.source = source.gender, path.name
+    motion.gender = source.gender
+    motion.source = path.name
     return Imported(motion, body, notes)
 
 
@@ -195,7 +196,8 @@ def _standing(
         lambda p, r: (Clip(np.zeros(len(p)), exp(p), r).soles(body, betas),), poses, root
     )
     weight = standing_probability(soles, UP, times)
-    heights, standing = soles[..., 2], weight > 0.5
+    heights = soles[..., 2]
+    standing = weight > 0.5
     return weight, float(np.median(heights[standing] if standing.any() else heights.min(axis=1)))
 
 

@@ -45,12 +45,14 @@ _ALL_JOINTS = (
 _ROOT = ("root_orient", "global_orient")
 _BODY = ("pose_body", "body_pose")
 _HANDS = ("pose_hand", "hand_pose")
-_LEFT_HAND, _RIGHT_HAND = ("left_hand_pose",), ("right_hand_pose",)
+_LEFT_HAND = ("left_hand_pose",)
+_RIGHT_HAND = ("right_hand_pose",)
 _TRANS = ("trans_world", "trans", "transl", "smpl_trans", "translation")
 _BETAS = ("betas", "beta", "smpl_betas", "shape")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "frame_rate", "framerate", "fps")
 _SCALE = ("smpl_scaling",)  # AIST++: by which smpl_trans is to be divided
-_GENDER, _MODEL = "gender", "body_model"
+_GENDER = "gender"
+_MODEL = "body_model"
 _READ = {
     *_ALL_JOINTS,
     *_ROOT,
@@ -158,7 +160,8 @@ def _poses(
     points up.
     """
     key = _first(arrays, _ALL_JOINTS)
-    root, body = _first(arrays, _ROOT), _first(arrays, _BODY)
+    root = _first(arrays, _ROOT)
+    body = _first(arrays, _BODY)
     if key is not None:
         poses = _axis_angles(arrays[key], key, path)
         skeleton = SKELETONS.get(poses.shape[1])

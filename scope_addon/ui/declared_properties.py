@@ -82,7 +82,8 @@ def choices_of(option: Option) -> tuple[Choice, ...]:
 
 def limits_of(option: Option) -> tuple[float | None, float | None]:
     """Return the minimum and maximum of the property, in its own unit."""
-    declared, same_unit = option.blender, not option.blender.unit
+    declared = option.blender
+    same_unit = not option.blender.unit
     low = option.minimum if declared.minimum is None and same_unit else declared.minimum
     high = option.maximum if declared.maximum is None and same_unit else declared.maximum
     return low, high

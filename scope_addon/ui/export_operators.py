@@ -122,14 +122,16 @@ class SCOPE_OT_export(ReportingOperator):
         shown = shown_capture(context.scene)
         name = re.sub(r'[\\/:*?"<>|]', "_", shown.name) if shown else "capture"
         folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
-        self.filepath, self.filter_glob = str(folder / f"{name}{suffix}"), f"*{suffix}"
+        self.filepath = str(folder / f"{name}{suffix}")
+        self.filter_glob = f"*{suffix}"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def check(self, context: bpy.types.Context) -> bool:
         """Correct the suffix while the name is typed."""
         path: str = bpy.path.ensure_ext(self.filepath, _SUFFIX[self.format])
-        changed, self.filepath = path != self.filepath, path
+        changed = path != self.filepath
+        self.filepath = path
         return bool(changed)
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -166,7 +168,8 @@ class SCOPE_OT_export(ReportingOperator):
             separate=self.separate,
             bvh_unit=self.bvh_unit.lower(),
         )
-        collections, rig = captures(context.scene), context.scene.scope_retarget.rig
+        collections = captures(context.scene)
+        rig = context.scene.scope_retarget.rig
         if self.which == "RIG" and self.format == "NPZ":
             raise UsageError(
                 "a motion file contains the captured motion, not a rig; choose another format"

@@ -126,7 +126,8 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     from .capture.frame_rate_operators import rate_warnings
     from .capture.result import show_result
 
-    motion, footage = imported.motion, None
+    motion = imported.motion
+    footage = None
     seen = bool(motion.image_size.all())  # by a camera, as motions of other tools are not
     beside = path.parent / Path(motion.source).name
     if seen and beside.suffix.lower() in FOOTAGE_SUFFIXES and beside.is_file():

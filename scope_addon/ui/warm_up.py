@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 KERNELS = 77  # that a capture and its preview compile
-_DELAY_S, _INTERVAL_S = 3.0, 1.0
+_DELAY_S = 3.0
+_INTERVAL_S = 1.0
 _REQUEST = b'{"warm_up": true}\n'
 
 
@@ -111,7 +112,8 @@ def start() -> bool:
 
 def stop() -> None:
     """End the process. What it has compiled is kept."""
-    process, folder = WarmUp.process, WarmUp.folder
+    process = WarmUp.process
+    folder = WarmUp.folder
     WarmUp.process = WarmUp.folder = None
     if process is not None:
         if process.poll() is None:

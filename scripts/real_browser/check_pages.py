@@ -16,7 +16,8 @@ from typing import Any
 
 from devtools import Browser
 
-WINDOW, PHONE = (1280, 900), (390, 844)
+WINDOW = (1280, 900)
+PHONE = (390, 844)
 SHOWN = "[capturedMotion.row(), Number(document.getElementById('row').value)]"
 LARGEST_MB = 20
 
@@ -140,9 +141,11 @@ def check_page(folder: Path, page: Path, wanted: dict[str, Any] | None) -> dict[
 
 def main() -> int:
     """Check the pages named on the command line; return 1 if one has a problem."""
-    folder, pages = Path(sys.argv[1]), [Path(name) for name in sys.argv[2:]]
+    folder = Path(sys.argv[1])
+    pages = [Path(name) for name in sys.argv[2:]]
     expected = json.loads((folder / "expected.json").read_text("utf-8"))
-    found, status = {}, 0
+    found = {}
+    status = 0
     for page in pages:
         try:
             found[page.name] = check_page(folder, page, expected.get(page.name))

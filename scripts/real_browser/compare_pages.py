@@ -31,9 +31,13 @@ from scope.solver.body import Body
 from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
-CAPTURED, MADE, REPORT = "captured.html", "made <b>&amp; 'two'.html", "report.html"
-ROWS, VERTICES = (40, 0, 77, 100), tuple(range(0, 12972, 300))
-LIMIT_MM, OVERLAP = 1.0, 0.9
+CAPTURED = "captured.html"
+MADE = "made <b>&amp; 'two'.html"
+REPORT = "report.html"
+ROWS = (40, 0, 77, 100)
+VERTICES = tuple(range(0, 12972, 300))
+LIMIT_MM = 1.0
+OVERLAP = 0.9
 
 
 def made_people(motion: Motion) -> list[Motion]:
@@ -127,7 +131,8 @@ def made_run(report: dict[str, Any]) -> Run:
 
 def expect(folder: Path) -> None:
     """Write the page of the made motion, and what the pages must show."""
-    body, of_page = load_body("scope"), people_of(folder)
+    body = load_body("scope")
+    of_page = people_of(folder)
     report: dict[str, Any] = json.loads((folder / "captured.json").read_text("utf-8"))
     warnings = [
         "made.mp4 cuts to another scene at 2.0 s and at 3.5 s: </script><script>alert(1)</script>"
@@ -148,7 +153,8 @@ def expect(folder: Path) -> None:
 
 def compare(folder: Path) -> list[str]:
     """Return what the browser shows differently."""
-    body, problems = load_body("scope"), []
+    body = load_body("scope")
+    problems = []
     found = json.loads((folder / "found.json").read_text("utf-8"))
     for name, people in people_of(folder).items():
         of_page = found[name]
@@ -206,7 +212,8 @@ def main() -> int:
     """Run the command line; return 1 if the browser shows something else than the body model
     says.
     """
-    command, folder = sys.argv[1], Path(sys.argv[2])
+    command = sys.argv[1]
+    folder = Path(sys.argv[2])
     if command == "expect":
         expect(folder)
         return 0

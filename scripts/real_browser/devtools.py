@@ -65,7 +65,9 @@ class Browser:
         )
         os.close(read_commands)
         os.close(write_answers)
-        self._buffer, self._last, self._session = b"", 0, None
+        self._buffer = b""
+        self._last = 0
+        self._session = None
         self.events: list[dict[str, Any]] = []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)[
@@ -188,7 +190,8 @@ class Browser:
     def drag(self, selector: str, dx: float, dy: float, *, touch: bool = False) -> None:
         """Press in the middle of an element, move, and release; with a finger or the mouse."""
         box = self.box(selector)
-        x, y = box["left"] + box["width"] / 2, box["top"] + box["height"] / 2
+        x = box["left"] + box["width"] / 2
+        y = box["top"] + box["height"] / 2
         points = [(x + dx * k / 5, y + dy * k / 5) for k in range(6)]
         if touch:
             moves = [("touchMove", [point]) for point in points[1:]]
@@ -215,7 +218,8 @@ class Browser:
     def click(self, selector: str, share: float = 0.5) -> None:
         """Click an element at a share of its width."""
         box = self.box(selector)
-        x, y = box["left"] + share * box["width"], box["top"] + box["height"] / 2
+        x = box["left"] + share * box["width"]
+        y = box["top"] + box["height"] / 2
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
@@ -226,7 +230,8 @@ class Browser:
         self.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
         found = []
         for event in self.events:
-            method, of = event.get("method"), event.get("params", {})
+            method = event.get("method")
+            of = event.get("params", {})
             if method == "Runtime.exceptionThrown":
                 details = of["exceptionDetails"]
                 found.append(

@@ -78,7 +78,8 @@ class CodeCache(_Cache):
         """Return the code for a signature; None if it must be compiled."""
         target_context.refresh()
         for folder, trusted in self._area.folders() if self._enabled else ():
-            path, key = folder / self._file_name(sig), self._key(sig)
+            path = folder / self._file_name(sig)
+            key = self._key(sig)
             payload = read_code(path, key, trusted=trusted)
             if payload is None:
                 continue

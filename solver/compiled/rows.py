@@ -40,13 +40,12 @@ def splat_of(builder: Any, scalar: Any) -> Any:
 
 def _combine(context: Any, builder: Any, sig: Any, args: Any, terms: int) -> Any:
     """Emit dst[d:d+n] += sum_k a_k src[s_k:s_k+n]."""
-    dst, d = args[0], args[1]
-    scales, src, offsets, n = (
-        args[2 : 2 + terms],
-        args[2 + terms],
-        args[3 + terms : 3 + 2 * terms],
-        args[-1],
-    )
+    dst = args[0]
+    d = args[1]
+    scales = args[2 : 2 + terms]
+    src = args[2 + terms]
+    offsets = args[3 + terms : 3 + 2 * terms]
+    n = args[-1]
     dst_data = context.make_array(sig.args[0])(context, builder, dst).data
     src_data = context.make_array(sig.args[2 + terms])(context, builder, src).data
 
@@ -106,14 +105,16 @@ def copy(typingctx, dst, d, src, s, n):  # type: ignore[no-untyped-def]
 @intrinsic
 def add1(typingctx, dst, d, a, src, s, n):  # type: ignore[no-untyped-def]
     """dst[d:d+n] += a src[s:s+n]."""
-    i, f = types.intp, types.float64
+    i = types.intp
+    f = types.float64
     return types.void(dst, i, f, src, i, i), lambda c, b, sig, args: _combine(c, b, sig, args, 1)
 
 
 @intrinsic
 def add3(typingctx, dst, d, a0, a1, a2, src, s0, s1, s2, n):  # type: ignore[no-untyped-def]
     """dst[d:d+n] += a0 src[s0:s0+n] + a1 src[s1:s1+n] + a2 src[s2:s2+n]."""
-    i, f = types.intp, types.float64
+    i = types.intp
+    f = types.float64
     return types.void(dst, i, f, f, f, src, i, i, i, i), lambda c, b, sig, args: _combine(
         c, b, sig, args, 3
     )

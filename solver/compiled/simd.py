@@ -32,7 +32,8 @@ class Vector:
 
     def __init__(self, builder: Any, value: Any) -> None:
         """Wrap an LLVM value of type <WIDTH x double>."""
-        self.builder, self.value = builder, value
+        self.builder = builder
+        self.value = value
 
     def _of(self, other: Any) -> Any:
         if isinstance(other, Vector):
@@ -63,7 +64,8 @@ class Vector:
         """Quotient of a number."""
         return Vector(self.builder, self.builder.fdiv(self._of(other), self.value, flags=_FLAGS))
 
-    __radd__, __rmul__ = __add__, __mul__
+    __radd__ = __add__
+    __rmul__ = __mul__
 
     def sqrt(self) -> Vector:
         """Square root, by one instruction."""

@@ -87,7 +87,8 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
     v = _check(body.V, (m, 3, p), "V")
     warn_of_units(np.cumsum(offsets, axis=0), "The body's joint offsets l")
     width = padded(p + focal)
-    s_padded, v_padded = np.zeros((n, 3, width)), np.zeros((m + n, 3, width))
+    s_padded = np.zeros((n, 3, width))
+    v_padded = np.zeros((m + n, 3, width))
     s_padded[1:, :, :p] = s[1:]  # row 0 is not used: the root's pose is free
     v_padded[:m, :, :p] = v
     return Tree(
@@ -111,7 +112,8 @@ def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
     :raises InvalidValueError: beta is not finite.
     """
     beta = _check(beta, (tree.shape,), "beta")
-    n, m = len(tree.parents), len(tree.v_bar)
+    n = len(tree.parents)
+    m = len(tree.v_bar)
     return Tree(
         tree.parents,
         np.zeros((n, 3, 0)),

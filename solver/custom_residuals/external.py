@@ -29,7 +29,8 @@ from . import numeric
 MAX_EXTERNAL = 16  # external residuals; each has a column of the weights
 INDEXES = ("points", "parts", "joints")
 
-_I, _F = types.int64, types.float64
+_I = types.int64
+_F = types.float64
 _PI, _PF = types.CPointer(_I), types.CPointer(_F)  # type: ignore[no-untyped-call]
 _PROTOTYPE = _F(
     _PI, _I, _PF, _F, _F, _F,  # ints, how many rows, floats, weight, inv_sigma, triggs
@@ -85,7 +86,8 @@ class Registered:
         return int(self._callable.address)
 
     def _entry(self) -> Any:
-        ints, floats = self.INTS, self.FLOATS
+        ints = self.INTS
+        floats = self.FLOATS
         given: Any = self.kernel
         accumulate = given if hasattr(given, "signatures") else inlined_kernel(given)
 
@@ -148,7 +150,8 @@ class Registered:
                 carray(c, (W,)),
                 carray(cross, (1,)),
             )
-            table, numbers = carray(i, (rows, ints)), carray(f, (rows, floats))
+            table = carray(i, (rows, ints))
+            numbers = carray(f, (rows, floats))
             return accumulate(tree, table, numbers, weight, inv_sigma, triggs, pose, blocks)
 
         try:
@@ -165,7 +168,10 @@ class Registered:
             ) from error
 
     def _callback(self) -> Any:
-        name, function, ints, floats = self.name, self.function, self.INTS, self.FLOATS
+        name = self.name
+        function = self.function
+        ints = self.INTS
+        floats = self.FLOATS
 
         def call(
             i: int, rows: int, f: int, weight: float, _s: float, _t: float, *sizes_and_arrays: int
@@ -209,10 +215,13 @@ def raise_failure() -> None:
 
 def pack_external(tables: list[tuple[Registered, Array, Array]], first_column: int) -> External:
     """Return the rows (n, INTS), (n, FLOATS) of several residuals for the kernels."""
-    calls, i, f = np.zeros((len(tables), 5), np.int64), 0, 0
+    calls = np.zeros((len(tables), 5), np.int64)
+    i = 0
+    f = 0
     for k, (residual, ints, floats) in enumerate(tables):
         calls[k] = residual.address(), len(ints), i, f, first_column + residual.slot
-        i, f = i + ints.size, f + floats.size
+        i = i + ints.size
+        f = f + floats.size
     ints = np.concatenate([ints.ravel() for _, ints, _ in tables])
     return External(calls, ints, np.concatenate([floats.ravel() for _, _, floats in tables]))
 
@@ -239,7 +248,10 @@ def _call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
 @compiled
 def accumulate_external(tree, external, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
     """Add all rows to the blocks and return their cost."""
-    cost, n, points, W = 0.0, tree.parents.shape[0], tree.point_part.shape[0], tree.S.shape[2]
+    cost = 0.0
+    n = tree.parents.shape[0]
+    points = tree.point_part.shape[0]
+    W = tree.S.shape[2]
     for k in range(external.calls.shape[0]):
         address, rows, i, f, column = external.calls[k]
         arguments = (

@@ -37,7 +37,8 @@ def differentiate(function: Callable[[Part], Any], part: Part) -> Linearization:
         return (ahead - behind) / (2.0 * STEP)
 
     def twisted(k: int, h: float) -> Part:
-        w, nu = np.zeros(3), np.zeros(3)
+        w = np.zeros(3)
+        nu = np.zeros(3)
         (w if k < 3 else nu)[k % 3] = h
         return replace(part, R=exp(w) @ part.R, t=part.t + np.cross(w, part.t - part.origin) + nu)
 
@@ -79,15 +80,19 @@ def accumulate(
     ints = _view(tables[0], extent[0], extent[1], whole=True)
     floats = _view(tables[1], extent[0], extent[2])
     up = _view(parents, n, whole=True)
-    rotation, position, state = _view(R, n, 3, 3), _view(t, n, 3), _view(Omega, n, 3, 3)
-    by_shape, shape = _view(D, n, 3, W), _view(beta, W)
-    blocks_A, blocks_Hu, blocks_Huu = (
-        _view(A, n, 6, SHAPE + W),
-        _view(H_u, n, 3, SHAPE + W),
-        _view(H_uu, n, 3, 3),
-    )
-    blocks_C, blocks_c, crossed = _view(C, W, W), _view(c, W), _view(cross, 1, whole=True)
-    cost, s = 0.0, math.sqrt(weight)
+    rotation = _view(R, n, 3, 3)
+    position = _view(t, n, 3)
+    state = _view(Omega, n, 3, 3)
+    by_shape = _view(D, n, 3, W)
+    shape = _view(beta, W)
+    blocks_A = _view(A, n, 6, SHAPE + W)
+    blocks_Hu = _view(H_u, n, 3, SHAPE + W)
+    blocks_Huu = _view(H_uu, n, 3, 3)
+    blocks_C = _view(C, W, W)
+    blocks_c = _view(c, W)
+    crossed = _view(cross, 1, whole=True)
+    cost = 0.0
+    s = math.sqrt(weight)
     for k in range(extent[0] if weight > 0.0 else 0):
         i = int(ints[k, 0])
         parent = np.eye(3) if up[i] < 0 else rotation[up[i]].copy()
@@ -101,9 +106,11 @@ def accumulate(
             shape[:P].copy(),
         )
         row = ints[k].copy(), floats[k].copy()
-        r, J_x, J_u, J_beta = (
-            s * a for a in differentiate(lambda p, row=row: function(p, *row), part)
-        )  # type: ignore[misc]
+
+        def residual(p: Part, row: tuple[Any, Any] = row) -> Any:
+            return function(p, *row)
+
+        r, J_x, J_u, J_beta = (s * a for a in differentiate(residual, part))
         cost += 0.5 * float(r @ r)
         for block, J in ((blocks_A[i], J_x), (blocks_Hu[i], J_u)):
             block[:, GRADIENT] += J.T @ r

@@ -21,8 +21,10 @@ def main() -> float:
     rng = np.random.default_rng(2)
     names = body.keypoint_set("coco")  # what most detectors give
     index = np.array(list(names.values()))
-    first, last = person.pose(body, seed=3, bend=0.15), person.pose(body, seed=4, bend=0.15)
-    clip, seen = [], []
+    first = person.pose(body, seed=3, bend=0.15)
+    last = person.pose(body, seed=4, bend=0.15)
+    clip = []
+    seen = []
     turn = rotations.log(np.swapaxes(first.Omega, -1, -2) @ last.Omega)
     for k in range(FRAMES):
         now = replace(first, Omega=first.Omega @ rotations.exp(turn * k / FRAMES))

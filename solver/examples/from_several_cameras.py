@@ -23,7 +23,9 @@ from .. import (
 )
 from . import person
 
-RATE, FRAMES, NOISE_PX = 30.0, 24, 3.0
+RATE = 30.0
+FRAMES = 24
+NOISE_PX = 3.0
 LOST = range(10, 14)
 
 
@@ -45,7 +47,8 @@ def main() -> float:
     body = load_body("scope")
     rng = np.random.default_rng(8)
     index = list(body.keypoint_set("blazepose").values())
-    start, times = person.pose(body, seed=9), np.arange(FRAMES) / RATE
+    start = person.pose(body, seed=9)
+    times = np.arange(FRAMES) / RATE
     frames: list[list[View]] = []
     truth = []
     for f, t in enumerate(times):

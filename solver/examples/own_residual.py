@@ -24,7 +24,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
     """
     cost = 0.0
     for k in range(ints.shape[0]):
-        i, w = ints[k, 0], weight * floats[k, 1]
+        i = ints[k, 0]
+        w = weight * floats[k, 1]
         r = pose.t[i, 1] - floats[k, 0]
         cost += 0.5 * w * r * r
         origin = tree.keypoints + i  # a joint is a point too

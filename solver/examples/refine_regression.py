@@ -29,7 +29,9 @@ def read_states(body: Body, file: Path) -> list[State]:
     length f, principal point (u, v), sees the same with
         t = (t_x + 2 (c_x - u) / (s b), t_y + 2 (c_y - v) / (s b), 2 f / (s b)).
     """
-    f, u, v = person.INTRINSICS[0, 0], person.INTRINSICS[0, 2], person.INTRINSICS[1, 2]
+    f = person.INTRINSICS[0, 0]
+    u = person.INTRINSICS[0, 2]
+    v = person.INTRINSICS[1, 2]
     with np.load(file) as data:
         s, tx, ty = data["camera"].T
         x, y, b = data["crop"].T

@@ -129,7 +129,8 @@ def fit_clip(
         clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0
     )
     joint.optimize()
-    beta, scale = joint.beta[: tree.shape].copy(), float(np.exp(joint.log_focal))
+    beta = joint.beta[: tree.shape].copy()
+    scale = float(np.exp(joint.log_focal))
     together = dict(zip(chosen, joint.fits(), strict=True))
     fixed = with_fixed_shape(tree, beta)
     fits = [
@@ -190,7 +191,8 @@ def fit_in_order(
             last = None
             continue
         if not seen:
-            states, seen = [state] * len(states), True
+            states = [state] * len(states)
+            seen = True
         last = state
         priors = carry(priors, fitted, weight)
         states.append(last)
@@ -268,17 +270,17 @@ class _Joint(SeveralFrames):
         focal_weight: float,
     ) -> None:
         super().__init__()
-        self.tree, self.report, self.P = tree, options.report, tree.shape
+        self.tree = tree
+        self.report = options.report
+        self.P = tree.shape
         self.shared = SharedPriors(*priors.packed_shape(tree.shape), focal_weight)
         self.settings = make_settings(options, options.schedule(cold=False))
         self.stages = self.settings.stages
         self.shape_weights = self.stages[:, 0, SHAPE_PRIOR].copy()
         self.stages[:, 0, SHAPE_PRIOR] = 0.0  # once for the clip, not in every frame
-        self.beta, self.log_focal, self.status = (
-            np.zeros(tree.S.shape[2]),
-            0.0,
-            Status.NO_MEASUREMENTS,
-        )
+        self.beta = np.zeros(tree.S.shape[2])
+        self.log_focal = 0.0
+        self.status = Status.NO_MEASUREMENTS
         # the last frame's shape has seen most, when the frames were fitted in order
         first = (
             as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.shared.shape_mean
@@ -351,7 +353,8 @@ class _Joint(SeveralFrames):
         of |q~|^2.
         """
         squares = 0.0
-        C, c = np.zeros_like(self.frames[0].work.C), np.zeros_like(self.beta)
+        C = np.zeros_like(self.frames[0].work.C)
+        c = np.zeros_like(self.beta)
         for f in self.frames:
             squares += eliminate(
                 self.tree, f.pose, f.blocks, damping, self.settings.root_scale, f.work
@@ -376,7 +379,8 @@ class _Joint(SeveralFrames):
     def fits(self) -> list[Fit]:
         """Return the frames' results."""
         out = []
-        last, triggs = self.stages[-1], self.settings.triggs
+        last = self.stages[-1]
+        triggs = self.settings.triggs
         for f in self.frames:
             f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
             eliminate(self.tree, f.pose, f.blocks, MIN_DAMPING, self.settings.root_scale, f.work)

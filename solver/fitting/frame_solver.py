@@ -87,7 +87,8 @@ class FrameSolver:
         check_type(self.priors, Priors, "priors")
         check_type(self.options, Options, "options")
         tree = self.tree
-        poses, blocks = (make_pose(tree), make_pose(tree)), (make_blocks(tree), make_blocks(tree))
+        poses = (make_pose(tree), make_pose(tree))
+        blocks = (make_blocks(tree), make_blocks(tree))
         self._memory = Memory(poses, blocks, make_curvature(tree), make_workspace(tree))
         self._rest = np.tile(np.eye(3), (len(tree.parents) - 1, 1, 1))
         self._layout: Layout | None = None
@@ -113,7 +114,9 @@ class FrameSolver:
         check_type(init, (State, type(None)), "init")
         check_type(priors, Priors, "priors")
         check_type(options, Options, "options")
-        tree, memory, work = self.tree, self._memory, self._memory.work
+        tree = self.tree
+        memory = self._memory
+        work = self._memory.work
         packed = self._pack(priors)
         terms, count, self._layout = fill_terms(tree, measurements, packed, self._layout)
         count += len(terms.ints[0])
@@ -123,7 +126,9 @@ class FrameSolver:
         self._enter(init)
         cost, code, iterations, rejected, which = optimize(tree, terms, count > 0, settings, memory)
         raise_failure()
-        found, P, last = memory.poses[which], tree.shape, settings.stages[-1]
+        found = memory.poses[which]
+        P = tree.shape
+        last = settings.stages[-1]
         information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
         shares = {}
         if options.report:
@@ -155,14 +160,17 @@ class FrameSolver:
 
     def _enter(self, state: State) -> None:
         """Put `state` into the first pose, with rotations made orthonormal."""
-        tree, pose = self.tree, self._memory.poses[0]
-        K, P = len(tree.parents) - 1, tree.shape
+        tree = self.tree
+        pose = self._memory.poses[0]
+        K = len(tree.parents) - 1
+        P = tree.shape
         R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
         t = as_array(state.t_camera_root, (3,), "t_camera_root")
         Omega = as_array(state.Omega, (K, 3, 3), "Omega")
         check_state_rotations(R, Omega)
         if not _enter(R, t, Omega, as_array(state.beta, (P,), "beta"), pose):
-            pose.R[0], pose.Omega[1:] = nearest_rotation(R), nearest_rotation(Omega)
+            pose.R[0] = nearest_rotation(R)
+            pose.Omega[1:] = nearest_rotation(Omega)
 
 
 _last = threading.local()

@@ -17,7 +17,9 @@ from ..gauss_newton.linearize import make_pose, place_parts
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
 from ..state import State
 
-NEAREST, FARTHEST = 0.3, 100.0  # metres, of the first guess
+# metres, of the first guess
+NEAREST = 0.3
+FARTHEST = 100.0
 FRONTAL = np.diag([1.0, -1.0, -1.0])  # upright and facing the camera
 DISTANCE = 3.0
 
@@ -33,7 +35,9 @@ def _moments(tree, terms, pose, points, space, directed) -> None:  # type: ignor
     place_parts(tree, pose)
     for i in range(tree.parents.shape[0]):
         for j in range(terms.starts[i], terms.starts[i + 1]):
-            x, y, z = terms.rest[j, 0], terms.rest[j, 1], terms.rest[j, 2]
+            x = terms.rest[j, 0]
+            y = terms.rest[j, 1]
+            z = terms.rest[j, 2]
             for a in range(tree.shape):
                 x += terms.V[j, 0, a] * pose.beta[a]
                 y += terms.V[j, 1, a] * pose.beta[a]
@@ -67,11 +71,14 @@ def _image_system(terms, points, R, H, g, mean) -> None:  # type: ignore[no-unty
     for j in range(points.shape[0]):
         if not terms.flags[j] & HAS_2D:
             continue
-        u, v, w = terms.image[j, 0], terms.image[j, 1], terms.image[j, 2]
+        u = terms.image[j, 0]
+        v = terms.image[j, 1]
+        w = terms.image[j, 2]
         x = R[0, 0] * points[j, 0] + R[0, 1] * points[j, 1] + R[0, 2] * points[j, 2]
         y = R[1, 0] * points[j, 0] + R[1, 1] * points[j, 1] + R[1, 2] * points[j, 2]
         z = R[2, 0] * points[j, 0] + R[2, 1] * points[j, 1] + R[2, 2] * points[j, 2]
-        a, b = u * z - x, v * z - y
+        a = u * z - x
+        b = v * z - y
         H[0, 0] += w
         H[1, 1] += w
         H[0, 2] -= w * u
@@ -112,9 +119,12 @@ def initial_state(
     pose = make_pose(tree)
     pose.Omega[1:] = joint_mean
     pose.beta[: tree.shape] = beta
-    points, space, directed = np.empty((len(terms.flags), 3)), np.zeros(16), np.zeros(16)
+    points = np.empty((len(terms.flags), 3))
+    space = np.zeros(16)
+    directed = np.zeros(16)
     _moments(tree, terms, pose, points, space, directed)
-    R, t = None, None
+    R = None
+    t = None
     if space[0] > 0.0:
         products = space[7:].reshape(3, 3) - np.outer(space[4:7], space[1:4] / space[0])
         R = _rotation_onto(products)
@@ -137,7 +147,9 @@ def _position_in_image(
     """Return t (3,) by linear least squares; where it is not in front of the camera, at a distance
     on the mean ray.
     """
-    H, g, mean = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    H = np.zeros((3, 3))
+    g = np.zeros(3)
+    mean = np.zeros(3)
     _image_system(terms, points, R, H, g, mean)
     if not mean[0] > 0.0 or not np.isfinite(H).all() or not np.isfinite(g).all():
         return None

@@ -48,7 +48,8 @@ def check_residual(
     check_count(seed, "seed", 0)
     tree = make_tree(body)
     problem = _Problem(tree, name, ints, floats)
-    state, found = _random_state(tree, seed), np.zeros(problem.size)
+    state = _random_state(tree, seed)
+    found = np.zeros(problem.size)
     cost, g, H = problem.linearized(state)
     if not 0.0 < cost < np.inf:
         raise InvalidValueError(
@@ -92,14 +93,20 @@ class _Problem:
 
     def linearized(self, state: State) -> tuple[float, Array, Array]:
         """Return the cost, its gradient (n,) and JᵀJ (n, n), of the blocks of all parts."""
-        tree, blocks, pose = self._tree, make_blocks(self._tree), state.pose(self._tree)
+        tree = self._tree
+        blocks = make_blocks(self._tree)
+        pose = state.pose(self._tree)
         cost = linearize(
             tree, self._terms, self._weights, 0.0, pose, blocks, make_workspace(tree).scratch
         )
         raise_failure()
-        n, P, end = self.size, tree.shape, SHAPE + tree.shape
+        n = self.size
+        P = tree.shape
+        end = SHAPE + tree.shape
         # x_i = x[i] @ unknowns
-        g, H, x = np.zeros(n), np.zeros((n, n)), np.zeros((len(tree.parents), 6, n))
+        g = np.zeros(n)
+        H = np.zeros((n, n))
+        x = np.zeros((len(tree.parents), 6, n))
         beta = np.eye(n)[n - P :]
         for i, parent in enumerate(tree.parents):
             if i == 0:
@@ -122,7 +129,8 @@ class _Problem:
 
     def moved(self, state: State, d: Array) -> State:
         """Return the state after a step d (n,) of the unknowns."""
-        pose, P = state.pose(self._tree), self._tree.shape
+        pose = state.pose(self._tree)
+        P = self._tree.shape
         R_parent = pose.R[self._tree.parents[1:]]
         turns = exp(d[6 : len(d) - P].reshape(-1, 3))
         Omega = np.swapaxes(R_parent, 1, 2) @ turns @ R_parent @ state.Omega
@@ -131,7 +139,8 @@ class _Problem:
 
 
 def _random_state(tree: Tree, seed: int) -> State:
-    rng, K = np.random.default_rng(seed), len(tree.parents) - 1
+    rng = np.random.default_rng(seed)
+    K = len(tree.parents) - 1
     place = np.array([0.0, 0.0, 3.0]) + 0.2 * rng.standard_normal(3)
     Omega = exp(0.5 * rng.standard_normal((K, 3)))
     return State(exp(rng.standard_normal(3)), place, Omega, rng.standard_normal(tree.shape))

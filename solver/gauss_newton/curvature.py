@@ -44,35 +44,27 @@ def make_curvature(tree: Tree) -> Curvature:
 @kernel
 def turned(R, H, transposed):  # type: ignore[no-untyped-def]
     """Return RᵀHR, or RHRᵀ if `transposed`, by rows of its upper triangle; H is symmetric."""
-    a, b, c, d, e, f, g, h, k = (
-        R[0, 0],
-        R[1, 0],
-        R[2, 0],
-        R[0, 1],
-        R[1, 1],
-        R[2, 1],
-        R[0, 2],
-        R[1, 2],
-        R[2, 2],
-    )
+    a = R[0, 0]
+    b = R[1, 0]
+    c = R[2, 0]
+    d = R[0, 1]
+    e = R[1, 1]
+    f = R[2, 1]
+    g = R[0, 2]
+    h = R[1, 2]
+    k = R[2, 2]
     if transposed:
         b, c, d, f, g, h = d, g, b, h, c, f
     h00, h01, h02, h11, h12, h22 = H
-    x0, x1, x2 = (
-        a * h00 + b * h01 + c * h02,
-        a * h01 + b * h11 + c * h12,
-        a * h02 + b * h12 + c * h22,
-    )
-    y0, y1, y2 = (
-        d * h00 + e * h01 + f * h02,
-        d * h01 + e * h11 + f * h12,
-        d * h02 + e * h12 + f * h22,
-    )
-    z0, z1, z2 = (
-        g * h00 + h * h01 + k * h02,
-        g * h01 + h * h11 + k * h12,
-        g * h02 + h * h12 + k * h22,
-    )
+    x0 = a * h00 + b * h01 + c * h02
+    x1 = a * h01 + b * h11 + c * h12
+    x2 = a * h02 + b * h12 + c * h22
+    y0 = d * h00 + e * h01 + f * h02
+    y1 = d * h01 + e * h11 + f * h12
+    y2 = d * h02 + e * h12 + f * h22
+    z0 = g * h00 + h * h01 + k * h02
+    z1 = g * h01 + h * h11 + k * h12
+    z2 = g * h02 + h * h12 + k * h22
     return (
         x0 * a + x1 * b + x2 * c, x0 * d + x1 * e + x2 * f, x0 * g + x1 * h + x2 * k,
         y0 * d + y1 * e + y2 * f, y0 * g + y1 * h + y2 * k, z0 * g + z1 * h + z2 * k,
@@ -88,7 +80,9 @@ def upper(M):  # type: ignore[no-untyped-def]
 @kernel
 def _store(M, m):  # type: ignore[no-untyped-def]
     M[0, 0], M[0, 1], M[0, 2], M[1, 1], M[1, 2], M[2, 2] = m
-    M[1, 0], M[2, 0], M[2, 1] = m[1], m[2], m[4]
+    M[1, 0] = m[1]
+    M[2, 0] = m[2]
+    M[2, 1] = m[4]
 
 
 @kernel
@@ -104,7 +98,8 @@ def allowed_share(H, S) -> float:  # type: ignore[no-untyped-def]
     """Return t: how much of S may be added to H."""
     h00, h01, h02, h11, h12, h22 = upper(H)
     s00, s01, s02, s11, s12, s22 = upper(S)
-    k, t = 1.0 - MIN_SHARE, 1.0
+    k = 1.0 - MIN_SHARE
+    t = 1.0
     for _ in range(4):
         if _positive(
             k * h00 + t * s00, k * h01 + t * s01, k * h02 + t * s02,
@@ -130,7 +125,9 @@ def set_current(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) ->
     for i in range(1, tree.parents.shape[0]):
         R = pose.R[tree.parents[i]]
         _store(curvature.H[i], turned(R, upper(blocks.H_uu[i]), False))
-        x, y, z = blocks.H_u[i, 0, GRADIENT], blocks.H_u[i, 1, GRADIENT], blocks.H_u[i, 2, GRADIENT]
+        x = blocks.H_u[i, 0, GRADIENT]
+        y = blocks.H_u[i, 1, GRADIENT]
+        z = blocks.H_u[i, 2, GRADIENT]
         for c in range(3):
             curvature.g[i, c] = R[0, c] * x + R[1, c] * y + R[2, c] * z
 
@@ -153,22 +150,26 @@ def update(
     if trial_blocks.cross[0]:
         return
     for i in range(1, tree.parents.shape[0]):
-        R, Q = pose.R[tree.parents[i]], trial.R[tree.parents[i]]
+        R = pose.R[tree.parents[i]]
+        Q = trial.R[tree.parents[i]]
         w0 = R[0, 0] * u[i, 0] + R[1, 0] * u[i, 1] + R[2, 0] * u[i, 2]
         w1 = R[0, 1] * u[i, 0] + R[1, 1] * u[i, 1] + R[2, 1] * u[i, 2]
         w2 = R[0, 2] * u[i, 0] + R[1, 2] * u[i, 1] + R[2, 2] * u[i, 2]
         length = w0 * w0 + w1 * w1 + w2 * w2
         if not length > SHORTEST_STEP * SHORTEST_STEP:
             continue
-        x, y, z = (
-            trial_blocks.H_u[i, 0, GRADIENT],
-            trial_blocks.H_u[i, 1, GRADIENT],
-            trial_blocks.H_u[i, 2, GRADIENT],
-        )
+        x = trial_blocks.H_u[i, 0, GRADIENT]
+        y = trial_blocks.H_u[i, 1, GRADIENT]
+        z = trial_blocks.H_u[i, 2, GRADIENT]
         h = turned(Q, upper(trial_blocks.H_uu[i]), False) if accepted else upper(curvature.H[i])
-        S, g = curvature.S[i], curvature.g[i]
-        m00, m01, m02 = h[0] + S[0, 0], h[1] + S[0, 1], h[2] + S[0, 2]
-        m11, m12, m22 = h[3] + S[1, 1], h[4] + S[1, 2], h[5] + S[2, 2]
+        S = curvature.S[i]
+        g = curvature.g[i]
+        m00 = h[0] + S[0, 0]
+        m01 = h[1] + S[0, 1]
+        m02 = h[2] + S[0, 2]
+        m11 = h[3] + S[1, 1]
+        m12 = h[4] + S[1, 2]
+        m22 = h[5] + S[2, 2]
         d0 = Q[0, 0] * x + Q[1, 0] * y + Q[2, 0] * z - g[0] - m00 * w0 - m01 * w1 - m02 * w2
         d1 = Q[0, 1] * x + Q[1, 1] * y + Q[2, 1] * z - g[1] - m01 * w0 - m11 * w1 - m12 * w2
         d2 = Q[0, 2] * x + Q[1, 2] * y + Q[2, 2] * z - g[2] - m02 * w0 - m12 * w1 - m22 * w2
@@ -192,12 +193,17 @@ def apply_correction(
     Gauss-Newton's.
     """
     for i in range(1, tree.parents.shape[0]):
-        H, S = curvature.H[i], curvature.S[i]
+        H = curvature.H[i]
+        S = curvature.S[i]
         h00, h01, h02, h11, h12, h22 = upper(H)
         t = share * allowed_share(H, S) if share > 0.0 else 0.0
         if t > 0.0:  # False if S has overflowed
-            h00, h01, h02 = h00 + t * S[0, 0], h01 + t * S[0, 1], h02 + t * S[0, 2]
-            h11, h12, h22 = h11 + t * S[1, 1], h12 + t * S[1, 2], h22 + t * S[2, 2]
+            h00 = h00 + t * S[0, 0]
+            h01 = h01 + t * S[0, 1]
+            h02 = h02 + t * S[0, 2]
+            h11 = h11 + t * S[1, 1]
+            h12 = h12 + t * S[1, 2]
+            h22 = h22 + t * S[2, 2]
         _store(
             blocks.H_uu[i], turned(pose.R[tree.parents[i]], (h00, h01, h02, h11, h12, h22), True)
         )

@@ -65,8 +65,12 @@ def _tile(vectors: int, sign: int) -> Any:
     return tile
 
 
-_plus1, _plus2, _plus3 = _tile(1, 1), _tile(2, 1), _tile(3, 1)
-_minus1, _minus2, _minus3 = _tile(1, -1), _tile(2, -1), _tile(3, -1)
+_plus1 = _tile(1, 1)
+_plus2 = _tile(2, 1)
+_plus3 = _tile(3, 1)
+_minus1 = _tile(1, -1)
+_minus2 = _tile(2, -1)
+_minus3 = _tile(3, -1)
 
 
 @kernel
@@ -111,7 +115,9 @@ def subtract_gram_below(C, W, X, x, x_row, count, first) -> None:  # type: ignor
             width = min(12, W - b)
             skip = 3 * ((b - first) // 3) if first <= b and b + width <= first + count else 0
             skip = max(skip, a_skip)
-            rows, left, right = count - skip, x + a + skip * x_row, x + b + skip * x_row
+            rows = count - skip
+            left = x + a + skip * x_row
+            right = x + b + skip * x_row
             if width == 12:
                 _minus3(C, a * W + b, W, X, left, x_row, X, right, x_row, rows)
             elif width == 8:

@@ -86,7 +86,10 @@ def _part_formula(s, N, D, pairs):  # type: ignore[no-untyped-def]
 
     With H = N_lin + A D / 2:  C += HᵀD + DᵀH,  N_ang += [s]x N_lin + Z D,  N_lin += A D.
     """
-    a, Z, (x, y, z), half = s[:6], s[6:15], s[15:18], s[18]
+    a = s[:6]
+    Z = s[6:15]
+    (x, y, z) = s[15:18]
+    half = s[18]
     AD = [_dot(row, D) for row in ([a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]])]
     H = [N[3 + r] + AD[r] * half for r in range(3)]
     turned = [y * N[5] - z * N[4], z * N[3] - x * N[5], x * N[4] - y * N[3]]
@@ -98,19 +101,22 @@ def _part_formula(s, N, D, pairs):  # type: ignore[no-untyped-def]
 
 
 _place = row_pass(_place_formula, (3, 3, 0))
-_point, _part = row_pass(_point_formula, (6, 3, 0)), row_pass(_part_formula, (6, 3, 0))
+_point = row_pass(_point_formula, (6, 3, 0))
+_part = row_pass(_part_formula, (6, 3, 0))
 
 
 def make_pose(tree: Tree) -> Pose:
     """Return a pose of zeros and identities for `tree`."""
-    n, w = len(tree.parents), tree.S.shape[2]
+    n = len(tree.parents)
+    w = tree.S.shape[2]
     eye = np.tile(np.eye(3), (n, 1, 1))
     return Pose(eye, eye.copy(), np.zeros((n, 3)), np.zeros((n, 3, w)), np.zeros(w), np.zeros(1))
 
 
 def make_blocks(tree: Tree) -> Blocks:
     """Return blocks of zeros for `tree`."""
-    n, w = len(tree.parents), tree.S.shape[2]
+    n = len(tree.parents)
+    w = tree.S.shape[2]
     return Blocks(
         np.zeros((n, 6, SHAPE + w)),
         np.zeros((n, 3, SHAPE + w)),
@@ -125,11 +131,17 @@ def make_blocks(tree: Tree) -> Blocks:
 def place_parts(tree: Tree, pose: Pose) -> None:
     """Fill R, t and D of parts 1..K from Omega, beta and the root's R and t; D_0 = 0."""
     W = tree.S.shape[2]
-    R, t, D, beta = pose.R, pose.t, pose.D, pose.beta
+    R = pose.R
+    t = pose.t
+    D = pose.D
+    beta = pose.beta
     for i in range(1, tree.parents.shape[0]):
         j = tree.parents[i]
-        Q, Om = R[j], pose.Omega[i]
-        x, y, z = tree.l[i, 0], tree.l[i, 1], tree.l[i, 2]
+        Q = R[j]
+        Om = pose.Omega[i]
+        x = tree.l[i, 0]
+        y = tree.l[i, 1]
+        z = tree.l[i, 2]
         for a in range(tree.shape):
             b = beta[a]
             x += tree.S[i, 0, a] * b
@@ -138,7 +150,9 @@ def place_parts(tree: Tree, pose: Pose) -> None:
         turn = (Q[0, 0], Q[0, 1], Q[0, 2], Q[1, 0], Q[1, 1], Q[1, 2], Q[2, 0], Q[2, 1], Q[2, 2])
         _place(turn, W, D, 3 * j * W, W, tree.S, 3 * i * W, W, D, 3 * i * W, W)
         for r in range(3):
-            q0, q1, q2 = Q[r, 0], Q[r, 1], Q[r, 2]
+            q0 = Q[r, 0]
+            q1 = Q[r, 1]
+            q2 = Q[r, 2]
             for c in range(3):
                 R[i, r, c] = q0 * Om[0, c] + q1 * Om[1, c] + q2 * Om[2, c]
             t[i, r] = t[j, r] + q0 * x + q1 * y + q2 * z
@@ -147,7 +161,8 @@ def place_parts(tree: Tree, pose: Pose) -> None:
 @kernel
 def clear_blocks(blocks: Blocks) -> None:
     """Set everything but A to zero."""
-    n, W = blocks.H_u.shape[0], blocks.c.shape[0]
+    n = blocks.H_u.shape[0]
+    W = blocks.c.shape[0]
     if blocks.cross[0]:
         clear(blocks.H_u, 0, 3 * n * (SHAPE + W))
         blocks.cross[0] = 0
@@ -178,17 +193,50 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
     (6), [e]x W (9), [e]x W_all [e]xᵀ (6), the force (3) and its moment (3), and those of the focal
     length's column.
     """
-    A, C, c, V = blocks.A, blocks.C, blocks.c, terms.V
-    W, P = C.shape[0], tree.shape
+    A = blocks.A
+    C = blocks.C
+    c = blocks.c
+    V = terms.V
+    W = C.shape[0]
+    P = tree.shape
     row = SHAPE + W
     fit_focal = tree.globals > P
     R = pose.R[i]
     r = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
-    a00, a01, a02, a11, a12, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    x00, x01, x02, x10, x11, x12, x20, x21, x22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    y00, y01, y02, y11, y12, y22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    fx, fy, fz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    hx, hy, hz, nx, ny, nz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # scalars, as in point_terms.py
+    a00 = 0.0
+    a01 = 0.0
+    a02 = 0.0
+    a11 = 0.0
+    a12 = 0.0
+    a22 = 0.0
+    x00 = 0.0
+    x01 = 0.0
+    x02 = 0.0
+    x10 = 0.0
+    x11 = 0.0
+    x12 = 0.0
+    x20 = 0.0
+    x21 = 0.0
+    x22 = 0.0
+    y00 = 0.0
+    y01 = 0.0
+    y02 = 0.0
+    y11 = 0.0
+    y12 = 0.0
+    y22 = 0.0
+    fx = 0.0
+    fy = 0.0
+    fz = 0.0
+    mx = 0.0
+    my = 0.0
+    mz = 0.0
+    # scalars, as in point_terms.py
+    hx = 0.0
+    hy = 0.0
+    hz = 0.0
+    nx = 0.0
+    ny = 0.0
+    nz = 0.0
     for j in range(terms.starts[i], terms.starts[i + 1]):
         flags = terms.flags[j]
         if flags <= HAS_SHAPE:
@@ -231,8 +279,11 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
                         scratch[k, n] * h[0] + scratch[k + 2, n] * h[1] + scratch[k + 4, n] * h[2]
                     )
             waiting += 3
-    a, x = (a00, a01, a02, a11, a12, a22), (x00, x01, x02, x10, x11, x12, x20, x21, x22)
-    y, f, m = (y00, y01, y02, y11, y12, y22), (fx, fy, fz), (mx, my, mz)
+    a = (a00, a01, a02, a11, a12, a22)
+    x = (x00, x01, x02, x10, x11, x12, x20, x21, x22)
+    y = (y00, y01, y02, y11, y12, y22)
+    f = (fx, fy, fz)
+    m = (mx, my, mz)
     return cost, waiting, (a, x, y, f, m, (hx, hy, hz), (nx, ny, nz))
 
 
@@ -242,9 +293,15 @@ def _add_part(tree, i, s, sums, pose, blocks, scratch, waiting):  # type: ignore
     are waiting.
     """
     a, x, y, f, m, h, n = sums
-    A, C, c, D = blocks.A, blocks.C, blocks.c, pose.D
-    W, P = C.shape[0], tree.shape
-    B, row, at = A[i], SHAPE + W, 3 * i * W
+    A = blocks.A
+    C = blocks.C
+    c = blocks.c
+    D = pose.D
+    W = C.shape[0]
+    P = tree.shape
+    B = A[i]
+    row = SHAPE + W
+    at = 3 * i * W
     if tree.globals > P:
         B[0, SHAPE + P], B[1, SHAPE + P], B[2, SHAPE + P] = n
         B[3, SHAPE + P], B[4, SHAPE + P], B[5, SHAPE + P] = h
@@ -286,21 +343,28 @@ def linearize(
     `make_scratch`.
     """
     place_parts(tree, pose)
-    weights, inv_sigma = stage[0], stage[1]
+    weights = stage[0]
+    inv_sigma = stage[1]
     settings = (
         weights[KEYPOINT2D], inv_sigma[KEYPOINT2D], weights[KEYPOINT3D], inv_sigma[KEYPOINT3D],
         weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD], np.exp(pose.log_focal[0]), triggs,
     )  # fmt: skip
-    A, C, W = blocks.A, blocks.C, blocks.C.shape[0]
+    A = blocks.A
+    C = blocks.C
+    W = blocks.C.shape[0]
     clear_blocks(blocks)
     waiting = 0  # pairs in the queue
-    ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
+    ox = pose.t[0, 0]
+    oy = pose.t[0, 1]
+    oz = pose.t[0, 2]
     cost: float = 0.0
     for i in range(tree.parents.shape[0]):
         clear(A, 6 * i * (SHAPE + W), 6 * (SHAPE + W))
         if terms.starts[i] == terms.starts[i + 1]:
             continue
-        tx, ty, tz = pose.t[i, 0], pose.t[i, 1], pose.t[i, 2]
+        tx = pose.t[i, 0]
+        ty = pose.t[i, 1]
+        tz = pose.t[i, 2]
         cost, waiting, sums = _add_points(
             tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, waiting, cost
         )

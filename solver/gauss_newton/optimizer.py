@@ -24,7 +24,8 @@ from .curvature import Curvature, apply_correction, reset, set_current, update
 from .linearize import linearize
 from .recursion import Workspace, eliminate, retract, step
 
-MIN_DAMPING, MAX_DAMPING = 1e-9, 1e12
+MIN_DAMPING = 1e-9
+MAX_DAMPING = 1e12
 # of the damping after the first rejected step; it doubles with every further one in a row
 FIRST_GROWTH = 2.0
 MIN_DECREASE = 1e-13  # a predicted decrease below this share of the cost is rounding
@@ -50,11 +51,9 @@ def make_settings(options: Options, stages: Sequence[Stage]) -> Settings:
     :raises ShapeError: when a weight, a robust scale or a tolerance cannot be used.
     """
     table = options.stage_table(stages)
-    triggs, damping, root_scale = (
-        float(options.triggs),
-        float(options.damping),
-        1.0 / options.root_length,
-    )
+    triggs = float(options.triggs)
+    damping = float(options.damping)
+    root_scale = 1.0 / options.root_length
     return Settings(*table, triggs, damping, root_scale, bool(options.curvature))
 
 
@@ -103,11 +102,19 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
 
     The blocks of the result have the same index.
     """
-    stage, tolerance = settings.stages[s], settings.tolerances[s]
-    curvature, work = memory.curvature, memory.work
-    at, damping, growth, iterations, rejected = start, settings.damping, FIRST_GROWTH, 0, 0
-    pose, blocks = memory.poses[start], memory.blocks[start]
-    trial, trial_blocks = memory.poses[1 - start], memory.blocks[1 - start]
+    stage = settings.stages[s]
+    tolerance = settings.tolerances[s]
+    curvature = memory.curvature
+    work = memory.work
+    at = start
+    damping = settings.damping
+    growth = FIRST_GROWTH
+    iterations = 0
+    rejected = 0
+    pose = memory.poses[start]
+    blocks = memory.blocks[start]
+    trial = memory.poses[1 - start]
+    trial_blocks = memory.blocks[1 - start]
     cost = linearize(tree, terms, stage, settings.triggs, pose, blocks, work.scratch)
     if not np.isfinite(cost):
         return cost, NON_FINITE, iterations, rejected, at
@@ -135,7 +142,8 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
         if settings.curvature and np.isfinite(trial_cost):
             update(tree, pose, work.u, trial, trial_blocks, accepted, curvature)
         if accepted:
-            cost, at = trial_cost, 1 - at
+            cost = trial_cost
+            at = 1 - at
             pose, trial = trial, pose
             blocks, trial_blocks = trial_blocks, blocks
             if settings.curvature:
@@ -159,9 +167,13 @@ def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untype
     memory.work.C is the reduced Gauss-Newton system of the result: see `eliminate`.
     """
     # Not the constant 0, for which `_run_stage` would be compiled once more.
-    work, at, iterations, rejected = memory.work, np.int64(0), 0, 0
+    work = memory.work
+    at = np.int64(0)
+    iterations = 0
+    rejected = 0
     if measured:
-        cost, status = 0.0, CONVERGED
+        cost = 0.0
+        status = CONVERGED
         for s in range(settings.stages.shape[0]):
             cost, status, more, missed, at = _run_stage(tree, terms, s, settings, memory, at)
             iterations += more

@@ -14,7 +14,9 @@ from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE
 @expanded_kernel
 def point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
     """Return V_j beta + v_bar_j of slot j, in its part's axes."""
-    x, y, z = terms.rest[j, 0], terms.rest[j, 1], terms.rest[j, 2]
+    x = terms.rest[j, 0]
+    y = terms.rest[j, 1]
+    z = terms.rest[j, 2]
     if terms.flags[j] & HAS_SHAPE:
         for a in range(P):
             b = beta[a]
@@ -61,8 +63,20 @@ def point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
     flags = terms.flags[j]
     ex, ey, ez = e
     tx, ty, tz = t
-    w00, w01, w02, w11, w12, w22, gx, gy, gz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    hx, hy, hz, ff, fr = 0.0, 0.0, 0.0, 0.0, 0.0
+    w00 = 0.0
+    w01 = 0.0
+    w02 = 0.0
+    w11 = 0.0
+    w12 = 0.0
+    w22 = 0.0
+    gx = 0.0
+    gy = 0.0
+    gz = 0.0
+    hx = 0.0
+    hy = 0.0
+    hz = 0.0
+    ff = 0.0
+    fr = 0.0
     if flags & HAS_2D:
         q = terms.image[j]
         more, w00, w01, w02, w11, w12, w22, gx, gy, gz, hx, hy, hz, ff, fr = keypoint2d.term(
@@ -70,7 +84,9 @@ def point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
         )
         cost += more
     if flags & HAS_3D:
-        q, p, w = terms.point[j], (ex + tx, ey + ty, ez + tz), (w00, w01, w02, w11, w12, w22)
+        q = terms.point[j]
+        p = (ex + tx, ey + ty, ez + tz)
+        w = (w00, w01, w02, w11, w12, w22)
         cost, w, (gx, gy, gz) = _add_keypoint3d(q, p, w3, k3, triggs, cost, w, (gx, gy, gz))
         w00, w01, w02, w11, w12, w22 = w
     position = (w00, w01, w02, w11, w12, w22)
@@ -84,5 +100,6 @@ def point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
         )
         w00, w01, w02, w11, w12, w22 = w
         b00, b01, b02, b10, b11, b12, b20, b21, b22 = cross_symmetric(e, w)
-    w, b = (w00, w01, w02, w11, w12, w22), (b00, b01, b02, b10, b11, b12, b20, b21, b22)
+    w = (w00, w01, w02, w11, w12, w22)
+    b = (b00, b01, b02, b10, b11, b12, b20, b21, b22)
     return cost, position, moments, force, w, b, (gx, gy, gz), (hx, hy, hz), ff, fr

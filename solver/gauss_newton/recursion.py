@@ -52,7 +52,8 @@ class Workspace(NamedTuple):
 
 def make_workspace(tree: Tree) -> Workspace:
     """Return a workspace of zeros for `tree`."""
-    n, w = len(tree.parents), tree.S.shape[2]
+    n = len(tree.parents)
+    w = tree.S.shape[2]
     row = SHAPE + w
     shapes: list[tuple[int, ...]] = [
         (n, 6, row),
@@ -88,7 +89,8 @@ def _parent_formula(s, A_parent, A, Y):  # type: ignore[no-untyped-def]
     return out, [], []
 
 
-_moment, _scale = row_pass(_moment_formula, (6, 0, 0)), row_pass(_scale_formula, (3, 0, 0))
+_moment = row_pass(_moment_formula, (6, 0, 0))
+_scale = row_pass(_scale_formula, (3, 0, 0))
 _to_parent = row_pass(_parent_formula, (6, 6, 3))
 
 
@@ -126,18 +128,28 @@ def eliminate(
     eliminated. `root_scale` is s, in radians per metre. The blocks are kept, to be eliminated again
     with another damping.
     """
-    A, Y, L, C, c = work.A, work.Y, work.L, work.C, work.c
+    A = work.A
+    Y = work.Y
+    L = work.L
+    C = work.C
+    c = work.c
     W = c.shape[0]
     row = SHAPE + W
-    n, P = tree.parents.shape[0], tree.globals
+    n = tree.parents.shape[0]
+    P = tree.globals
     copy(A, 0, blocks.A, 0, 6 * n * row)
     copy(c, 0, blocks.c, 0, W)
     copy(C, 0, blocks.C, 0, W * W)
-    ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
+    ox = pose.t[0, 0]
+    oy = pose.t[0, 1]
+    oz = pose.t[0, 2]
     squares = 0.0
     for i in range(n - 1, 0, -1):
-        sx, sy, sz = pose.t[i, 0] - ox, pose.t[i, 1] - oy, pose.t[i, 2] - oz
-        base, y = 6 * i * row, 3 * i * row
+        sx = pose.t[i, 0] - ox
+        sy = pose.t[i, 1] - oy
+        sz = pose.t[i, 2] - oz
+        base = 6 * i * row
+        y = 3 * i * row
         _moment((sx, sy, sz), row, A, base, row, Y, y, row, Y, y, row)
         if blocks.cross[0]:
             add1(Y, y, 1.0, blocks.H_u, y, 3 * row)
@@ -162,7 +174,8 @@ def eliminate(
             q21 += B[1, 2] + sy * B[1, 3] - sx * B[1, 4]
             q22 += B[2, 2] + sy * B[2, 3] - sx * B[2, 4]
         i00 = 1.0 / math.sqrt(q00) if q00 > 1e-290 else 0.0
-        l10, l20 = q10 * i00, q20 * i00
+        l10 = q10 * i00
+        l20 = q20 * i00
         d = q11 - l10 * l10
         i11 = 1.0 / math.sqrt(d) if d > TINY * q11 else 0.0
         l21 = (q21 - l20 * l10) * i11
@@ -172,9 +185,16 @@ def eliminate(
         i21 = -l21 * i11 * i22
         i20 = -(l20 * i00 + l21 * i10) * i22
         F = L[i]
-        F[0], F[1], F[2], F[3], F[4], F[5] = i00, i10, i11, i20, i21, i22
+        F[0] = i00
+        F[1] = i10
+        F[2] = i11
+        F[3] = i20
+        F[4] = i21
+        F[5] = i22
         _scale((i00, i10, i11, i20, i21, i22), row, Y, y, row, Y, y, row, Y, y, row)
-        g0, g1, g2 = T[0, GRADIENT], T[1, GRADIENT], T[2, GRADIENT]
+        g0 = T[0, GRADIENT]
+        g1 = T[1, GRADIENT]
+        g2 = T[2, GRADIENT]
         squares += g0 * g0 + g1 * g1 + g2 * g2
         to = 6 * tree.parents[i] * row
         columns = (
@@ -208,7 +228,8 @@ def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-
     """Solve C dbeta = -c for the global columns, overwriting C with its factor; return |L^-1
     c|^2.
     """
-    P, W = tree.globals, C.shape[0]
+    P = tree.globals
+    W = C.shape[0]
     factorize(C, W, P, dbeta)
     for a in range(P):
         dbeta[a] = -c[a]
@@ -232,7 +253,11 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
     """Fill work.x and work.u from work.dbeta, and return dᵀ Lambda d of the damping that was
     added.
     """
-    x, u, Y, root, dbeta = work.x, work.u, work.Y, work.root, work.dbeta
+    x = work.x
+    u = work.u
+    Y = work.Y
+    root = work.root
+    dbeta = work.dbeta
     P = tree.globals
     for r in range(5, -1, -1):
         s = -root[r, GRADIENT]
@@ -241,12 +266,18 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
         for j in range(r + 1, 6):
             s -= root[r, j] * x[0, j]
         x[0, r] = s * root[r, r]
-    ox, oy, oz = pose.t[0, 0], pose.t[0, 1], pose.t[0, 2]
+    ox = pose.t[0, 0]
+    oy = pose.t[0, 1]
+    oz = pose.t[0, 2]
     squares: float = x[0, 0] ** 2 + x[0, 1] ** 2 + x[0, 2] ** 2
     squares += root_scale**2 * (x[0, 3] ** 2 + x[0, 4] ** 2 + x[0, 5] ** 2)
     for i in range(1, tree.parents.shape[0]):
-        T, z, F = Y[i], x[tree.parents[i]], work.L[i]
-        s0, s1, s2 = T[0, GRADIENT], T[1, GRADIENT], T[2, GRADIENT]
+        T = Y[i]
+        z = x[tree.parents[i]]
+        F = work.L[i]
+        s0 = T[0, GRADIENT]
+        s1 = T[1, GRADIENT]
+        s2 = T[2, GRADIENT]
         for k in range(6):
             s0 += T[0, k] * z[k]
             s1 += T[1, k] * z[k]
@@ -255,11 +286,19 @@ def substitute(tree: Tree, pose: Pose, damping: float, root_scale: float, work: 
             s0 += T[0, SHAPE + a] * dbeta[a]
             s1 += T[1, SHAPE + a] * dbeta[a]
             s2 += T[2, SHAPE + a] * dbeta[a]
-        u0, u1, u2 = -(F[0] * s0 + F[1] * s1 + F[3] * s2), -(F[2] * s1 + F[4] * s2), -F[5] * s2
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+        u0 = -(F[0] * s0 + F[1] * s1 + F[3] * s2)
+        u1 = -(F[2] * s1 + F[4] * s2)
+        u2 = -F[5] * s2
+        u[i, 0] = u0
+        u[i, 1] = u1
+        u[i, 2] = u2
         squares += u0 * u0 + u1 * u1 + u2 * u2
-        sx, sy, sz = pose.t[i, 0] - ox, pose.t[i, 1] - oy, pose.t[i, 2] - oz
-        x[i, 0], x[i, 1], x[i, 2] = z[0] + u0, z[1] + u1, z[2] + u2
+        sx = pose.t[i, 0] - ox
+        sy = pose.t[i, 1] - oy
+        sz = pose.t[i, 2] - oz
+        x[i, 0] = z[0] + u0
+        x[i, 1] = z[1] + u1
+        x[i, 2] = z[2] + u2
         x[i, 3] = z[3] + sy * u2 - sz * u1
         x[i, 4] = z[4] + sz * u0 - sx * u2
         x[i, 5] = z[5] + sx * u1 - sy * u0
@@ -299,7 +338,8 @@ def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
     for i in range(tree.parents.shape[0]):
         if i == 0:
             E = exp3(x[0], x[1], x[2])
-            old, new = pose.R[0], trial.R[0]
+            old = pose.R[0]
+            new = trial.R[0]
         else:
             R = pose.R[tree.parents[i]]
             E = exp3(
@@ -307,9 +347,12 @@ def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
                 R[0, 1] * u[i, 0] + R[1, 1] * u[i, 1] + R[2, 1] * u[i, 2],
                 R[0, 2] * u[i, 0] + R[1, 2] * u[i, 1] + R[2, 2] * u[i, 2],
             )
-            old, new = pose.Omega[i], trial.Omega[i]
+            old = pose.Omega[i]
+            new = trial.Omega[i]
         for k in range(3):
-            a, b, d = old[0, k], old[1, k], old[2, k]
+            a = old[0, k]
+            b = old[1, k]
+            d = old[2, k]
             new[0, k] = E[0] * a + E[1] * b + E[2] * d
             new[1, k] = E[3] * a + E[4] * b + E[5] * d
             new[2, k] = E[6] * a + E[7] * b + E[8] * d

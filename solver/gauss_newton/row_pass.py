@@ -19,7 +19,8 @@ class _Row:
     """A SIMD vector of a row during code generation; its operators emit LLVM instructions."""
 
     def __init__(self, builder: Any, value: Any) -> None:
-        self.builder, self.value = builder, value
+        self.builder = builder
+        self.value = value
 
     def __add__(self, other: "_Row") -> "_Row":
         return _Row(self.builder, self.builder.fadd(self.value, other.value, flags=["contract"]))
@@ -55,7 +56,8 @@ def row_pass(formula: Callable[..., Sequence[Sequence["_Row"]]], rows: Sequence[
     """
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        scalars, n = args[0], args[1]
+        scalars = args[0]
+        n = args[1]
         written = [len(list(group)) for group in formula(*_counted(sig.args[0].count, rows))]
         splats = [
             _Row(builder, splat_of(builder, builder.extract_value(scalars, k)))

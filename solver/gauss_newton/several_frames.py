@@ -42,7 +42,8 @@ class SharedPriors(NamedTuple):
         self, weight: float, beta: Array, log_focal: float, focal: bool, system: tuple[Array, Array]
     ) -> None:
         """Add their Hessian and gradient to C (W, W) and c (W,) of `system`."""
-        (C, c), P = system, len(self.shape_mean)
+        (C, c) = system
+        P = len(self.shape_mean)
         C[:P, :P] += weight * self.shape_information
         c[:P] += weight * (self.shape_information @ (beta[:P] - self.shape_mean))
         if focal:
@@ -56,7 +57,9 @@ class SeveralFrames(ABC):
     settings: Settings
 
     def __init__(self) -> None:
-        self.cost, self.iterations, self.rejected = 0.0, 0, 0
+        self.cost = 0.0
+        self.iterations = 0
+        self.rejected = 0
 
     def run(self) -> int:
         """Optimize through all stages and return the last one's status."""
@@ -69,7 +72,9 @@ class SeveralFrames(ABC):
 
     def _run_stage(self, s: int) -> int:
         settings = self.settings
-        damping, growth, status = settings.damping, FIRST_GROWTH, MAX_ITERATIONS
+        damping = settings.damping
+        growth = FIRST_GROWTH
+        status = MAX_ITERATIONS
         self.cost = self._begin(s)
         if not np.isfinite(self.cost):
             return NON_FINITE

@@ -20,7 +20,10 @@ from ..validation import all_within
 if TYPE_CHECKING:
     from ..options import Priors
 
-HAS_SHAPE, HAS_2D, HAS_3D, HAS_DIRECTION = 1, 2, 4, 8
+HAS_SHAPE = 1
+HAS_2D = 2
+HAS_3D = 4
+HAS_DIRECTION = 8
 # The least that a residual's whole numbers may be, by its INDEXES, and the array of `Tree` that has
 # one row for each.
 _RANGES = {
@@ -74,19 +77,25 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
     Points with several kinds of measurement share one slot, unless one kind repeats. `shaped` is
     HAS_SHAPE where V is not zero.
     """
-    n_points, W = tree.V.shape[0], tree.S.shape[2]
+    n_points = tree.V.shape[0]
+    W = tree.S.shape[2]
     n_parts = tree.parents.shape[0]
     counts = (i2.shape[0], i3.shape[0], i_end.shape[0])
     most = counts[0] + counts[1] + counts[2]
     # after the points: joints as points of their parents
     of_point = np.full(n_points + n_parts, -1, np.int64)
-    part, listed = np.empty(most, np.int64), np.zeros(most, np.int64)
-    point, minus = np.empty(most, np.int64), np.full(most, -1, np.int64)  # numbered as of_point
+    part = np.empty(most, np.int64)
+    listed = np.zeros(most, np.int64)
+    # numbered as of_point
+    point = np.empty(most, np.int64)
+    minus = np.full(most, -1, np.int64)
     slots = np.empty(most, np.int64)
-    n, term = 0, 0
+    n = 0
+    term = 0
     for kind in range(3):
         for k in range(counts[kind]):
-            first, last = -1, -1
+            first = -1
+            last = -1
             if kind < 2:
                 end = i2[k] if kind == 0 else i3[k]
                 i = tree.point_part[end]
@@ -112,7 +121,8 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
             if slot < 0 or listed[slot] & bit:
                 slot = n
                 n += 1
-                part[slot], point[slot] = i, key
+                part[slot] = i
+                point[slot] = key
                 if from_origin:
                     of_point[key] = slot
                 else:
@@ -125,8 +135,11 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
         starts[part[k] + 1] += 1
     for i in range(n_parts):
         starts[i + 1] += starts[i]
-    shaped, rest, V = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 3, W))
-    place, free = np.empty(n, np.int64), starts[:-1].copy()
+    shaped = np.zeros(n, np.int64)
+    rest = np.zeros((n, 3))
+    V = np.zeros((n, 3, W))
+    place = np.empty(n, np.int64)
+    free = starts[:-1].copy()
     for k in range(n):
         at = free[part[k]]
         free[part[k]] += 1
@@ -148,7 +161,8 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
                     shaped[at] = HAS_SHAPE
     for k in range(most):
         slots[k] = place[slots[k]]
-    a, b = counts[0], counts[0] + counts[1]
+    a = counts[0]
+    b = counts[0] + counts[1]
     return starts, shaped, rest, V, slots[:a], slots[a:b], slots[b:], -1
 
 
@@ -311,7 +325,8 @@ def fill_terms(
     if layout is None or not layout.fits(indices):
         layout = Layout(tree, indices)
     count = _fill(layout.shaped, *layout.slots, m2, m3, md, *layout.values)
-    tables, external = priors.tables, NONE
+    tables = priors.tables
+    external = NONE
     own = m.packed_tables(len(tree.parents) - 1, n_points)
     if own or m.tables:
         tables = {**tables, **own}

@@ -15,7 +15,9 @@ from ..errors import ModelFileError
 
 # What a file's array must hold, and its shape; None is any extent.
 Form = tuple[str, tuple[int | None, ...]]
-_MIN_EXTENT_M, _MAX_EXTENT_M = 0.01, 50.0  # of a template along each axis
+# of a template along each axis
+_MIN_EXTENT_M = 0.01
+_MAX_EXTENT_M = 50.0
 _KINDS = {"numbers": "iuf", "whole numbers": "iu", "text": "U"}
 
 REQUIRED: dict[str, Form] = {
@@ -70,7 +72,10 @@ def check_body(body: Body, path: Path) -> None:
 
     :raises ModelFileError: an array has another shape, points outside, or is not finite.
     """
-    n, p, v, m = len(body.parents), body.P, len(body.v_template), len(body.keypoint_names)
+    n = len(body.parents)
+    p = body.P
+    v = len(body.v_template)
+    m = len(body.keypoint_names)
     materials = max(1, len(body.material_names))
     if body.faces.shape[1] not in (3, 4):
         raise ModelFileError(
@@ -150,7 +155,9 @@ def check_extent(v_template: NDArray[np.float64], path: Path) -> None:
 
 def _check_indices(body: Body, path: Path) -> None:
     """Refuse indices of joints, vertices and materials that point outside."""
-    n, v, materials = len(body.parents), len(body.v_template), max(1, len(body.material_names))
+    n = len(body.parents)
+    v = len(body.v_template)
+    materials = max(1, len(body.material_names))
     tops = {"skin_joints": n, "faces": v, "keypoint_part": n, "face_material": materials}
     if body.uv is not None:
         tops["uv_faces"] = len(body.uv)

@@ -80,7 +80,8 @@ def _face(points: RestPoints) -> dict[str, Attached]:
     face = {"nose": nose}
     for side in ("left", "right"):
         out = eye[side] - between
-        face[f"{side}_eye"], face[f"{side}_ear"] = eye[side], ear[side]
+        face[f"{side}_eye"] = eye[side]
+        face[f"{side}_ear"] = ear[side]
         face[f"{side}_eye_inner"] = between + 0.5 * out
         face[f"{side}_eye_outer"] = eye[side] + 0.48 * out + 0.11 * (ear[side] - eye[side])
         face[f"mouth_{side}"] = below + 0.83 * out
@@ -90,7 +91,8 @@ def _face(points: RestPoints) -> dict[str, Attached]:
 def _feet(points: RestPoints) -> dict[str, Attached]:
     feet: dict[str, Attached] = {}
     for side in ("left", "right"):
-        big, small = points.landmark(f"{side}_big_toe"), points.landmark(f"{side}_small_toe")
+        big = points.landmark(f"{side}_big_toe")
+        small = points.landmark(f"{side}_small_toe")
         feet[f"{side}_heel"] = (points.landmark(f"{side}_heel"), f"{side}_ankle")
         feet[f"{side}_big_toe"] = (big, f"{side}_foot")
         feet[f"{side}_small_toe"] = (small, f"{side}_foot")

@@ -77,9 +77,11 @@ class RestPoints:
         if known is not None:
             return self.vertex(known)
         if f"{side}_{finger}3" in self.joint_index:
-            last, before = self.joint(f"{side}_{finger}3"), self.joint(f"{side}_{finger}2")
+            last = self.joint(f"{side}_{finger}3")
+            before = self.joint(f"{side}_{finger}2")
             return last + _TIP_BEYOND * (last - before)
-        wrist, reach = self.joint(f"{side}_wrist"), self.vertex(self._farthest_of_hand(side))
+        wrist = self.joint(f"{side}_wrist")
+        reach = self.vertex(self._farthest_of_hand(side))
         sign = 1.0 if side == "left" else -1.0
         length = abs(reach[0, 0] - wrist[0, 0])
         along, up, forward = _TIP_OFFSETS[finger]
@@ -134,7 +136,8 @@ class RestPoints:
         found = {"nose": nose}
         for side, rim_at in sides.items():
             ear_at = rim_at + 0.15 * (nose_at - rim_at)  # from the rim of the ear to its opening
-            width, depth = ear_at[0] - middle, nose_at[2] - ear_at[2]
+            width = ear_at[0] - middle
+            depth = nose_at[2] - ear_at[2]
             eye_at = np.array(
                 [middle + 0.42 * width, nose_at[1] + 0.5 * abs(width), nose_at[2] - 0.25 * depth]
             )
@@ -157,7 +160,8 @@ class RestPoints:
         outward = sign * t[:, 0]
         across = (outward - outward.min()) / max(np.ptp(outward), 1e-9)
         # a flat part has no outer side
-        inner, outer = across <= 0.5, across >= min(0.88, across.max())
+        inner = across <= 0.5
+        outer = across >= min(0.88, across.max())
         return {
             f"{side}_heel": int(foot[sole][np.argmin(v[sole, 2])]),
             f"{side}_big_toe": int(toes[inner][np.argmax(t[inner, 2])]),

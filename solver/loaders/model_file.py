@@ -34,8 +34,12 @@ from .skeletons import recognise_skeleton
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
 # how a full SMPL-X file divides shapedirs; older ones have 10 and 10
-SMPLX_SHAPE, SMPLX_EXPRESSION = 300, 100
-MAX_VERTICES, MAX_JOINTS, MAX_WEIGHTS = 200_000, 500, 20_000_000  # SMPL-X: 10475, 55, 576125
+SMPLX_SHAPE = 300
+SMPLX_EXPRESSION = 100
+# SMPL-X: 10475, 55, 576125
+MAX_VERTICES = 200_000
+MAX_JOINTS = 500
+MAX_WEIGHTS = 20_000_000
 STAR_CORRECTIVES = 93  # 23 quaternions and one shape coefficient; SMPL has 207
 
 _NUMERIC = ("v_template", "shapedirs", "J_regressor", "kintree_table", "weights", "f")
@@ -134,7 +138,8 @@ def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
         {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))},
         path,
     )
-    vertices, n = len(arrays["v_template"]), arrays["kintree_table"].shape[1]
+    vertices = len(arrays["v_template"])
+    n = arrays["kintree_table"].shape[1]
     if 0 in (vertices, n):
         raise ModelFileError(
             f"{path}: {vertices} vertices and {n} joints do not match any supported body; choose "

@@ -119,7 +119,8 @@ def _refuse(*_: object) -> NoReturn:
     raise ModelFileError("it makes an object in a way that such files do not")
 
 
-_NDARRAY, _OBJECT = Global(_refuse), Global(_refuse)
+_NDARRAY = Global(_refuse)
+_OBJECT = Global(_refuse)
 
 
 def _reconstruct(kind: object, *_: object) -> PickledArray:
@@ -206,7 +207,8 @@ def to_array(value: object, depth: int = 0) -> NDArray[Any]:
     if isinstance(value, bytes | str):
         return np.array(value.decode("latin1") if isinstance(value, bytes) else value)
     if isinstance(value, PickledObject) and value.state is not None and depth < DEEPEST:
-        kind, deeper = type(value).__name__, depth + 1
+        kind = type(value).__name__
+        deeper = depth + 1
         if kind in _SPARSE:
             return _dense(kind, value.state, deeper)
         return (
@@ -250,7 +252,8 @@ def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
         pair = state.get("coords", (state.get("row"), state.get("col")))
         if not isinstance(pair, tuple) or len(pair) != 2:
             raise ModelFileError("it holds a COO matrix without coordinates")
-        i, j = _indices(to_array(pair[0], depth), rows), _indices(to_array(pair[1], depth), columns)
+        i = _indices(to_array(pair[0], depth), rows)
+        j = _indices(to_array(pair[1], depth), columns)
     else:
         major, minor = (columns, rows) if kind == "csc" else (rows, columns)
         start = to_array(state.get("indptr"), depth)

@@ -144,7 +144,8 @@ class _BodyUnpickler(pickle._Unpickler):
 
     def load_setitem(self) -> None:
         """Handle SETITEM."""
-        value, key = self.stack.pop(), self.stack.pop()
+        value = self.stack.pop()
+        key = self.stack.pop()
         self.set_items([key, value])
 
     def load_dict(self) -> None:

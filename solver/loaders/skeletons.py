@@ -15,10 +15,8 @@ from ..names import BODY_JOINTS, BODY_PARENTS
 
 HAND_ORDER = ("index", "middle", "pinky", "ring", "thumb")  # as SMPL+H and SMPL-X store them
 FACE_JOINTS = ("jaw", "left_eye_smplhf", "right_eye_smplhf")
-_HEAD, _WRISTS = (
-    BODY_JOINTS.index("head"),
-    (BODY_JOINTS.index("left_wrist"), BODY_JOINTS.index("right_wrist")),
-)
+_HEAD = BODY_JOINTS.index("head")
+_WRISTS = (BODY_JOINTS.index("left_wrist"), BODY_JOINTS.index("right_wrist"))
 
 
 @dataclass(frozen=True)
@@ -39,9 +37,11 @@ def _with_fingers(names: list[str], parents: list[int]) -> None:
 
 
 def _skeletons() -> dict[int, Skeleton]:
-    smplh, smplh_parents = list(BODY_JOINTS), list(BODY_PARENTS)
+    smplh = list(BODY_JOINTS)
+    smplh_parents = list(BODY_PARENTS)
     _with_fingers(smplh, smplh_parents)
-    smplx, smplx_parents = [*BODY_JOINTS, *FACE_JOINTS], [*BODY_PARENTS, _HEAD, _HEAD, _HEAD]
+    smplx = [*BODY_JOINTS, *FACE_JOINTS]
+    smplx_parents = [*BODY_PARENTS, _HEAD, _HEAD, _HEAD]
     _with_fingers(smplx, smplx_parents)
     every = (
         Skeleton("smpl", (*BODY_JOINTS, "left_hand", "right_hand"), (*BODY_PARENTS, *_WRISTS)),

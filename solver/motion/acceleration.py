@@ -40,7 +40,9 @@ def _velocity(A, B, h, phi, J) -> None:  # type: ignore[no-untyped-def]
     )
     x, y, z = log3(E[0], E[1], E[2], E[3], E[4], E[5], E[6], E[7], E[8])
     Ji = left_jacobian_inverse3(x, y, z)
-    phi[0], phi[1], phi[2] = x / h, y / h, z / h
+    phi[0] = x / h
+    phi[1] = y / h
+    phi[2] = z / h
     for r in range(3):
         J[0, r] = (Ji[0] * A[r, 0] + Ji[1] * A[r, 1] + Ji[2] * A[r, 2]) / h
         J[1, r] = (Ji[3] * A[r, 0] + Ji[4] * A[r, 1] + Ji[5] * A[r, 2]) / h
@@ -51,7 +53,9 @@ def _velocity(A, B, h, phi, J) -> None:  # type: ignore[no-untyped-def]
 def _turn(J, R) -> None:  # type: ignore[no-untyped-def]
     """J <- J Rᵀ, in place, both (3, 3)."""
     for r in range(3):
-        a, b, c = J[r, 0], J[r, 1], J[r, 2]
+        a = J[r, 0]
+        b = J[r, 1]
+        c = J[r, 2]
         for s in range(3):
             J[r, s] = a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
 
@@ -64,7 +68,9 @@ def _add(system, f, at, slot, a, J, weight) -> None:  # type: ignore[no-untyped-
     for p in range(3):
         to = f - 2 + p
         for r in range(3):
-            J0, J1, J2 = weight * J[p, 0, r], weight * J[p, 1, r], weight * J[p, 2, r]
+            J0 = weight * J[p, 0, r]
+            J1 = weight * J[p, 1, r]
+            J2 = weight * J[p, 2, r]
             system.N[to, at + r, 0] += J0 * a[0] + J1 * a[1] + J2 * a[2]
             for q in range(p + 1):
                 for s in range(3):
@@ -118,12 +124,18 @@ def accumulate(tree, poses, motion, first, last, memory, system) -> float:  # ty
     """
     cost: float = 0.0
     parts = tree.parents.shape[0]
-    first, a, J, h, table = max(first, 2), memory.a, memory.J, motion.h, motion.table
+    first = max(first, 2)
+    a = memory.a
+    J = memory.J
+    h = motion.h
+    table = motion.table
     for f in range(first, last):
         if f == first:
             _velocities(tree, poses, h, table, f - 1, memory.v[(f - 1) % 2], memory.M[(f - 1) % 2])
-        before, after = memory.M[(f - 1) % 2], memory.M[f % 2]
-        v_before, v_after = memory.v[(f - 1) % 2], memory.v[f % 2]
+        before = memory.M[(f - 1) % 2]
+        after = memory.M[f % 2]
+        v_before = memory.v[(f - 1) % 2]
+        v_after = memory.v[f % 2]
         _velocities(tree, poses, h, table, f, v_after, after)
         mean = 0.5 * (h[f] + h[f - 1])
         for k in range(parts + 1):

@@ -100,8 +100,10 @@ def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: igno
     """Write frame f's rows of the front: what the frames before have left of it, and its own
     blocks, damped.
     """
-    n, q = system.N.shape[1], system.N.shape[2]
-    D, N = system.D[f], system.N[f]
+    n = system.N.shape[1]
+    q = system.N.shape[2]
+    D = system.D[f]
+    N = system.N[f]
     last = system.D.shape[0] - 1
     for a in range(n):
         for b in range(a, n):
@@ -138,9 +140,14 @@ def _load_contacts(contacts, f, other, n: int, Z) -> None:  # type: ignore[no-un
         w = contacts.w[max(f, other), k]
         if w <= 0.0:
             continue
-        own, its, columns = contacts.J[f, k], contacts.J[other, k], contacts.columns[k]
+        own = contacts.J[f, k]
+        its = contacts.J[other, k]
+        columns = contacts.columns[k]
         for a in range(contacts.counts[k]):
-            g0, g1, g2, row = w * own[0, a], w * own[1, a], w * own[2, a], columns[a]
+            g0 = w * own[0, a]
+            g1 = w * own[1, a]
+            g2 = w * own[2, a]
+            row = columns[a]
             for b in range(contacts.counts[k]):
                 Z[row, n + columns[b]] -= g0 * its[0, b] + g1 * its[1, b] + g2 * its[2, b]
 
@@ -167,8 +174,10 @@ def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) 
     `trail` (2 n + q, 2 n + q) is what the frames before have left of these two and of the global
     columns, and becomes what is left of the two that follow.
     """
-    n, q = system.N.shape[1], system.N.shape[2]
-    size, row = 2 * n + q, 3 * n + q
+    n = system.N.shape[1]
+    q = system.N.shape[2]
+    size = 2 * n + q
+    row = 3 * n + q
     for k in range(count):
         f = first + step * k
         _load(system, f, step, damping, root_scale, trail, Z[f])
@@ -182,7 +191,8 @@ def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-
     """Fill d of `count` frames, whose elimination ended at `first` and went by `step`, from the
     next two and dg.
     """
-    n, row = Z.shape[1], Z.shape[2]
+    n = Z.shape[1]
+    row = Z.shape[2]
     W = dg.shape[0]
     for k in range(count):
         f = first - step * k
@@ -278,7 +288,8 @@ def solve_clip(
     eliminate_clip(system, damping, root_scale, factor, pool)
     factor.dg[:] = 0.0
     solve_globals(tree, factor.C, factor.c, factor.dg)
-    frames, middle = len(factor.d), _middle(len(factor.d))
+    frames = len(factor.d)
+    middle = _middle(len(factor.d))
     both = min(frames, 2)
     factor.d[:] = 0.0
     _substitute_middle(factor, middle, both)

@@ -60,12 +60,15 @@ def joint_covariances(
     """
     eliminate_clip(system, MIN_DAMPING, root_scale, factor, pool)
     T, n, _ = system.N.shape
-    G, parts, W = tree.globals, len(tree.parents), len(factor.c)
+    G = tree.globals
+    parts = len(tree.parents)
+    W = len(factor.c)
     C = np.triu(factor.C[:G, :G])
     shared = np.linalg.pinv(C + np.triu(C, 1).T, hermitian=True)
     middle = max(T // 2 - 1, 0)
     out = ClipCovariance(np.empty((T, parts, 3, 3)), np.empty((T, parts, 3, 3)), shared)
-    front, back = _make_memory(n, W, parts), _make_memory(n, W, parts)
+    front = _make_memory(n, W, parts)
+    back = _make_memory(n, W, parts)
     front.S[3 * n : 3 * n + G, 3 * n : 3 * n + G] = shared
     both = min(T, 2)
     _select(tree, poses, factor.Z, middle + both - 1, both, -1, front, out.joints, out.from_root)
@@ -93,7 +96,8 @@ def joint_covariances(
 
 
 def _make_memory(n: int, W: int, parts: int) -> _Memory:
-    size, columns = 3 * n + W, 3 + 3 * parts + W
+    size = 3 * n + W
+    columns = 3 + 3 * parts + W
     return _Memory(
         np.zeros((size, size)),
         np.zeros((size, 4)),
@@ -125,11 +129,15 @@ def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
     Of the second frame after it, only the columns that the rows reach (`far_width`) are read, here
     and before, and so only they are filled.
     """
-    size, shared = S.shape[0], 3 * n
+    size = S.shape[0]
+    shared = 3 * n
     for first in range(n - 4, -1, -4):
-        after, end = first + 4, 2 * n + far_width(first, n)
-        width, W = end - after, size - shared
-        at, to = first * size + after, first * size + shared
+        after = first + 4
+        end = 2 * n + far_width(first, n)
+        width = end - after
+        W = size - shared
+        at = first * size + after
+        to = first * size + shared
         for r in range(4):
             clear(S, (first + r) * size + after, width)
             clear(S, (first + r) * size + shared, W)
@@ -146,7 +154,8 @@ def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
         for r in range(3, -1, -1):
             i = first + r
             for q in range(r + 1, 4):
-                z, row = -Z[i, first + q], (first + q) * size
+                z = -Z[i, first + q]
+                row = (first + q) * size
                 add1(S, i * size + after, z, S, row + after, width)
                 add1(S, i * size + shared, z, S, row + shared, W)
             u = Z[i, i]
@@ -200,18 +209,28 @@ def _write_joints(tree, poses, f, memory, joints, from_root) -> None:  # type: i
     f.
     """
     n = (memory.S.shape[0] - tree.S.shape[2]) // 3
-    J, columns = memory.J, memory.columns
-    t, D = poses.t[f], poses.D[f]
+    J = memory.J
+    columns = memory.columns
+    t = poses.t[f]
+    D = poses.D[f]
     for i in range(tree.parents.shape[0]):
         count = 0
         k = tree.parents[i]
         while k >= 0:
-            x, y, z = t[i, 0] - t[k, 0], t[i, 1] - t[k, 1], t[i, 2] - t[k, 2]
+            x = t[i, 0] - t[k, 0]
+            y = t[i, 1] - t[k, 1]
+            z = t[i, 2] - t[k, 2]
             for r in range(3):
                 columns[count + r] = r if k == 0 else 3 + 3 * k + r
-            J[0, 0, count], J[0, 0, count + 1], J[0, 0, count + 2] = 0.0, z, -y
-            J[0, 1, count], J[0, 1, count + 1], J[0, 1, count + 2] = -z, 0.0, x
-            J[0, 2, count], J[0, 2, count + 1], J[0, 2, count + 2] = y, -x, 0.0
+            J[0, 0, count] = 0.0
+            J[0, 0, count + 1] = z
+            J[0, 0, count + 2] = -y
+            J[0, 1, count] = -z
+            J[0, 1, count + 1] = 0.0
+            J[0, 1, count + 2] = x
+            J[0, 2, count] = y
+            J[0, 2, count + 1] = -x
+            J[0, 2, count + 2] = 0.0
             count += 3
             k = tree.parents[k]
         for a in range(tree.shape):
@@ -239,7 +258,9 @@ def _project(S, J, columns, count: int, out) -> None:  # type: ignore[no-untyped
             x += J[0, 0, a] * s
             y += J[0, 1, a] * s
             z += J[0, 2, a] * s
-        J[1, 0, b], J[1, 1, b], J[1, 2, b] = x, y, z
+        J[1, 0, b] = x
+        J[1, 1, b] = y
+        J[1, 2, b] = z
     for r in range(3):
         for s in range(r, 3):
             value = 0.0

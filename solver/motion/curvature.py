@@ -62,8 +62,10 @@ def _apply(tree, poses, curvature, share, added, system) -> None:  # type: ignor
             if t > 0.0:  # False if S has overflowed
                 S = turned(poses.R[f, tree.parents[i]], S, True)
             else:
-                t, S = 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            at, k = 3 + 3 * i, 0
+                t = 0.0
+                S = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            at = 3 + 3 * i
+            k = 0
             for r in range(3):
                 for c in range(r, 3):
                     D[at + r, at + c] += t * S[k] - added[f, i, k]
@@ -76,7 +78,9 @@ class ClipCurvature:
 
     def __init__(self, tree: Tree, frames: int, on: bool) -> None:
         """Begin with nothing; if it is not `on`, it stays at that."""
-        self._tree, self._on, parts = tree, on, len(tree.parents)
+        self._tree = tree
+        self._on = on
+        parts = len(tree.parents)
         S, H = np.zeros((2, frames, parts, 3, 3))
         self._curvature = Curvature(S, H, np.zeros((frames, parts, 3)))
         self._added = np.zeros((frames, parts, 6))

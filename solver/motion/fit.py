@@ -233,30 +233,32 @@ class _Clip:
         settings: _Settings,
         pool: ThreadPoolExecutor | None,
     ) -> None:
-        self.tree, self.frames, self.motion, self.settings, self.pool = (
-            tree,
-            frames,
-            motion,
-            settings,
-            pool,
-        )
-        T, K, P = len(frames), len(tree.parents) - 1, tree.shape
-        self.R, self.t, self.Omega = (
-            np.empty((T, K + 1, 3, 3)),
-            np.empty((T, K + 1, 3)),
-            np.empty((T, K, 3, 3)),
-        )
+        self.tree = tree
+        self.frames = frames
+        self.motion = motion
+        self.settings = settings
+        self.pool = pool
+        T = len(frames)
+        K = len(tree.parents) - 1
+        P = tree.shape
+        self.R = np.empty((T, K + 1, 3, 3))
+        self.t = np.empty((T, K + 1, 3))
+        self.Omega = np.empty((T, K, 3, 3))
         for f, state in enumerate(init):
             self.R[f, 0] = as_array(state.R_camera_root, (3, 3), "R_camera_root")
             self.t[f, 0] = as_array(state.t_camera_root, (3,), "t_camera_root")
             self.Omega[f] = as_array(state.Omega, (K, 3, 3), "Omega")
             check_state_rotations(self.R[f, 0], self.Omega[f])
         self.R[:, 0], self.Omega = nearest_rotation(self.R[:, 0]), nearest_rotation(self.Omega)
-        self.beta, self.log_focal = as_array(init[-1].beta, (P,), "beta").copy(), 0.0
+        self.beta = as_array(init[-1].beta, (P,), "beta").copy()
+        self.log_focal = 0.0
         self.information = np.zeros((P, P))
         self.covariances = np.empty((2, T, K + 1, 3, 3)) if settings.covariance else None
         self.counts = np.zeros(T, np.int64)
-        self.status, self.cost, self.iterations, self.rejected = Status.NO_MEASUREMENTS, 0.0, 0, 0
+        self.status = Status.NO_MEASUREMENTS
+        self.cost = 0.0
+        self.iterations = 0
+        self.rejected = 0
         self.costs: dict[str, float] = {}
 
     def solve(self, free: Tree, shape: Array | None, windows: list[Window]) -> MotionFit:
@@ -278,16 +280,20 @@ class _Clip:
 
     def _optimize(self, tree: Tree, window: Window) -> Optimizer:
         """Optimize the frames of a window with the global columns of `tree`."""
-        settings, P = self.settings, tree.shape
+        settings = self.settings
+        P = tree.shape
         priors = settings.priors if P else _without_shape(settings.priors)
-        first, frames = window.frames.start, self.frames[window.frames]
+        first = window.frames.start
+        frames = self.frames[window.frames]
         views, self.counts[window.frames] = pack_frames(
             tree, frames, pack_priors(tree, priors), first
         )
         poses = make_poses(tree, len(frames))
-        poses.R[:, 0], poses.t[:, 0] = self.R[window.frames, 0], self.t[window.frames, 0]
+        poses.R[:, 0] = self.R[window.frames, 0]
+        poses.t[:, 0] = self.t[window.frames, 0]
         poses.Omega[:, 1:] = self.Omega[window.frames]
-        poses.beta[:P], poses.log_focal[:] = self.beta[:P], self.log_focal
+        poses.beta[:P] = self.beta[:P]
+        poses.log_focal[:] = self.log_focal
         shared = SharedPriors(*priors.packed_shape(P), settings.focal_weight)
         options = settings.options
         problem = ClipProblem(
@@ -313,28 +319,33 @@ class _Clip:
         """Set the shape, and the focal length, to what parts of the clip say together; keep the
         parts' poses.
         """
-        estimates, informations = [], []
-        P, G = tree.shape, tree.globals
+        estimates = []
+        informations = []
+        P = tree.shape
+        G = tree.globals
         for part in parts:
             optimizer = self._optimize(tree, part)
             self._keep_poses(optimizer.poses, part)
             estimates.append(np.append(optimizer.poses.beta[:P], optimizer.poses.log_focal)[:G])
             informations.append(optimizer.information())
-        prior, mean = np.zeros((G, G)), np.zeros(G)
+        prior = np.zeros((G, G))
+        mean = np.zeros(G)
         mean[:P], information = self.settings.priors.packed_shape(P)
         prior[:P, :P] = optimizer.problem.shape_weights[-1] * information
         if G > P:
             prior[P, P] = self.settings.focal_weight
         self.information = sum(informations) - (len(parts) - 1) * prior
         shared = combined(estimates, informations, mean, prior)
-        self.beta, self.log_focal = shared[:P], float(shared[P]) if G > P else 0.0
+        self.beta = shared[:P]
+        self.log_focal = float(shared[P]) if G > P else 0.0
         self.information = shape_information(self.information, P)
 
     def _keep_poses(self, poses: Pose, window: Window) -> None:
         inner = slice(
             window.kept.start - window.frames.start, window.kept.stop - window.frames.start
         )
-        self.R[window.kept], self.t[window.kept] = poses.R[inner], poses.t[inner]
+        self.R[window.kept] = poses.R[inner]
+        self.t[window.kept] = poses.t[inner]
         self.Omega[window.kept] = poses.Omega[inner, 1:]
 
     def _keep(self, tree: Tree, optimizer: Optimizer, window: Window) -> None:
@@ -345,7 +356,8 @@ class _Clip:
         for name, cost in optimizer.costs.items():
             self.costs[name] = self.costs.get(name, 0.0) + cost
         if tree.shape:
-            self.beta, self.log_focal = poses.beta[: tree.shape].copy(), float(poses.log_focal[0])
+            self.beta = poses.beta[: tree.shape].copy()
+            self.log_focal = float(poses.log_focal[0])
             self.information = shape_information(optimizer.information(), tree.shape)
         if self.covariances is not None:
             root_scale = optimizer.problem.settings.root_scale

@@ -69,15 +69,15 @@ def triangulated(views: Sequence[View], points: int) -> Measurements:
     """
     p = np.full((points, 3), np.nan)
     for _ in range(2):
-        A, b = np.zeros((points, 3, 3)), np.zeros((points, 3))
+        A = np.zeros((points, 3, 3))
+        b = np.zeros((points, 3))
         for view in views:
-            R, t = (
-                np.asarray(view.R_camera_world, dtype=float),
-                np.asarray(view.t_camera_world, dtype=float),
-            )
+            R = np.asarray(view.R_camera_world, dtype=float)
+            t = np.asarray(view.t_camera_world, dtype=float)
             indices, m = view.measurements.packed2d(points)
             usable = np.isfinite(m).all(axis=1) & (m[:, 2] > 0.0)
-            indices, m = indices[usable], m[usable]
+            indices = indices[usable]
+            m = m[usable]
             depth = np.nan_to_num(p[indices] @ R[2] + t[2], nan=1.0)
             weight = m[:, 2] / np.maximum(depth, 0.1) ** 2
             for axis in range(2):

@@ -33,9 +33,13 @@ class Optimizer(SeveralFrames):
         accepted.
         """
         super().__init__()
-        self.problem, self.settings, self.pool = problem, problem.settings, pool
-        self.poses, self._trial = poses, make_poses(problem.tree, problem.frames)
-        self.system, self._other = problem.make_system(), problem.make_system()
+        self.problem = problem
+        self.settings = problem.settings
+        self.pool = pool
+        self.poses = poses
+        self._trial = make_poses(problem.tree, problem.frames)
+        self.system = problem.make_system()
+        self._other = problem.make_system()
         self.factor = make_factor(self.system)
         self.costs = dict[str, float]()
 
@@ -76,7 +80,8 @@ class Optimizer(SeveralFrames):
         """Return the information (G, G) of the global columns with all poses eliminated, priors
         included.
         """
-        G, root_scale = self.problem.tree.globals, self.settings.root_scale
+        G = self.problem.tree.globals
+        root_scale = self.settings.root_scale
         eliminate_clip(self.system, MIN_DAMPING, root_scale, self.factor, self.pool)
         C = np.triu(self.factor.C[:G, :G])
         information: Array = C + np.triu(C, 1).T

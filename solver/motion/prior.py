@@ -74,7 +74,8 @@ class MotionPrior:
         sigmas = _each(self.robust_joints, K, "MotionPrior.robust_joints")
         for sigma in sigmas:
             check_robust(sigma, "MotionPrior.robust_joints")
-        table[1:-1, 0], table[1:-1, 1] = joints, 1.0 / sigmas
+        table[1:-1, 0] = joints
+        table[1:-1, 1] = 1.0 / sigmas
         table[-1] = self.root_position, _inverse(self.robust_root_position)
         return table
 

@@ -86,8 +86,10 @@ class _Memory(NamedTuple):
 
 
 def _make_memory(tree: Tree) -> _Memory:
-    blocks, total = make_blocks(tree), make_blocks(tree)
-    sums, W = np.zeros_like(blocks.A), len(blocks.c)
+    blocks = make_blocks(tree)
+    total = make_blocks(tree)
+    sums = np.zeros_like(blocks.A)
+    W = len(blocks.c)
     return _Memory(
         make_pose(tree),
         blocks,
@@ -102,18 +104,22 @@ def _make_memory(tree: Tree) -> _Memory:
 
 
 @inlined_kernel
-def linearize_frames(
+def linearize_frames(  # type: ignore[no-untyped-def]
     tree, views, first, last, stage, triggs, poses, memory, joints, system
-) -> float:  # type: ignore[no-untyped-def]
+) -> float:
     """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`;
     return the cost.
     """
     cost: float = 0.0
-    blocks, total = memory.blocks, memory.total
+    blocks = memory.blocks
+    total = memory.total
     for f in range(first, last):
-        pose, v, end = pose_of(poses, f), views.of_frame[f], views.of_frame[f + 1]
+        pose = pose_of(poses, f)
+        v = views.of_frame[f]
+        end = views.of_frame[f + 1]
         alone = end - v == 1 and views.own_axes[v]
-        at, own = pose if alone else memory.seen, blocks if alone else total
+        at = pose if alone else memory.seen
+        own = blocks if alone else total
         if not alone:
             place_parts(tree, pose)
             clear_blocks(total)
@@ -198,7 +204,8 @@ class ClipProblem:
         self.settings = self.settings._replace(stages=self.settings.stages.copy())
         self.settings.stages[:, 0, SHAPE_PRIOR] = 0.0
         self._memories = _make_memory(self.tree), _make_memory(self.tree)
-        parts, T = len(self.tree.parents), self.frames
+        parts = len(self.tree.parents)
+        T = self.frames
         # of the joints alone, as last linearized, with a leading dimension of frames
         self.joints = self._memories[0].total._replace(
             H_u=np.zeros((T, parts, 3, GRADIENT + 1)),
@@ -220,7 +227,8 @@ class ClipProblem:
         cost.
         """
         # by half, then of the frames that reach from one to the other
-        T, costs = self.frames, np.zeros((3, 3))
+        T = self.frames
+        costs = np.zeros((3, 3))
         system.C[:] = 0.0
         system.c[:] = 0.0
         self.joints.cross[0] = 0

@@ -22,16 +22,27 @@ def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untype
     pose = pose_of(poses, f)
     i = tree.point_part[j]
     x, y, z = lever(tree, pose, j)
-    p[0], p[1], p[2] = x + pose.t[i, 0], y + pose.t[i, 1], z + pose.t[i, 2]
-    at, k = count - 3, i
+    p[0] = x + pose.t[i, 0]
+    p[1] = y + pose.t[i, 1]
+    p[2] = z + pose.t[i, 2]
+    at = count - 3
+    k = i
     while k >= 0:
         if k == 0:
             at = 0
-        ex, ey, ez = p[0] - pose.t[k, 0], p[1] - pose.t[k, 1], p[2] - pose.t[k, 2]
+        ex = p[0] - pose.t[k, 0]
+        ey = p[1] - pose.t[k, 1]
+        ez = p[2] - pose.t[k, 2]
         # u x e: column r is the unit vector r crossed with e
-        J[0, at], J[0, at + 1], J[0, at + 2] = 0.0, ez, -ey
-        J[1, at], J[1, at + 1], J[1, at + 2] = -ez, 0.0, ex
-        J[2, at], J[2, at + 1], J[2, at + 2] = ey, -ex, 0.0
+        J[0, at] = 0.0
+        J[0, at + 1] = ez
+        J[0, at + 2] = -ey
+        J[1, at] = -ez
+        J[1, at + 1] = 0.0
+        J[1, at + 2] = ex
+        J[2, at] = ey
+        J[2, at + 1] = -ex
+        J[2, at + 2] = 0.0
         at -= 3
         k = tree.parents[k]
     for r in range(3):
@@ -62,15 +73,14 @@ def place_points(tree, poses, motion, first, last, system) -> None:  # type: ign
                 both += motion.contact * motion.probability[f + 1, k] / motion.h[f + 1]
             if both <= 0.0:
                 continue
-            own, count = J[f, k], counts[k]
+            own = J[f, k]
+            count = counts[k]
             _jacobian(tree, poses, f, motion.indices[k], count, p[f, k], own)
             for a in range(count):
-                g0, g1, g2, row = (
-                    both * own[0, a],
-                    both * own[1, a],
-                    both * own[2, a],
-                    columns[k, a],
-                )
+                g0 = both * own[0, a]
+                g1 = both * own[1, a]
+                g2 = both * own[2, a]
+                row = columns[k, a]
                 for b in range(a, count):
                     D[row, columns[k, b]] += g0 * own[0, b] + g1 * own[1, b] + g2 * own[2, b]
 
@@ -81,7 +91,9 @@ def _add_gradient(N, J, columns, count, force, moved, P) -> None:  # type: ignor
     (3, W).
     """
     for a in range(count):
-        x, y, z = J[0, a], J[1, a], J[2, a]
+        x = J[0, a]
+        y = J[1, a]
+        z = J[2, a]
         N[columns[a], 0] += x * force[0] + y * force[1] + z * force[2]
         for b in range(P):
             N[columns[a], GLOBALS + b] += x * moved[0, b] + y * moved[1, b] + z * moved[2, b]
@@ -98,10 +110,12 @@ def accumulate(tree, first, last, work, system, C, c) -> float:  # type: ignore[
     cost: float = 0.0
     P = tree.shape
     w, p, J, columns, counts = system.contacts
-    force, moved = work[:, 0], work[:, 1:]
+    force = work[:, 0]
+    moved = work[:, 1:]
     for f in range(max(first, 1), last):
         for k in range(counts.shape[0]):
-            weight, count = w[f, k], counts[k]
+            weight = w[f, k]
+            count = counts[k]
             if weight <= 0.0:
                 continue
             for r in range(3):
@@ -111,7 +125,9 @@ def accumulate(tree, first, last, work, system, C, c) -> float:  # type: ignore[
                 for a in range(P):
                     moved[r, a] = weight * (J[f, k, r, count + a] - J[f - 1, k, r, count + a])
             for a in range(P):
-                m0, m1, m2 = moved[0, a] / weight, moved[1, a] / weight, moved[2, a] / weight
+                m0 = moved[0, a] / weight
+                m1 = moved[1, a] / weight
+                m2 = moved[2, a] / weight
                 c[a] += m0 * force[0] + m1 * force[1] + m2 * force[2]
                 for b in range(a, P):
                     C[a, b] += m0 * moved[0, b] + m1 * moved[1, b] + m2 * moved[2, b]

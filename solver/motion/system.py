@@ -57,13 +57,15 @@ def make_system(tree: Tree, frames: int, points: Sequence[int] | Array = ()) -> 
     """Return a system of zeros for that many frames, in which the points of these numbers (C,) may
     stand.
     """
-    K, W = len(tree.parents) - 1, tree.S.shape[2]
+    K = len(tree.parents) - 1
+    W = tree.S.shape[2]
     n = padded(6 + 3 * K)
     shapes: list[tuple[int, ...]] = [(n, n), (K + 2, 3, 3), (K + 2, 3, 3), (n, GLOBALS + W)]
     D, B1, B2, N = (np.zeros((frames, *shape)) for shape in shapes)
     columns = [_columns(tree, int(tree.point_part[j])) for j in points]
     counts = np.array([len(some) for some in columns], np.int64)
-    m, C = max(counts, default=0), len(points)
+    m = max(counts, default=0)
+    C = len(points)
     padded_columns = np.array([some + [0] * (m - len(some)) for some in columns], np.int64).reshape(
         C, m
     )
@@ -85,9 +87,11 @@ def make_poses(tree: Tree, frames: int) -> Pose:
     """Return the poses of a clip in arrays with a leading dimension of frames; beta and log_focal
     as of one frame.
     """
-    K, W = len(tree.parents) - 1, tree.S.shape[2]
+    K = len(tree.parents) - 1
+    W = tree.S.shape[2]
     eye = np.tile(np.eye(3), (frames, K + 1, 1, 1))
-    t, D = np.zeros((frames, K + 1, 3)), np.zeros((frames, K + 1, 3, W))
+    t = np.zeros((frames, K + 1, 3))
+    D = np.zeros((frames, K + 1, 3, W))
     return Pose(eye, eye.copy(), t, D, np.zeros(W), np.zeros(1))
 
 
@@ -102,7 +106,8 @@ def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-u
     """Add blocks of a camera whose axes are turn (3, 3) times those of `sums`: x' = (R w, R nu), u'
     = R u.
     """
-    n, row = source.A.shape[0], source.A.shape[2]
+    n = source.A.shape[0]
+    row = source.A.shape[2]
     W = source.c.shape[0]
     for i in range(n):
         for half in range(3):
@@ -110,7 +115,9 @@ def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-u
             rows = source.H_u[i] if half == 2 else source.A[i, 3 * half : 3 * half + 3]
             into = sums.H_u[i] if half == 2 else sums.A[i, 3 * half : 3 * half + 3]
             for r in range(3):
-                a, b, c = turn[0, r], turn[1, r], turn[2, r]
+                a = turn[0, r]
+                b = turn[1, r]
+                c = turn[2, r]
                 for k in range(GRADIENT, row):
                     into[r, k] += a * rows[0, k] + b * rows[1, k] + c * rows[2, k]
                 for first in range(0, 6, 3):
@@ -121,7 +128,9 @@ def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-u
                         into[r, first + s] += x * turn[0, s] + y * turn[1, s] + z * turn[2, s]
         H = source.H_uu[i]
         for r in range(3):
-            a, b, c = turn[0, r], turn[1, r], turn[2, r]
+            a = turn[0, r]
+            b = turn[1, r]
+            c = turn[2, r]
             x = a * H[0, 0] + b * H[1, 0] + c * H[2, 0]
             y = a * H[0, 1] + b * H[1, 1] + c * H[2, 1]
             z = a * H[0, 2] + b * H[1, 2] + c * H[2, 2]
@@ -142,7 +151,9 @@ def write_frame(tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c) -> Non
 
     sums (K+1, 6, 8+W) is overwritten.
     """
-    n_parts, row, W = blocks.A.shape[0], blocks.A.shape[2], blocks.c.shape[0]
+    n_parts = blocks.A.shape[0]
+    row = blocks.A.shape[2]
+    W = blocks.c.shape[0]
     o = pose.t[0]
     for a in range(D.shape[0]):
         for b in range(a - a % 3, D.shape[0]):
@@ -154,15 +165,21 @@ def write_frame(tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c) -> Non
             for k in range(row):
                 sums[i, r, k] = blocks.A[i, r, k]
     for i in range(n_parts - 1, 0, -1):
-        S, up = sums[i], sums[tree.parents[i]]
-        H, Y = blocks.H_uu[i], blocks.H_u[i]
-        x, y, z = pose.t[i, 0] - o[0], pose.t[i, 1] - o[1], pose.t[i, 2] - o[2]
+        S = sums[i]
+        up = sums[tree.parents[i]]
+        H = blocks.H_uu[i]
+        Y = blocks.H_u[i]
+        x = pose.t[i, 0] - o[0]
+        y = pose.t[i, 1] - o[1]
+        z = pose.t[i, 2] - o[2]
         for r in range(6):
             for k in range(row):
                 up[r, k] += S[r, k]
         # rows 0..2 of S become Y = UᵀS + H_u: the moment about the joint
         for k in range(row):
-            f0, f1, f2 = S[3, k], S[4, k], S[5, k]
+            f0 = S[3, k]
+            f1 = S[4, k]
+            f2 = S[5, k]
             S[0, k] += Y[0, k] - (y * f2 - z * f1)
             S[1, k] += Y[1, k] - (z * f0 - x * f2)
             S[2, k] += Y[2, k] - (x * f1 - y * f0)
@@ -174,14 +191,18 @@ def write_frame(tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c) -> Non
             for k in range(W):
                 N[at + r, GLOBALS + k] = S[r, SHAPE + k]
         for r in range(3):
-            b0, b1, b2 = Y[r, 3], Y[r, 4], Y[r, 5]
+            b0 = Y[r, 3]
+            b1 = Y[r, 4]
+            b2 = Y[r, 5]
             own = (Y[r, 0] + b1 * z - b2 * y, Y[r, 1] + b2 * x - b0 * z, Y[r, 2] + b0 * y - b1 * x)
             for s in range(3):
                 D[at + r, at + s] += H[r, s]
                 D[at + r, at + s] += own[s]
         j = i
         while j > 0:
-            sx, sy, sz = pose.t[j, 0] - o[0], pose.t[j, 1] - o[1], pose.t[j, 2] - o[2]
+            sx = pose.t[j, 0] - o[0]
+            sy = pose.t[j, 1] - o[1]
+            sz = pose.t[j, 2] - o[2]
             to = 3 + 3 * j
             for r in range(3):
                 D[to, at + r] += S[r, 0] + S[r, 4] * sz - S[r, 5] * sy

@@ -93,7 +93,8 @@ _rows_of = _tables_of  # all tables' rows of a view, as a tuple
 def terms_of(views: PackedViews, v: int) -> Terms:
     """Return the terms of view v; for kernels as well."""
     n = views.starts[v, -1]
-    a, b = views.slots[v, 0], views.slots[v, 1]
+    a = views.slots[v, 0]
+    b = views.slots[v, 1]
     external = External(
         views.external.calls[views.calls[v] : views.calls[v + 1]],
         views.external.ints,
@@ -129,11 +130,10 @@ def pack_frames(
     :raises InvalidValueError: a value that no fit can use, or a frame that is neither measurements
         nor views.
     """
-    packer, without = (
-        _Packer(tree),
-        PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information),
-    )
-    of_frame, counts = [0], np.zeros(len(frames), np.int64)
+    packer = _Packer(tree)
+    without = PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information)
+    of_frame = [0]
+    counts = np.zeros(len(frames), np.int64)
     for f, frame in enumerate(frames):
         name = f"frames[{first + f}]"
         for k, view in enumerate(views_of(frame, name) or [View(Measurements())]):
@@ -160,10 +160,8 @@ def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
     for k, view in enumerate(frame):
         check_type(view, View, f"{name}[{k}]")
         check_type(view.measurements, Measurements, f"measurements of {name}[{k}]")
-        R, t = (
-            as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]"),
-            view.t_camera_world,
-        )
+        R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]")
+        t = view.t_camera_world
         check_rotations(R[None], f"R_camera_world of {name}[{k}]")
         check_finite(
             as_array(t, (3,), f"t_camera_world of {name}[{k}]"), f"t_camera_world of {name}[{k}]"
@@ -175,7 +173,8 @@ class _Packer:
     """Collects the terms of views."""
 
     def __init__(self, tree: Tree) -> None:
-        self._tree, self._layout = tree, Layout(tree, (np.zeros(0, np.int64),) * 4)
+        self._tree = tree
+        self._layout = Layout(tree, (np.zeros(0, np.int64),) * 4)
         self.starts: list[Array] = []
         self._slots: list[tuple[int, int]] = []
         self._values: list[tuple[Array, ...]] = []
@@ -268,24 +267,26 @@ def _camera_of(view: View) -> tuple[Array, Array, bool]:
     """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are
     the world's.
     """
-    R, t = (
-        np.asarray(view.R_camera_world, dtype=float),
-        np.asarray(view.t_camera_world, dtype=float),
-    )
+    R = np.asarray(view.R_camera_world, dtype=float)
+    t = np.asarray(view.t_camera_world, dtype=float)
     if np.array_equal(R, _EYE) and not t.any():
         return _EYE, _NULL, True
     return nearest_rotation(R), t, False
 
 
-_EYE, _NULL = np.eye(3), np.zeros(3)
+_EYE = np.eye(3)
+_NULL = np.zeros(3)
 
 
 def _joined(views: Sequence[External]) -> tuple[Array, External]:
     """Return where the calls of each view begin and end (V+1,), and the rows of all of them."""
-    calls, i, f = [], 0, 0
+    calls = []
+    i = 0
+    f = 0
     for external in views:
         calls.append(external.calls + np.array([0, 0, i, f, 0]))
-        i, f = i + len(external.ints), f + len(external.floats)
+        i = i + len(external.ints)
+        f = f + len(external.floats)
     ints, floats = (
         np.concatenate([getattr(each, name) for each in views]) for name in ("ints", "floats")
     )

@@ -22,7 +22,8 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
 
     :param times: (T,) seconds, increasing.
     """
-    T, span = len(times), float(times[-1] - times[0])
+    T = len(times)
+    span = float(times[-1] - times[0])
     if span <= length:
         return [Window(slice(0, T), slice(0, T))]
     count = int(np.ceil((span - overlap) / (length - overlap)))

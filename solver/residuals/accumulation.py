@@ -38,12 +38,12 @@ def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2
     """
     R = pose.R[tree.parents[i]]
     for r in range(3):
-        x, y, z = R[r, 0], R[r, 1], R[r, 2]
-        a, b, c = (
-            x * h00 + y * h01 + z * h02,
-            x * h01 + y * h11 + z * h12,
-            x * h02 + y * h12 + z * h22,
-        )
+        x = R[r, 0]
+        y = R[r, 1]
+        z = R[r, 2]
+        a = x * h00 + y * h01 + z * h02
+        b = x * h01 + y * h11 + z * h12
+        c = x * h02 + y * h12 + z * h22
         for s in range(3):
             blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
         blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
@@ -52,7 +52,9 @@ def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2
 @kernel
 def lever(tree, pose, k):  # type: ignore[no-untyped-def]
     """Return R_i (V_k beta + v_bar_k), from the part's origin to point k, in camera axes."""
-    x, y, z = tree.v_bar[k, 0], tree.v_bar[k, 1], tree.v_bar[k, 2]
+    x = tree.v_bar[k, 0]
+    y = tree.v_bar[k, 1]
+    z = tree.v_bar[k, 2]
     for a in range(tree.shape):
         b = pose.beta[a]
         x += tree.V[k, 0, a] * b
@@ -69,8 +71,11 @@ def lever(tree, pose, k):  # type: ignore[no-untyped-def]
 @kernel
 def _shape_derivative(tree, pose, k, i, a):  # type: ignore[no-untyped-def]
     """Return column a of B = R_i V_k + D_i."""
-    R, D = pose.R[i], pose.D[i]
-    x, y, z = tree.V[k, 0, a], tree.V[k, 1, a], tree.V[k, 2, a]
+    R = pose.R[i]
+    D = pose.D[i]
+    x = tree.V[k, 0, a]
+    y = tree.V[k, 1, a]
+    z = tree.V[k, 2, a]
     return (
         R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + D[0, a],
         R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + D[1, a],
@@ -84,18 +89,29 @@ def add_to_point(tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22
     time, for the few that touch something; the many that are measured go through linearize.py.
     """
     i = tree.point_part[k]
-    A, C, c = blocks.A[i], blocks.C, blocks.c
-    t, o = pose.t[i], pose.t[0]
-    x, y, z = lx + t[0] - o[0], ly + t[1] - o[1], lz + t[2] - o[2]
+    A = blocks.A[i]
+    C = blocks.C
+    c = blocks.c
+    t = pose.t[i]
+    o = pose.t[0]
+    x = lx + t[0] - o[0]
+    y = ly + t[1] - o[1]
+    z = lz + t[2] - o[2]
     W = ((w00, w01, w02), (w01, w11, w12), (w02, w12, w22))
     for s in range(3):
         # column s of W, of [e]x W, and of [e]x W [e]xT = -[e]x W [e]x
         A[3, 3 + s] += W[0][s]
         A[4, 3 + s] += W[1][s]
         A[5, 3 + s] += W[2][s]
-    b00, b01, b02 = y * w02 - z * w01, y * w12 - z * w11, y * w22 - z * w12
-    b10, b11, b12 = z * w00 - x * w02, z * w01 - x * w12, z * w02 - x * w22
-    b20, b21, b22 = x * w01 - y * w00, x * w11 - y * w01, x * w12 - y * w02
+    b00 = y * w02 - z * w01
+    b01 = y * w12 - z * w11
+    b02 = y * w22 - z * w12
+    b10 = z * w00 - x * w02
+    b11 = z * w01 - x * w12
+    b12 = z * w02 - x * w22
+    b20 = x * w01 - y * w00
+    b21 = x * w11 - y * w01
+    b22 = x * w12 - y * w02
     corner = ((b00, b01, b02), (b10, b11, b12), (b20, b21, b22))
     for r in range(3):
         for s in range(3):
@@ -114,11 +130,9 @@ def add_to_point(tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22
     for a in range(tree.shape):
         B0, B1, B2 = _shape_derivative(tree, pose, k, i, a)
         c[a] += B0 * f0 + B1 * f1 + B2 * f2
-        g0, g1, g2 = (
-            w00 * B0 + w01 * B1 + w02 * B2,
-            w01 * B0 + w11 * B1 + w12 * B2,
-            w02 * B0 + w12 * B1 + w22 * B2,
-        )
+        g0 = w00 * B0 + w01 * B1 + w02 * B2
+        g1 = w01 * B0 + w11 * B1 + w12 * B2
+        g2 = w02 * B0 + w12 * B1 + w22 * B2
         A[0, SHAPE + a] += y * g2 - z * g1
         A[1, SHAPE + a] += z * g0 - x * g2
         A[2, SHAPE + a] += x * g1 - y * g0

@@ -32,7 +32,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         j = ints[k, 0]
         x, y, z = lever(tree, pose, j)
         t = pose.t[tree.point_part[j]]
-        a, b, c = f[0], f[1], f[2]
+        a = f[0]
+        b = f[1]
+        c = f[2]
         h = a * (x + t[0]) + b * (y + t[1]) + c * (z + t[2]) - f[3]
         w = weight * (f[4] if h < 0.0 else f[5])
         if w <= 0.0:
@@ -72,8 +74,10 @@ def pack(
     """
     n = len(points)
     floats = np.empty((n, 6))
-    floats[:, :3], floats[:, 3] = normal, offset
-    floats[:, 4], floats[:, 5] = w_below, w_above
+    floats[:, :3] = normal
+    floats[:, 3] = offset
+    floats[:, 4] = w_below
+    floats[:, 5] = w_above
     return np.reshape(points, (n, 1)).astype(np.int64), floats
 
 

@@ -34,7 +34,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         j = ints[k, 0]
         x, y, z = lever(tree, pose, j)
         t = pose.t[tree.point_part[j]]
-        r0, r1, r2 = x + t[0] - f[0], y + t[1] - f[1], z + t[2] - f[2]
+        r0 = x + t[0] - f[0]
+        r1 = y + t[1] - f[1]
+        r2 = z + t[2] - f[2]
         cost += 0.5 * w * (r0 * r0 + r1 * r1 + r2 * r2)
         add_to_point(tree, pose, blocks, j, x, y, z, w, 0.0, 0.0, w, 0.0, w, w * r0, w * r1, w * r2)
     return cost
@@ -44,7 +46,8 @@ def pack(points: Array, p_stand: Array, weights: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from points (n,), positions (n, 3) and weights (n,)."""
     n = len(points)
     floats = np.empty((n, 4))
-    floats[:, :3], floats[:, 3] = p_stand, weights
+    floats[:, :3] = p_stand
+    floats[:, 3] = weights
     return np.reshape(points, (n, 1)).astype(np.int64), floats
 
 

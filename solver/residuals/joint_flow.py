@@ -35,7 +35,8 @@ from ..compiled.simd import WIDTH, sqrt, vectorized
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .accumulation import add_to_joint
 
-LAYERS, HIDDEN = 4, 4
+LAYERS = 4
+HIDDEN = 4
 # Parameters of a layer in order, and where the parts of a joint's parameters begin.
 LAYER_SHAPES = {
     "A": (3, 3), "b": (3,),
@@ -44,9 +45,12 @@ LAYER_SHAPES = {
     "beta": (3,),
 }  # fmt: skip
 LAYER_SIZE = sum(math.prod(shape) for shape in LAYER_SHAPES.values())
-MEAN, FIRST_LAYER = 0, 9
+MEAN = 0
+FIRST_LAYER = 9
 LAST = FIRST_LAYER + LAYERS * LAYER_SIZE  # A (3, 3) and b (3,) of the last linear map
-CONSTANT, BOUND = LAST + 12, LAST + 13  # sum of log |det A| with -log(2/pi^2); B
+# sum of log |det A| with -log(2/pi^2); B
+CONSTANT = LAST + 12
+BOUND = LAST + 13
 SIZE = LAST + 14  # of a joint's parameters
 
 INTS = WIDTH  # joints, 0 for none: one row holds several
@@ -80,8 +84,12 @@ def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     ]
     f = 0.5 * root
     n = 0.25 / root
-    a, b, c = n * y[0], n * y[1], n * y[2]
-    hx, hy, hz = 0.5 * y[0], 0.5 * y[1], 0.5 * y[2]
+    a = n * y[0]
+    b = n * y[1]
+    c = n * y[2]
+    hx = 0.5 * y[0]
+    hy = 0.5 * y[1]
+    hz = 0.5 * y[2]
     J = [f + a * y[0], a * y[1] + hz, a * y[2] - hy,
          a * y[1] - hz, f + b * y[1], b * y[2] + hx,
          a * y[2] + hy, b * y[2] - hx, f + c * y[2]]  # fmt: skip
@@ -109,14 +117,17 @@ def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
     """Return (s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one
     or two inputs x.
     """
-    n, H = len(x), HIDDEN
-    out, bias = at + (n + 1) * H, at + (n + 3) * H
+    n = len(x)
+    H = HIDDEN
+    out = at + (n + 1) * H
+    bias = at + (n + 3) * H
     sums = [[q(bias + r)] + [None] * n for r in range(2)]
     for k in range(H):
         W = [q(at + n * k + i) for i in range(n)]
         u = q(at + n * H + k) + sum(W[i] * x[i] for i in range(n))
         r = 1.0 / (1.0 + u * u)
-        tau, slope = u * r, r * (2.0 * r - 1.0)
+        tau = u * r
+        slope = r * (2.0 * r - 1.0)
         for total, o in zip(sums, (q(out + k), q(out + H + k)), strict=True):
             total[0] = total[0] + o * tau
             d = o * slope
@@ -128,26 +139,37 @@ def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
 def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
     """Return the state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
     x, J = _linear(q, 0, s[:3], s[3:12])
-    J1, J2, J3 = J[:3], J[3:6], J[6:]
-    det, G = s[12], s[13:16]
+    J1 = J[:3]
+    J2 = J[3:6]
+    J3 = J[6:]
+    det = s[12]
+    G = s[13:16]
     H = HIDDEN
     (a, a1), (t, t1) = _hidden(q, 12, x[:1])
     root = sqrt(1.0 + a * a)
-    S, rate = a + root, a1 / root  # rate: d log S / dx_1
+    # rate: d log S / dx_1
+    S = a + root
+    rate = a1 / root
     x2 = S * x[1] + t
     k1 = S * rate * x[1] + t1
-    det, G = det * S, [G[c] + rate * J1[c] for c in range(3)]
+    det = det * S
+    G = [G[c] + rate * J1[c] for c in range(3)]
     old2 = J2
     J2 = [S * J2[c] + k1 * J1[c] for c in range(3)]
     (a, a1, a2), (t, t1, t2) = _hidden(q, 14 + 4 * H, x[:2])
     root = sqrt(1.0 + a * a)
-    S, inverse = a + root, 1.0 / root
-    rate1, rate2 = a1 * inverse, a2 * inverse
+    S = a + root
+    inverse = 1.0 / root
+    rate1 = a1 * inverse
+    rate2 = a2 * inverse
     x3 = S * x[2] + t
-    k1, k2 = S * rate1 * x[2] + t1, S * rate2 * x[2] + t2
-    det, G = det * S, [G[c] + rate1 * J1[c] + rate2 * old2[c] for c in range(3)]
+    k1 = S * rate1 * x[2] + t1
+    k2 = S * rate2 * x[2] + t2
+    det = det * S
+    G = [G[c] + rate1 * J1[c] + rate2 * old2[c] for c in range(3)]
     J3 = [S * J3[c] + k1 * J1[c] + k2 * old2[c] for c in range(3)]
-    out, rows = [], []
+    out = []
+    rows = []
     for k, (value, row) in enumerate(((x[0], J1), (x2, J2), (x3, J3))):
         beta = q(LAYER_SIZE - 3 + k)
         root = sqrt(1.0 + value * value)
@@ -155,7 +177,8 @@ def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
         slope = 1.0 + beta * value * inverse
         out.append(value + beta * root)
         bend = beta * inverse * inverse * inverse / slope
-        det, G = det * slope, [G[c] + bend * row[c] for c in range(3)]
+        det = det * slope
+        G = [G[c] + bend * row[c] for c in range(3)]
         rows += [slope * row[c] for c in range(3)]
     return [*out, *rows, det, *G]
 
@@ -207,7 +230,8 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
     """Take the joints of row k in `state` that are nearly a half turn from their M back to pi -
     `NEAREST`.
     """
-    M, R = np.empty((3, 3)), np.empty((3, 3))
+    M = np.empty((3, 3))
+    R = np.empty((3, 3))
     for lane in range(WIDTH):
         for e in range(9):
             M[e // 3, e % 3] = floats[k, (MEAN + e) * WIDTH + lane]
@@ -258,20 +282,21 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         _normal(floats, at, state)
         for lane in range(WIDTH):
             i = ints[k, lane]
-            w, h = weight * floats[k, _W * WIDTH + lane], floats[k, (_W + 1) * WIDTH + lane]
+            w = weight * floats[k, _W * WIDTH + lane]
+            h = floats[k, (_W + 1) * WIDTH + lane]
             if i == 0 or w <= 0.0:
                 continue
             e = state[lane::WIDTH]
             cost += 0.5 * w * e[9]
-            h00, h01, h02, h11, h12, h22 = (
-                w * e[0],
-                w * e[1],
-                w * e[2],
-                w * e[3],
-                w * e[4],
-                w * e[5],
-            )
-            g0, g1, g2 = w * e[6], w * e[7], w * e[8]
+            h00 = w * e[0]
+            h01 = w * e[1]
+            h02 = w * e[2]
+            h11 = w * e[3]
+            h12 = w * e[4]
+            h22 = w * e[5]
+            g0 = w * e[6]
+            g1 = w * e[7]
+            g2 = w * e[8]
             if h > 0.0:
                 a = (
                     floats[k, BOUND * WIDTH + lane]
@@ -282,10 +307,19 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
                 half = 0.5 * (a + root)  # l^2 / 2
                 slope = half / root
                 cost += w * h * half
-                x, y, z, v = -slope * e[13], -slope * e[14], -slope * e[15], 0.5 * w * h / half
-                h00, h01, h02 = h00 + v * x * x, h01 + v * x * y, h02 + v * x * z
-                h11, h12, h22 = h11 + v * y * y, h12 + v * y * z, h22 + v * z * z
-                g0, g1, g2 = g0 + w * h * x, g1 + w * h * y, g2 + w * h * z
+                x = -slope * e[13]
+                y = -slope * e[14]
+                z = -slope * e[15]
+                v = 0.5 * w * h / half
+                h00 = h00 + v * x * x
+                h01 = h01 + v * x * y
+                h02 = h02 + v * x * z
+                h11 = h11 + v * y * y
+                h12 = h12 + v * y * z
+                h22 = h22 + v * z * z
+                g0 = g0 + w * h * x
+                g1 = g1 + w * h * y
+                g2 = g2 + w * h * z
             add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2)
     return cost
 
@@ -298,7 +332,8 @@ def pack(
     """
     n = len(joints)
     rows = -(-n // WIDTH)
-    ints, floats = np.zeros((rows * WIDTH, 1), np.int64), np.zeros((rows * WIDTH, SIZE + 2))
+    ints = np.zeros((rows * WIDTH, 1), np.int64)
+    floats = np.zeros((rows * WIDTH, SIZE + 2))
     floats[:, MEAN : MEAN + 9] = np.eye(3).ravel()
     ints[:n, 0] = joints
     floats[:n] = np.hstack(

@@ -52,29 +52,40 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         )  # fmt: skip
         angle = f[0] * x + f[1] * y + f[2] * z
         r = max(0.0, angle - f[4]) - max(0.0, f[3] - angle)
-        sx, sy, sz = x - angle * f[0], y - angle * f[1], z - angle * f[2]
+        sx = x - angle * f[0]
+        sy = y - angle * f[1]
+        sz = z - angle * f[2]
         swing = math.sqrt(sx * sx + sy * sy + sz * sz)
-        w, v = weight * f[6], weight * f[7]
+        w = weight * f[6]
+        v = weight * f[7]
         hinged = r != 0.0 and w > 0.0
         swung = swing > f[5] and v > 0.0
         if not hinged and not swung:
             continue
         J = left_jacobian_inverse3(x, y, z)
-        h00, h01, h02, h11, h12, h22, g0, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        h00 = 0.0
+        h01 = 0.0
+        h02 = 0.0
+        h11 = 0.0
+        h12 = 0.0
+        h22 = 0.0
+        g0 = 0.0
+        g1 = 0.0
+        g2 = 0.0
         a0 = f[0] * J[0] + f[1] * J[3] + f[2] * J[6]
         a1 = f[0] * J[1] + f[1] * J[4] + f[2] * J[7]
         a2 = f[0] * J[2] + f[1] * J[5] + f[2] * J[8]
         if hinged:
             cost += 0.5 * w * r * r
-            h00, h01, h02, h11, h12, h22 = (
-                w * a0 * a0,
-                w * a0 * a1,
-                w * a0 * a2,
-                w * a1 * a1,
-                w * a1 * a2,
-                w * a2 * a2,
-            )
-            g0, g1, g2 = w * r * a0, w * r * a1, w * r * a2
+            h00 = w * a0 * a0
+            h01 = w * a0 * a1
+            h02 = w * a0 * a2
+            h11 = w * a1 * a1
+            h12 = w * a1 * a2
+            h22 = w * a2 * a2
+            g0 = w * r * a0
+            g1 = w * r * a1
+            g2 = w * r * a2
         if swung:
             share = 1.0 - f[5] / swing
             cost += 0.5 * v * share * share * swing * swing
@@ -82,7 +93,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
             b0 = (sx * J[0] + sy * J[3] + sz * J[6]) / swing
             b1 = (sx * J[1] + sy * J[4] + sz * J[7]) / swing
             b2 = (sx * J[2] + sy * J[5] + sz * J[8]) / swing
-            p, q = v * share * share, v * (1.0 - share * share)
+            p = v * share * share
+            q = v * (1.0 - share * share)
             h00 += p * (J[0] * J[0] + J[3] * J[3] + J[6] * J[6] - a0 * a0) + q * b0 * b0
             h01 += p * (J[0] * J[1] + J[3] * J[4] + J[6] * J[7] - a0 * a1) + q * b0 * b1
             h02 += p * (J[0] * J[2] + J[3] * J[5] + J[6] * J[8] - a0 * a2) + q * b0 * b2
@@ -90,7 +102,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
             h12 += p * (J[1] * J[2] + J[4] * J[5] + J[7] * J[8] - a1 * a2) + q * b1 * b2
             h22 += p * (J[2] * J[2] + J[5] * J[5] + J[8] * J[8] - a2 * a2) + q * b2 * b2
             g = v * share * swing
-            g0, g1, g2 = g0 + g * b0, g1 + g * b1, g2 + g * b2
+            g0 = g0 + g * b0
+            g1 = g1 + g * b1
+            g2 = g2 + g * b2
         add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2)
     return cost
 
@@ -162,12 +176,14 @@ def evaluate(
     angle = float(axis @ phi)
     s = phi - angle * axis
     swing = np.linalg.norm(s)
-    r, J_u = np.zeros(4), np.zeros((4, 3))
+    r = np.zeros(4)
+    J_u = np.zeros((4, 3))
     r[0] = max(0.0, angle - upper) - max(0.0, lower - angle)
     if r[0] != 0.0:
         J_u[0] = axis @ J
     if swing > swing_limit:
-        share, unit = 1.0 - swing_limit / swing, s / swing
+        share = 1.0 - swing_limit / swing
+        unit = s / swing
         r[1:] = share * s
         J_u[1:] = (
             (share * np.eye(3) + (1.0 - share) * np.outer(unit, unit))

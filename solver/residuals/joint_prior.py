@@ -62,7 +62,8 @@ def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array
     """
     n = len(joints)
     floats = np.empty((n, 10))
-    floats[:, :9], floats[:, 9] = np.reshape(Omega_mean, (n, 9)), weights
+    floats[:, :9] = np.reshape(Omega_mean, (n, 9))
+    floats[:, 9] = weights
     return np.reshape(joints, (n, 1)).astype(np.int64), floats
 
 

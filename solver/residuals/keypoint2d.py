@@ -31,8 +31,10 @@ def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-un
     """
     front = z > Z_MIN
     iz = 1.0 / (z if front else Z_MIN)
-    gx, gy = focal * x * iz, focal * y * iz
-    rx, ry = gx - u, gy - v
+    gx = focal * x * iz
+    gy = focal * y * iz
+    rx = gx - u
+    ry = gy - v
     s = rx * rx + ry * ry
     rho, w = geman_mcclure(s, inv_sigma)
     cost = 0.5 * weight * rho
@@ -40,15 +42,26 @@ def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-un
     a = focal * iz
     bx, by = (-gx * iz, -gy * iz) if front else (0.0, 0.0)
     aw = a * w
-    fx, fy = aw * rx, aw * ry
+    fx = aw * rx
+    fy = aw * ry
     fz = w * (bx * rx + by * ry)
-    w00, w01, w02 = a * aw, 0.0, bx * aw
-    w11, w12, w22 = a * aw, by * aw, w * (bx * bx + by * by)
+    w00 = a * aw
+    w01 = 0.0
+    w02 = bx * aw
+    w11 = a * aw
+    w12 = by * aw
+    w22 = w * (bx * bx + by * by)
     if triggs > 0.0 and s > 0.0:
         k = triggs_share(s, inv_sigma, triggs) / (s * w) if w > 0.0 else 0.0
-        w00, w01, w02 = w00 - k * fx * fx, w01 - k * fx * fy, w02 - k * fx * fz
-        w11, w12, w22 = w11 - k * fy * fy, w12 - k * fy * fz, w22 - k * fz * fz
-    hx, hy, hz = aw * gx, aw * gy, w * (bx * gx + by * gy)
+        w00 = w00 - k * fx * fx
+        w01 = w01 - k * fx * fy
+        w02 = w02 - k * fx * fz
+        w11 = w11 - k * fy * fy
+        w12 = w12 - k * fy * fz
+        w22 = w22 - k * fz * fz
+    hx = aw * gx
+    hy = aw * gy
+    hz = w * (bx * gx + by * gy)
     if not front:
         depth = (Z_MIN - z) / Z_MIN
         cost += 0.5 * weight * depth * depth

@@ -17,7 +17,9 @@ from .robust import geman_mcclure, triggs_share
 @kernel
 def term(x, y, z, mx, my, mz, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
     """Return (cost, w, kappa, 3 of w r): the second-order matrix is w I - kappa (w r)(w r)ᵀ."""
-    rx, ry, rz = x - mx, y - my, z - mz
+    rx = x - mx
+    ry = y - my
+    rz = z - mz
     s = rx * rx + ry * ry + rz * rz
     rho, w = geman_mcclure(s, inv_sigma)
     w *= weight

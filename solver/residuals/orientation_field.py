@@ -28,21 +28,35 @@ def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-
     if length < SHORTEST:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     il = 1.0 / length
-    hx, hy, hz = dx * il, dy * il, dz * il
-    rx, ry, rz = hx - nx, hy - ny, hz - nz
+    hx = dx * il
+    hy = dy * il
+    hz = dz * il
+    rx = hx - nx
+    ry = hy - ny
+    rz = hz - nz
     s = rx * rx + ry * ry + rz * rz
     rho, w = geman_mcclure(s, inv_sigma)
     w *= weight
     along = hx * rx + hy * ry + hz * rz
     g = w * il
-    fx, fy, fz = g * (rx - hx * along), g * (ry - hy * along), g * (rz - hz * along)
+    fx = g * (rx - hx * along)
+    fy = g * (ry - hy * along)
+    fz = g * (rz - hz * along)
     g *= il
-    w00, w01, w02 = g * (1.0 - hx * hx), -g * hx * hy, -g * hx * hz
-    w11, w12, w22 = g * (1.0 - hy * hy), -g * hy * hz, g * (1.0 - hz * hz)
+    w00 = g * (1.0 - hx * hx)
+    w01 = -g * hx * hy
+    w02 = -g * hx * hz
+    w11 = g * (1.0 - hy * hy)
+    w12 = -g * hy * hz
+    w22 = g * (1.0 - hz * hz)
     if triggs > 0.0 and s > 0.0 and w > 0.0:
         k = triggs_share(s, inv_sigma, triggs) / (s * w)
-        w00, w01, w02 = w00 - k * fx * fx, w01 - k * fx * fy, w02 - k * fx * fz
-        w11, w12, w22 = w11 - k * fy * fy, w12 - k * fy * fz, w22 - k * fz * fz
+        w00 = w00 - k * fx * fx
+        w01 = w01 - k * fx * fy
+        w02 = w02 - k * fx * fz
+        w11 = w11 - k * fy * fy
+        w12 = w12 - k * fy * fz
+        w22 = w22 - k * fz * fz
     return 0.5 * weight * rho, w00, w01, w02, w11, w12, w22, fx, fy, fz
 
 

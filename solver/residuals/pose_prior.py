@@ -31,7 +31,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         i = ints[k, 0]
         h = floats[k]
         R = pose.R[i]
-        w_r, w_t = weight * h[12], weight * h[13]
+        w_r = weight * h[12]
+        w_t = weight * h[13]
         if w_r > 0.0:
             phi = relative_log(h, R)
             cost += 0.5 * w_r * (phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
@@ -48,7 +49,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
                     b2 = Ji[6] * h[3 * s] + Ji[7] * h[3 * s + 1] + Ji[8] * h[3 * s + 2]
                     A[i, r, s] += w_r * (a0 * b0 + a1 * b1 + a2 * b2)
         if w_t > 0.0:
-            f0, f1, f2 = pose.t[i, 0] - h[9], pose.t[i, 1] - h[10], pose.t[i, 2] - h[11]
+            f0 = pose.t[i, 0] - h[9]
+            f1 = pose.t[i, 1] - h[10]
+            f2 = pose.t[i, 2] - h[11]
             cost += 0.5 * w_t * (f0 * f0 + f1 * f1 + f2 * f2)
             origin = tree.keypoints + i  # the part's origin as a point
             add_to_point(
@@ -69,8 +72,10 @@ def pack(
     """
     n = len(parts)
     floats = np.empty((n, 14))
-    floats[:, :9], floats[:, 9:12] = np.reshape(R_camera_part, (n, 9)), t_camera_part
-    floats[:, 12], floats[:, 13] = w_R, w_t
+    floats[:, :9] = np.reshape(R_camera_part, (n, 9))
+    floats[:, 9:12] = t_camera_part
+    floats[:, 12] = w_R
+    floats[:, 13] = w_t
     return np.reshape(parts, (n, 1)).astype(np.int64), floats
 
 
@@ -82,7 +87,8 @@ def evaluate(
     :param R_hat, t_hat: (3, 3), (3,) the expected pose of the part, metres, camera frame.
     """
     phi = log(R_hat.T @ part.R)
-    a, b = np.sqrt(weight * w_R), np.sqrt(weight * w_t)
+    a = np.sqrt(weight * w_R)
+    b = np.sqrt(weight * w_t)
     J_x = np.zeros((6, 6))
     J_x[:3, :3] = a * left_jacobian_inverse(phi) @ R_hat.T
     J_x[3:] = b * hat_identity(part.t - part.origin)

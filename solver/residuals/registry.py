@@ -65,7 +65,8 @@ def _followed_by(before: Any, index: int, name: str, accumulate: Any) -> Any:
 
     def run(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
         cost = before(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks)
-        w, s = weights[column], inv_sigma[column]
+        w = weights[column]
+        s = inv_sigma[column]
         return cost + accumulate(tree, ints[index], floats[index], w, s, triggs, pose, blocks)
 
     # Numba names machine code by this and a number that counts up within a process. Code that

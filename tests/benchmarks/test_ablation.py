@@ -118,10 +118,12 @@ def test_iou_is_of_the_frames_that_have_masks(body: Body) -> None:
     does not count.
     """
     turned = np.tile(np.array([[0.0, 0.0, np.pi]] + [[0.0] * 3] * body.K), (3, 1, 1))
-    seen, camera = np.array([True, True, False]), np.tile(np.eye(4), (3, 1, 1))
+    seen = np.array([True, True, False])
+    camera = np.tile(np.eye(4), (3, 1, 1))
     trans = np.tile([0.0, 0.0, 3.0], (3, 1))
     motion = made_motion(body, turned, trans, valid=seen, world_from_camera=camera)
-    region, size = Region((320.0, 240.0), 480.0, 0.0), (640, 480)
+    region = Region((320.0, 240.0), 480.0, 0.0)
+    size = (640, 480)
     whole = (
         silhouette(body, camera_vertices(motion, body, 0), motion.intrinsics, None, size, region)
         == 2

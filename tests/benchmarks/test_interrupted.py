@@ -40,7 +40,9 @@ def test_a_clip_goes_there_and_back_again_at_an_even_rate(tmp_path: Path) -> Non
     greys = [40, 90, 140, 190]
     with av.open(str(source), "w") as target:
         stream = target.add_stream("libx264", rate=30)
-        stream.width, stream.height, stream.pix_fmt = 64, 36, "yuv420p"
+        stream.width = 64
+        stream.height = 36
+        stream.pix_fmt = "yuv420p"
         for grey in greys:
             image = np.full((36, 64, 3), grey, np.uint8)
             target.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))

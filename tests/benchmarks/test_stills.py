@@ -40,7 +40,8 @@ def test_the_truth_of_a_frame_has_no_error(monkeypatch: pytest.MonkeyPatch, body
     others.
     """
     with np.load(SAMPLE.truth) as file:
-        joints, names = file["joints_cam"], file["joint_names"].tolist()
+        joints = file["joints_cam"]
+        names = file["joint_names"].tolist()
     assert tuple(names) == body.joint_names
     true = made_motion(body, np.zeros((1, body.K + 1, 3)), np.zeros((1, 3)))
     asked = [37, 74, 111]  # a quarter, half and three quarters of 150 frames

@@ -23,7 +23,10 @@ def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
     trunk = [names.index(n) for n in ("LShoulder", "RShoulder", "LHip", "RHip")]
     at = np.full((100, 2), np.nan)
     at[truth["frame_index"]] = np.nanmean(truth["uv"][:, trunk], axis=1)
-    left, top, right, bottom = 60, 330, 860, 1330
+    left = 60
+    top = 330
+    right = 860
+    bottom = 1330
     video = cv2.VideoCapture(str(shared / f"data/pose2sim/{camera}.mp4"))
     images = []
     for t in range(FRAMES.stop):

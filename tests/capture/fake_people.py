@@ -95,7 +95,9 @@ def _time(image: np.ndarray) -> int:
 
 class FakeDetector:
     def __init__(self, people: list[Person]) -> None:
-        self.people, self.calls, self.close_calls = people, 0, 0
+        self.people = people
+        self.calls = 0
+        self.close_calls = 0
 
     def detect(
         self, image: np.ndarray, threshold: float = 0.5, closely: bool = False
@@ -119,7 +121,8 @@ class FakeDetector:
 
 class FakeLandmarks:
     def __init__(self, people: list[Person], is_reliable: bool = False) -> None:
-        self.people, self.is_reliable = people, is_reliable
+        self.people = people
+        self.is_reliable = is_reliable
         self.batches: list[int] = []
         self.begun = 0
 
@@ -153,7 +156,8 @@ class FakeLandmarks:
             body = body[MIRROR_PARTNER]
         if t in person.turned and not self.is_reliable:
             angle = np.radians(person.turned[t])
-            c, s = np.cos(angle), np.sin(angle)
+            c = np.cos(angle)
+            s = np.sin(angle)
             body = body @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         there = Region((float(place[0]), float(place[1])), 2.5 * person.size_px, 0.0)
         return PoseEstimate(

@@ -12,7 +12,9 @@ import numpy as np
 
 from ..required import need_encoder, package
 
-_PARAMETERS, _SEQUENCE_PARAMETERS = (32, 33, 34), 33  # kinds of HEVC's units
+# kinds of HEVC's units
+_PARAMETERS = (32, 33, 34)
+_SEQUENCE_PARAMETERS = 33
 
 
 def box(name: bytes, content: bytes) -> bytes:
@@ -30,15 +32,11 @@ def coded(picture_rgb: np.ndarray) -> tuple[bytes, bytes]:
     av = package("av")
     need_encoder("libx265")
     encoder = av.CodecContext.create("libx265", "w")
-    encoder.width, encoder.height, encoder.pix_fmt = (
-        picture_rgb.shape[1],
-        picture_rgb.shape[0],
-        "yuv444p",
-    )
-    encoder.time_base, encoder.options = (
-        Fraction(1),
-        {"crf": "8", "x265-params": "log-level=none:repeat-headers=1"},
-    )
+    encoder.width = picture_rgb.shape[1]
+    encoder.height = picture_rgb.shape[0]
+    encoder.pix_fmt = "yuv444p"
+    encoder.time_base = Fraction(1)
+    encoder.options = {"crf": "8", "x265-params": "log-level=none:repeat-headers=1"}
     frame = av.VideoFrame.from_ndarray(picture_rgb, "rgb24")
     stream = b"".join(bytes(packet) for packet in [*encoder.encode(frame), *encoder.encode()])
     units = [unit for unit in re.split(b"\0?\0\0\x01", stream) if unit]
@@ -73,9 +71,12 @@ def heic(
     """
     height, width = picture_rgb.shape[:2]
     if tile is None:
-        rows, columns, pieces = 1, 1, [picture_rgb]
+        rows = 1
+        columns = 1
+        pieces = [picture_rgb]
     else:
-        rows, columns = -(-height // tile), -(-width // tile)
+        rows = -(-height // tile)
+        columns = -(-width // tile)
         whole = np.pad(
             picture_rgb,
             ((0, rows * tile - height), (0, columns * tile - width), (0, 0)),
@@ -91,17 +92,20 @@ def heic(
     kinds = [b"hvc1"] * len(data)
     contents = [content for _, content in data]
     numbers = list(range(1, len(data) + 1))  # 1 is the thumbnail
-    primary, references = 2, b""
+    primary = 2
+    references = b""
     if tile is not None:
         primary = len(numbers) + 1
-        numbers, kinds = [*numbers, primary], [*kinds, b"grid"]
+        numbers = [*numbers, primary]
+        kinds = [*kinds, b"grid"]
         tiles = numbers[1:-1]
         references += box(b"dimg", struct.pack(f">HH{len(tiles)}H", primary, len(tiles), *tiles))
         contents.append(grid or struct.pack(">BBBBHH", 0, 0, rows - 1, columns - 1, width, height))
     references += box(b"thmb", struct.pack(">HHH", 1, 1, primary))
     if focal_mm is not None:
         number = numbers[-1] + 1
-        numbers, kinds = [*numbers, number], [*kinds, b"Exif"]
+        numbers = [*numbers, number]
+        kinds = [*kinds, b"Exif"]
         references += box(b"cdsc", struct.pack(">HHH", number, 1, primary))
         directory = struct.pack(">HHHIHHI", 1, 0x8769, 4, 1, 0, 0, 0)[:10] + struct.pack(
             ">II", 26, 0
@@ -156,7 +160,8 @@ def heic(
         )
 
     begin = box(b"ftyp", brands)
-    at, places = len(begin) + len(meta([(0, 0)] * len(numbers))) + 8, []
+    at = len(begin) + len(meta([(0, 0)] * len(numbers))) + 8
+    places = []
     for content, within in zip(contents, inside, strict=True):
         places.append((0 if within else at, len(content)))
         at += 0 if within else len(content)

@@ -53,7 +53,8 @@ def mask_of(
     edges.
     """
     R, t = posed(body, state, betas)
-    points, triangles = body.skin(R, t, betas), body.triangles()
+    points = body.skin(R, t, betas)
+    triangles = body.triangles()
     a, b, c = points[triangles].transpose(1, 0, 2)
     # the back lies behind the front
     triangles = triangles[np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0]
@@ -76,8 +77,10 @@ def mask_of(
 
 def seen_in(body: Body, betas: NDArray[np.float64], garment: Garment | None) -> Track:
     """Exact keypoints and masks of a person who wears a garment."""
-    at, states = body.keypoint_set("blazepose"), standing(body)
-    order, count = [at[name] for name in KEYPOINT_NAMES], len(states)
+    at = body.keypoint_set("blazepose")
+    states = standing(body)
+    order = [at[name] for name in KEYPOINT_NAMES]
+    count = len(states)
     points = np.array(
         [body.keypoints(*posed(body, state, betas), betas)[order] for state in states]
     )

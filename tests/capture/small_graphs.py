@@ -40,7 +40,8 @@ def picture_input(
 
 def fixed(path: Path, width: int | str, height: int | str, outputs: dict[str, np.ndarray]) -> Path:
     """Write a graph that returns these arrays for any input."""
-    nodes, constants = [], {}
+    nodes = []
+    constants = {}
     for name, value in outputs.items():
         constants[f"{name}_value"] = value
         nodes.append(helper.make_node("Identity", [f"{name}_value"], [name]))

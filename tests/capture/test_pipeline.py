@@ -109,7 +109,8 @@ def test_errors_are_as_large_as_the_joints_deviations_say(sample):
     limbs = [4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
     error = (m.joints_cam - m.joints_cam[:, :1] - truth + truth[:, :1])[m.valid][:, limbs]
     sight = (m.joints_cam / np.linalg.norm(m.joints_cam, axis=-1, keepdims=True))[m.valid][:, limbs]
-    sigma, along = m.joint_sigma_m[m.valid][:, limbs], m.joint_sigma_depth_m[m.valid][:, limbs]
+    sigma = m.joint_sigma_m[m.valid][:, limbs]
+    along = m.joint_sigma_depth_m[m.valid][:, limbs]
     across = np.sqrt((3 * sigma**2 - along**2) / 2)
     depth = (error * sight).sum(-1)
     rest = np.sqrt(((error**2).sum(-1) - depth**2) / 2)
@@ -173,7 +174,8 @@ def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path)
 
 
 def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
-    footage, blanked = cv2.VideoCapture(str(SAMPLE)), tmp_path / "blanked.avi"
+    footage = cv2.VideoCapture(str(SAMPLE))
+    blanked = tmp_path / "blanked.avi"
     size = int(footage.get(cv2.CAP_PROP_FRAME_WIDTH)), int(footage.get(cv2.CAP_PROP_FRAME_HEIGHT))
     writer = cv2.VideoWriter(str(blanked), cv2.VideoWriter.fourcc(*"MJPG"), 30, size)
     for k in range(30):
@@ -273,7 +275,8 @@ def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
 
 
 def test_a_warning_names_the_person_without_hands(shared):
-    clip, body = shared / "data" / "clips" / "two_people_portrait.mp4", load_body("scope_h")
+    clip = shared / "data" / "clips" / "two_people_portrait.mp4"
+    body = load_body("scope_h")
     options = CaptureOptions(
         quality="fast", people=2, hands="on", wanted=VideoRange(0.0, 0.5, None)
     )

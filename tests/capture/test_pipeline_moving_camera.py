@@ -11,7 +11,11 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.solver import load_body
 from scope.solver.rotations import exp, log
 
-START, FRAMES, WIDTH, HEIGHT, FOV = 130, 50, 960, 540, 60.0
+START = 130
+FRAMES = 50
+WIDTH = 960
+HEIGHT = 540
+FOV = 60.0
 
 
 def film(source, path, turn):
@@ -34,7 +38,8 @@ def test_the_world_of_a_panning_camera_does_not_move(shared, tmp_path):
     pan = np.array([0.02, 0.10, 0.01])
     film(clip, tmp_path / "stand.mp4", lambda k: 0 * pan)
     film(clip, tmp_path / "pan.mp4", lambda k: np.sin(2 * np.pi * k / FRAMES) * pan)
-    body, options = load_body("scope"), CaptureOptions(quality="fast", fov_deg=FOV)
+    body = load_body("scope")
+    options = CaptureOptions(quality="fast", fov_deg=FOV)
     found = {name: capture(tmp_path / f"{name}.mp4", body, options) for name in ("stand", "pan")}
     stand, moving = (found[name].motions[0] for name in ("stand", "pan"))
 

@@ -57,7 +57,8 @@ def captured(detector: Path | None = None, keypoints: Path | None = None) -> Cap
 
 
 def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path]) -> None:
-    ours, theirs = captured(), captured(*own_networks)
+    ours = captured()
+    theirs = captured(*own_networks)
     assert theirs.report["detector"] == str(own_networks[0])
     assert theirs.report["execution"] == "CPU, 1 thread"
     motion = theirs.motions[0]
@@ -134,10 +135,8 @@ def test_a_runner_is_tracked_at_a_low_frame_rate(
     """Without auxiliary points, at 7.5 frames per second, every limb stays in the predicted
     region.
     """
-    tracker, numbers = (
-        PeopleTracker("fast", 1, detector=own_networks[0], keypoints=own_networks[1]),
-        set(),
-    )
+    tracker = PeopleTracker("fast", 1, detector=own_networks[0], keypoints=own_networks[1])
+    numbers = set()
     for image in frames("clips/run_moving_camera", every=4):
         ((number, seen),) = tracker.step(image)
         numbers.add(number)
@@ -152,7 +151,8 @@ def test_the_track_of_a_person_who_leaves_the_image_ends(
     own_networks: tuple[Path, Path], frames: Frames
 ) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
-    tracker, woman = PeopleTracker("fast", 1, people=2, keypoints=own_networks[1]), []
+    tracker = PeopleTracker("fast", 1, people=2, keypoints=own_networks[1])
+    woman = []
     for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=215), 185):
         seen = tracker.step(image)
         woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]

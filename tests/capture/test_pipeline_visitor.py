@@ -22,7 +22,9 @@ EDGE = 1200.0
 @pytest.fixture(scope="module")
 def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray]:
     """A video, and the true positions of the two, (T, 2, 2) pixels."""
-    path, places, writer = tmp_path_factory.mktemp("visit") / "visit.avi", [], None
+    path = tmp_path_factory.mktemp("visit") / "visit.avi"
+    places = []
+    writer = None
     for image, at in visit(shared):
         writer = writer or cv2.VideoWriter(
             str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1]
@@ -46,7 +48,8 @@ def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
     assert len(everybody.motions) == 2
     stays, visitor = everybody.motions
     assert stays.valid.mean() >= 0.98
-    inside, outside = places[:, 1, 0] < EDGE - 150, ~(places[:, 1, 0] < EDGE + 30)
+    inside = places[:, 1, 0] < EDGE - 150
+    outside = ~(places[:, 1, 0] < EDGE + 30)
     assert inside.sum() >= 15
     assert outside.sum() >= 12
     assert visitor.valid[inside][8:].all()  # a search every 0.27 s

@@ -17,10 +17,13 @@ def someone_walking(
     per second.
     """
     body = load_body("scope")
-    seen, at = with_keypoint_offsets(body), list(body.keypoint_set("blazepose").values())
-    pixels, world = [], []
+    seen = with_keypoint_offsets(body)
+    at = list(body.keypoint_set("blazepose").values())
+    pixels = []
+    world = []
     for k in range(frames):
-        swing, pose = 0.5 * np.sin(2 * np.pi * k / rate), np.zeros((body.K + 1, 3))
+        swing = 0.5 * np.sin(2 * np.pi * k / rate)
+        pose = np.zeros((body.K + 1, 3))
         for name, axis, angle in (
             ("left_hip", 0, -swing),
             ("right_hip", 0, swing),

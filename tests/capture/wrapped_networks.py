@@ -18,7 +18,8 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.person_detector import make_anchors
 from scope.scope_addon.capture.perception.sessions import network_path
 
-_SIDE, _RATIO = 256, 2
+_SIDE = 256
+_RATIO = 2
 
 
 def _extend(

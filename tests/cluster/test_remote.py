@@ -49,7 +49,8 @@ def test_names_that_lead_elsewhere_are_left_out(store, tmp_path, monkeypatch):
 
 
 def test_results_replace_earlier_ones_and_nothing_else_stays(store, tmp_path):
-    out, file = "memory://bucket/out", tmp_path / "a.npz"
+    out = "memory://bucket/out"
+    file = tmp_path / "a.npz"
     for text in ("first", "second"):
         staging = RemoteStaging(out)
         file.write_text(text)

@@ -23,7 +23,8 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker
 @pytest.fixture
 def store(monkeypatch):
     """An empty bucket, and variables by which this process and workers find it."""
-    s3fs, server = package("s3fs"), package("moto.server")
+    s3fs = package("s3fs")
+    server = package("moto.server")
     serving = server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     serving.start()
     host, port = serving.get_host_and_port()

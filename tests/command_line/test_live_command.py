@@ -176,7 +176,8 @@ def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_
                 client.makefile("rb") as lines,
             ):
                 assert json.loads(lines.readline())["format"] == "scope live"
-                sent, bones = [], {}
+                sent = []
+                bones = {}
                 while len(times_seen(sent)) < 4:
                     sent.append(lines.readline())
                 while len(bones) < len(BONES):

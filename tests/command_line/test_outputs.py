@@ -49,7 +49,8 @@ def test_results_of_images_in_the_current_folder_are_named_after_it(tmp_path, mo
 
 
 def test_folders_of_images_whose_names_have_dots_have_different_results(tmp_path):
-    first, second = tmp_path / "take.1", tmp_path / "take.2"
+    first = tmp_path / "take.1"
+    second = tmp_path / "take.2"
     for folder in (first, second):
         folder.mkdir()
     assert default_outputs(first) == [tmp_path / "take.1.npz", tmp_path / "take.1.glb"]

@@ -32,7 +32,8 @@ def test_a_bar_is_replaced_by_the_next_and_removed_at_the_end() -> None:
 
 
 def test_elsewhere_nothing_is_shown() -> None:
-    stream, file = Terminal(), io.StringIO()
+    stream = Terminal()
+    file = io.StringIO()
     with ProgressBar(stream, show=False) as bar, ProgressLine(file, show=True) as line:
         bar("Finding", 1, 2)
         line.write("text")

@@ -15,9 +15,12 @@ ZERO = np.zeros(BODY.P)
 J = BODY.rest_joints(ZERO) @ R_WORLD_MODEL.T
 V = BODY.rest_vertices(ZERO) @ R_WORLD_MODEL.T
 FLOOR = V[:, 2].min()
-PERIOD, STANCE, STRIDE = 1.2, 0.62, 1.0
+PERIOD = 1.2
+STANCE = 0.62
+STRIDE = 1.0
 # shares of the stance at which the sole is flat, and at which the heel lifts
-FLAT, RISE = 0.2, 0.55
+FLAT = 0.2
+RISE = 0.55
 
 
 def joint(part):
@@ -49,12 +52,11 @@ def foot(side, step):
     """Return ankle, rotations of foot and toes, contact of heel and of ball, at a time in steps of
     this foot.
     """
-    number, phase = np.floor(step), step % 1 / STANCE
+    number = np.floor(step)
+    phase = step % 1 / STANCE
     place = joint(f"{side}_ankle") + [0, -STRIDE * number, -FLOOR]
-    heel, ball = (
-        heel_of(side) - joint(f"{side}_ankle"),
-        joint(f"{side}_foot") - joint(f"{side}_ankle"),
-    )
+    heel = heel_of(side) - joint(f"{side}_ankle")
+    ball = joint(f"{side}_foot") - joint(f"{side}_ankle")
     if phase < FLAT:
         turn = pitch(-22 * (1 - phase / FLAT) ** 2)
         return place + heel - turn @ heel, turn, turn, True, False
@@ -65,15 +67,18 @@ def foot(side, step):
         return place + ball - turn @ ball, turn, np.eye(3), False, True
     share = (step % 1 - STANCE) / (1 - STANCE)
     ease = share * share * (3 - 2 * share)
-    off, on = pitch(45), pitch(-22)
-    first, last = place + ball - off @ ball, place + [0, -STRIDE, 0] + heel - on @ heel
+    off = pitch(45)
+    on = pitch(-22)
+    first = place + ball - off @ ball
+    last = place + [0, -STRIDE, 0] + heel - on @ heel
     ankle = first + ease * (last - first) + [0, 0, 0.09 * np.sin(np.pi * share)]
     turn = pitch(45 - 67 * ease)
     return ankle, turn, pitch(-22 * ease), False, False
 
 
 def shortest(a, b):
-    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    a = a / np.linalg.norm(a)
+    b = b / np.linalg.norm(b)
     axis = np.cross(a, b)
     return turn_by(axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(axis), a @ b))
 
@@ -107,7 +112,9 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
             hip = root[t] + joint(f"{side}_hip") - J[0]
             upper = joint(f"{side}_knee") - joint(f"{side}_hip")
             lower = joint(f"{side}_ankle") - joint(f"{side}_knee")
-            a, b, leg = np.linalg.norm(upper), np.linalg.norm(lower), ankle - hip
+            a = np.linalg.norm(upper)
+            b = np.linalg.norm(lower)
+            leg = ankle - hip
             c = np.linalg.norm(leg)
             assert c < a + b, "the walk's legs are too short"
             along = (a * a - b * b + c * c) / (2 * c)

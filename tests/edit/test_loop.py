@@ -68,7 +68,8 @@ def test_a_movement_that_is_made_once_is_no_cycle():
 
 def test_a_cycle_after_a_pause_is_found():
     """The still part, whose poses differ least, is not chosen."""
-    still, moving = sitting(2.0), walk(3.0, period=1.0, speed=0.0)
+    still = sitting(2.0)
+    moving = walk(3.0, period=1.0, speed=0.0)
     times = np.concatenate([still.times, still.times[-1] + 1 / 30 + moving.times])
     clip = Clip(
         times,

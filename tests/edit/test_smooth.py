@@ -41,7 +41,8 @@ def amplitude(clip: Clip) -> float:
 def test_strength_zero_is_the_raw_motion_and_one_the_finished() -> None:
     motion = motion_of(walk(), noise=0.05)
     for strength, raw in ((0, True), (1, False)):
-        found, expected = smoothed(BODY, motion, strength), clip_from_motion(BODY, motion, raw=raw)
+        found = smoothed(BODY, motion, strength)
+        expected = clip_from_motion(BODY, motion, raw=raw)
         np.testing.assert_array_equal(found.rotations, expected.rotations)
         np.testing.assert_array_equal(found.root, expected.root)
 
@@ -64,7 +65,8 @@ def test_what_the_finished_motion_adds_stays_and_fades_out_below_strength_one(
     strength: float, share: float
 ) -> None:
     """Here a place that differs from the raw motion's, as that of a foot that is held does."""
-    motion, shift = motion_of(walk(2.0), noise=0.02), np.array([0.03, -0.02, 0.05])
+    motion = motion_of(walk(2.0), noise=0.02)
+    shift = np.array([0.03, -0.02, 0.05])
     moved = replace(motion, trans=motion.trans + shift)
     added = smoothed(BODY, moved, strength).root - smoothed(BODY, motion, strength).root
     # beyond, the distance from the camera is smoothed by itself
@@ -90,7 +92,8 @@ def test_a_walk_begins_and_ends_where_it_was(strength: float, end_m: float) -> N
     away = clip_from_motion(BODY, motion, raw=False).root - camera
     nearer = np.linspace(0.0, 1.0 - end_m / np.linalg.norm(away[-1]), len(motion))
     motion = replace(motion, trans=motion.trans - nearer[:, None] * away[-1])
-    found, before = smoothed(BODY, motion, strength), clip_from_motion(BODY, motion, raw=False)
+    found = smoothed(BODY, motion, strength)
+    before = clip_from_motion(BODY, motion, raw=False)
     assert np.linalg.norm((before.root - camera)[-1]) == pytest.approx(end_m, abs=0.01)
     np.testing.assert_allclose(found.root[[0, -1]], before.root[[0, -1]], atol=1e-3)
     np.testing.assert_allclose(found.rotations[[0, -1]], before.rotations[[0, -1]], atol=1e-6)
@@ -134,7 +137,8 @@ def motion_joints(motion: Motion) -> np.ndarray:
 
 def test_smoothing_has_no_delay() -> None:
     motion = motion_of(walk(), noise=0.0)
-    found, before = smoothed(BODY, motion, 3.0), clip_from_motion(BODY, motion, raw=True)
+    found = smoothed(BODY, motion, 3.0)
+    before = clip_from_motion(BODY, motion, raw=True)
     knee = NAMES.index("left_knee")
     a, b = (log(c.rotations[:, knee])[:, 0] - 0.4 for c in (found, before))
     lags = range(-5, 6)

@@ -38,7 +38,8 @@ def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
     )
     out = spans.swap_sides(clip, BODY, 0.2, 0.5, limbs)
     span = (clip.times > 0.199) & (clip.times < 0.501)
-    before, after = clip.joints(BODY, BETAS), out.joints(BODY, BETAS)
+    before = clip.joints(BODY, BETAS)
+    after = out.joints(BODY, BETAS)
     for kind, chain in (
         ("legs", ("hip", "knee", "ankle", "foot")),
         ("arms", ("shoulder", "elbow", "wrist")),

@@ -24,7 +24,8 @@ from .system_calls import FULL, KILL, NO_MEMORY
 
 ACTIONS = (KILL, FULL, NO_MEMORY)
 SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample" / "sample.mp4"
-SCOPE, PROGRAM = "scope.scope_addon", "scope.tests.fuzz.programs"
+SCOPE = "scope.scope_addon"
+PROGRAM = "scope.tests.fuzz.programs"
 SIZES = 0.05  # by which a format may differ that states times
 SHORT = 12  # frames of a short video
 CACHE = "home/scope-mocap/cache"

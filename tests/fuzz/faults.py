@@ -27,7 +27,8 @@ class _File:
     """A file of which one write fails; everything else is the file's own."""
 
     def __init__(self, file: Any, count: Callable[[], None]) -> None:
-        self._file, self._count = file, count
+        self._file = file
+        self._count = count
 
     def write(self, data: Any) -> Any:
         self._count()
@@ -90,7 +91,9 @@ def all_faults(
 
     :param state: everything in the folder, to be ``old`` or ``new`` after each.
     """
-    n, was, said = 0, old, []
+    n = 0
+    was = old
+    said = []
     while True:
         n += 1
         with failing(n) as calls:

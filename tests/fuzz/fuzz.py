@@ -36,7 +36,8 @@ _LARGEST_NOISE = 16.0  # of a file of random bytes, in powers of two
 
 def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
     """Yield a target's past findings, then damaged inputs without end, each as a file."""
-    target, chance = TARGETS[name], random.Random(f"{name} {seed}")
+    target = TARGETS[name]
+    chance = random.Random(f"{name} {seed}")
     pool = [
         *target.seeds(folder),
         *(path.read_bytes() for path in sorted(CORPUS.glob(f"{name}-*"))),
@@ -55,7 +56,8 @@ def random_inputs(name: str, folder: Path, seed: int, count: int) -> Iterator[Pa
     """Yield files of random bytes, and valid inputs of which a part is replaced by random bytes,
     ``count`` in all.
     """
-    target, chance = TARGETS[name], random.Random(f"{name} {seed}")
+    target = TARGETS[name]
+    chance = random.Random(f"{name} {seed}")
     pool = target.seeds(folder)
     while count > 0:
         noise = chance.randbytes(min(count, round(2 ** chance.uniform(0, _LARGEST_NOISE))))
@@ -98,7 +100,8 @@ def run_target(name: str, seconds: float, seed: int, count: int = 0) -> None:
 
     folder = FOUND / name
     folder.mkdir(parents=True, exist_ok=True)
-    end, done = time.monotonic() + seconds, 0
+    end = time.monotonic() + seconds
+    done = 0
     for path in random_inputs(name, folder, seed, count) if count else inputs(name, folder, seed):
         faulthandler.dump_traceback_later(SLOWEST_S, exit=True)
         check(name, path)

@@ -35,7 +35,8 @@ class Workplace:
     """A folder with what a command needs, in which it runs again and again."""
 
     def __init__(self, folder: Path, command: Command) -> None:
-        self._folder, self._command = folder.resolve(), command
+        self._folder = folder.resolve()
+        self._command = command
         self._whole = dict[str, bytes]()
         for name in FOLDERS:
             (self._folder / name).mkdir()
@@ -190,7 +191,10 @@ def check_command(
         numbers = (
             itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
         )
-        done, problems, seen, ran_again = 0, [], set[object](), False
+        done = 0
+        problems = []
+        seen = set[object]()
+        ran_again = False
         for n in numbers:
             ran_again = False
             try:

@@ -82,7 +82,8 @@ def _json(data: bytes, chance: random.Random) -> bytes:
     except (ValueError, RecursionError):
         return data[: chance.randrange(len(data) + 1)]
     for _ in range(chance.randint(1, 3)):
-        holder, key = document, None
+        holder = document
+        key = None
         while isinstance(holder, dict | list) and holder:
             key = chance.choice(list(holder) if isinstance(holder, dict) else range(len(holder)))
             inside = holder[key]

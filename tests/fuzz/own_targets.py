@@ -16,8 +16,10 @@ from unittest.mock import patch
 import numpy as np
 from scope.solver.names import EXPRESSIONS
 
-BATCH_NAME, KEY = "walk", "key"
-JOINTS, COEFFICIENTS = 24, 10
+BATCH_NAME = "walk"
+KEY = "key"
+JOINTS = 24
+COEFFICIENTS = 10
 LARGEST_ARRAYS = 1 << 24
 
 
@@ -253,10 +255,12 @@ def windows(folder: Path) -> list[bytes]:
 
     times = 1.0 + np.arange(6) / 2
     background = BackgroundRecord(times, np.tile(np.eye(3), (6, 1, 1)), np.ones(6, bool), [1.0])
-    values, centers = [np.ones((33, 6), np.float32)] * 6, [np.ones(2)] * 6
+    values = [np.ones((33, 6), np.float32)] * 6
+    centers = [np.ones(2)] * 6
     people = {0: Tracklet(list(range(6)), values, centers, [9.0] * 6)}
     regions = {0: Region((1.0, 2.0), 9.0, 0.0)}
-    sums, indices = np.ones(6, np.uint32), np.arange(6)
+    sums = np.ones(6, np.uint32)
+    indices = np.arange(6)
     record = WindowRecord(
         Window(1, 1.0, 2.0, 4.0), indices, times, sums, 2, 5, people, regions, [], background
     )

@@ -49,7 +49,8 @@ def panel_live(video: str, result: str) -> int:
 
     _register()
     scene = bpy.context.scene
-    scene.scope_live.source, scene.scope_live.file = "FILE", os.path.abspath(video)
+    scene.scope_live.source = "FILE"
+    scene.scope_live.file = os.path.abspath(video)
     job = LiveJob(scene)
     job.record()
     try:

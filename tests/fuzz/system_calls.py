@@ -22,8 +22,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 AVAILABLE = sys.platform == "linux" and platform.machine() == "x86_64"
-KILL, FULL, NO_MEMORY = "kill", "full", "no memory"
-_DISK_FULL, _LACK_OF_MEMORY = 28, 12  # ENOSPC, ENOMEM
+KILL = "kill"
+FULL = "full"
+NO_MEMORY = "no memory"
+# ENOSPC, ENOMEM
+_DISK_FULL = 28
+_LACK_OF_MEMORY = 12
 # the first argument is a file, a path, or a folder to which a path belongs
 _AT_FD, _AT_PATH, _AT_FOLDER = range(3)
 _WRITES = {
@@ -50,12 +54,20 @@ _WRITES = {
     268: ("chmod", _AT_FOLDER),
     316: ("rename", _AT_FOLDER),
 }
-_MMAP, _ANONYMOUS = 9, 0x20
+_MMAP = 9
+_ANONYMOUS = 0x20
 _FOR_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 _LARGE = 1 << 20  # bytes of an allocation that counts
 # Of struct user_regs_struct, in words of 8 bytes.
-_RAX, _ORIG_RAX, _ARGUMENTS, _WORDS = 10, 15, (14, 13, 12, 7, 9, 8), 27
-_TRACEME, _CONT, _GETREGS, _SETREGS, _SETOPTIONS = 0, 7, 12, 13, 0x4200
+_RAX = 10
+_ORIG_RAX = 15
+_ARGUMENTS = (14, 13, 12, 7, 9, 8)
+_WORDS = 27
+_TRACEME = 0
+_CONT = 7
+_GETREGS = 12
+_SETREGS = 13
+_SETOPTIONS = 0x4200
 # fork, vfork, clone, exec, seccomp; kill all if the tracer ends
 _OPTIONS = 0x2 | 0x4 | 0x8 | 0x10 | 0x80 | 0x100000
 _SECCOMP_EVENT = 7
@@ -104,7 +116,9 @@ class _Tracer:
     """Traces one command with all of its threads and processes."""
 
     def __init__(self, plan: dict[str, Any]) -> None:
-        self._folder, self._n, self._action = plan["folder"], plan["n"], plan["action"]
+        self._folder = plan["folder"]
+        self._n = plan["n"]
+        self._action = plan["action"]
         self._libc = ctypes.CDLL(None, use_errno=True)
         self._libc.ptrace.argtypes = [
             ctypes.c_long,
@@ -134,7 +148,8 @@ class _Tracer:
             if not os.WIFSTOPPED(state):
                 status = os.waitstatus_to_exitcode(state) if thread == child else status
                 continue
-            sent, event = os.WSTOPSIG(state), state >> 16
+            sent = os.WSTOPSIG(state)
+            event = state >> 16
             if event == _SECCOMP_EVENT:
                 self._at_call(thread)
             # A new thread or process begins with a SIGSTOP of the tracing, which it must not get.
@@ -153,7 +168,9 @@ class _Tracer:
         )
         buffer = ctypes.create_string_buffer(code)
         program = struct.pack("HxxxxxxQ", len(code) // 8, ctypes.addressof(buffer))
-        no_new_privileges, seccomp, with_filter = 38, 22, 2
+        no_new_privileges = 38
+        seccomp = 22
+        with_filter = 2
         self._libc.prctl(no_new_privileges, 1, 0, 0, 0)
         if self._libc.prctl(seccomp, with_filter, ctypes.c_char_p(program), 0, 0):
             os.write(2, b"no seccomp filter\n")

@@ -210,7 +210,8 @@ def _motions(_: Path) -> list[bytes]:
 
     from ..made_motion import made_face, made_motion
 
-    poses, trans = np.zeros((6, 72)), np.zeros((6, 3))
+    poses = np.zeros((6, 72))
+    trans = np.zeros((6, 3))
     body = load_body("scope")
     motions = [made_motion(body, poses, trans, face=face) for face in ({}, made_face(6))]
     measured = (

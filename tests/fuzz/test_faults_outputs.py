@@ -77,7 +77,8 @@ def test_an_export_is_the_old_or_the_new_one(tmp_path, temporary, small, motion,
     whole = path.stat().st_size  # some formats state times and addresses, which change
     objects = len(bpy.data.objects), len(bpy.data.scenes)
     path.write_bytes(OLD)
-    n, said = 0, []
+    n = 0
+    said = []
     while True:
         n = later(n)
         with failing(n) as calls:
@@ -130,7 +131,8 @@ def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatc
     command += [part for name in names[:2] for part in ("-o", str(out / name))]
     assert cli.main(command) == 0
     new = {name: (out / name).read_bytes() for name in names}
-    n, failed = 0, 0
+    n = 0
+    failed = 0
     while True:
         n += 1
         for name in names:
@@ -160,10 +162,14 @@ def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatc
 
 
 def test_a_batch_keeps_what_it_had(tmp_path, temporary):
-    clips, out, program = tmp_path / "clips", tmp_path / "out", [sys.executable, "-c", PROGRAM]
+    clips = tmp_path / "clips"
+    out = tmp_path / "out"
+    program = [sys.executable, "-c", PROGRAM]
     clips.mkdir()
     (clips / "a.mp4").write_text("a")
-    n, failed, said = 0, 0, []
+    n = 0
+    failed = 0
+    said = []
     while True:
         n += 1
         with failing(n, without=("close",)) as calls:  # closing the pipes of a process never fails

@@ -252,7 +252,8 @@ def test_f6_flat_and_tiny_bodies(
         body = {key: file[key] for key in file.files}
     body["v_template"] = body["v_template"] * np.array(factors)
     if form == "smpl":
-        count, joints = len(body["v_template"]), body["kintree_table"].shape[1]
+        count = len(body["v_template"])
+        joints = body["kintree_table"].shape[1]
         body["weights"] = np.eye(joints)[np.arange(count) % joints]
         body |= {"J_regressor": np.full((joints, count), 1 / count), "f": body["faces"][:, :3]}
         body = {
@@ -533,7 +534,8 @@ def test_the_fallback_cache_is_the_users_own(tmp_path: Path, prepared: str) -> N
     """It was a predictable folder in the system's temporary one, and what lies in it is
     unpickled.
     """
-    caches, theirs = tmp_path / "caches", tmp_path / "theirs"
+    caches = tmp_path / "caches"
+    theirs = tmp_path / "theirs"
     caches.mkdir()
     theirs.mkdir()
     if prepared == "link":

@@ -21,6 +21,7 @@ def played_again_and_again(path: Path, rounds: int = 60) -> str:
                 for packet in source.demux(shown):
                     if packet.size and packet.pts is not None:
                         packet.pts += number * shown.duration
-                        packet.dts, packet.stream = packet.pts, stream
+                        packet.dts = packet.pts
+                        packet.stream = stream
                         target.mux(packet)
     return str(path)

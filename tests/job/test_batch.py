@@ -181,7 +181,8 @@ def test_results_may_be_on_another_disk(folder, tmp_path):
     """A folder inside the output folder is a link, as users make it who run out of space."""
     (folder / "later").mkdir()
     (folder / "later" / "f.mp4").write_text("ok")
-    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    out = tmp_path / "out"
+    elsewhere = tmp_path / "elsewhere"
     out.mkdir()
     elsewhere.mkdir()
     (out / "later").symlink_to(elsewhere)
@@ -229,7 +230,8 @@ def test_clips_of_several_people_share_no_name_with_a_persons_result(tmp_path):
 
 
 def test_results_of_clips_in_subfolders_lie_in_such_folders(tmp_path):
-    clips, out = tmp_path / "clips", tmp_path / "out"
+    clips = tmp_path / "clips"
+    out = tmp_path / "out"
     (clips / "below" / "deep").mkdir(parents=True)
     (clips / "below" / "deep" / "d.mp4").write_text("x")
     report = batch(clips, out, suffixes=(".npz",)).run(1, recursive=True)
@@ -281,7 +283,8 @@ def test_a_clip_that_ends_while_the_batch_is_stopped_is_finished(folder, tmp_pat
 @pytest.mark.skipif(os.name == "nt", reason="select() on Windows is for sockets only")
 def test_an_interrupt_while_clips_are_being_started_stops_the_first(folder, tmp_path, monkeypatch):
     """A signal can arrive before the last clip has been submitted."""
-    begun, ended = tmp_path / "begun", tmp_path / "ended"
+    begun = tmp_path / "begun"
+    ended = tmp_path / "ended"
     code = (
         f"import pathlib, select, sys; pathlib.Path({str(begun)!r}).touch()\n"
         f"select.select([sys.stdin], [], [], 300)[0] or pathlib.Path({str(ended)!r}).touch()\n"
@@ -338,7 +341,8 @@ cli.run()
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
 def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_again(tmp_path, capfd):
-    clips, out = tmp_path / "clips", tmp_path / "out"
+    clips = tmp_path / "clips"
+    out = tmp_path / "out"
     clips.mkdir()
     shutil.copy(SAMPLE, clips / "a.mp4")
     (tmp_path / "clip.py").write_text(KILLS_THE_BATCH)
@@ -391,7 +395,8 @@ def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_agai
 @pytest.mark.parametrize("at", ["finding the person", "overlay"])
 def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at):
     """It is killed while the networks run, and while a result is being written."""
-    clips, out = tmp_path / "clips", tmp_path / "out"
+    clips = tmp_path / "clips"
+    out = tmp_path / "out"
     clips.mkdir()
     for name in ("a.mp4", "b.mp4"):
         shutil.copy(SAMPLE, clips / name)

@@ -107,7 +107,8 @@ def test_another_blenders_job_may_end_at_the_same_time(cache, vanishing):
 
 
 def test_abandoned_jobs_are_removed_and_running_ones_kept(cache):
-    running, abandoned = cache.new_job_folder(), cache.new_job_folder()
+    running = cache.new_job_folder()
+    abandoned = cache.new_job_folder()
     os.utime(abandoned, (1, 1))
     cache.clear()
     cache.new_job_folder()

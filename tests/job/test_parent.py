@@ -89,7 +89,8 @@ def test_what_the_parent_writes_is_heard(tmp_path):
 
 def test_on_windows_the_pipe_is_polled_and_only_what_is_there_is_read(monkeypatch):
     """A pending read would block the loading of numpy's libraries there."""
-    looks, heard = [], []
+    looks = []
+    heard = []
 
     def peek(handle, size):
         looks.append((handle, size))

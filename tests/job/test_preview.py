@@ -70,7 +70,8 @@ def test_the_file_is_complete_and_bottom_row_first(tmp_path, monkeypatch):
 
 def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
     monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
-    sent, image = [], np.zeros((10, 10, 3), np.uint8)
+    sent = []
+    image = np.zeros((10, 10, 3), np.uint8)
     with PreviewWriter(tmp_path / "gone", lambda event, **values: sent.append(event)) as writer:
         writer(Frame(0, 0.0, image), None, NotReady())
         wait_for(writer._drawing.done)
@@ -82,7 +83,8 @@ def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
 
 def test_a_preview_that_is_being_read_does_not_stop_the_capture(tmp_path, monkeypatch):
     """Windows does not remove a file that is open."""
-    sent, refused = [], []
+    sent = []
+    refused = []
 
     def in_use(self, missing_ok=False):
         refused.append(self)
@@ -106,10 +108,8 @@ def test_the_skeleton_is_drawn_if_the_body_cannot_be_fitted(tmp_path):
     sent = []
     with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
         writer._rasterizer.result()
-        image, seen = (
-            np.zeros((50, 50, 3), np.uint8),
-            observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33)),
-        )
+        image = np.zeros((50, 50, 3), np.uint8)
+        seen = observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33))
         writer(Frame(0, 0.0, image), seen, Broken())
         wait_for(lambda: sent == ["preview"])
         shown = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(
@@ -126,7 +126,8 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
         def fit(self, observation):
             sent.append("fitted")
 
-    sent, compiled = [], threading.Event()
+    sent = []
+    compiled = threading.Event()
     monkeypatch.setattr(preview, "INTERVAL_S", 0.0)
     monkeypatch.setattr(preview, "load_rasterizer", compiled.wait)
     with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
@@ -144,10 +145,12 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
 
 def test_the_preview_shows_the_body_at_the_ground_truth(body):
     """The image has the body's colour at the joints, and is unchanged away from them."""
-    truth, checked = np.load(SAMPLE.with_name("sample_truth.npz")), []
+    truth = np.load(SAMPLE.with_name("sample_truth.npz"))
+    checked = []
 
     def watch(frame, seen, live):
-        bare, shown = draw(frame.image_rgb, None), draw(frame.image_rgb, None, live.fit(seen))
+        bare = draw(frame.image_rgb, None)
+        shown = draw(frame.image_rgb, None, live.fit(seen))
         changed = (bare != shown).any(axis=2)
         pixels = truth["joints_cam"][frame.index] @ truth["intrinsics"].T
         pixels = pixels[:, :2] / pixels[:, 2:] * (LONGER_SIDE / max(frame.image_rgb.shape))

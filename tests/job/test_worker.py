@@ -171,7 +171,8 @@ def test_keys_differ_if_the_result_may_differ(tmp_path):
     assert request.key("1") != JobRequest(str(clip), quality="fast").key("1")
     assert request.key("1") != JobRequest(str(clip), hands="on").key("1")
     assert request.key("1") != JobRequest(str(clip), heights_m=(1.8,)).key("1")
-    key, status = request.key("1"), clip.stat()
+    key = request.key("1")
+    status = clip.stat()
     clip.write_bytes(b"x" * 99 + b"y")
     os.utime(clip, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert request.key("1") != key

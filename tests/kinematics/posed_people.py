@@ -52,7 +52,8 @@ def plank_person():
     high.
     """
     body = load_body("scope")
-    supported, times = with_contact_points(body, np.zeros(body.P)), np.arange(60) / FPS
+    supported = with_contact_points(body, np.zeros(body.P))
+    times = np.arange(60) / FPS
     T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     for side, sign in (("left", 1), ("right", -1)):
@@ -74,7 +75,8 @@ def plank_person():
             @ down
         )
         points = place(omega[None], np.zeros((1, 3)))[2][0]
-        toes, palms = points[[1, 3]].mean(0), points[4:].mean(0)
+        toes = points[[1, 3]].mean(0)
+        palms = points[4:].mean(0)
         pitch += 0.5 * (palms - toes)[2] / np.linalg.norm(palms - toes)
     assert abs((palms - toes)[2]) < 1e-3
     root = np.array([0.0, 4.0, -toes[2]]) - [*points.mean(0)[:2], 0.0]

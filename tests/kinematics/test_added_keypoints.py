@@ -12,7 +12,8 @@ OMEGA = exp(np.random.default_rng(0).normal(0.0, 0.3, (BODY.K + 1, 3)))
 
 
 def test_points_that_keep_their_offset_move_with_their_part_and_others_stay():
-    parts, offsets = np.array([20, 4]), np.array([[0.1, 0.0, 0.0], [0.0, -0.2, 0.05]])
+    parts = np.array([20, 4])
+    offsets = np.array([[0.1, 0.0, 0.0], [0.0, -0.2, 0.05]])
     body = with_points_on_parts(BODY, ("one", "two"), parts, offsets)
     assert body.keypoint_names == (*BODY.keypoint_names, "one", "two")
     R, t = body.forward_kinematics(OMEGA, np.zeros(3), BETAS)

@@ -52,7 +52,8 @@ def distances_outside(points: np.ndarray, R: np.ndarray, t: np.ndarray) -> np.nd
     The arms' own triangles are left out, and so are the holes that they leave: the shoulders are
     far from all points.
     """
-    v, triangles = BODY.skin(R[0], t[0], BETAS), BODY.triangles()
+    v = BODY.skin(R[0], t[0], BETAS)
+    triangles = BODY.triangles()
     part = BODY.strongest_joints
     arms = [
         k
@@ -79,7 +80,8 @@ def distances_outside(points: np.ndarray, R: np.ndarray, t: np.ndarray) -> np.nd
 def test_heights_are_the_distances_from_the_skin_less_the_room_that_the_arm_needs(
     pose: str,
 ) -> None:
-    (R, t), own = POSES[pose], surface()
+    (R, t) = POSES[pose]
+    own = surface()
     body = with_contact_points(with_arm_points(BODY), BETAS)
     planes = own.planes(R, t)
     points = body.keypoints(R, t, BETAS)[0, own.indices]
@@ -106,8 +108,10 @@ def test_arms_enter_the_body_in_some_poses_and_in_others_not() -> None:
 
 def test_planes_move_with_the_body() -> None:
     R, t = POSES["seated, a hand in the thigh"]
-    turn, shift = exp(np.array([0.3, -1.2, 0.5])), np.array([0.4, -2.0, 5.0])
-    here, there = surface().planes(R, t), surface().planes(turn @ R, t @ turn.T + shift)
+    turn = exp(np.array([0.3, -1.2, 0.5]))
+    shift = np.array([0.4, -2.0, 5.0])
+    here = surface().planes(R, t)
+    there = surface().planes(turn @ R, t @ turn.T + shift)
     np.testing.assert_allclose(there.height, here.height, atol=1e-6)
     np.testing.assert_allclose(there.normal, here.normal @ turn.T, atol=1e-6)
     np.testing.assert_array_equal(there.near, here.near)
@@ -135,7 +139,8 @@ def test_points_are_where_the_shape_has_them() -> None:
         omega[child.joint_names.index(f"{side}_shoulder")] = exp(np.array([0.0, 0.0, angle]))
     R, t = child.forward_kinematics(omega, np.zeros(3), betas)
     planes = own.planes(R[None], t[None])
-    skin, points = child.skin(R, t, betas), body.keypoints(R, t, betas)[own.indices]
+    skin = child.skin(R, t, betas)
+    points = body.keypoints(R, t, betas)[own.indices]
     part = child.strongest_joints
     names = child.joint_names
     trunk = [

@@ -24,7 +24,8 @@ def test_contact_points_are_keypoints_at_the_end_of_the_mesh(which, size):
     assert supported.keypoint_names == (*body.keypoint_names, *CONTACT_POINTS)
     pose = np.tile(np.eye(3), (body.K + 1, 1, 1))
     R, t = body.forward_kinematics(pose, np.zeros(3), betas)
-    points, vertices = contact_point_positions(supported, R, t), body.skin(R, t, betas)
+    points = contact_point_positions(supported, R, t)
+    vertices = body.skin(R, t, betas)
     floor = vertices[:, 1].min()
     assert np.abs(points[:4, 1] - floor).max() < 0.01  # the model frame's y is up
     assert (points[[1, 3], 2] > points[[0, 2], 2] + 0.05).all()  # toes lie in front of heels
@@ -36,10 +37,8 @@ def test_contact_points_are_keypoints_at_the_end_of_the_mesh(which, size):
 
 def test_contact_points_follow_their_parts():
     body = load_body("scope")
-    supported, pose = (
-        with_contact_points(body, np.zeros(body.P)),
-        np.tile(np.eye(3), (body.K + 1, 1, 1)),
-    )
+    supported = with_contact_points(body, np.zeros(body.P))
+    pose = np.tile(np.eye(3), (body.K + 1, 1, 1))
     bent = pose.copy()
     bent[body.joint_names.index("left_hip")] = rotations.exp(np.array([-0.8, 0.0, 0.0]))
     still, moved = (

@@ -17,7 +17,8 @@ STANDING = np.full((60, 4), 0.95)
 
 @pytest.mark.parametrize("pitch", [-0.6, -0.2, 0.0, 0.2, 0.6])
 def test_the_lowest_skin_is_the_lowest_vertex_of_a_pitched_foot(pitch):
-    body, betas = load_body("scope"), np.linspace(-1.5, 1.5, load_body("scope").P)
+    body = load_body("scope")
+    betas = np.linspace(-1.5, 1.5, load_body("scope").P)
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
     omega[0] = rotations.exp(np.array([np.pi / 2, 0, 0]))  # z up
     for side in ("left", "right"):
@@ -29,7 +30,8 @@ def test_the_lowest_skin_is_the_lowest_vertex_of_a_pitched_foot(pitch):
 
 def test_heights_and_frames_under_the_floor_of_a_motion():
     body = load_body("scope")
-    poses, trans = np.zeros((20, body.K + 1, 3)), np.zeros((20, 3))
+    poses = np.zeros((20, body.K + 1, 3))
+    trans = np.zeros((20, 3))
     poses[:, 0] = [np.pi / 2, 0, 0]
     R, t = body.forward_kinematics(rotations.exp(poses[0]), trans[0])
     trans[:, 2] = -body.skin(R, t)[:, 2].min()
@@ -70,7 +72,8 @@ def test_rests_on_a_step_are_found(height, found):
 
 
 def test_a_touch_of_a_step_is_no_rest():
-    heights, contact = np.full((60, 4), 0.18), np.zeros((60, 4))
+    heights = np.full((60, 4), 0.18)
+    contact = np.zeros((60, 4))
     contact[30:34, 1] = 0.95  # 0.1 s
     assert steps(heights, contact, TIMES) == []
     contact[45:, 1] = 0.95  # 0.47 s

@@ -10,7 +10,8 @@ from scope.scope_addon.kinematics import frame_blocks
 def test_blocks_give_the_result_of_one_call(frames, monkeypatch):
     monkeypatch.setattr(frame_blocks, "BLOCK_FRAMES", 5)
     rng = np.random.default_rng(frames)
-    a, b = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 2)).astype(np.float32)
+    a = rng.normal(size=(frames, 3))
+    b = rng.normal(size=(frames, 2)).astype(np.float32)
     sizes = []
 
     def compute(x, y):

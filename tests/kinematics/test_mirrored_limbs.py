@@ -39,13 +39,15 @@ def test_a_mirrored_bone_has_the_other_depth_and_looks_the_same(
     others = [i for i in range(BODY.K + 1) if not _is_below(i, a)]
     np.testing.assert_allclose(after[:, others], before[:, others], atol=1e-9)
     for is_mirrored, start, end in ((upper, a, b), (lower, b, c)):
-        bone, other = before[:, end] - before[:, start], after[:, end] - after[:, start]
+        bone = before[:, end] - before[:, start]
+        other = after[:, end] - after[:, start]
         if not is_mirrored:
             np.testing.assert_allclose(other, bone, atol=1e-9)
             continue
         sight = before[:, end] - center
         sight /= np.linalg.norm(sight, axis=1, keepdims=True)
-        along, across = (bone * sight).sum(axis=1), np.cross(bone, sight)
+        along = (bone * sight).sum(axis=1)
+        across = np.cross(bone, sight)
         np.testing.assert_allclose((other * sight).sum(axis=1), -along, atol=1e-9)
         np.testing.assert_allclose(np.cross(other, sight), across, atol=1e-9)
         np.testing.assert_allclose(

@@ -12,7 +12,8 @@ from scope.scope_addon.kinematics.runs import runs
 
 def test_runs_of_every_short_mask_are_those_that_grouping_finds():
     for mask in itertools.product([False, True], repeat=7):
-        expected, row = [], 0
+        expected = []
+        row = 0
         for value, group in itertools.groupby(mask):
             length = len(list(group))
             expected += [(row, row + length)] if value else []

@@ -42,7 +42,8 @@ def test_only_large_arrays_are_rounded() -> None:
 
 
 def walk(frames: int) -> tuple[Track, FittedTrack]:
-    body, times = load_body("scope"), np.arange(frames) / 30
+    body = load_body("scope")
+    times = np.arange(frames) / 30
     pose = 0.3 * np.sin(times[:, None, None] * np.linspace(1, 3, 3 * (body.K + 1)).reshape(-1, 3))
     root = np.stack([np.sin(times), 0 * times, 4 + 0.5 * np.cos(times)], axis=1)
     valid = np.ones(frames, bool)
@@ -63,11 +64,10 @@ def walk(frames: int) -> tuple[Track, FittedTrack]:
 
 
 def test_a_fit_in_single_precision_is_placed_within_a_hundredth_of_a_millimetre() -> None:
-    body, (track, fitted) = load_body("scope"), walk(120)
-    exact, small = (
-        place_track(body, track, fitted, True),
-        place_track(body, track, to_single_precision(fitted), True),
-    )
+    body = load_body("scope")
+    (track, fitted) = walk(120)
+    exact = place_track(body, track, fitted, True)
+    small = place_track(body, track, to_single_precision(fitted), True)
     np.testing.assert_allclose(small.joints, exact.joints, atol=1e-5)
     np.testing.assert_allclose(small.soles, exact.soles, atol=1e-5)
     # and as the same formula in double precision has it
@@ -78,7 +78,8 @@ def test_a_fit_in_single_precision_is_placed_within_a_hundredth_of_a_millimetre(
 
 
 def test_placing_a_long_clip_takes_few_kilobytes_per_frame() -> None:
-    body, count = load_body("scope"), 30_000
+    body = load_body("scope")
+    count = 30_000
     track, fitted = walk(count)
     fitted = to_single_precision(fitted)
     tracemalloc.start()

@@ -15,8 +15,10 @@ from scope.solver.rotations import matrix_from_quaternion
 
 
 def turn(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    z, one = np.zeros_like(angle), np.ones_like(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
+    z = np.zeros_like(angle)
+    one = np.ones_like(angle)
     return np.stack(
         [np.stack([c, -s, z], -1), np.stack([s, c, z], -1), np.stack([z, z, one], -1)], -2
     )

@@ -110,10 +110,12 @@ def test_both_feet_rest_on_stairs_where_the_ground_is_uneven(step):
 
 def test_palms_at_rest_on_the_floor_are_in_contact(plank):
     _, omega, root, place, T_world_camera, times = plank
-    up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
+    up = T_world_camera[2, :3]
+    contact_points = place(omega, root)[2]
     p = standing.resting_probability(contact_points, up, times, CAMERA)
     assert p[:, [1, 3, 4, 5]].min() > 0.8  # toes and palms
-    raised, moved = contact_points.copy(), contact_points.copy()
+    raised = contact_points.copy()
+    moved = contact_points.copy()
     raised[:, 4] += 0.4 * up
     moved[:, 4, 1] += 0.3 * np.sin(2 * np.pi * times)
     for other in (raised, moved):
@@ -124,7 +126,8 @@ def test_palms_at_rest_on_the_floor_are_in_contact(plank):
 
 def test_feet_at_rest_above_the_hands_are_not_in_contact(plank):
     _, omega, root, place, T_world_camera, times = plank
-    up, contact_points = T_world_camera[2, :3], place(omega, root)[2]
+    up = T_world_camera[2, :3]
+    contact_points = place(omega, root)[2]
     contact_points[:, :4] += 1.5 * up
     p = standing.resting_probability(contact_points, up, times, CAMERA)
     assert p[:, :4].max() < 0.05
@@ -135,7 +138,8 @@ def s(x):
     return 1 / (1 + np.exp(-x))
 
 
-UP, TIMES = np.array([0.0, 0.0, 1.0]), np.arange(60) / 30
+UP = np.array([0.0, 0.0, 1.0])
+TIMES = np.arange(60) / 30
 
 
 def sliding(heights, speeds, away=(0.0, 5.0)):
@@ -150,7 +154,8 @@ def sliding(heights, speeds, away=(0.0, 5.0)):
 
 
 def test_without_a_camera_the_probability_is_the_documented_function_of_speed_and_height():
-    heights, speeds = np.array([0.0, 0.02, 0.05, 0.08]), np.array([0.1, 0.35, 0.5, 0.0])
+    heights = np.array([0.0, 0.02, 0.05, 0.08])
+    speeds = np.array([0.1, 0.35, 0.5, 0.0])
     p = standing.standing_probability(sliding(heights, speeds), UP, TIMES)[30]
     np.testing.assert_allclose(
         p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / 0.05)), rtol=1e-6
@@ -158,7 +163,8 @@ def test_without_a_camera_the_probability_is_the_documented_function_of_speed_an
 
 
 def test_a_still_point_may_be_higher_by_what_an_error_in_depth_explains():
-    heights, speeds = np.array([0.0, 0.1, 0.2, 0.1]), np.array([0.0, 0.0, 0.0, 0.15])
+    heights = np.array([0.0, 0.1, 0.2, 0.1])
+    speeds = np.array([0.0, 0.0, 0.0, 0.15])
     points = sliding(heights, speeds)
     center = np.array([0.0, 0.0, 3.0])
     sight = (points[30] - center) / np.linalg.norm(points[30] - center, axis=1, keepdims=True)

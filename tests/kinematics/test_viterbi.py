@@ -15,10 +15,8 @@ from scope.scope_addon.kinematics.viterbi import least_cost_path
 def test_no_other_path_costs_less(count: int, states: int, barred: float) -> None:
     rng = np.random.default_rng(count)
     for _ in range(5):
-        costs, switching = (
-            rng.normal(size=(count, states)),
-            rng.normal(size=(count - 1, states, states)),
-        )
+        costs = rng.normal(size=(count, states))
+        switching = rng.normal(size=(count - 1, states, states))
         switching[rng.random(switching.shape) < barred] = np.inf
         switching[:, 0, 0] = 1.0  # there is always a way
 

@@ -40,7 +40,10 @@ class FakeSource:
     focal_35mm = None
 
     def __init__(self, *runs, ends=False, before=lambda _: None, error=None, images=None):
-        self.runs, self.ends, self.before, self.error = list(runs), ends, before, error
+        self.runs = list(runs)
+        self.ends = ends
+        self.before = before
+        self.error = error
         self.images = images
         self.opened = self.closed = 0
 

@@ -53,14 +53,13 @@ def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, r
         stream.height, stream.width = images[0].shape[:2]
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
         stream.bit_rate = 4_000_000
-        stream.gop_size, stream.max_b_frames, stream.options = (
-            group,
-            0,
-            _WITHOUT_SCENE_CUTS.get(codec, {}),
-        )
+        stream.gop_size = group
+        stream.max_b_frames = 0
+        stream.options = _WITHOUT_SCENE_CUTS.get(codec, {})
         for k, image in enumerate(images):
             frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-            frame.time_base, frame.pts = Fraction(1, rate), round(begins_s * rate) + k
+            frame.time_base = Fraction(1, rate)
+            frame.pts = round(begins_s * rate) + k
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return target.getvalue()
@@ -106,11 +105,9 @@ def with_damage(data, numbers, kind="mpegts"):
             if k in numbers:
                 half = packet.size // 2
                 damaged = av.Packet(bytes(packet)[:half] + bytes(packet.size - half))
-                damaged.pts, damaged.dts, damaged.time_base = (
-                    packet.pts,
-                    packet.dts,
-                    packet.time_base,
-                )
+                damaged.pts = packet.pts
+                damaged.dts = packet.dts
+                damaged.time_base = packet.time_base
                 packet = damaged
             packet.stream = stream
             container.mux(packet)
@@ -186,7 +183,8 @@ def rtp_of_transport_stream(data):
 
 def rtp_of_h264(data, rate=30):
     """Return the RTP packets of each picture of an H.264 stream, and its media description."""
-    pictures, numbers = [], count()
+    pictures = []
+    numbers = count()
     for k, units in enumerate(nal_units(data)):
         payloads = [payload for unit in units for payload in _payloads(unit)]
         ends = [False] * (len(payloads) - 1) + [True]
@@ -233,7 +231,8 @@ def rtsp_server(packets, media):
     class Handler(StreamRequestHandler):
         def handle(self):
             while line := self.rfile.readline():
-                method, head = line.split()[0].decode(), {}
+                method = line.split()[0].decode()
+                head = {}
                 while (line := self.rfile.readline().strip()) != b"":
                     name, _, value = line.decode().partition(":")
                     head[name.lower()] = value.strip()

@@ -18,7 +18,8 @@ def calibration(height_m=1.2, tilt=0.0, focal_px=1000.0, beta=0.0):
     return Calibration(camera, np.full(3, beta), up, np.array([0.0, 0.0, height_m]))
 
 
-BEFORE, AFTER = calibration(1.0), calibration(1.1)
+BEFORE = calibration(1.0)
+AFTER = calibration(1.1)
 
 
 def course(step_s, seconds, world_s=SETTLING_S, before=BEFORE, after=AFTER):

@@ -36,7 +36,9 @@ def read(swapped: np.ndarray, answers: dict[int, int | None], *, wait: bool = Fa
     :param answers: the reference network's: frame that it was asked about, and frame before which
         it answers; None: it has answered at once.
     """
-    truth, sides, wrong = turning_body(), CausalLeftRight(wait=wait), []
+    truth = turning_body()
+    sides = CausalLeftRight(wait=wait)
+    wrong = []
     pending: dict[int, Future] = {frame: Future() for frame in answers}
     for k in range(COUNT):
         for frame, due in answers.items():

@@ -33,7 +33,8 @@ def mean_step(R):
 
 def test_rotations_at_rest_jitter_less_and_turning_ones_are_followed():
     noise = rotations.exp(np.random.default_rng(0).normal(0, 0.02, (90, 3)))
-    still, turning = RotationFilter(MOTION), RotationFilter(MOTION)
+    still = RotationFilter(MOTION)
+    turning = RotationFilter(MOTION)
     assert mean_step(np.array([still(R[None], 1 / 30)[0] for R in noise])) < 0.5 * mean_step(noise)
     truth = rotations.exp(np.linspace(0, 6, 60)[:, None] * [0, 0, 1.0])  # 3 rad/s
     last = [turning(R[None], 2 / 59)[0] for R in truth][-1]

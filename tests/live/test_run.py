@@ -12,12 +12,16 @@ from scope.scope_addon.live.run import Listeners, LiveOptions, run_live
 
 from .fake_source import FakeClock, FakeSource
 
-WIDE, TALL = np.zeros((96, 160, 3), np.uint8), np.zeros((160, 96, 3), np.uint8)
+WIDE = np.zeros((96, 160, 3), np.uint8)
+TALL = np.zeros((160, 96, 3), np.uint8)
 
 
 @pytest.mark.usefixtures("networks")
 def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
-    given, said, sizes, poses = threading.Semaphore(1), [], [], []
+    given = threading.Semaphore(1)
+    said = []
+    sizes = []
+    poses = []
     source = FakeSource(
         [0.0, 0.1, 0.2], ends=True, images=[WIDE, WIDE, TALL], before=lambda _: given.acquire()
     )

@@ -26,7 +26,8 @@ from scope.scope_addon.motion import Motion
 LATE = 2  # frames of the delay of 60 ms
 LEAD = 12  # frames until the filters know how the body moves
 # one and a half seconds, and frames without a person after them, a tenth of a second apart
-FRAMES, EMPTY = 46, 8
+FRAMES = 46
+EMPTY = 8
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +124,8 @@ def test_feet_stand_on_the_floor_and_the_world_does_not_jump(live):
 
 
 def test_without_a_person_the_pose_is_held_and_then_lost(live):
-    last, rest = live[1][FRAMES - 1], live[1][FRAMES + 2 :]
+    last = live[1][FRAMES - 1]
+    rest = live[1][FRAMES + 2 :]
     assert last.presence is Presence.SEEN
     for pose in rest:
         elapsed_s = pose.timestamp_s - last.timestamp_s

@@ -33,17 +33,16 @@ def played(body, networks):
     """The poses, and the clip's frame that each of them shows."""
     with open_video(SAMPLE) as video:
         images = [frame.image_rgb for frame in video if frame.index % 2 == 0]
-    tracker, order = (
-        PeopleTracker("fast", 1),
-        [*range(len(images)), *range(len(images) - 2, -1, -1)],
-    )
+    tracker = PeopleTracker("fast", 1)
+    order = [*range(len(images)), *range(len(images) - 2, -1, -1)]
     found = [tracker.step(image, time_s=k / RATE) for k, image in enumerate(images)]
     size = images[0].shape[1], images[0].shape[0]
     at = iter(order)
     people = LivePeople(
         body, SimpleNamespace(step=lambda *_: found[next(at)]), choose_camera(*size), size
     )
-    poses, focal = [], []
+    poses = []
+    focal = []
     for k, row in enumerate(order):
         poses.append(people.step(Frame(k, k / RATE, images[row]))[0])
         focal.append(people.sessions[0].camera.intrinsics[0, 0])
@@ -74,7 +73,8 @@ def test_feet_that_stand_by_the_ground_truth_do_not_slide(played):
     joints = np.array([pose.joints for pose in poses])
     slides = []
     for side, (ankle, toe) in enumerate([(7, 10), (8, 11)]):
-        foot, now = joints[:, [ankle, toe]].mean(axis=1), stands[:, side] & settled
+        foot = joints[:, [ankle, toe]].mean(axis=1)
+        now = stands[:, side] & settled
         for rows in np.split(np.arange(len(now)), np.flatnonzero(np.diff(now)) + 1):
             if now[rows[0]] and len(rows) >= LATE + SHORTEST:
                 shown = foot[rows[LATE:]]
@@ -91,7 +91,8 @@ def test_after_an_hour_of_sleep_the_body_is_where_it_was(body, played):
     image in depth, and puts an ankle 10 cm farther away.
     """
     poses, _, _, people = played
-    last, size = poses[-1], (480, 640, 3)
+    last = poses[-1]
+    size = (480, 640, 3)
     awake = [
         people.step(Frame(200 + k, 3600 + (200 + k) / RATE, np.zeros(size, np.uint8)))[0]
         for k in range(12)

@@ -53,7 +53,8 @@ def test_noise_is_less() -> None:
 def test_the_distance_is_smoothed_more_than_the_place_in_the_image() -> None:
     """A camera measures it less accurately."""
     times = np.arange(600) / 60
-    shaking, left = 0.02 * np.sin(2 * np.pi * 4.0 * times), []
+    shaking = 0.02 * np.sin(2 * np.pi * 4.0 * times)
+    left = []
     for direction in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]):
         _, places = filtered(
             np.zeros(600), np.array([0.0, 0.0, 4.0]) + np.outer(shaking, direction), times

@@ -55,7 +55,8 @@ def test_a_file_goes_on_where_it_was_when_the_computer_slept():
     """Nothing that would have been shown meanwhile is made up for, which would be shown as fast as
     it can be read.
     """
-    clock, arrived = FakeClock(), []
+    clock = FakeClock()
+    arrived = []
     for picture in islice(open_source(str(SAMPLE)).pictures(clock), 8):
         arrived.append(picture.arrived_s - 100.0)
         if picture.index == 3:
@@ -72,7 +73,9 @@ def pictures():
 
 
 def test_a_stream_is_read_and_after_its_end_read_again(pictures):
-    said, taken, clock = [], [], Clock()
+    said = []
+    taken = []
+    clock = Clock()
     with mjpeg_server(pictures, rounds=3) as address:
         source = open_source(address)
         with NewestFrame(source, clock, reconnect_s=0.05, say=said.append) as reader:
@@ -91,7 +94,8 @@ def test_a_stream_is_read_and_after_its_end_read_again(pictures):
 
 def test_the_end_of_a_capture_closes_the_connection(pictures):
     """Before the reader itself is left: a recording is written only then."""
-    left, clock = threading.Event(), Clock()
+    left = threading.Event()
+    clock = Clock()
     with mjpeg_server(pictures, rounds=10_000, left=left) as address:
         with NewestFrame(open_source(address), clock, reconnect_s=0.05) as reader:
             assert reader.take() is not None
@@ -210,7 +214,8 @@ def test_a_stream_all_of_whose_pictures_are_damaged_is_shown_after_a_while(tmp_p
 def test_a_server_s_timestamps_may_jump_and_its_rate_change(tmp_path):
     parts = [encoded(moving(12), begins_s=9.0), encoded(moving(12, first=12), begins_s=3609.0)]
     parts += [encoded(moving(12, first=24), begins_s=4.0, rate=10)]
-    clock, taken = Clock(), []
+    clock = Clock()
+    taken = []
     with served(tmp_path, "a.ts", b"".join(parts)) as address:
         began_s = clock.now()
         with NewestFrame(open_source(address), clock, received=taken.append) as reader:

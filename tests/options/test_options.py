@@ -79,7 +79,8 @@ def test_defaults_are_of_the_declared_type():
 
 
 def test_command_line_and_worker_have_the_same_defaults():
-    values, request = option_values(parsed()), JobRequest("walk.mp4").values
+    values = option_values(parsed())
+    request = JobRequest("walk.mp4").values
     assert set(request) == {each.name for each in options_at(Place.WORKER)}
     assert {name: values[name] for name in request} == request
     assert capture_options(values) == capture_options(request) == CaptureOptions()

@@ -31,7 +31,9 @@ from ..made_motion import made_face, made_motion
 
 VOID = {"meta", "link", "img", "input", "br"}
 HOSTILE = "<img src=x onerror=alert(1)>&\"'</script><!--.mp4"
-W, H, FRAMES = 96, 64, 9
+W = 96
+H = 64
+FRAMES = 9
 
 
 class Page(HTMLParser):

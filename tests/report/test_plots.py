@@ -64,7 +64,8 @@ def test_shares_are_drawn_as_steps_that_hold_until_the_next_value():
 
 def test_a_long_curve_keeps_its_extremes_and_its_gaps():
     y = np.sin(np.arange(50_000) / 300)
-    y[12_345], y[33_333] = 7.0, -9.0
+    y[12_345] = 7.0
+    y[33_333] = -9.0
     y[20_000] = np.nan
     x, kept = thinned(np.arange(50_000.0), y)
     assert len(kept) <= 1200

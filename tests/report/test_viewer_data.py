@@ -22,7 +22,8 @@ def decoded(text: str, kind: str, *shape: int) -> np.ndarray:
 def rotation_matrices(q: np.ndarray) -> np.ndarray:
     """(..., 4) quaternions (w, x, y, z) to (..., 3, 3), as R = I + 2 w [v]× + 2 [v]×²."""
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    w, (x, y, z) = q[..., 0, None, None], np.moveaxis(q[..., 1:], -1, 0)
+    w = q[..., 0, None, None]
+    (x, y, z) = np.moveaxis(q[..., 1:], -1, 0)
     zero = np.zeros_like(x)
     V = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*x.shape, 3, 3)
     return np.eye(3) + 2 * w * V + 2 * V @ V
@@ -30,7 +31,8 @@ def rotation_matrices(q: np.ndarray) -> np.ndarray:
 
 def test_joints_and_skin_of_the_page_are_those_of_the_body(body):
     rng = np.random.default_rng(3)
-    T, K1 = 6, body.K + 1
+    T = 6
+    K1 = body.K + 1
     poses = rng.normal(0, 0.7, (T, K1, 3))
     poses[0] = 0
     poses[1, 5] = [np.pi, 0, 0]

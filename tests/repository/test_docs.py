@@ -225,11 +225,6 @@ def test_every_term_of_the_glossary_is_defined_once():
     assert [term for term, count in Counter(terms).items() if count > 1] == []
 
 
-@pytest.mark.parametrize(("name", "lines"), [("README.md", 120), ("CHANGELOG.md", 40)])
-def test_what_is_read_first_is_short(name, lines):
-    assert len((ROOT / name).read_text("utf-8").splitlines()) <= lines
-
-
 def test_the_solvers_reference_is_up_to_date():
     page = (DOCS / "solver_api.md").read_text("utf-8")
     headings = Counter(re.findall(r"^### (\S+)$", page, re.M))

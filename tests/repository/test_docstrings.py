@@ -223,7 +223,8 @@ def called_functions(function: Function, call: ast.Call) -> list[Function]:
     """The functions of the same module, the private methods and the solver's checks that a call may
     mean.
     """
-    called, near = last_name(call.func), modules()[function.module]
+    called = last_name(call.func)
+    near = modules()[function.module]
     if isinstance(call.func, ast.Attribute):
         return [f for f in near if called[0] == "_" and f.name.endswith(f".{called}")]
     checks = modules()[CHECKS] if function.module.is_relative_to(SOLVER) else []
@@ -269,7 +270,8 @@ def test_docstrings_give_the_shapes_of_arrays() -> None:
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
 def test_docstrings_name_the_errors(package: Path) -> None:
-    missing, some = {}, 0
+    missing = {}
+    some = 0
     for name, function in public_functions().items():
         if function.module.is_relative_to(package) and (errors := raised(function)):
             documented = set(re.findall(r":raises (\w+):", function.doc))

@@ -16,7 +16,8 @@ def array(kind, length, content, *, compressed=True, size=None):
 def node(at, name, properties=(), children=()):
     """A node of version 7400 at an offset; children are functions of their offset."""
     body = b"".join(properties)
-    inside, inner = at + 13 + len(name) + len(body), b""
+    inside = at + 13 + len(name) + len(body)
+    inner = b""
     for child in children:
         inner += child(inside + len(inner))
     inner += bytes(13) if children else b""

@@ -133,7 +133,8 @@ def test_other_names_are_not_guessed():
 
 
 def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
-    path, other = tmp_path / "face.json", tmp_path / "package.json"
+    path = tmp_path / "face.json"
+    other = tmp_path / "package.json"
     written = ExpressionMap(
         {"mund": {"jawOpen": 1.5, "mouthClose": -1.0}, "auge": {"eyeBlinkLeft": 1.0}}
     )

@@ -12,7 +12,8 @@ def lowered(fps, seconds=2.0):
     """
     times = np.arange(round(seconds * fps)) / fps
     needed = np.where(np.abs(times - 1.0) < 0.095, 0.05, 0.0)
-    hips, goals = np.zeros((len(times), 1, 3)), np.zeros((len(times), 1, 3))
+    hips = np.zeros((len(times), 1, 3))
+    goals = np.zeros((len(times), 1, 3))
     hips[:, 0, 2] = 1.0 + needed
     return times, needed, pelvis_drop(hips, goals, np.array([1.0]), times)
 

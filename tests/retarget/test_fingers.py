@@ -49,7 +49,9 @@ def hand(
     """Return names, parents and rest heads of a wrist and its fingers, the thumb forward (-y), on
     an arm along +x.
     """
-    names, parents, heads = ["hand_l"], [-1], [(0.6, 0.0, 1.4)]
+    names = ["hand_l"]
+    parents = [-1]
+    heads = [(0.6, 0.0, 1.4)]
     for f, finger in enumerate(fingers):
         for k in (1, 2, 3):
             parents.append(0 if k == 1 else len(names) - 1)
@@ -96,7 +98,8 @@ def test_bones_of_the_palm_and_controls_are_left_out():
 @pytest.mark.parametrize("turn", [0.0, 0.7, 3.0])
 def test_fingers_without_names_are_found_by_their_shape_in_any_order(turn):
     names, parents, heads = hand("b{finger}{k}", tuple("qwerz"))
-    c, s = np.cos(turn), np.sin(turn)
+    c = np.cos(turn)
+    s = np.sin(turn)
     heads = heads @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     assert find_fingers(names, parents, heads, {"left": 0}) == expected(names)
     order = [0, *(1 + 3 * f + k for f in (3, 0, 4, 2, 1) for k in range(3))]

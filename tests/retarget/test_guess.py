@@ -13,7 +13,8 @@ from .naming_schemes import PARENTS, PLACES, SCHEMES, SIDED, names_of
 def bones_of(scheme: str, size: float = 1.0, drop: float = 0.0) -> tuple[RestBones, dict[str, str]]:
     """Return the bones of a rig and the part of each; arms lowered by `drop` radians."""
     bone_of = names_of(scheme)
-    heads, parents = [], []
+    heads = []
+    parents = []
     order = list(bone_of)
     for part in order:
         side, _, kind = part.partition("_")
@@ -63,7 +64,8 @@ def test_a_short_upper_arm_is_no_collar() -> None:
     bones, part_of = bones_of("unreal")
     parts = [part_of[name] for name in bones.names]
     kept = [i for i, part in enumerate(parts) if not part.endswith("collar")]
-    heads, parents = bones.heads.copy(), []
+    heads = bones.heads.copy()
+    parents = []
     for i, part in enumerate(parts):
         if part.endswith("elbow"):
             shoulder = int(bones.parents[i])

@@ -41,7 +41,8 @@ def test_arms_of_any_rest_pose_are_turned_to_the_t_pose(arms_down: float) -> Non
     A, F = aligned(rig)
     for side in ("left", "right"):
         for part, end in (("shoulder", "elbow"), ("elbow", "wrist")):
-            a, b = f"{side}_{part}", f"{side}_{end}"
+            a = f"{side}_{part}"
+            b = f"{side}_{end}"
             found = A[ROW[a]] @ F @ (rig.heads[ROW[b]] - rig.heads[ROW[a]])
             np.testing.assert_allclose(found, 1.4 * (REST[INDEX[b]] - REST[INDEX[a]]), atol=1e-9)
 
@@ -50,7 +51,8 @@ def test_arms_of_any_rest_pose_are_turned_to_the_t_pose(arms_down: float) -> Non
 def test_hands_of_any_rest_pose_are_turned_until_the_palms_are_the_bodys(turn: float) -> None:
     """A rig whose hands and fingers are turned about the forearms at rest."""
     body = load_body("scope_h")
-    rest, names = body.rest_joints(np.zeros(body.P)) @ R_WORLD_MODEL.T, list(body.joint_names)
+    rest = body.rest_joints(np.zeros(body.P)) @ R_WORLD_MODEL.T
+    names = list(body.joint_names)
     heads = rest.copy()
     for side, sign in (("left", 1.0), ("right", -1.0)):
         wrist = rest[names.index(f"{side}_wrist")]
@@ -58,7 +60,8 @@ def test_hands_of_any_rest_pose_are_turned_until_the_palms_are_the_bodys(turn: f
             i for i, name in enumerate(names) if name.startswith(f"{side}_") and name[-1] in "123"
         ]
         heads[of_hand] = wrist + (heads[of_hand] - wrist) @ exp(np.array([sign * turn, 0.0, 0.0])).T
-    parents, tails = np.asarray(body.parents), heads + [0.0, 0.0, 0.02]
+    parents = np.asarray(body.parents)
+    tails = heads + [0.0, 0.0, 0.02]
     rig = Skeleton(
         names, parents, parents, heads, tails, np.tile(np.eye(3), (len(names), 1, 1)), floor=0.0
     )
@@ -82,7 +85,8 @@ def test_feet_are_turned_about_the_vertical_alone() -> None:
     rig = body_rig()
     heads = rig.heads.copy()
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        ankle, ball = ROW[f"{side}_ankle"], ROW[f"{side}_foot"]
+        ankle = ROW[f"{side}_ankle"]
+        ball = ROW[f"{side}_foot"]
         heads[ball] = (
             heads[ankle]
             + exp(sign * 0.5 * VERTICAL) @ (heads[ball] - heads[ankle])

@@ -15,7 +15,8 @@ FRAMES = 7
 
 def rigid(R: np.ndarray, t: np.ndarray) -> np.ndarray:
     out = np.eye(4)
-    out[:3, :3], out[:3, 3] = R, t
+    out[:3, :3] = R
+    out[:3, 3] = t
     return out
 
 
@@ -34,7 +35,8 @@ def test_channels_and_heads_give_the_world_rotations_when_blender_multiplies_the
     rng = np.random.default_rng(seed)
     rig = random_rig(rng)
     wanted = exp(rng.normal(size=(FRAMES, len(rig.names), 3)))
-    channels, heads = basis(rig, wanted), head_positions(rig, wanted)
+    channels = basis(rig, wanted)
+    heads = head_positions(rig, wanted)
     for t in range(FRAMES):
         posed: list[np.ndarray] = []
         for b, parent in enumerate(rig.parents.tolist()):

@@ -66,7 +66,8 @@ def test_travel_scales_positions_on_the_floor_and_legs_scale_heights(feet: bool)
     rig = body_rig(scale=1.2)
     pose = Transfer(BODY, BETAS, rig, same_names(), feet=feet, travel=1.1).pose(CLIP)
     hips = [MAPPED.index(f"{side}_hip") for side in ("left", "right")]
-    ours, theirs = pose.heads[:, hips].mean(axis=1), JOINTS[:, hips].mean(axis=1)
+    ours = pose.heads[:, hips].mean(axis=1)
+    theirs = JOINTS[:, hips].mean(axis=1)
     np.testing.assert_allclose(ours, theirs * [1.1, 1.1, 1.2], atol=5e-3)
     if feet:  # they stand still where the body's do
         ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
@@ -80,7 +81,8 @@ def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
     own metre.
     """
     lower = Clip(CLIP.times, CLIP.rotations, CLIP.root - VERTICAL)
-    rig, ankles = body_rig(scale=1.7), [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
+    rig = body_rig(scale=1.7)
+    ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
     above = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP).heads
     below = Transfer(BODY, BETAS, rig, same_names(), one_floor=False).pose(lower).heads
     np.testing.assert_allclose(below, above - 1.7 * VERTICAL, atol=0.05)

@@ -93,9 +93,11 @@ def dance(
     """A smooth random dance, turning while it walks towards the camera."""
     rng = np.random.default_rng(seed)
     timestamps = np.arange(count) / rate if timestamps is None else np.asarray(timestamps, float)
-    count, n = len(timestamps), body.K + 1
+    count = len(timestamps)
+    n = body.K + 1
     phase = rng.uniform(0, 2 * np.pi, (n, 3))
-    speed, size = rng.uniform(1, 4, (n, 3)), rng.uniform(-0.5, 0.5, (n, 3))
+    speed = rng.uniform(1, 4, (n, 3))
+    size = rng.uniform(-0.5, 0.5, (n, 3))
     w = size * np.sin(speed * timestamps[:, None, None] + phase)
     for t, time in enumerate(timestamps):
         heading = Quaternion((0, 0, 1), 2.8 + 1.5 * time)  # passes through half a turn
@@ -131,7 +133,8 @@ def dance(
         source=source,
     )
     joints = truth_of(body, motion).joints
-    R, c = world_from_camera[:, :3, :3], world_from_camera[:, :3, 3]
+    R = world_from_camera[:, :3, :3]
+    c = world_from_camera[:, :3, 3]
     motion.joints_cam = np.einsum("tji,tkj->tki", R, joints - c[:, None]).astype(np.float32)
     return motion
 

@@ -10,7 +10,9 @@ import numpy as np
 from mathutils.kdtree import KDTree
 from scope.scope_addon.scene.animation_data import actions
 
-JOINT_TOLERANCE, SKIN_TOLERANCE = 1e-3, 2e-3  # metres
+# metres
+JOINT_TOLERANCE = 1e-3
+SKIN_TOLERANCE = 2e-3
 
 
 def read_back(path: Path, rate: float = 30.0) -> float:
@@ -19,7 +21,8 @@ def read_back(path: Path, rate: float = 30.0) -> float:
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     render = bpy.context.scene.render
-    render.fps, render.fps_base = round(rate), round(rate) / rate
+    render.fps = round(rate)
+    render.fps_base = round(rate) / rate
     if path.suffix == ".glb":
         render.fps_base = rate / round(rate)  # whose inverse the importer takes
         bpy.ops.import_scene.gltf(filepath=str(path))
@@ -46,7 +49,9 @@ def read_back(path: Path, rate: float = 30.0) -> float:
     elif path.suffix == ".usdc":
         bpy.ops.wm.usd_import(filepath=str(path))
         for key in (k for block in bpy.data.shape_keys for k in block.key_blocks):
-            key.slider_min, key.slider_max = -10.0, 10.0  # the importer leaves 0..1, which clamps
+            # the importer leaves 0..1, which clamps
+            key.slider_min = -10.0
+            key.slider_max = 10.0
     elif path.suffix == ".bvh":
         bpy.ops.import_anim.bvh(
             filepath=str(path), global_scale=0.01, frame_start=1, update_scene_fps=True

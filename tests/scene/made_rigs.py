@@ -73,7 +73,8 @@ def build_rig(scheme, size=1.3, drop=40.0, seed=1, matrix=None):
         elif kind == "foot":
             tail = head + Vector((0, -0.06, 0))
         bone = data.edit_bones.new(name)
-        bone.head, bone.tail = matrix.inverted() @ head, matrix.inverted() @ tail
+        bone.head = matrix.inverted() @ head
+        bone.tail = matrix.inverted() @ tail
         bone.roll = rng.uniform(-3, 3)
         parent = PARENTS.get(kind or part)
         if parent:
@@ -93,7 +94,8 @@ def captured(motion, body=BODY):
     of the time.
     """
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = int(RATE), 1.0
+    scene.render.fps = int(RATE)
+    scene.render.fps_base = 1.0
     is_plain = body is BODY and not bpy.data.objects and scene.unit_settings.scale_length == 1.0
     key = hashlib.sha1(pickle.dumps(vars(motion))).hexdigest() if is_plain else ""
     if key in _kept:
@@ -116,7 +118,8 @@ def _appended(path, frames):
         here.collections = there.collections
     for library in bpy.data.libraries[:]:
         bpy.data.libraries.remove(library)  # the appended blocks remember it; a built file has none
-    scene, (collection,) = bpy.context.scene, here.collections
+    scene = bpy.context.scene
+    (collection,) = here.collections
     scene.collection.children.link(collection)
     scene.frame_start, scene.frame_end = frames[:2]
     scene.frame_set(frames[2])
@@ -143,7 +146,8 @@ def captured_together():
 
 def truth(motion=None, body=BODY):
     """Return the joints (T, K+1, 3) by forward kinematics of the motion."""
-    motion, rest = motion or motion_of(walk(2.0)), body.rest_joints(np.zeros(body.P))
+    motion = motion or motion_of(walk(2.0))
+    rest = body.rest_joints(np.zeros(body.P))
     out = np.empty((len(motion), body.K + 1, 3))
     for t, row in enumerate(motion.poses.reshape(len(motion), -1, 3)):
         R = []
@@ -194,10 +198,13 @@ def add_mpfb_face(rig):
     """Give a rig the bones of the face of MPFB's default rig, by which Scope knows it."""
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
-    bones, head = rig.data.edit_bones, rig.data.edit_bones["head"]
+    bones = rig.data.edit_bones
+    head = rig.data.edit_bones["head"]
     for name, ends in MPFB_FACE.items():
         for side in (1, -1) if name.endswith(".L") else (1,):
             bone = bones.new(name if side == 1 else name.replace(".L", ".R"))
             at = [Vector((side * x, -z, y - 6)) * 0.1 + head.head for x, y, z in ends]
-            (bone.head, bone.tail), bone.parent, bone.roll = at, head, 0.3
+            (bone.head, bone.tail) = at
+            bone.parent = head
+            bone.roll = 0.3
     bpy.ops.object.mode_set(mode="OBJECT")

@@ -132,7 +132,8 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender)
 
 def test_the_scene_rate_is_kept_unless_asked(body, make_motion, truth, blender):
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = 24, 1.0
+    scene.render.fps = 24
+    scene.render.fps_base = 1.0
     motion = make_motion(body, 31, rate=30.0)
     result = build_scene([motion], body)
     assert (scene.render.fps, result.frame_rate) == (24, 24.0)
@@ -240,8 +241,10 @@ def test_cancel_and_failure_leave_the_scene_as_it_was(body, make_motion, tmp_pat
     cube = bpy.context.object
     bpy.ops.object.mode_set(mode="EDIT")
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = 25, 1.0
-    scene.frame_start, scene.frame_end = 3, 77
+    scene.render.fps = 25
+    scene.render.fps_base = 1.0
+    scene.frame_start = 3
+    scene.frame_end = 77
     scene.frame_set(12)
 
     def state():

@@ -16,7 +16,8 @@ from ..required import package
 def projected_by_blender(camera: bpy.types.Object, points_world: np.ndarray) -> np.ndarray:
     """(N, 2) pixels from the top left, by the matrix Blender renders with."""
     render = bpy.context.scene.render
-    width, height = render.resolution_x, render.resolution_y
+    width = render.resolution_x
+    height = render.resolution_y
     graph = bpy.context.evaluated_depsgraph_get()
     posed = camera.evaluated_get(graph)
     aspect = {"scale_x": render.pixel_aspect_x, "scale_y": render.pixel_aspect_y}
@@ -85,12 +86,18 @@ def film(tmp_path_factory) -> bytes:
     if bpy.app.version >= (5, 0, 0):
         render.image_settings.media_type = "VIDEO"
     render.image_settings.file_format = "FFMPEG"
-    render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "MPEG4"
-    render.engine, render.fps = "CYCLES", 30
-    render.resolution_x, render.resolution_y = 64, 48
-    render.filepath, render.use_file_extension = str(path), False
+    render.ffmpeg.format = "MPEG4"
+    render.ffmpeg.codec = "MPEG4"
+    render.engine = "CYCLES"
+    render.fps = 30
+    render.resolution_x = 64
+    render.resolution_y = 48
+    render.filepath = str(path)
+    render.use_file_extension = False
     scene = bpy.context.scene
-    scene.cycles.samples, scene.frame_start, scene.frame_end = 1, 1, 5
+    scene.cycles.samples = 1
+    scene.frame_start = 1
+    scene.frame_end = 5
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
@@ -129,7 +136,8 @@ def test_footage_fills_the_picture_also_where_pixels_are_not_square(
 ):
     still = tmp_path / "still.png"
     image = bpy.data.images.new("still", 64, 48)
-    image.filepath_raw, image.file_format = str(still), "PNG"
+    image.filepath_raw = str(still)
+    image.file_format = "PNG"
     image.save()
     K = np.array([[600.0, 0, 32], [0, fy, 24], [0, 0, 1]])
     motion = make_motion(body, 1, image_size=(64, 48), intrinsics=K)
@@ -171,17 +179,17 @@ def undistorted_by_blender(clip: bpy.types.MovieClip, folder: Path) -> np.ndarra
     Through the sequencer, which asks for it as the viewport does. The compositor does not: it
     forgets the pixel aspect.
     """
-    scene, render = bpy.context.scene, bpy.context.scene.render
+    scene = bpy.context.scene
+    render = bpy.context.scene.render
     strip = strips_of(scene.sequence_editor_create()).new_clip(
         "undistorted", clip, 1, scene.frame_current
     )
     strip.undistort = True
-    render.filepath, render.image_settings.file_format = str(folder / "undistorted.png"), "PNG"
+    render.filepath = str(folder / "undistorted.png")
+    render.image_settings.file_format = "PNG"
     render.image_settings.color_depth = "16"
-    scene.view_settings.view_transform, scene.sequencer_colorspace_settings.name = (
-        "Raw",
-        "Non-Color",
-    )
+    scene.view_settings.view_transform = "Raw"
+    scene.sequencer_colorspace_settings.name = "Non-Color"
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(render.filepath)
     image.colorspace_settings.name = "Non-Color"
@@ -196,7 +204,8 @@ def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist
     """Blobs at five points distorted by OpenCV's model are undistorted to the pinhole
     projection.
     """
-    width, height = 320, 240
+    width = 320
+    height = 240
     K = np.array([[300.0, 0, 150], [0, fy, 130], [0, 0, 1]])
     points = np.array([[90.0, 70], [230, 80], [100, 170], [220, 165], [160, 60]])
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -204,11 +213,13 @@ def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist
         np.exp(-((x - u) ** 2 + (y - v) ** 2) / 18)
         for u, v in distorted_by_opencv(points, K, np.array(dist))
     ]
-    picture, pixels = tmp_path / "still.png", np.ones((height, width, 4), np.float32)
+    picture = tmp_path / "still.png"
+    pixels = np.ones((height, width, 4), np.float32)
     pixels[..., :3] = np.sum(blobs, axis=0)[::-1, :, None].clip(0, 1)
     image = bpy.data.images.new("still", width, height)
     image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.filepath_raw = str(picture)
+    image.file_format = "PNG"
     image.save()
     motion = make_motion(body, 1, image_size=(width, height), intrinsics=K)
     motion.dist[:] = dist
@@ -275,7 +286,8 @@ def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(
     ):
         result = build_scene([motion], body, footage=clip, options=options)
         assert result.warnings == []
-        camera, frames = result.people[0].camera, result.people[0].frames
+        camera = result.people[0].camera
+        frames = result.people[0].frames
         for f in range(int(np.ceil(frames[0])), int(np.floor(frames[-1])) + 1):
             assert abs(frame_shown(camera, f) - (f - start) / rate * 30) <= 0.5 + 1e-3
     assert not bpy.data.movieclips
@@ -318,7 +330,8 @@ def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make
 def test_a_picture_is_shown_in_the_background(body, make_motion, tmp_path):
     picture = tmp_path / "still.png"
     image = bpy.data.images.new("still", 64, 48)
-    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.filepath_raw = str(picture)
+    image.file_format = "PNG"
     image.save()
     motion = make_motion(body, 1, image_size=(64, 48))
     result = build_scene([motion], body, footage=picture)
@@ -331,7 +344,8 @@ def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
     numbers = [7, 8, 10, 11]  # one is missing
     for number in numbers:
         image = bpy.data.images.new("picture", 64, 48)
-        image.filepath_raw, image.file_format = str(tmp_path / f"walk_{number:04d}.png"), "PNG"
+        image.filepath_raw = str(tmp_path / f"walk_{number:04d}.png")
+        image.file_format = "PNG"
         image.save()
     motion = make_motion(
         body, timestamps=np.array([0, 1, 3, 4]) / 24, rate=24.0, image_size=(64, 48)
@@ -350,7 +364,8 @@ def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
 def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_motion, tmp_path):
     for number in (20261122101500, 20261122101501):
         image = bpy.data.images.new("picture", 64, 48)
-        image.filepath_raw, image.file_format = str(tmp_path / f"{number}.png"), "PNG"
+        image.filepath_raw = str(tmp_path / f"{number}.png")
+        image.file_format = "PNG"
         image.save()
     motion = make_motion(body, 2, image_size=(64, 48))
     result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
@@ -362,7 +377,8 @@ def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_mo
 def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
     picture = tmp_path / "still.png"
     image = bpy.data.images.new("still", 32, 48)
-    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.filepath_raw = str(picture)
+    image.file_format = "PNG"
     image.save()
     result = build_scene([make_motion(body, 1)], body, footage=picture)
     assert any("32 x 48" in warning for warning in result.warnings)

@@ -40,7 +40,8 @@ def rendered(scene, tmp_path, size) -> np.ndarray:
     render = scene.render
     render.resolution_x, render.resolution_y = size
     render.resolution_percentage = 100
-    render.filepath, render.image_settings.file_format = str(tmp_path / "rendered.png"), "PNG"
+    render.filepath = str(tmp_path / "rendered.png")
+    render.image_settings.file_format = "PNG"
     scene.view_settings.view_transform = "Standard"
     scene.frame_set(1)
     bpy.ops.render.render(write_still=True)
@@ -115,11 +116,9 @@ def pixels_of(image) -> np.ndarray:
 def clip_rendered(clip, tmp_path, captured) -> np.ndarray:
     """Return what the compositor shows of a movie clip."""
     scene = bpy.context.scene
-    scene.render.engine, scene.render.use_sequencer, scene.render.use_compositing = (
-        "CYCLES",
-        False,
-        True,
-    )
+    scene.render.engine = "CYCLES"
+    scene.render.use_sequencer = False
+    scene.render.use_compositing = True
     scene.cycles.samples = 1
     if hasattr(scene, "compositing_node_group"):
         tree = scene.compositing_node_group = bpy.data.node_groups.new("clip", "CompositorNodeTree")

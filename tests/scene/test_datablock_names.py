@@ -35,7 +35,8 @@ def test_the_objects_of_a_long_name_say_what_they_are(body, make_motion):
 
 
 def test_an_object_of_the_same_name_in_another_file_is_another_one(tmp_path):
-    scene, path = bpy.context.scene, str(tmp_path / "other.blend")
+    scene = bpy.context.scene
+    path = str(tmp_path / "other.blend")
     own = bpy.data.collections.new("walk")
     own.objects.link(bpy.data.objects.new("walk", None))
     scene.collection.children.link(own)
@@ -44,7 +45,8 @@ def test_an_object_of_the_same_name_in_another_file_is_another_one(tmp_path):
         there.collections = ["walk"]
     linked = there.collections[0]
     scene.collection.children.link(linked)
-    mine, other = own.objects[0], linked.objects[0]
+    mine = own.objects[0]
+    other = linked.objects[0]
     assert mine.name == other.name
     assert [holds(c, o) for c in (own, linked) for o in (mine, other)] == [True, False, False, True]
     assert [holds(scene.collection, o) for o in (mine, other)] == [True, True]

@@ -61,7 +61,8 @@ def test_sound_is_added(shared):
 
 def test_a_picture_becomes_an_image_strip(tmp_path):
     image = bpy.data.images.new("still", 8, 8)
-    image.filepath_raw, image.file_format = str(tmp_path / "still.png"), "PNG"
+    image.filepath_raw = str(tmp_path / "still.png")
+    image.file_format = "PNG"
     image.save()
     assert add_footage_strips(bpy.context.scene, tmp_path / "still.png", 1.0)[0].type == "IMAGE"
 

@@ -10,7 +10,8 @@ from .made_rigs import captured
 
 
 def state(armature):
-    action, scene = armature.animation_data.action, bpy.context.scene
+    action = armature.animation_data.action
+    scene = bpy.context.scene
     return {
         "objects": sorted((each.name, each.type, each.select_get()) for each in bpy.data.objects),
         "action": (action.name, action.use_fake_user, action.users, tuple(action.frame_range)),

@@ -57,7 +57,8 @@ def test_everyone_has_their_own_motion_after_saving_and_opening(people, tmp_path
 
 @pytest.mark.parametrize("link", [False, True])
 def test_append_and_link_bring_the_motion_along(people, tmp_path, link):
-    (armature, motion), name = people[0], people[0][0].name
+    (armature, motion) = people[0]
+    name = people[0][0].name
     del armature
     (got,) = load(saved(tmp_path), [name], link=link)
     assert (got.library is not None) == link
@@ -65,7 +66,8 @@ def test_append_and_link_bring_the_motion_along(people, tmp_path, link):
 
 
 def test_a_library_override_reads_the_motion_of_its_library(people, tmp_path):
-    name, motion = people[0][0].name, people[0][1]
+    name = people[0][0].name
+    motion = people[0][1]
     (linked,) = load(saved(tmp_path), [name], link=True)
     override = linked.override_create()
     assert override.override_library is not None
@@ -77,7 +79,8 @@ def test_duplicates_share_the_motion_and_keep_it(people, tmp_path):
     copy = armature.copy()
     bpy.context.scene.collection.objects.link(copy)
     assert len(bpy.data.texts) == 2
-    armature.name, copy.name = "renamed", "copied"
+    armature.name = "renamed"
+    copy.name = "copied"
     assert_same(stored_motion(copy), motion)
     pack_motion(armature, people[1][1].to_bytes())
     assert_same(stored_motion(copy), motion)
@@ -95,7 +98,8 @@ def test_the_motion_is_deleted_with_the_last_armature(people, tmp_path):
 
 
 def test_the_former_motion_is_not_saved(people, tmp_path):
-    armature, motion = people[0][0], people[1][1]
+    armature = people[0][0]
+    motion = people[1][1]
     name = armature.name
     pack_motion(armature, motion.to_bytes())
     bpy.ops.wm.open_mainfile(filepath=saved(tmp_path))
@@ -118,7 +122,9 @@ def test_an_operator_that_fails_restores_the_former_motion(people):
 
 
 def test_undo_restores_the_former_motion(people):
-    name, motion, other = people[0][0].name, people[0][1], people[1][1]
+    name = people[0][0].name
+    motion = people[0][1]
+    other = people[1][1]
     bpy.ops.ed.undo_push(message="before")
     pack_motion(bpy.data.objects[name], other.to_bytes())
     bpy.ops.ed.undo_push(message="after")

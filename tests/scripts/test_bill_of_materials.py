@@ -175,7 +175,8 @@ def test_a_bill_is_valid_and_has_all_parts(bills, extension):
     assert bill["metadata"]["component"]["version"] == "0.1.0"
     assert bill["metadata"]["timestamp"] == "2026-01-02T03:04:05+00:00"
     parts = {part["name"]: part for part in bill["components"]}
-    made, network = parts["made"], parts["assets/networks/pose.onnx"]
+    made = parts["made"]
+    network = parts["assets/networks/pose.onnx"]
     assert made["purl"] == "pkg:pypi/made@1.0?file_name=made-1.0-py3-none-any.whl"
     assert made["licenses"] == [{"expression": "MIT"}]
     assert made["hashes"] == [

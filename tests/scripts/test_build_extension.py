@@ -69,7 +69,8 @@ def with_empty_wheels(builder, small_root, tmp_path, monkeypatch):
     lock = {python: "" for python in builder.BLENDERS}
 
     def wheels(target):
-        tag, cp = builder.PLATFORMS[target.platform][0], "cp" + target.python.replace(".", "")
+        tag = builder.PLATFORMS[target.platform][0]
+        cp = "cp" + target.python.replace(".", "")
         names = [f"opencv_contrib_python_headless-4.11.0.86-cp37-abi3-{tag}.whl"]
         names += [
             f"{name}-1.0-{cp}-{cp}-{tag}.whl"
@@ -203,13 +204,12 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
     builder = with_empty_wheels
     assert run(builder, monkeypatch, "--website", "https://example.com/scope") == 0
     archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
-    blenders, platforms = (
-        ("blender_4.2_before_5.1", "blender_5.1"),
-        ("linux_x64", "macos_arm64", "windows_x64"),
-    )
+    blenders = ("blender_4.2_before_5.1", "blender_5.1")
+    platforms = ("linux_x64", "macos_arm64", "windows_x64")
     assert archives == sorted(f"scope-0.1.0-{b}-{p}.zip" for b in blenders for p in platforms)
     assert "6 zips listed" in capsys.readouterr().out
-    archive, target = builder.DIST / archives[0], builder.Target("linux-x64", "3.11")
+    archive = builder.DIST / archives[0]
+    target = builder.Target("linux-x64", "3.11")
     assert manifest_of(archive)["website"] == "https://example.com/scope"
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
@@ -298,7 +298,8 @@ def changed(target, archive, contents):
 
 @pytest.mark.usefixtures("networks")
 def test_the_compiled_solver_can_be_left_out(with_empty_wheels, monkeypatch):
-    builder, added = with_empty_wheels, []
+    builder = with_empty_wheels
+    added = []
     monkeypatch.setattr(builder, "add_kernels", lambda *arguments: added.append(arguments[1:3]))
     assert run(builder, monkeypatch, "linux-x64", "--python", "3.13", "--no-kernels") == 0
     assert added == []

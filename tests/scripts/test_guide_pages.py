@@ -20,7 +20,11 @@ class Page(HTMLParser):
 
     def __init__(self, path):
         super().__init__()
-        self.links, self.names, self.tags, self.text, self.open = [], set(), Counter(), "", []
+        self.links = []
+        self.names = set()
+        self.tags = Counter()
+        self.text = ""
+        self.open = []
         self.feed(path.read_text("utf-8"))
         assert self.open == [], f"{path.name} leaves {self.open} open"
 
@@ -56,7 +60,8 @@ def extension(tmp_path_factory):
 
 def test_every_link_leads_to_something_inside(extension):
     folder, paths = extension
-    pages, count = {path: Page(path) for path in paths}, 0
+    pages = {path: Page(path) for path in paths}
+    count = 0
     for path, page in pages.items():
         for link in page.links:
             target, _, name = link.partition("#")
@@ -79,7 +84,8 @@ def test_the_guide_shows_all_its_pictures(extension):
 
 def test_nothing_that_is_written_is_lost(extension):
     for path in extension[1]:
-        source, page = (ROOT / "docs" / f"{path.stem}.md").read_text("utf-8"), Page(path)
+        source = (ROOT / "docs" / f"{path.stem}.md").read_text("utf-8")
+        page = Page(path)
         prose = re.sub(r"^```.*?^```$", "", source, flags=re.M | re.S)
         for tag, pattern in (
             ("h1", r"^# "),

@@ -95,7 +95,8 @@ def test_our_own_files_are_read_as_they_are(tmp_path):
 
 def test_an_own_file_of_another_body_is_applied_to_ours(tmp_path):
     own = motion_of(CLIP)
-    own.body_model, own.betas = "smpl", np.ones(10)
+    own.body_model = "smpl"
+    own.betas = np.ones(10)
     own.save(tmp_path / "own.npz")
     found = import_motion(tmp_path / "own.npz")
     assert found.body.name == "scope"

@@ -86,7 +86,8 @@ def residuals(body, data, focal=False):
 
 def robust_factors(raw, sigmas, weights):
     """sqrt(weight rho'(|r|^2)) of each residual, and the cost 1/2 sum weight rho."""
-    factors, cost = [], 0.0
+    factors = []
+    cost = 0.0
     for r, sigma, weight in zip(raw, sigmas, weights, strict=True):
         s = (np.real(r) ** 2).sum(1)
         k = 1.0 / (1.0 + s / sigma)
@@ -99,9 +100,11 @@ def random_coupling(rng, tree, blocks, t, origin):
     """Add random residuals r(T_i, Omega_i, beta) on every joint to the blocks; return their dense
     rows J and r.
     """
-    n, P = len(tree.parents), tree.shape
+    n = len(tree.parents)
+    P = tree.shape
     K = n - 1
-    rows, values = [], []
+    rows = []
+    values = []
     chain = [np.hstack([np.eye(6), np.zeros((6, 3 * K + P))])]
     for i in range(1, n):
         U = np.vstack([np.eye(3), hat(t[i] - origin)])

@@ -6,7 +6,9 @@ from scope.solver import Keypoints3D, Measurements
 
 from .synthetic import forward, random_body, random_state
 
-K, P, M = 4, 3, 12
+K = 4
+P = 3
+M = 12
 BODY = random_body(np.random.default_rng(1), K, P, M)
 POINTS = forward(BODY, *random_state(np.random.default_rng(2), K, P))[2]
 KEYPOINTS = Keypoints3D(np.arange(M), POINTS, np.ones(M))

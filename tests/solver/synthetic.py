@@ -41,12 +41,14 @@ def forward(body, R0, t0, Omega, beta):
     complex-safe.
     """
     n = len(body.parents)
-    R, t = [R0], [t0]
+    R = [R0]
+    t = [t0]
     for i in range(1, n):
         j = body.parents[i]
         R.append(R[j] @ Omega[i - 1])
         t.append(t[j] + R[j] @ (body.S[i] @ beta + body.l[i]))
-    R, t = np.array(R), np.array(t)
+    R = np.array(R)
+    t = np.array(t)
     part = body.keypoint_part
     points = np.einsum("mij,mj->mi", R[part], body.V @ beta + body.v_bar) + t[part]
     return R, t, points

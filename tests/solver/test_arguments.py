@@ -214,7 +214,8 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
     smooth = {f.name: getattr(MotionPrior(), f.name) for f in fields(MotionPrior)}
     stand = {"indices": [0], "probability": [[1.0], [1.0]]}
     arrays = {f.name: getattr(BODY, f.name) for f in fields(BODY)}
-    vectors, matrices = {"phi": np.ones(3)}, {"rotation": TURN}
+    vectors = {"phi": np.ones(3)}
+    matrices = {"rotation": TURN}
     own = {
         "name": "test_arguments",
         "ints": 1,

@@ -8,7 +8,11 @@ import pytest
 from scope.solver.errors import ModelFileError
 from scope.solver.loaders.body_file import load_body
 
-N, V, F, M, P = 3, 8, 5, 4, 2
+N = 3
+V = 8
+F = 5
+M = 4
+P = 2
 
 
 def small_body():

@@ -114,8 +114,12 @@ def test_shapes_are_checked():
 def test_the_shortest_turn_takes_one_direction_to_the_other_about_what_is_across_both():
     rng = np.random.default_rng(5)
     a, b = rng.standard_normal((2, 50, 3))
-    a[0], b[0] = [1.0, 0, 0], [-2.0, 0, 0]  # opposite
-    a[1], b[1] = [0, 3.0, 0], [0, 1.0, 0]  # the same
+    # opposite
+    a[0] = [1.0, 0, 0]
+    b[0] = [-2.0, 0, 0]
+    # the same
+    a[1] = [0, 3.0, 0]
+    b[1] = [0, 1.0, 0]
     R = rotations.shortest_turn(a, b)
     unit = lambda v: v / np.linalg.norm(v, axis=-1, keepdims=True)  # noqa: E731
     np.testing.assert_allclose(np.einsum("nij,nj->ni", R, unit(a)), unit(b), atol=1e-9)
@@ -160,7 +164,9 @@ def test_what_is_no_rotation_is_not_made_orthonormal(column):
     as well.
     """
     turn = rotations.exp([0.9, -0.7, 1.3])
-    longer, slanted, mirrored = turn.copy(), turn.copy(), turn.copy()
+    longer = turn.copy()
+    slanted = turn.copy()
+    mirrored = turn.copy()
     longer[:, column] *= 1.0 + 1e-6
     slanted[:, column] += 1e-6 * turn[:, column - 1]
     mirrored[:, column] *= -1.0

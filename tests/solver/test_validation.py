@@ -47,7 +47,8 @@ from .synthetic import INTRINSICS
 
 UPRIGHT = np.eye(3)
 SHORT = Options(stages=[Stage(max_iterations=2)])
-NAN, INF = np.nan, np.inf
+NAN = np.nan
+INF = np.inf
 
 
 def untyped(value: object) -> Any:
@@ -638,7 +639,8 @@ def test_frame_numbers_or_milliseconds_for_seconds_bring_a_warning_and_a_motion(
 
 def test_seconds_bring_no_warning():
     # slow: a second apart
-    usual, slow = MotionPrior(), MotionPrior(root_rotation=1 / 3600, root_position=30 / 3600)
+    usual = MotionPrior()
+    slow = MotionPrior(root_rotation=1 / 3600, root_position=30 / 3600)
     # three: too few
     for times, motion in ((np.arange(5) / 30, usual), (np.arange(3), usual), (np.arange(5), slow)):
         fit_motion(BODY, [SEEN] * len(times), times, motion=motion, priors=Priors(), options=SHORT)

@@ -69,7 +69,8 @@ def winding_number(points, vertices, triangles):
 
 def weight_of_joint(arrays):
     """(V, joints) skin weights, whatever the order of a vertex's joints."""
-    joints, weights = arrays["skin_joints"].astype(int), arrays["skin_weights"]
+    joints = arrays["skin_joints"].astype(int)
+    weights = arrays["skin_weights"]
     dense = np.zeros((len(joints), joints.max() + 1))
     np.add.at(dense, (np.arange(len(joints))[:, None], joints), weights)
     return dense
@@ -154,14 +155,16 @@ BOTH_SEXES = {
     "tragion": (129.62, 6.66),
     "head_breadth": (152.18, 6.24),
 }  # fmt: skip
-MEN, WOMEN = 4082, 1986
+MEN = 4082
+WOMEN = 1986
 
 
 @pytest.mark.parametrize("name", ADULTS)
 def test_the_survey_of_both_sexes_follows_from_the_tables(name):
     """The mixture of two distributions: its variance has a part between their means."""
     (man, man_sd), (woman, woman_sd) = ADULTS[name]
-    men, women = MEN / (MEN + WOMEN), WOMEN / (MEN + WOMEN)
+    men = MEN / (MEN + WOMEN)
+    women = WOMEN / (MEN + WOMEN)
     deviation = np.sqrt(men * man_sd**2 + women * woman_sd**2 + men * women * (man - woman) ** 2)
     unit = 1.0 if name == "weight" else 1000.0
     mean, published = BOTH_SEXES[name]
@@ -183,7 +186,8 @@ def test_drawn_adults_have_the_proportions_of_measured_ones():
 
 def test_drawn_children_grow():
     children, years = draw_children(np.random.default_rng(0), np.arange(4000) % 2 == 0)
-    small, tall = years < 8, years > 14
+    small = years < 8
+    tall = years > 14
     assert children["stature"][small].mean() == pytest.approx(1.215, abs=0.02)
     assert children["stature"][tall].mean() == pytest.approx(1.65, abs=0.03)
     assert (children["sitting"] / children["stature"])[small].mean() > 0.535
@@ -287,10 +291,8 @@ def test_the_suit_covers_trunk_and_limbs(body):
         body.face_material, [body.material_names.index("skin"), body.material_names.index("hair")]
     )
     centre = body.v_template[body.faces[bare]].mean(axis=1)
-    neck, wrist = (
-        body.J_template[body.joint_names.index("neck")],
-        body.J_template[body.joint_names.index("left_wrist")],
-    )
+    neck = body.J_template[body.joint_names.index("neck")]
+    wrist = body.J_template[body.joint_names.index("left_wrist")]
     assert ((centre[:, 1] > neck[1]) | (np.abs(centre[:, 0]) > wrist[0] - 0.02)).all()
 
 
@@ -319,7 +321,8 @@ def test_people_of_one_stature_have_longer_and_shorter_limbs(body):
     """Some 3 %, once what goes with stature is taken away."""
     betas = np.random.default_rng(5).normal(size=(500, body.P))
     J = body.J_template + np.einsum("jxp,np->njx", body.J_shapedirs, betas)
-    top, bottom = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
+    top = body.v_template[:, 1].argmax()
+    bottom = body.v_template[:, 1].argmin()
     rise = body.shapedirs[top, 1] - body.shapedirs[bottom, 1]
     stature = np.log(body.v_template[top, 1] - body.v_template[bottom, 1] + betas @ rise)
     columns = np.stack([stature, np.ones_like(stature)], axis=1)
@@ -345,7 +348,8 @@ def test_the_rest_pose_stands_upright(body, number, deviations):
     at = {name: J[i] for i, name in enumerate(body.joint_names)}
     trunk = 0.5 * (at["left_shoulder"] + at["right_shoulder"] - at["left_hip"] - at["right_hip"])
     assert -5.4 < np.degrees(np.arctan2(trunk[2], trunk[1])) < -3.0
-    thigh, shank = at["left_hip"] - at["left_knee"], at["left_knee"] - at["left_ankle"]
+    thigh = at["left_hip"] - at["left_knee"]
+    shank = at["left_knee"] - at["left_ankle"]
     cosine = thigh @ shank / np.linalg.norm(thigh) / np.linalg.norm(shank)
     assert np.degrees(np.arccos(cosine)) < 3.0
 
@@ -380,7 +384,8 @@ def test_trunks_and_legs_vary_against_each_other_as_in_surveys(body):
     leg = np.linalg.norm(at["left_hip"] - at["left_knee"], axis=1)
     leg = leg + np.linalg.norm(at["left_knee"] - at["left_ankle"], axis=1)
     ratio = np.linalg.norm(trunk, axis=1) / leg
-    top, bottom = body.v_template[:, 1].argmax(), body.v_template[:, 1].argmin()
+    top = body.v_template[:, 1].argmax()
+    bottom = body.v_template[:, 1].argmin()
     stature = betas @ (body.shapedirs[top, 1] - body.shapedirs[bottom, 1])
     assert ratio.std() == pytest.approx(0.046, abs=0.006)
     assert -0.5 < np.corrcoef(ratio, stature)[0, 1] < -0.1
@@ -441,13 +446,16 @@ def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
     """Against CDC growth charts (stature 1.15 m, 20 kg), Fredriks (sitting height) and Snyder 1977
     (heads).
     """
-    adult, body = load_body(CHILDREN[name]), load_body(name)
+    adult = load_body(CHILDREN[name])
+    body = load_body(name)
     assert (body.P, growth_of(body), growth_of(adult)) == (adult.P + 1, adult.P, None)
     for key in ("shapedirs", "J_shapedirs", "keypoint_shapedirs"):
         np.testing.assert_array_equal(getattr(body, key)[..., :-1], getattr(adult, key))
     betas = -np.eye(body.P)[growth_of(body)]
-    v, J = body.rest_vertices(betas), body.rest_joints(betas)
-    stature, at = np.ptp(v[:, 1]), {joint: J[i] for i, joint in enumerate(body.joint_names)}
+    v = body.rest_vertices(betas)
+    J = body.rest_joints(betas)
+    stature = np.ptp(v[:, 1])
+    at = {joint: J[i] for i, joint in enumerate(body.joint_names)}
     assert stature == pytest.approx(1.15, abs=0.015)
     a, b, c = v[body.triangles()].transpose(1, 0, 2)
     assert 1.01 * 1000.0 * np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0 == pytest.approx(
@@ -481,7 +489,8 @@ def test_keypoint_sets_are_complete(body):
         found = body.keypoint_set(prefix)
         for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"):
             for side in ("left", "right"):
-                index, part = found[f"{side}_{joint}"], body.joint_names.index(f"{side}_{joint}")
+                index = found[f"{side}_{joint}"]
+                part = body.joint_names.index(f"{side}_{joint}")
                 assert body.keypoint_part[index] == part
                 np.testing.assert_array_equal(body.keypoint_template[index], body.J_template[part])
                 np.testing.assert_array_equal(
@@ -524,7 +533,8 @@ def test_surface_keypoints_move_with_the_skin(body, shaped):
     for _ in range(30):
         betas = rng.normal(size=body.P)
         R, t = body.forward_kinematics(random_rotations(rng, body.K + 1), rng.normal(size=3), betas)
-        skinned, rigid = body.skin(R, t, betas), body.keypoints(R, t, betas)
+        skinned = body.skin(R, t, betas)
+        rigid = body.keypoints(R, t, betas)
         for name, vertices in sources.items():
             worst = max(worst, np.linalg.norm(skinned[vertices].mean(axis=0) - rigid[found[name]]))
     assert worst < 5e-4

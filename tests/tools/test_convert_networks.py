@@ -154,7 +154,8 @@ def _convolutions_run(
 ) -> int:
     """Count the convolutions in the profile of one run, which names every node that ran."""
     options = onnxruntime.SessionOptions()
-    options.enable_profiling, options.profile_file_prefix = True, str(folder / "profile")
+    options.enable_profiling = True
+    options.profile_file_prefix = str(folder / "profile")
     session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
     session.run(
         None, {"input": images} | ({} if with_mask is None else {"with_mask": np.array(with_mask)})

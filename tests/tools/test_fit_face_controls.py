@@ -40,7 +40,9 @@ def problem(ridge=1e-6):
 
 
 def test_known_amounts_are_found_and_small_ones_left_out():
-    rig, free, base = problem(), np.ones(4, bool), np.zeros(4)
+    rig = problem()
+    free = np.ones(4, bool)
+    base = np.zeros(4)
     np.testing.assert_allclose(
         rig.fit(rig.show(np.array([15.0, -0.2, 0.1, 0])), free, base, 8),
         [15, -0.2, 0.1, 0],
@@ -91,7 +93,8 @@ def test_a_map_has_both_sides_without_what_is_small(tmp_path):
 
 def test_mpfbs_map_moves_its_mesh_as_the_shapes_do():
     shapes = read_shapes(fetch_wheel())
-    face, amounts = SkinnedFace(shapes), built_in("mpfb").controls
+    face = SkinnedFace(shapes)
+    amounts = built_in("mpfb").controls
 
     def moved(*names):
         x = [

@@ -48,7 +48,8 @@ def test_a_view_from_the_cameras_right_has_what_is_near_the_camera_on_its_left()
 
 
 def test_a_rod_is_closed_and_turned_outwards():
-    a, b = np.array([0.1, 0.2, 0.3]), np.array([0.5, -0.1, 1.0])
+    a = np.array([0.1, 0.2, 0.3])
+    b = np.array([0.5, -0.1, 1.0])
     vertices, triangles = stick_figure({"LElbow": a, "LWrist": b}, 0.05)
     p, q, r = (vertices[triangles[:, k]] for k in range(3))
     volume = np.einsum("ij,ij->i", p, np.cross(q, r)).sum() / 6
@@ -72,7 +73,8 @@ def test_a_photographs_panel_has_the_face_in_its_middle_and_dots_on_its_landmark
     size = (60, 80)
     part = photographs.around(points, size)
     placed = points @ part[:2, :2].T + part[:2, 2]
-    low, high = placed.min(0), placed.max(0)
+    low = placed.min(0)
+    high = placed.max(0)
     assert np.allclose((low + high) / 2, FINER * np.array(size) / 2)
     assert 0.2 < (high - low).max() / (FINER * size[1]) < 0.6
     drawn = photographs.with_dots(

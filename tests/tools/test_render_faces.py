@@ -65,7 +65,8 @@ def test_heads_are_turned_away_by_45_to_60_degrees():
 
 
 def test_a_head_in_motion_moves_and_does_what_it_did():
-    still, moving = clip(), in_motion(clip())
+    still = clip()
+    moving = in_motion(clip())
     np.testing.assert_array_equal(still.weights, moving.weights)
     nose = np.array([[0.0, 0.64, 0.15]])
     track = np.array([to_camera(moving, t, nose)[0] for t in range(90)])

@@ -27,7 +27,8 @@ def posed(body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_a_leg_reaches_its_ankle_with_the_knee_ahead():
     rng = np.random.default_rng(4)
-    thigh, shank = np.array([0.0, -0.4, 0.02]), np.array([0.01, -0.42, -0.02])
+    thigh = np.array([0.0, -0.4, 0.02])
+    shank = np.array([0.01, -0.42, -0.02])
     for _ in range(50):
         root = cv2.Rodrigues(rng.normal(size=3))[0]
         hip = rng.normal(size=3)

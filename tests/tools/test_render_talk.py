@@ -32,7 +32,8 @@ def test_fingers_bend_into_the_right_palm_one_by_one_and_hands_stay_in_the_image
         assert (pixels > 0).all()
         assert (pixels < SIZE).all()
         for finger in ("index", "pinky"):
-            wrist, tip = t[joint("right_wrist")], t[joint(f"right_{finger}3")]
+            wrist = t[joint("right_wrist")]
+            tip = t[joint(f"right_{finger}3")]
             reach.setdefault(finger, []).append(np.linalg.norm(tip - wrist))
     closed = {finger: np.array(values) < 0.75 * values[0] for finger, values in reach.items()}
     assert closed["pinky"].argmax() + 5 < closed["index"].argmax()  # frames

@@ -90,8 +90,10 @@ def test_rotation_matrices_are_the_exponential():
 def test_the_input_is_that_of_captures():
     """`network_input` of the product is the second implementation."""
     rng = np.random.default_rng(0)
-    rays, world = rng.normal(0, 0.3, (6, 33, 2)), rng.normal(0, 0.4, (6, 33, 3))
-    confidence, known = rng.uniform(0, 1, (6, 33)), np.array([1.0, 0, 1, 0, 1, 1])
+    rays = rng.normal(0, 0.3, (6, 33, 2))
+    world = rng.normal(0, 0.4, (6, 33, 3))
+    confidence = rng.uniform(0, 1, (6, 33))
+    known = np.array([1.0, 0, 1, 0, 1, 1])
     expected, R = lifter.network_input(rays, confidence, world, known)
     x, R_ours = network_input.network_input(
         *(torch.tensor(a)[None] for a in (rays, confidence, world, known))
@@ -314,7 +316,8 @@ def test_arms_or_legs_swap_sides_as_whole(monkeypatch):
 
 
 def test_beyond_the_image_s_border_keypoints_are_pulled_back_with_low_confidence(monkeypatch):
-    rays, ones = torch.randn(2000, WINDOW, 33, 2), torch.ones(2000, WINDOW, 33)
+    rays = torch.randn(2000, WINDOW, 33, 2)
+    ones = torch.ones(2000, WINDOW, 33)
     for share in (0.0, 1.0):
         monkeypatch.setattr(detector_noise, "CUT_SHARE", share)
         cut, confidence = detector_noise.cut_by_edge(rays, ones, Persistence.draw(2000, "cpu"))
@@ -323,10 +326,8 @@ def test_beyond_the_image_s_border_keypoints_are_pulled_back_with_low_confidence
         assert moved.any() == bool(share)
     assert confidence[moved].max() <= 0.3
     x, y = (rays[..., k][moved] for k in (0, 1))
-    below, above = (
-        ((y > 0) & (y > x.abs())).float().mean(),
-        ((y < 0) & (-y > x.abs())).float().mean(),
-    )
+    below = ((y > 0) & (y > x.abs())).float().mean()
+    above = ((y < 0) & (-y > x.abs())).float().mean()
     assert below > above > 0  # people are cut at the feet most often
 
 
@@ -354,7 +355,8 @@ def test_held_cameras_look_down_on_hips_below_them_and_less_so_from_afar():
 
 
 def test_cameras_at_any_height_look_further_down_and_up():
-    hips, away = torch.full((8000,), 0.9), torch.full((8000,), 6.0)
+    hips = torch.full((8000,), 0.9)
+    away = torch.full((8000,), 6.0)
     usual, wide = (lines_of_sight(hips, away, share).numpy() for share in (0.0, 1.0))
     low, high = (np.arcsin((height - 0.9) / 6.0) for height in HEIGHTS_M)
     assert np.mean((wide > low) & (wide < high)) > 0.7  # those that are not held have any pitch
@@ -365,7 +367,9 @@ def test_cameras_at_any_height_look_further_down_and_up():
 
 
 def test_people_are_as_near_and_as_far_from_the_centre_as_was_asked_for(body, motions):
-    near, off, assumed = [], [], []
+    near = []
+    off = []
+    assumed = []
     for variety in (Variety(), Variety(nearest_m=1.2, field=(0.75, 0.5), focal_spread=0.35)):
         scene = Dataset(body, motions, variety).scene(2000)
         hips = scene.points[:, MIDDLE, HIPS].mean(dim=1).numpy()
@@ -381,7 +385,8 @@ def test_the_loss_is_the_laplace_density_s_and_the_bones_directions():
     """All errors 0.1 in x and −0.2 in z; the bones keep their directions, until all of them are
     reversed.
     """
-    truth, log_sigma = torch.randn(4, 33, 3), torch.tensor([-1.0, -2.0]).expand(4, 33, 2)
+    truth = torch.randn(4, 33, 3)
+    log_sigma = torch.tensor([-1.0, -2.0]).expand(4, 33, 2)
     points = truth + torch.tensor([0.1, 0.0, -0.2])
     expected = (np.sqrt(2) * (0.1 * np.e + 0.2 * np.e**2) - 1 - 1 - 2) / 3
     # a direction counts at least 0.001
@@ -396,7 +401,9 @@ class KnownErrors:
     """Stands for a network: returns given points and deviations, a part of them after another."""
 
     def __init__(self, points, log_sigma):
-        self.points, self.log_sigma, self.done = points, log_sigma, 0
+        self.points = points
+        self.log_sigma = log_sigma
+        self.done = 0
 
     def __call__(self, x):
         part = slice(self.done, self.done + len(x))
@@ -406,7 +413,8 @@ class KnownErrors:
 
 def test_measures_of_known_errors_are_those_worked_out_by_hand():
     n = 3000
-    flat, log_sigma = torch.randn(n, 33, 3), torch.full((n, 33, 2), math.log(0.02))
+    flat = torch.randn(n, 33, 3)
+    log_sigma = torch.full((n, 33, 2), math.log(0.02))
     flat[..., 2] = 0
     x = torch.zeros(n, WINDOW, 200)
     x[: n // 2, :, -2] = 1

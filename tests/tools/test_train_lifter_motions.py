@@ -28,7 +28,9 @@ def motions_of(performers, kinds=None, sets=None, take=None):
 
 def test_every_tenth_take_and_the_joint_prior_s_test_performers_are_held_out():
     performers = ["cmu_01"] * 12
-    performers[3], performers[5], performers[9] = "cmu_02", "expmap_soccer", "expmap_jumping"
+    performers[3] = "cmu_02"
+    performers[5] = "expmap_soccer"
+    performers[9] = "expmap_jumping"
     motions = motions_of(performers)
     assert held_out_frames(motions).take.tolist() == [3, 5, 9]
     assert training_frames(motions).take.tolist() == [0, 1, 2, 4, 6, 7, 8, 10, 11]

@@ -76,7 +76,8 @@ def footage(tmp_path) -> Path:
 @pytest.fixture(scope="session")
 def standing() -> Motion:
     """A body at rest for ten frames, three of which are not valid."""
-    body, count = load_body("scope"), 10
+    body = load_body("scope")
+    count = 10
     poses = np.zeros((count, 3 * (body.K + 1)))
     poses[:, 0] = np.pi / 2
     valid = np.ones(count, bool)

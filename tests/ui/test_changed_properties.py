@@ -55,7 +55,8 @@ PROPERTIES = (
 def rig(tmp_path):
     armature = captured(motion := motion_of(walk(1.0)))
     motion.save(tmp_path / "person1.npz")
-    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    armature["scope_motion"] = str(tmp_path / "person1.npz")
+    armature["scope_body_file"] = "scope"
     bpy.context.scene.scope.result.footage_rate = 25.0
     bpy.context.scene.frame_set(10)
     return armature
@@ -121,7 +122,8 @@ def test_a_changed_start_is_that_of_a_capture_at_frame_0(rig, value):
 @pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
 def test_a_changed_cycle_leaves_the_frame_range(rig, value):
     scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 3, 20
+    scene.frame_start = 3
+    scene.frame_end = 20
     rig["scope_cycle"] = value
     bpy.ops.scope.smooth(strength=1.0)
     assert (scene.frame_start, scene.frame_end) == (3, 20)
@@ -168,7 +170,8 @@ def test_a_changed_root_object_goes_with_smoothing(rig, name, value):
 
 @pytest.mark.parametrize("value", [*VALUES.values(), [1920.0, 0.0, 1.0, 1.0], [1e300] * 4])
 def test_a_changed_picture_leaves_the_resolution(rig, value):
-    scene, collection = bpy.context.scene, rig.users_collection[0]
+    scene = bpy.context.scene
+    collection = rig.users_collection[0]
     scene.render.resolution_x = 123
     collection["scope_picture"] = value
     set_resolution(scene, collection)

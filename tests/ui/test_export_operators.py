@@ -21,7 +21,8 @@ def both(tmp_path):
     """The armatures of a capture of this file, and of the same one linked from another file."""
     own = captured(motion := motion_of(walk(1.0)))
     motion.save(tmp_path / "person1.npz")
-    own["scope_motion"], own["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    own["scope_motion"] = str(tmp_path / "person1.npz")
+    own["scope_body_file"] = "scope"
     collection = own.users_collection[0]
     bpy.data.libraries.write(str(tmp_path / "läuferin.blend"), {collection})
     with bpy.data.libraries.load(str(tmp_path / "läuferin.blend"), link=True) as (_, there):
@@ -69,7 +70,8 @@ def test_the_person_of_a_rig_is_found(both, which):
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_what_the_view_layer_excludes_is_not_taken_for_the_other(both, which):
-    context, (excluded, shown) = bpy.context, both if which == 0 else both[::-1]
+    context = bpy.context
+    (excluded, shown) = both if which == 0 else both[::-1]
     layers = context.view_layer.layer_collection.children
     next(each for each in layers if each.collection == excluded.users_collection[0]).exclude = True
     context.view_layer.update()

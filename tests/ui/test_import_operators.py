@@ -31,7 +31,8 @@ def amass(tmp_path):
 
 def test_a_motion_of_another_tool_is_built_and_listed(amass):
     scene = bpy.context.scene
-    scene.render.fps, scene.scope.start_frame = 24, 1
+    scene.render.fps = 24
+    scene.scope.start_frame = 1
     assert bpy.ops.scope.import_motion(filepath=str(amass)) == {"FINISHED"}
     result = scene.scope.result
     assert (result.collection.name, result.people, result.frames) == ("walk_poses", 1, len(MOTION))

@@ -15,10 +15,12 @@ def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     # Blender names the menu after the preset
     monkeypatch.setattr(panel, "bl_label", panel.bl_label)
     settings = bpy.context.scene.scope
-    settings.quality, settings.people = "BEST", "ALL"
+    settings.quality = "BEST"
+    settings.people = "ALL"
     assert bpy.ops.scope.add_capture_preset(name="everybody") == {"FINISHED"}
     (stored,) = Path(tmp_path).rglob("everybody.py")
-    settings.quality, settings.people = "FAST", "LARGEST"
+    settings.quality = "FAST"
+    settings.people = "LARGEST"
     exec(compile(stored.read_text("utf-8"), stored, "exec"), {})
     assert (settings.quality, settings.people) == ("BEST", "ALL")
 
@@ -41,7 +43,8 @@ def test_settings_of_file_windows_can_be_stored_but_not_the_file(operator):
 def test_without_presets_blender_does_not_complain_of_missing_paths(monkeypatch, tmp_path):
     scripts = tmp_path / "scripts"
     monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(scripts))
-    panel, labels = presets.SCOPE_PT_capture_presets, []
+    panel = presets.SCOPE_PT_capture_presets
+    labels = []
     assert not bpy.utils.preset_paths(panel.preset_subdir)
     stub = MagicMock(preset_subdir=panel.preset_subdir, preset_operator=panel.preset_operator)
     stub.path_menu = lambda *given, **named: bpy.types.Menu.path_menu(stub, *given, **named)

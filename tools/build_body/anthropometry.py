@@ -78,7 +78,8 @@ CHILD_SPREAD = {"stature": 0.045, "weight": 0.17, "sitting": 0.013}  # relative
 
 def draw_adults(rng: np.random.Generator, male: NDArray[np.bool_]) -> Measured:
     """Draw the measurements of adults, (n,) each, for the sexes (n,) bool."""
-    count, names = len(male), list(ADULTS)
+    count = len(male)
+    names = list(ADULTS)
     normal = rng.standard_normal((count, len(names))) @ np.linalg.cholesky(correlation_matrix()).T
     civilian = rng.random(count) < CIVILIAN_SHARE
     drawn: Measured = {}
@@ -106,7 +107,8 @@ def draw_children(
     """
     years = list(CHILDREN)
     age = rng.uniform(years[0], years[-1], len(male))
-    mean, (taller, sitting, heavier) = mean_children(age, male), rng.standard_normal((3, len(male)))
+    mean = mean_children(age, male)
+    (taller, sitting, heavier) = rng.standard_normal((3, len(male)))
     stature = mean["stature"] * (1.0 + CHILD_SPREAD["stature"] * taller)
     ratio = mean["sitting"] / mean["stature"]
     return {

@@ -64,7 +64,9 @@ def rig_body(shaped: ShapedMesh, skeleton: Skeleton) -> dict[str, NDArray[Any]]:
     """Place the joints, weight the skin, turn everything into the T-pose; the arrays of the body
     file.
     """
-    source, mesh, basis = shaped.source, shaped.mesh, shaped.basis
+    source = shaped.source
+    mesh = shaped.mesh
+    basis = shaped.basis
     J, posed_J, R = rest_joints(shaped, skeleton)
     W = skin_weights(source, mesh, skeleton, basis[0])
     vertices = pose_vertices(skeleton, R, W, J, posed_J, basis[:, mesh.kept])
@@ -99,7 +101,8 @@ def rest_joints(
     """Return the joints (1 + P, K+1, 3) in the source pose and in the T-pose, and each part's
     rotation (K+1, 3, 3).
     """
-    source, basis = shaped.source, shaped.basis
+    source = shaped.source
+    basis = shaped.basis
     J = skeleton.regressor @ basis
     index, little = (basis[0, source.cubes[f"l-finger-{k}-1"]].mean(axis=0) for k in (2, 5))
     R = part_rotations(skeleton, J[0], index - little)

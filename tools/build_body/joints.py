@@ -78,7 +78,8 @@ def other_side(name: str) -> str:
 
 def make_skeleton(source: SourceMesh, with_hands: bool) -> Skeleton:
     """Return SMPL's topology (24 joints), or SMPL+H's (52) ``with_hands``."""
-    names, parents = list(BODY_JOINTS), list(BODY_PARENTS)
+    names = list(BODY_JOINTS)
+    parents = list(BODY_PARENTS)
     for side in ("left", "right"):
         wrist = names.index(f"{side}_wrist")
         if not with_hands:
@@ -104,7 +105,8 @@ def cube_row(source: SourceMesh, *cubes: str) -> NDArray[np.float64]:
 def _joint_row(source: SourceMesh, name: str) -> NDArray[np.float64]:
     if name in SPINE:
         # The three spine cubes move inconsistently between the targets: only their mean is used.
-        pelvis, neck = cube_row(source, "pelvis"), cube_row(source, "neck")
+        pelvis = cube_row(source, "pelvis")
+        neck = cube_row(source, "neck")
         centre = cube_row(source, "spine-1", "spine-2", "spine-3")
         return centre + (SPINE[name] - SPINE_CENTRE) * (neck - pelvis)
     side, _, joint = name.rpartition("_")

@@ -20,9 +20,11 @@ from .source import SourceMesh
 
 # MakeHuman's fingers 1 to 5
 HAND_FINGERS = ("thumb", "index_finger", "middle_finger", "ring_finger", "pinky")
-THUMB_POINTS, FINGER_POINTS = ("cmc", "mcp", "ip", "tip"), ("mcp", "pip", "dip", "tip")
+THUMB_POINTS = ("cmc", "mcp", "ip", "tip")
+FINGER_POINTS = ("mcp", "pip", "dip", "tip")
 
-BIG_TOE, FOOT_INDEX_MORE = (11551, 12756, 11560, 11569), (13133, 11628, 11624, 13084)
+BIG_TOE = (11551, 12756, 11560, 11569)
+FOOT_INDEX_MORE = (13133, 11628, 11624, 13084)
 # The left side of the surface keypoints: base mesh vertices and the part they lie on. The right
 # side is the mirror.
 SURFACE: dict[str, tuple[tuple[int, ...], str]] = {
@@ -90,7 +92,8 @@ def _body_point(
     vertices, part = SURFACE[left]
     indices = np.array(vertices)
     if mirrored:
-        indices, part = source.mirror[indices], other_side(part)
+        indices = source.mirror[indices]
+        part = other_side(part)
     row = np.zeros(len(source.vertices))
     row[indices] = 1.0 / len(indices)
     if left == "nose":

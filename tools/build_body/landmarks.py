@@ -7,11 +7,11 @@ the stature. Mean joint centres over the stature that result, beside those of Wi
 and Motor Control, figure 4.1) and of de Leva (J. Biomechanics 29, 1996), whose shoulders lie higher
 than a joint 3 to 4 cm below the acromion (0.80) would:
 
-    hip centre height       stature − sitting height + 0.0535 stature0.530  (0.530; 0.531)
+    hip centre height       stature − sitting height + 0.0535 stature 0.530  (0.530; 0.531)
     shoulder centre height  acromial height − 0.008 stature         0.812  (0.818; 0.827)
     knee centre height      epicondyle height + 0.005 stature       0.287  (0.285; 0.289)
     shoulder centres apart  biacromial breadth − 0.020 stature      0.210  (0.258, skin)
-    hip centres apart       0.1 hip breadth + 0.1045 stature        0.125  (0.191, skin; X-rays: 0.10)
+    hip centres apart       0.1 hip breadth + 0.1045 stature        0.125  (0.191, skin; X-ray 0.10)
     shoulder to elbow       acromion to radiale − 0.029 stature     0.162  (0.186, acromion; 0.162)
     elbow to wrist          radiale to stylion + 0.003 stature      0.154  (0.146; 0.154)
 """
@@ -32,7 +32,9 @@ from .source import SourceMesh
 # kg/m³: 985 of a person with air in the lungs; the mesh lacks hair, nails and the inside of the
 # mouth
 DENSITY = 1000.0
-HIP_BAND, WAIST_BAND = (-0.06, 0.02), (0.108, 0.126)  # metres above the hip joints of the base mesh
+# metres above the hip joints of the base mesh
+HIP_BAND = (-0.06, 0.02)
+WAIST_BAND = (0.108, 0.126)
 WAIST_POINTS = 36
 FROM_SURVEY = {  # what is matched -> terms of the survey's measurements
     "stature": {"stature": 1.0},
@@ -190,7 +192,8 @@ def _ring(
     """
     band = _band(V, among, heights)
     middle = V[band].mean(axis=0)
-    x, z = V[band, 0], V[band, 2] - middle[2]
+    x = V[band, 0]
+    z = V[band, 2] - middle[2]
     angle = np.arctan2(x, z)  # 0 in front, π behind
     edges = np.linspace(0.0, np.pi, WAIST_POINTS // 2 + 1)
     chosen: list[int] = []

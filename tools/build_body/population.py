@@ -36,7 +36,8 @@ FACTORS = {  # factor -> its levels and the slider's values there
     "proportions": {"uncommonproportions": 0.0, "": 0.5, "idealproportions": 1.0},
 }
 RACES = ("african", "asian", "caucasian")
-YEARS, AGE_SLIDER = (1.0, 10.0, 25.0, 90.0), (0.0, 0.1875, 0.5, 1.0)
+YEARS = (1.0, 10.0, 25.0, 90.0)
+AGE_SLIDER = (0.0, 0.1875, 0.5, 1.0)
 SOLVED = ("height", "weight")
 LIMITS = {"height": (-0.1, 1.15), "weight": (-0.2, 2.3)}  # linear beyond 0 and 1
 DETAIL_LIMIT = 1.3
@@ -51,7 +52,8 @@ TOLERANCE = {
     "head_breadth": 0.004,
 }
 TOLERANCE_M = 0.005  # of the others
-ROUNDS, WEIGH_IN = 8, (0, 2, 4, 6)
+ROUNDS = 8
+WEIGH_IN = (0, 2, 4, 6)
 STEP = 0.02  # of the differences that approximate derivatives
 
 
@@ -84,10 +86,8 @@ def draw_population(
     rng = np.random.default_rng(seed)
     children = round(CHILD_SHARE * count)
     male = np.arange(count) % 2 == 1
-    of_adults, (of_children, years) = (
-        draw_adults(rng, male[children:]),
-        draw_children(rng, male[:children]),
-    )
+    of_adults = draw_adults(rng, male[children:])
+    (of_children, years) = draw_children(rng, male[:children])
     adults = _Sliders.draw(rng, male[children:], rng.uniform(18.0, 75.0, count - children))
     young = _Sliders.draw(rng, male[:children], years)
     groups = [
@@ -112,11 +112,10 @@ def mean_child(source: SourceMesh, targets: SurveyTargets, years: float) -> NDAr
     """Return the vertices (N, 3) of the mean child of an age, of both sexes; the pelvis joint is at
     the origin.
     """
-    solver, male = _Solver(source, targets), np.array([False, True])
-    age, middle = (
-        np.full(2, years),
-        dict.fromkeys(("muscle", "proportions", "height", "weight"), np.full(2, 0.5)),
-    )
+    solver = _Solver(source, targets)
+    male = np.array([False, True])
+    age = np.full(2, years)
+    middle = dict.fromkeys(("muscle", "proportions", "height", "weight"), np.full(2, 0.5))
     values = middle | {"gender": male.astype(float), "age": np.interp(age, YEARS, AGE_SLIDER)}
     children = _Sliders(values, np.full((2, len(RACES)), 1.0 / len(RACES)), age)
     coefficients, *_ = solver.solve(children, mean_children(age, male))
@@ -203,7 +202,8 @@ class _Solver:
         for k in range(ROUNDS):
             coefficients = self._coefficients(sliders, x)
             if k in WEIGH_IN:  # in between, the weight is linear in the coefficients
-                at, (weight, gradient) = coefficients, self._weight(coefficients)
+                at = coefficients
+                (weight, gradient) = self._weight(coefficients)
             weights = weight + np.einsum("nt,nt->n", gradient, coefficients - at)
             value, J = self._linearize(sliders, x, centre, keys, weights, gradient)
             J /= tolerance[:, None]
@@ -249,7 +249,8 @@ class _Solver:
         self, coefficients: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the weights in kg (n,) and their derivatives (n, T) by the coefficients."""
-        weights, gradients = [], []
+        weights = []
+        gradients = []
         for part in np.array_split(
             coefficients.astype(np.float32), max(1, len(coefficients) // 100)
         ):
@@ -282,7 +283,8 @@ def _level_weights(
     """Return the weights of a factor's levels: linear between two, and on in the same way beyond
     the ends.
     """
-    names, knots = list(levels), np.array(list(levels.values()))
+    names = list(levels)
+    knots = np.array(list(levels.values()))
     k = np.searchsorted(knots, slider).clip(1, len(knots) - 1)
     share = (slider - knots[k - 1]) / (knots[k] - knots[k - 1])
     return {

@@ -98,7 +98,8 @@ def _knuckles(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def _about_z(angle: float) -> NDArray[np.float64]:
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 

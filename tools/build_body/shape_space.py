@@ -97,7 +97,8 @@ def build_shape_space(
     directions = (scatter @ left[:, :COMPONENTS]).T
     components = np.tensordot(directions, moves, axes=1)
     mean = base + np.tensordot(centre, moves, axes=1)
-    top, bottom = body[mean[body, 1].argmax()], body[mean[body, 1].argmin()]
+    top = body[mean[body, 1].argmax()]
+    bottom = body[mean[body, 1].argmin()]
     taller = components[:, top, 1] - components[:, bottom, 1]
     components *= np.where(taller < 0.0, -1.0, 1.0)[:, None, None]  # positive β is taller
     variance = squared / np.sum(squared)
@@ -142,14 +143,17 @@ def _draw_people(
         name: (longer[name.rpartition("-")[0]] / gain).clip(0.0) for name, gain in gains.items()
     }
 
-    top, bottom = base[:, 1].argmax(), base[:, 1].argmin()
+    top = base[:, 1].argmax()
+    bottom = base[:, 1].argmin()
     span = moves[:, top, 1] - moves[:, bottom, 1]
 
     def stature(height: float) -> NDArray[np.float64]:
         sliders["height"] = np.full(PEOPLE, height)
         return base[top, 1] - base[bottom, 1] + _coefficients(names, sliders, lengths) @ span
 
-    low, middle, high = stature(0.0), stature(0.5), stature(1.0)
+    low = stature(0.0)
+    middle = stature(0.5)
+    high = stature(1.0)
     below = 0.5 * (wanted - low) / (middle - low)
     above = 0.5 + 0.5 * (wanted - middle) / (high - middle)
     sliders["height"] = np.where(wanted < middle, below, above).clip(0.0, 1.0)

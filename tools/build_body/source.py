@@ -102,7 +102,8 @@ def _targets_of_adults(files: list[str]) -> list[str]:
     """Return the names of the targets that shape adults: MakeHuman's macro targets and those of
     ``LENGTHS``.
     """
-    folder, suffix = DATA + "targets/", ".target.gz"
+    folder = DATA + "targets/"
+    suffix = ".target.gz"
     names = (
         f[len(folder) : -len(suffix)] for f in files if f.startswith(folder) and f.endswith(suffix)
     )
@@ -140,7 +141,11 @@ def read_obj(
     """Return vertices (N, 3) in metres, faces (F, 4), texture coordinates, their faces, and each
     face's group.
     """
-    vertices, uv, corners, group, groups = [], [], [], "", []
+    vertices = []
+    uv = []
+    corners = []
+    group = ""
+    groups = []
     for line in text.splitlines():
         key, _, rest = line.partition(" ")
         if key == "v":

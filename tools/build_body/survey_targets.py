@@ -46,7 +46,8 @@ class SurveyTargets:
 
 def read_survey_targets(wheel: Path, source: SourceMesh) -> SurveyTargets:
     """Read the targets of the pinned wheel that the source has not read already."""
-    folder, suffix = DATA + "targets/", ".target.gz"
+    folder = DATA + "targets/"
+    suffix = ".target.gz"
     with zipfile.ZipFile(wheel) as archive:
 
         def displacements(name: str) -> NDArray[np.float64]:

@@ -16,7 +16,9 @@ from ...scope_addon.capture.tracking.face.expression_fit import FILE
 from .observe import seen_faces
 from .response import measure_response
 
-MOVING, DEGRADED = "shaded_talk", 0.5  # set, and scale of its small pictures
+# set, and scale of its small pictures
+MOVING = "shaded_talk"
+DEGRADED = 0.5
 LICENSE = "GPL-3.0-or-later, ours: measured by tools/calibrate_face on renders of the default body."
 
 

@@ -64,7 +64,9 @@ def _is_whole(kept: Path, count: int) -> bool:
 
 
 def _observe(folder: Path, count: int, scale: float, out: Path) -> None:
-    network, expressions, rows = FaceNetwork(1), ExpressionNetwork(), []
+    network = FaceNetwork(1)
+    expressions = ExpressionNetwork()
+    rows = []
     for t in range(count):
         image = cv2.imread(str(folder / f"{t:04d}.png"))
         if image is None:

@@ -30,7 +30,8 @@ TOGETHER = (  # what both eyes do, as people's do and as the network sees it
 )
 UNSEEN = ("tongueOut",)
 _ROUNDS = 8  # of reference, alignment and shares
-_RIDGE, _TURN_RIDGE = 0.02, 0.03
+_RIDGE = 0.02
+_TURN_RIDGE = 0.03
 _OF_POSES = 0.2  # of the covariance of errors in unrelated poses that is added to that in motion
 _DEGRADED = 0.5  # of the covariance of errors in motion that is from small and compressed pictures
 _SHRINK = 0.05  # of the covariance to its diagonal
@@ -50,12 +51,15 @@ def measure_response(poses: SeenFaces, moving: SeenFaces, degraded: SeenFaces) -
     """
     units = units_of_expression()
     share = units / units.sum(axis=1, keepdims=True)
-    landmarks, points = np.array(EXPRESSION_POINTS), poses.landmarks[:, EXPRESSION_POINTS]
-    W, person = poses.truth["weights"], poses.truth["person"]
+    landmarks = np.array(EXPRESSION_POINTS)
+    points = poses.landmarks[:, EXPRESSION_POINTS]
+    W = poses.truth["weights"]
+    person = poses.truth["person"]
     neutral = ~W.any(axis=1)
     people = np.unique(person)
     first = np.array([np.flatnonzero(neutral & (person == p))[0] for p in people])
-    reference, shares = points[first[0]] * [1, -1, -1], np.full(len(landmarks), 1 / len(landmarks))
+    reference = points[first[0]] * [1, -1, -1]
+    shares = np.full(len(landmarks), 1 / len(landmarks))
     for _ in range(_ROUNDS):
         reference = aligned(points[first], _unit(reference), shares).points.mean(axis=0)
         faces = aligned(points, reference := _unit(reference), shares)
@@ -69,7 +73,9 @@ def measure_response(poses: SeenFaces, moving: SeenFaces, degraded: SeenFaces) -
     x = (faces.points - rest[np.searchsorted(people, person)]).reshape(len(W), -1)
     terms = np.c_[W @ share.T, view_terms(faces.turns)]
     both = np.linalg.solve(terms.T @ terms + _RIDGE * np.eye(terms.shape[1]), terms.T @ x)
-    E, view, mean = both[:-VIEW_TERMS], both[-VIEW_TERMS:], rest.mean(axis=0).ravel()
+    E = both[:-VIEW_TERMS]
+    view = both[-VIEW_TERMS:]
+    mean = rest.mean(axis=0).ravel()
     covariance = _OF_POSES * np.cov((x - terms @ both).T)
     errors = [
         _errors_in_motion(
@@ -116,7 +122,8 @@ def _errors_in_motion(
     left = []
     for p in np.unique(moving.truth["person"]):
         rows = moving.truth["person"] == p
-        own, v = x[rows] - x[rows].mean(axis=0), faces.turns[rows] - faces.turns[rows].mean(axis=0)
+        own = x[rows] - x[rows].mean(axis=0)
+        v = faces.turns[rows] - faces.turns[rows].mean(axis=0)
         turned = np.linalg.solve(v.T @ v + _TURN_RIDGE * rows.sum() * np.eye(3), v.T @ own)
         left.append(own - v @ turned)
     return np.concatenate(left)

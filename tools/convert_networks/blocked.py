@@ -88,12 +88,14 @@ class _Nodes:
     ) -> list[NodeProto]:
         """Return the nodes that compute what a chain computes, see the module."""
         slopes = self._arrays[prelu.input[1]].astype(np.float32).reshape(-1, 1, 1, 1)
-        weights, bias = self._weights(one), self._bias(one)
+        weights = self._weights(one)
+        bias = self._bias(one)
         both = self._conv(
             one, one.input[0], np.concatenate([weights, -weights]), np.concatenate([bias, -bias])
         )
         above = helper.make_node("Relu", [both.output[0]], [prelu.output[0]], name=prelu.name)
-        weights, bias = self._weights(depthwise), self._bias(depthwise)
+        weights = self._weights(depthwise)
+        bias = self._bias(depthwise)
         each = self._conv(
             depthwise,
             above.output[0],
@@ -109,7 +111,8 @@ class _Nodes:
 
     def product(self, prelu: NodeProto) -> list[NodeProto]:
         """Return the nodes that compute what a PRelu computes, see the module."""
-        source, out = prelu.input[0], prelu.output[0]
+        source = prelu.input[0]
+        out = prelu.output[0]
         slopes = self._arrays[prelu.input[1]].astype(np.float32).reshape(-1, 1, 1, 1)
         names = [f"{out}_{part}" for part in ("negative", "below", "product")]
         factors = [self._graph.initializer(f) for f in (np.full_like(slopes, -1.0), 1.0 - slopes)]

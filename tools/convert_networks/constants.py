@@ -67,7 +67,8 @@ def densify(
     with coordinates indices[·]. Level number d < rank is original dimension d (counted in blocks),
     level rank + b is the place inside block b, along block_map[b].
     """
-    rank, blocks = len(shape), len(sparsity.block_map)
+    rank = len(shape)
+    blocks = len(sparsity.block_map)
     if (
         sorted(sparsity.traversal_order) != list(range(rank + blocks))
         or len(sparsity.levels) != rank + blocks

@@ -92,7 +92,8 @@ def _pip(scratch: Path) -> Path:
 
 def _npm(scratch: Path, package: Package) -> Path:
     npm = shutil.which("npm")
-    command, environment = [npm or ""], dict(os.environ)
+    command = [npm or ""]
+    environment = dict(os.environ)
     if npm is None:
         node = scratch / "node"
         _run([sys.executable, "-m", "pip", "install", "--target", str(node), _NODE_WHEEL], package)

@@ -15,7 +15,8 @@ def reshape(graph: Graph, operator: Operator) -> None:
     """Convert a reshape to the output tensor's shape; the first dimension stays free for the
     batch.
     """
-    source, target = operator.inputs[0], graph.shape(operator.outputs[0])
+    source = operator.inputs[0]
+    target = graph.shape(operator.outputs[0])
     if not target or target[0] != graph.shape(source)[0]:
         raise graph.fail(
             operator, f"reshape of {graph.shape(source)} to {target} changes the batch"
@@ -46,7 +47,8 @@ def strided_slice(graph: Graph, operator: Operator) -> None:
     """Convert a slice begin:end:1 along axes other than the batch, whole or dropped, which stays as
     it is.
     """
-    source, options = operator.inputs[0], operator.options
+    source = operator.inputs[0]
+    options = operator.options
     begin, end, step = (graph.constant(operator, i) for i in (1, 2, 3))
     shape = graph.shape(source)
     drops_batch = options["shrink_axis_mask"] == 1 and shape[0] == 1

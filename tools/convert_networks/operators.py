@@ -35,7 +35,8 @@ def _window_pads(
         )
     if PADDINGS[options["padding"]] == "VALID":
         return [0, 0, 0, 0]
-    before, after = [], []
+    before = []
+    after = []
     for n, k, axis in zip(size, kernel, "hw", strict=True):
         stride = options[f"stride_{axis}"]
         reach = (k - 1) * options.get(f"dilation_{axis}_factor", 1) + 1
@@ -140,10 +141,8 @@ def max_pool_2d(graph: Graph, operator: Operator) -> None:
 
 def resize_bilinear(graph: Graph, operator: Operator) -> None:
     """Convert a bilinear resize with the sampling grid of the options."""
-    (_, h_in, w_in, _), (_, h_out, w_out, _) = (
-        graph.shape(operator.inputs[0]),
-        graph.shape(operator.outputs[0]),
-    )
+    (_, h_in, w_in, _) = graph.shape(operator.inputs[0])
+    (_, h_out, w_out, _) = graph.shape(operator.outputs[0])
     if operator.options["align_corners"]:
         grid = "align_corners"
     else:

@@ -130,7 +130,8 @@ def _model(root: Any, name: str) -> Model:
         _operator(graph.Operators(i), kinds, len(tensors), name)
         for i in range(graph.OperatorsLength())
     )
-    inputs, outputs = _integers(graph.InputsAsNumpy()), _integers(graph.OutputsAsNumpy())
+    inputs = _integers(graph.InputsAsNumpy())
+    outputs = _integers(graph.OutputsAsNumpy())
     for index in inputs + outputs:
         if not 0 <= index < len(tensors):
             raise ModelFileError(
@@ -193,7 +194,8 @@ def _operator(table: Any, kinds: list[str], tensor_count: int, name: str) -> Ope
             f"{name}: operator code {table.OpcodeIndex()}, there are {len(kinds)}."
         )
     kind = kinds[table.OpcodeIndex()]
-    inputs, outputs = _integers(table.InputsAsNumpy()), _integers(table.OutputsAsNumpy())
+    inputs = _integers(table.InputsAsNumpy())
+    outputs = _integers(table.OutputsAsNumpy())
     if (
         not outputs
         or min((*inputs, 0)) < -1

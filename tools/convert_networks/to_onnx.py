@@ -105,7 +105,8 @@ def _append_branch(
     """Move what only this output needs into a branch that is computed on request; return the input
     that requests it.
     """
-    start, before = len(graph.nodes), graph.known()
+    start = len(graph.nodes)
+    before = graph.known()
     _append_needed(graph, [tensor], done)
     result = helper.make_tensor_value_info(
         graph.value(tensor), TensorProto.FLOAT, [None] * len(shape)

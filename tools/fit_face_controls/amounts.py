@@ -51,10 +51,12 @@ class Problem:
 
         :param free: (n,) which channels may be used.
         """
-        free, x = free.copy(), np.zeros(len(base))
+        free = free.copy()
+        x = np.zeros(len(base))
         # twice, what is small is left out, and the others are fitted again
         for factor in (0.7, 1.0, 1.0):
-            rows, x = np.flatnonzero(free), np.zeros(len(base))
+            rows = np.flatnonzero(free)
+            x = np.zeros(len(base))
             A = (self.jacobian * self.scale)[:, rows]
             for _ in range(steps):
                 residual = target - self.show(base + x)

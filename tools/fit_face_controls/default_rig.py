@@ -30,8 +30,10 @@ class SkinnedFace:
 
     def __init__(self, shapes: FaceShapes) -> None:
         """Read the rig at rest and the weights."""
-        rig, count = shapes.default, len(shapes.vertices)
-        self.vertices, self.parents = shapes.vertices, {bone: rig[bone]["parent"] for bone in rig}
+        rig = shapes.default
+        count = len(shapes.vertices)
+        self.vertices = shapes.vertices
+        self.parents = {bone: rig[bone]["parent"] for bone in rig}
         self.heads = {
             bone: shapes.place(rig[bone]["head"]) for bone in rig if "head" in self._above(bone)[1:]
         }
@@ -55,7 +57,9 @@ class SkinnedFace:
         given: dict[str, dict[str, float]] = {}
         for (bone, way), value in zip(CHANNELS, x, strict=True):
             given.setdefault(bone, {})[way] = value
-        axes, turned, out = self.frame.axes, {}, np.zeros_like(self.vertices)
+        axes = self.frame.axes
+        turned = {}
+        out = np.zeros_like(self.vertices)
         for bone, ways in given.items():
             R = axes @ exp(np.radians([ways.get(way, 0.0) for way in TURNED])) @ axes.T
             shift = axes @ [ways.get(way, 0.0) for way in MOVED] * self.frame.length(bone)
@@ -88,9 +92,11 @@ def fit_default_rig(shapes: FaceShapes) -> dict[str, Amounts]:
     for name in sorted(EXPRESSIONS, key=lambda name: name == "mouthClose"):
         if name.endswith("Right"):
             continue
-        target, base = shapes.moves[name], np.zeros(len(CHANNELS))
+        target = shapes.moves[name]
+        base = np.zeros(len(CHANNELS))
         if name == "mouthClose":  # lips meet although the jaw is open
-            target, base = target + shapes.moves["jawOpen"], found["jawOpen"]
+            target = target + shapes.moves["jawOpen"]
+            base = found["jawOpen"]
         wanted = target[rows].ravel() * _DECIMETRES
         found[name] = problem.fit(wanted, free_of(CHANNELS, name, "jaw"), base, 5)
         if wanted.any():  # not the tongue, which is no part of the skin

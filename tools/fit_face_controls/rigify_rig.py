@@ -108,7 +108,8 @@ class RigifyFace:
 
     def _points(self) -> NDArray[np.float64]:
         bpy.context.view_layer.update()
-        posed, found = self.rig.pose.bones, []
+        posed = self.rig.pose.bones
+        found = []
         for point in _POINTS:
             if point.startswith("lips."):
                 found.append(posed[f"DEF-lip.T.{point[-1]}.001"].tail)
@@ -185,11 +186,13 @@ def fit_rigify(shapes: FaceShapes, face: RigifyFace) -> dict[str, Amounts]:
     for name in sorted(EXPRESSIONS, key=lambda name: name == "mouthClose"):
         if name.endswith("Right"):
             continue
-        wanted, base = wanted_moves(shapes, name), np.zeros(len(face.channels))
+        wanted = wanted_moves(shapes, name)
+        base = np.zeros(len(face.channels))
         for k, channel in enumerate(face.channels):
             base[k] = eye_amounts(name).get(channel, 0.0)
         if name == "mouthClose":  # lips meet although the jaw is open
-            wanted, base = wanted + wanted_moves(shapes, "jawOpen"), found["jawOpen"]
+            wanted = wanted + wanted_moves(shapes, "jawOpen")
+            base = found["jawOpen"]
             points = wanted.reshape(-1, 3)
             for lip in ("", ".L.001", ".R.001"):
                 points[_POINTS.index(f"lip.B{lip}")] = points[_POINTS.index(f"lip.T{lip}")]

@@ -110,7 +110,10 @@ class _Fitter:
         position_weight: float = 24000.0,
         straight_knees: bool = False,
     ) -> None:
-        self.body, self.betas, self.found, self.tree = body, betas, found, make_tree(body)
+        self.body = body
+        self.betas = betas
+        self.found = found
+        self.tree = make_tree(body)
         names = list(body.joint_names)
         self.parts = np.array([names.index(p) for p in found.parts])
         self.joints = np.array([names.index(j) for j in found.points])
@@ -135,8 +138,10 @@ class _Fitter:
         """Return part poses R (T, K+1, 3, 3), t (T, K+1, 3) for targets (T, parts, 3, 3) and (T,
         points, 3).
         """
-        T, n = len(R_target), self.body.K + 1
-        R, t = np.empty((T, n, 3, 3)), np.empty((T, n, 3))
+        T = len(R_target)
+        n = self.body.K + 1
+        R = np.empty((T, n, 3, 3))
+        t = np.empty((T, n, 3))
         none = np.zeros((len(self.parts), 3))
         for k in range(T):
             fit = fit_tree(
@@ -151,7 +156,8 @@ class _Fitter:
                 self.priors,
                 self.options,
             )
-            R[k], t[k] = fit.R_camera_part, fit.t_camera_part
+            R[k] = fit.R_camera_part
+            t[k] = fit.t_camera_part
         return R, t
 
     def _start(self, R_target: NDArray[np.float64], p_target: NDArray[np.float64]) -> State:

@@ -23,7 +23,8 @@ Points = NDArray[np.float64]
 FPS = 30.0
 SIDES = ("left", "right")
 # of knee or elbow: below, its axis says nothing; above, all
-STRAIGHT, BENT = np.radians(8.0), np.radians(35.0)
+STRAIGHT = np.radians(8.0)
+BENT = np.radians(35.0)
 JOINTS = (
     "pelvis",
     "chest",
@@ -93,10 +94,8 @@ def _segments(
     for side in SIDES:
         hip, knee, ankle = (points[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle"))
         hinge = _hinge(hip - knee, knee - ankle, lefts.get(f"{side}_hip", pelvis[..., 0]), 1.0)
-        found[f"{side}_hip"], found[f"{side}_knee"] = (
-            along(hip - knee, hinge),
-            along(knee - ankle, hinge),
-        )
+        found[f"{side}_hip"] = along(hip - knee, hinge)
+        found[f"{side}_knee"] = along(knee - ankle, hinge)
         forward = points[f"{side}_foot_end"] - points.get(f"{side}_heel", ankle)
         across = lefts.get(f"{side}_ankle", hinge)
         found[f"{side}_ankle"] = frame(across, np.cross(forward, across))  # up: forward × left
@@ -106,10 +105,8 @@ def _segments(
         straight = lefts.get(f"{side}_shoulder")
         straight = _carried(chest, shoulder - elbow) if straight is None else straight
         hinge = _hinge(shoulder - elbow, elbow - wrist, straight, -1.0)
-        found[f"{side}_shoulder"], found[f"{side}_elbow"] = (
-            along(shoulder - elbow, hinge),
-            along(elbow - wrist, hinge),
-        )
+        found[f"{side}_shoulder"] = along(shoulder - elbow, hinge)
+        found[f"{side}_elbow"] = along(elbow - wrist, hinge)
         found[f"{side}_wrist"] = found[f"{side}_elbow"]
     return found
 

@@ -78,10 +78,13 @@ NAMED = {
 }
 # Measured, with the length of the leg as the unit of length. Median hips of people on the floor,
 # and of those who sit:
-FLOOR_HEIGHT, SEAT_HEIGHT = 0.45, 0.75
+FLOOR_HEIGHT = 0.45
+SEAT_HEIGHT = 0.75
 LEVEL_THIGH = 0.6  # of a thigh's length: what a sitting person's hip is above the knee, at most
 # median speed of the hips in the horizontal plane
-RUN_M_PER_S, WALK_M_PER_S, STAND_M_PER_S = 2.2, 0.6, 0.2
+RUN_M_PER_S = 2.2
+WALK_M_PER_S = 0.6
+STAND_M_PER_S = 0.2
 UPRIGHT = 0.93  # hips of people who stand, most of the time
 
 

@@ -57,7 +57,8 @@ def load_asf_amc(texts: dict[str, str]) -> tuple[list[Take], list[Skeleton]]:
     """Read the takes and skeletons of the Acclaim archive; ``02/02_01.amc`` belongs to
     ``02/02.asf``.
     """
-    takes, skeletons = [], {}
+    takes = []
+    skeletons = {}
     for path in sorted(p for p in texts if p.endswith(".asf")):
         skeletons[PurePosixPath(path).stem] = asf_amc.parse_asf(texts[path], path)
     for path in sorted(p for p in texts if p.endswith(".amc")):
@@ -121,7 +122,8 @@ def without_doubles(takes: list[Take]) -> list[Take]:
 
 def _same_recording(take: Take, other: Take) -> bool:
     """Return whether the root trajectory of ``take`` is a section of that of ``other``."""
-    path, longer = take.joint("pelvis"), other.joint("pelvis")
+    path = take.joint("pelvis")
+    longer = other.joint("pelvis")
     if take.source == "deepmimic" or len(path) > len(longer) + 1:
         return False
     starts = np.flatnonzero(np.abs(longer - path[0]).max(axis=1) < 5e-4)

@@ -19,7 +19,9 @@ from .joint_centres import R_Y_UP_Z_UP, SIDES, frame
 
 Points = NDArray[np.float64]
 KNEE_M = 0.055  # half a knee's width and half a marker
-ANKLE_AT, ANKLE_M = 0.3, 0.045  # share of the way from heel to forefoot, and height above it
+# share of the way from heel to forefoot, and height above it
+ANKLE_AT = 0.3
+ANKLE_M = 0.045
 SHOULDER_M = 0.05  # below the marker on the acromion
 
 
@@ -46,10 +48,12 @@ def joint_centres(markers: Mapping[str, Points]) -> tuple[dict[str, Points], Poi
     :param markers: (T, 3) millimetres each, z up.
     """
     m = {key: 0.001 * value @ R_Y_UP_Z_UP.T for key, value in markers.items()}
-    front, back = 0.5 * (m["LFWT"] + m["RFWT"]), 0.5 * (m["LBWT"] + m["RBWT"])
+    front = 0.5 * (m["LFWT"] + m["RFWT"])
+    back = 0.5 * (m["LBWT"] + m["RBWT"])
     wide = float(np.median(np.linalg.norm(m["LFWT"] - m["RFWT"], axis=1)))
     deep = float(np.median(np.linalg.norm(front - back, axis=1)))
-    left, ahead = m["LFWT"] - m["RFWT"], front - back
+    left = m["LFWT"] - m["RFWT"]
+    ahead = front - back
     R = frame(left, np.cross(ahead, left))  # x left, y up, z ahead
     ribs = 0.5 * (m["T10"] + m["STRN"])
     joints = {
@@ -63,10 +67,12 @@ def joint_centres(markers: Mapping[str, Points]) -> tuple[dict[str, Points], Poi
     }
     chest = frame(m["LSHO"] - m["RSHO"], joints["neck"] - ribs)
     for side in SIDES:
-        s, sign = side[0].upper(), 1.0 if side == "left" else -1.0
+        s = side[0].upper()
+        sign = 1.0 if side == "left" else -1.0
         hip = joints["pelvis"] + R @ [sign * (0.33 * wide + 0.0073), 0.0, 0.0]
         knee = _inward(hip, m[f"{s}THI"], m[f"{s}KNE"], KNEE_M)
-        heel, forefoot = m[f"{s}HEL"], 0.5 * (m[f"{s}TOE"] + m[f"{s}MT5"])
+        heel = m[f"{s}HEL"]
+        forefoot = 0.5 * (m[f"{s}TOE"] + m[f"{s}MT5"])
         sole = heel + ANKLE_AT * (forefoot - heel)
         ankle = sole + ANKLE_M * (knee - sole) / np.linalg.norm(knee - sole, axis=1, keepdims=True)
         shoulder = m[f"{s}SHO"] - SHOULDER_M * chest[..., 1]

@@ -70,7 +70,9 @@ CLIMB_JOINTS = (  # of the 53 columns
         for joint in joints
     ),
 )
-UPPER_ARM_M, FOREARM_M = 0.28, 0.25  # of arms that were not recorded
+# of arms that were not recorded
+UPPER_ARM_M = 0.28
+FOREARM_M = 0.25
 
 
 def load_new_performers(folder: Path = DOWNLOADS) -> list[Take]:
@@ -215,13 +217,12 @@ def debian_texts(package: Path, ends: tuple[str, ...]) -> dict[str, str]:
 
     :raises MotionFileError: when the package is malformed, or lacks one of them.
     """
-    data, at = package.read_bytes(), 8
+    data = package.read_bytes()
+    at = 8
     # an ar archive: 60 bytes of header before each member, members at even offsets
     while at < len(data):
-        name, digits = (
-            data[at : at + 16].decode("ascii", "replace").strip(" /"),
-            data[at + 48 : at + 58].strip(),
-        )
+        name = data[at : at + 16].decode("ascii", "replace").strip(" /")
+        digits = data[at + 48 : at + 58].strip()
         if not digits.isdigit():
             raise MotionFileError(f"{package}: malformed header of {name!r}")
         size = int(digits)

@@ -203,7 +203,8 @@ def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
     ]
     index = {name: i for i, name in enumerate(body.joint_names)}
     rows = []  # (P + 1, 3) of the vector between two joints and its measured length
-    measured, sigma = [], []
+    measured = []
+    sigma = []
     affine = np.concatenate([body.J_template[..., None], body.J_shapedirs], axis=2)  # (K+1, 3, 1+P)
     for a, b, source_a, source_b, deviation in pairs:
         rows.append(affine[index[b]] - affine[index[a]])
@@ -220,7 +221,8 @@ def shape_from_lengths(body: Body, take: Take) -> NDArray[np.float64]:
     # upright: bending shortens it
     measured.append(float(np.quantile(np.linalg.norm(trunk, axis=1), 0.9)))
     sigma.append(0.03)
-    A, beta = np.array(rows), np.zeros(body.P)
+    A = np.array(rows)
+    beta = np.zeros(body.P)
     for _ in range(10):
         v = A[:, :, 0] + A[:, :, 1:] @ beta
         length = np.linalg.norm(v, axis=1)

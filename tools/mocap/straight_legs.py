@@ -80,7 +80,8 @@ def straightened(take: Take) -> Take:
     orientations = take.orientations.copy()
     for side in SIDES:
         for upper, lower in (("hip", "knee"), ("knee", "ankle")):
-            first, second = f"{side}_{upper}", f"{side}_{lower}"
+            first = f"{side}_{upper}"
+            second = f"{side}_{lower}"
             turn = shortest_turn(before[first] - before[second], after[first] - after[second])
             orientations[:, take.index(first)] = turn @ orientations[:, take.index(first)]
     return replace(take, positions=positions, orientations=orientations)

@@ -90,7 +90,8 @@ def write_jpeg(path: Path, picture: NDArray[np.uint8], most_bytes: int = MAX_BYT
 
 
 def _write_animation(name: str, path: Path) -> None:
-    frames, most_bytes = animation.animation_frames(name), animation.LARGEST_BYTES[name]
+    frames = animation.animation_frames(name)
+    most_bytes = animation.LARGEST_BYTES[name]
     with atomic_path(path) as temporary:
         quality = animation.write_webp(
             temporary, frames, animation.CUTS[name].frames_per_second, most_bytes

@@ -22,7 +22,8 @@ from ..render_talk.shot import FOLDER, VIDEO
 from .shapes import joints, true_joints
 
 DATA = ASSETS.parent.parent / "shared" / "data"
-SAMPLE, SAMPLE_TRUTH = ASSETS / "sample" / "sample.mp4", ASSETS / "sample" / "sample_truth.npz"
+SAMPLE = ASSETS / "sample" / "sample.mp4"
+SAMPLE_TRUTH = ASSETS / "sample" / "sample_truth.npz"
 _LIMBS = {  # name in the ground truth: SMPL's joint
     "LShoulder": 16, "RShoulder": 17, "LElbow": 18, "RElbow": 19, "LWrist": 20, "RWrist": 21,
     "LHip": 1, "RHip": 2, "LKnee": 4, "RKnee": 5, "LAnkle": 7, "RAnkle": 8,
@@ -81,7 +82,8 @@ def error_mm(motion: Motion, row: int, truth: Path) -> float:
     """Return the mean distance of the twelve limb joints from ground truth, with the middle of the
     hips aligned.
     """
-    true, found = true_joints(motion, row, truth), joints(motion, row)
+    true = true_joints(motion, row, truth)
+    found = joints(motion, row)
     return 1000 * float(
         np.mean(
             [np.linalg.norm(found[k] - true[name]) for name, k in _LIMBS.items() if name in true]

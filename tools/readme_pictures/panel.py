@@ -19,12 +19,17 @@ from .shapes import stick_figure
 from .view import View
 
 FINER = 3  # supersampling: everything is drawn larger by this factor and scaled down at the end
-GROUND, GRID, INK = (246, 247, 249), (203, 208, 215), (52, 58, 66)
+GROUND = (246, 247, 249)
+GRID = (203, 208, 215)
+INK = (52, 58, 66)
 Color = tuple[float, ...]  # RGB: 0..1 of bodies and sticks, 0..255 of lines and text
-OURS, TRUTH = (0.42, 0.62, 0.90), (0.88, 0.22, 0.16)
+OURS = (0.42, 0.62, 0.90)
+TRUTH = (0.88, 0.22, 0.16)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _HIDDEN = 0.55  # opacity of a stick behind the body
-_STEP, _REACH = 0.5, 5.0  # spacing and half width of the grid, metres
+# spacing and half width of the grid, metres
+_STEP = 0.5
+_REACH = 5.0
 
 
 class Panel:
@@ -102,7 +107,8 @@ class Panel:
 
     def legend(self, entries: Sequence[tuple[str, Color]]) -> None:
         """Draw a legend of colours in the lower left corner."""
-        left, top = FINER * 12, self.image.shape[0] - FINER * 12
+        left = FINER * 12
+        top = self.image.shape[0] - FINER * 12
         for text, color in entries:
             rgb = tuple(int(255 * c) for c in color)
             cv2.rectangle(self.image, (left, top - FINER * 10), (left + FINER * 10, top), rgb, -1)
@@ -124,7 +130,8 @@ class Panel:
         for axis in (0, 1):
             for offset in across:
                 points = np.zeros((len(along), 3))
-                points[:, axis], points[:, 1 - axis] = along, offset
+                points[:, axis] = along
+                points[:, 1 - axis] = offset
                 points[:, :2] += center
                 pixels = self.view.project(points)
                 fade = np.clip(

@@ -100,7 +100,8 @@ def around(points: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.flo
     :param points: (F, 2) landmarks, pixels of the photograph.
     :param size: (width, height) of the finished panel, pixels.
     """
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     scale = FINER * _FACES_TALL * size[1] / float((high - low).max())
     middle = FINER * np.array(size) / 2 - scale * (low + high) / 2
     return np.array([[scale, 0, middle[0]], [0, scale, middle[1]], [0, 0, 1.0]])
@@ -130,7 +131,8 @@ def _head(motion: Motion, part: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Draw the body at the photograph's moment in the same part of its camera's view."""
     body = body_with_face()
     blank = np.full((FINER * _SIZE[1], FINER * _SIZE[0], 3), GROUND, np.uint8)
-    vertices, colors = posed_in_camera(motion, body, 0), colors_with_face(body, OURS)
+    vertices = posed_in_camera(motion, body, 0)
+    colors = colors_with_face(body, OURS)
     return draw_overlay(
         blank, vertices, body.faces, part @ motion.intrinsics, colors=colors, opacity=1
     )

@@ -18,9 +18,12 @@ from .panel import OURS, TRUTH, Color, Panel, next_to_each_other
 from .shapes import joints, posed, true_joints
 from .view import View, from_around, from_the_camera
 
-AMBER, FAINT = (0.96, 0.70, 0.34), (0.74, 0.79, 0.86)  # a second person; a filled-in pose
+# a second person; a filled-in pose
+AMBER = (0.96, 0.70, 0.34)
+FAINT = (0.74, 0.79, 0.86)
 BOTH = [("Scope", OURS), ("ground truth", TRUTH)]
-LEFT_WRIST, HEAD = 20, 15
+LEFT_WRIST = 20
+HEAD = 15
 
 
 def sample() -> NDArray[np.uint8]:

@@ -117,7 +117,8 @@ def _rod(
     turn = 2 * np.pi * np.arange(_SIDES) / _SIDES
     ring = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other
     vertices = a + along[:, None, None] * axis + wide[:, None, None] * ring
-    k, n = np.arange(_SIDES), np.roll(np.arange(_SIDES), -1)
+    k = np.arange(_SIDES)
+    n = np.roll(np.arange(_SIDES), -1)
     quads = [
         np.stack([k, n, n + _SIDES, k + _SIDES], 1) + _SIDES * i for i in range(len(along) - 1)
     ]

@@ -27,7 +27,8 @@ class View:
 
     def to_camera(self, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform points (..., 3) to the camera frame, metres, OpenCV's axes."""
-        R, t = self.world_from_camera[:3, :3], self.world_from_camera[:3, 3]
+        R = self.world_from_camera[:3, :3]
+        t = self.world_from_camera[:3, 3]
         return (points_world - t) @ R
 
     def project(self, points_world: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,7 +46,8 @@ def from_the_camera(
     """
     whole = View(motion.intrinsics, motion.world_from_camera[row], size)
     pixels = whole.project(points_world)
-    low, high = pixels.min(0), pixels.max(0)
+    low = pixels.min(0)
+    high = pixels.max(0)
     scale = min(fill * size[1] / (high[1] - low[1]), fill * size[0] / (high[0] - low[0]))
     crop = np.array([[scale, 0, size[0] / 2], [0, scale, size[1] / 2], [0, 0, 1.0]])
     crop[:2, 2] -= scale * (low + high) / 2
@@ -70,7 +72,8 @@ def from_around(
     """
     toward = motion.world_from_camera[row, :3, 2] * [1, 1, 0]
     toward = toward / np.linalg.norm(toward)
-    a, p = np.radians(turn), np.radians(pitch)
+    a = np.radians(turn)
+    p = np.radians(pitch)
     toward = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ toward
     forward = np.cos(p) * toward - np.sin(p) * np.array([0, 0, 1.0])
     T = level_camera(center - _FAR * forward, forward)

@@ -53,11 +53,14 @@ def main() -> int:
 def _render(
     faces: FaceSet, targets: NDArray[np.float64], folder: Path, frames: list[int] | None
 ) -> None:
-    rng, body = np.random.default_rng(faces.seed), load_body("scope")
+    rng = np.random.default_rng(faces.seed)
+    body = load_body("scope")
     clip = faces.change(faces.draw(rng, **faces.sizes))
     identities = np.array([draw_identity(targets, rng) for _ in range(faces.sizes["people"])])
     write_truth(folder / "truth.npz", body, clip, identities)
-    stage, dressed, worn = _stage(body, faces.cycles), -1, Worn({})
+    stage = _stage(body, faces.cycles)
+    dressed = -1
+    worn = Worn({})
     for t in range(len(clip.weights)) if frames is None else frames:
         path = folder / f"{t:04d}.png"
         if path.is_file():
@@ -96,12 +99,14 @@ def _places(
 
 def _blur(path: Path, clip: FaceClip, t: int) -> None:
     """Blur a picture along the way that the head's middle goes while the shutter is open."""
-    before, after = clip.middle[max(t - 1, 0)], clip.middle[min(t + 1, len(clip.middle) - 1)]
+    before = clip.middle[max(t - 1, 0)]
+    after = clip.middle[min(t + 1, len(clip.middle) - 1)]
     x, y = (
         _SHUTTER * (after - before)[:2] / 2 * focal_px(float(clip.distance[t])) / clip.distance[t]
     )
     size = 2 * int(np.ceil(max(abs(x), abs(y)) / 2)) + 3
-    kernel, middle = np.zeros((size, size), np.float32), np.array([size // 2, size // 2])
+    kernel = np.zeros((size, size), np.float32)
+    middle = np.array([size // 2, size // 2])
     start, end = (
         np.round(16 * (middle + side * np.array([x, y]) / 2)).astype(int).tolist()
         for side in (-1, 1)

@@ -15,12 +15,21 @@ from .looks import masks
 from .truth import head_faces
 
 HAIRS = 9000
-_LENGTH_M, _HALF_WIDTH_M = (0.006, 0.013), 0.00045
-_MOUSTACHE_SHORTER, _MOUSTACHE_DENSER = 0.75, 3.0
+_LENGTH_M = (0.006, 0.013)
+_HALF_WIDTH_M = 0.00045
+_MOUSTACHE_SHORTER = 0.75
+_MOUSTACHE_DENSER = 3.0
 # In the model frame, metres: the moustache between nose and mouth, and where the beard ends above,
 # below and behind.
-_NOSE, _MOUTH, _CHIN, _CORNER, _CHEEK_SLOPE = 0.6495, 0.6425, 0.6105, 0.024, 0.75
-_MOUSTACHE_HALF, _LOWEST, _BACK, _EARS = 0.027, 0.564, 0.028, 0.069
+_NOSE = 0.6495
+_MOUTH = 0.6425
+_CHIN = 0.6105
+_CORNER = 0.024
+_CHEEK_SLOPE = 0.75
+_MOUSTACHE_HALF = 0.027
+_LOWEST = 0.564
+_BACK = 0.028
+_EARS = 0.069
 
 
 @dataclass(frozen=True)
@@ -65,7 +74,8 @@ def grow_beard(body: Body, rng: np.random.Generator) -> Beard:
         moustache, _MOUSTACHE_DENSER, 1.0
     )
     drawn = rng.choice(len(skin), HAIRS, p=density / density.sum())
-    corners, shares = skin[drawn], rng.dirichlet(np.ones(3), HAIRS)
+    corners = skin[drawn]
+    shares = rng.dirichlet(np.ones(3), HAIRS)
     length = rng.uniform(*_LENGTH_M, HAIRS) * np.where(moustache[drawn], _MOUSTACHE_SHORTER, 1.0)
     return Beard(triangles, corners, shares, 0.35 * rng.standard_normal((HAIRS, 3)), length)
 
@@ -73,7 +83,9 @@ def grow_beard(body: Body, rng: np.random.Generator) -> Beard:
 def bearded(body: Body) -> NDArray[np.float64]:
     """Return (V,) 1 at the vertices that a beard covers, otherwise 0."""
     V = body.v_template
-    x, y, z = abs(V[:, 0]), V[:, 1], V[:, 2]
+    x = abs(V[:, 0])
+    y = V[:, 1]
+    z = V[:, 2]
     moustache = (x < _MOUSTACHE_HALF) & (y > _MOUTH - 0.5 * x) & (y < _NOSE - 0.3 * x) & (z > 0.11)
     edge = np.where(x < _CORNER, _CHIN, 0.641 + _CHEEK_SLOPE * (x - _CORNER))
     beard = (y < edge) & (y > _LOWEST) & (z > _BACK) & (x < _EARS)

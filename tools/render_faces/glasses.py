@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 
-_SIDES, _RIM = 8, 40  # corners of a rod's section, points around a lens
+# corners of a rod's section, points around a lens
+_SIDES = 8
+_RIM = 40
 _SQUARENESS = 3.0  # exponent of the superellipse |x/a|ⁿ + |y/b|ⁿ = 1 that is a lens' outline
 _CLEARANCE_M = 0.002  # from the skin around the eye to the frame
 _WRAP = 1.6  # per metre: lenses bend back by this times the square of the distance from the middle
-_BELOW_EYE_M, _HINGE_M = 0.004, 0.010  # middle of a lens under the eye's, hinge over it
+# middle of a lens under the eye's, hinge over it
+_BELOW_EYE_M = 0.004
+_HINGE_M = 0.010
 _EAR_Z_M = 0.03  # where a temple rests on the ear
 
 
@@ -49,12 +53,15 @@ def glasses(style: Style, body: Body, face: NDArray[np.float64]) -> dict[str, Me
 
     :param face: (V, 3) vertices, metres, model frame.
     """
-    rims, lenses, rods = [], [], []
+    rims = []
+    lenses = []
+    rods = []
     width, height = style.half
     eyes = _eyes(body, face)
     front = _front(face, eyes, style)
     turn = np.linspace(0, 2 * np.pi, _RIM, endpoint=False)
-    cosine, sine = np.cos(turn), np.sin(turn)
+    cosine = np.cos(turn)
+    sine = np.sin(turn)
     power = 2 / _SQUARENESS
     outline = np.stack(
         [
@@ -147,10 +154,12 @@ def _rod(
     ring = (
         radii[0] * np.cos(turn)[:, None] * side[:, None] + radii[1] * np.sin(turn)[:, None] * across
     )
-    n, k = len(path), np.arange(_SIDES)
+    n = len(path)
+    k = np.arange(_SIDES)
     faces: list[tuple[int, ...]] = []
     for i in range(n if closed else n - 1):
-        a, b = _SIDES * i, _SIDES * ((i + 1) % n)
+        a = _SIDES * i
+        b = _SIDES * ((i + 1) % n)
         faces += [
             (a + int(j), a + int(j + 1) % _SIDES, b + int(j + 1) % _SIDES, b + int(j)) for j in k
         ]

@@ -16,7 +16,9 @@ LIPS = np.array([0.85, 0.5, 0.5])  # times the skin's colour
 HAIR = np.array([0.03, 0.018, 0.012])
 IRISES = ((0.1, 0.055, 0.025), (0.08, 0.14, 0.2), (0.07, 0.11, 0.05))
 # metres from the middle, in the model frame
-_BROW_ENDS, _BROW_HEIGHT, _BROW_HALF_M = (0.012, 0.052), 0.702, 0.004
+_BROW_ENDS = (0.012, 0.052)
+_BROW_HEIGHT = 0.702
+_BROW_HALF_M = 0.004
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,10 @@ def with_beard(look: Look, covered: NDArray[np.float64]) -> Look:
 
 def masks(body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return how far each vertex (V,) belongs to the lips, the brows and the lashes, 0 to 1."""
-    V, keys = body.v_template, {e.name: e for e in expressions_of(body)}
-    lips, lashes = np.zeros(len(V)), np.zeros(len(V))
+    V = body.v_template
+    keys = {e.name: e for e in expressions_of(body)}
+    lips = np.zeros(len(V))
+    lashes = np.zeros(len(V))
     for mask, names, share in (
         (lips, ("mouthRollLower", "mouthRollUpper"), 0.7),
         (lashes, ("eyeBlinkLeft", "eyeBlinkRight"), 0.85),
@@ -64,7 +68,8 @@ def masks(body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray
             mask[keys[name].vertices] = np.maximum(
                 mask[keys[name].vertices], length > share * length.max()
             )
-    x, y = abs(V[:, 0]), V[:, 1]
+    x = abs(V[:, 0])
+    y = V[:, 1]
     inner, outer = _BROW_ENDS
     across = np.clip((x - inner) / 0.006, 0, 1) * np.clip((outer - x) / 0.006 + 1, 0, 1)
     arch = _BROW_HEIGHT - 12.0 * (x - 0.033) ** 2

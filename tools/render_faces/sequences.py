@@ -14,7 +14,10 @@ from ...solver.names import EXPRESSIONS
 from ...solver.rotations import exp
 
 FPS = 30
-YAW, PITCH, ROLL = 45.0, 20.0, 15.0  # degrees, largest
+# degrees, largest
+YAW = 45.0
+PITCH = 20.0
+ROLL = 15.0
 INDEX = {name: k for k, name in enumerate(EXPRESSIONS)}
 _OPPOSITE = (("jawLeft", "jawRight"), ("mouthLeft", "mouthRight"), ("mouthFunnel", "mouthPucker"))
 _GAZE = [name for name in EXPRESSIONS if name.startswith("eyeLook")]
@@ -101,16 +104,15 @@ class FaceClip:
 def random_poses(rng: np.random.Generator, people: int, each: int) -> FaceClip:
     """Draw unrelated poses: ``each`` of every person, the first of them neutral and frontal."""
     T = people * each
-    weights, angles = (
-        np.zeros((T, len(EXPRESSIONS))),
-        rng.uniform(-1, 1, (T, 3)) * [PITCH, YAW, ROLL],
-    )
+    weights = np.zeros((T, len(EXPRESSIONS)))
+    angles = rng.uniform(-1, 1, (T, 3)) * [PITCH, YAW, ROLL]
     for t in range(T):
         if t % each == 0:
             angles[t] *= 0.1
         elif rng.uniform() > 0.1:
             _draw_weights(weights[t], rng)
-    distance, person = rng.uniform(0.45, 1.6, T), np.repeat(np.arange(people), each)
+    distance = rng.uniform(0.45, 1.6, T)
+    person = np.repeat(np.arange(people), each)
     return FaceClip(
         weights, _rotations(angles), distance, person, np.arange(T) / FPS, np.zeros((T, 3))
     )
@@ -176,7 +178,8 @@ def in_motion(clip: FaceClip) -> FaceClip:
     once a second.
     """
     phase = 2 * np.pi * (clip.seconds + 0.3 * clip.person)
-    shaking, nodding = np.sin(1.1 * phase), np.sin(1.7 * phase)
+    shaking = np.sin(1.1 * phase)
+    nodding = np.sin(1.7 * phase)
     turn = exp(np.radians(np.stack([8.0 * nodding, 20.0 * shaking, 0 * phase], axis=1)))
     shift = np.stack([0.03 * shaking, 0.02 * nodding, 0 * phase], axis=1)
     return replace(clip, R_camera_head=np.asarray(clip.R_camera_head @ turn, float), shift=shift)
@@ -185,7 +188,8 @@ def in_motion(clip: FaceClip) -> FaceClip:
 def _one_person(
     rng: np.random.Generator, T: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    half, weights = T // 2, np.zeros((T, len(EXPRESSIONS)))
+    half = T // 2
+    weights = np.zeros((T, len(EXPRESSIONS)))
     t = rng.integers(8, 14)  # at rest at first
     while t < half:
         length = int(rng.integers(3, 7))
@@ -196,7 +200,8 @@ def _one_person(
         length = int(rng.integers(18, 28))
         add_pose(weights, GRIMACES[rng.integers(len(GRIMACES))], t, length, rng.uniform(0.8, 1.05))
         t += length + int(rng.integers(0, 6))
-    gaze, t = np.zeros((T, 2)), 0
+    gaze = np.zeros((T, 2))
+    t = 0
     while t < T:
         length = int(rng.integers(12, 30))
         gaze[t : t + length] = rng.uniform(-0.7, 0.7, 2) * (rng.uniform() < 0.6)
@@ -210,7 +215,8 @@ def _one_person(
             weights[t : t + len(shape), blinks], shape[:, None]
         )
         t += int(rng.integers(40, 75))
-    s, phase = np.arange(T)[:, None] / FPS, rng.uniform(0, 2 * np.pi, 3)
+    s = np.arange(T)[:, None] / FPS
+    phase = rng.uniform(0, 2 * np.pi, 3)
     turn = rng.uniform(-30, 30)
     angles = np.array([6.0, 13.0, 5.0]) * np.sin(
         2 * np.pi * s * rng.uniform(0.15, 0.4, 3) + phase

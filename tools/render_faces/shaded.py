@@ -33,14 +33,13 @@ class ShadedStage:
         self._triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(
             np.int32
         )
-        self._material, self._names = body.face_material[kept], list(body.material_names)
+        self._material = body.face_material[kept]
+        self._names = list(body.material_names)
         self._palette = np.asarray(body.material_colors)[:, :3]
         self._mouth = np.isin(np.flatnonzero(kept), mouth_faces_of(body))
         self._worn: dict[str, tuple[NDArray[np.int32], NDArray[np.float32]]] = {}
-        self._quads, self._edges = (
-            quads,
-            np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]),
-        )
+        self._quads = quads
+        self._edges = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
 
     def dress(self, look: Look, rng: np.random.Generator) -> None:
         """Take a person's colours, and draw light and background."""
@@ -126,7 +125,8 @@ def hollows(
     :param edges: (E, 2) from a vertex to another.
     """
     a, b = edges.T
-    step, count = vertices[b] - vertices[a], len(vertices)
+    step = vertices[b] - vertices[a]
+    count = len(vertices)
     rise = np.bincount(a, np.einsum("ex,ex->e", step, normals[a]), count)
     out: NDArray[np.float64] = rise / np.maximum(
         np.bincount(a, np.linalg.norm(step, axis=1) ** 2, count), 1e-12

@@ -18,7 +18,8 @@ from .looks import Look
 from .truth import SIZE, head_faces
 from .worn import WORN
 
-SAMPLES, SAMPLES_OF_LENSES = 4, 8
+SAMPLES = 4
+SAMPLES_OF_LENSES = 8
 
 
 class Stage:
@@ -43,7 +44,8 @@ class Stage:
             surface = self._mesh.materials[name].node_tree.nodes["Principled BSDF"]
             surface.inputs["Base Color"].default_value = (*color, 1)
         for lamp, watts in zip(self._lights, (rng.uniform(4, 14), rng.uniform(0, 4)), strict=True):
-            lamp.data.energy, lamp.data.size = watts, rng.uniform(0.2, 1.0)
+            lamp.data.energy = watts
+            lamp.data.size = rng.uniform(0.2, 1.0)
             lamp.location = (rng.uniform(-0.9, 0.9), rng.uniform(-1.0, 0.2), rng.uniform(-0.4, 0.2))
         background = bpy.context.scene.world.node_tree.nodes["Background"]
         background.inputs["Color"].default_value = (*rng.uniform(0.5, 1.0, 3), 1)
@@ -102,10 +104,12 @@ class Stage:
 
     @staticmethod
     def _camera() -> None:
-        scene, data = bpy.context.scene, bpy.data.cameras.new("camera")
+        scene = bpy.context.scene
+        data = bpy.data.cameras.new("camera")
         scene.camera = bpy.data.objects.new("camera", data)
         scene.collection.objects.link(scene.camera)
-        data.sensor_fit, data.sensor_width = "HORIZONTAL", 36.0
+        data.sensor_fit = "HORIZONTAL"
+        data.sensor_width = 36.0
         data.clip_start = 0.01
         scene.camera.matrix_world = blender_camera_matrix(np.eye(4)).T.tolist()
 
@@ -158,13 +162,12 @@ def _worn_material(name: str) -> bpy.types.Material:
     color, stopped, roughness, metal = WORN[name]
     material = bpy.data.materials.new(name)
     material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
     surface = nodes["Principled BSDF"]
     surface.inputs["Base Color"].default_value = (*color, 1)
-    surface.inputs["Roughness"].default_value, surface.inputs["Metallic"].default_value = (
-        roughness,
-        float(metal),
-    )
+    surface.inputs["Roughness"].default_value = roughness
+    surface.inputs["Metallic"].default_value = float(metal)
     mix = nodes.new("ShaderNodeMixShader")
     mix.inputs["Fac"].default_value = stopped
     links.new(nodes.new("ShaderNodeBsdfTransparent").outputs["BSDF"], mix.inputs[1])

@@ -21,7 +21,8 @@ MIDDLE = np.array([0.0, 0.681, 0.11])  # of the face, in the model frame; the ca
 WIDTH_M = 0.27  # that the picture shows at the face
 SIZE = 256
 # below the neck joint and beside the body's middle, where the picture ends
-_NECK_M, _HALF_M = 0.08, 0.2
+_NECK_M = 0.08
+_HALF_M = 0.2
 
 
 def focal_px(distance: float) -> float:

@@ -54,7 +54,8 @@ def put_on(what: str, body: Body, face: NDArray[np.float64], rng: np.random.Gene
         return Worn({})
     if what == "beard":
         return Worn({}, grow_beard(body, rng))
-    style, parts = STYLES[what], glasses(STYLES[what], body, face)
+    style = STYLES[what]
+    parts = glasses(STYLES[what], body, face)
     frame = "thin frame" if what == "thin glasses" else "thick frame"
     return Worn(
         {frame: parts["frame"], "dark lenses" if style.dark else "clear lenses": parts["lenses"]}

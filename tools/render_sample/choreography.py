@@ -23,7 +23,8 @@ from .leg import solve_leg
 DURATION = 5.0
 START = np.array([-0.50, 0.0])
 TURN = 68.0  # yaw of the walk: to the right of the image and slightly towards the camera
-FOOT_APART, TOE_OUT = 0.115, 8.0
+FOOT_APART = 0.115
+TOE_OUT = 8.0
 SQUAT = (2.2, 2.72, 2.86, 3.28)  # begins, is lowest from .. to, ends
 
 Key = tuple[float, NDArray[np.float64]]  # time, value
@@ -52,7 +53,8 @@ def choreograph(
             @ R_WORLD_MODEL
             @ exp(np.radians([_eased(_LEAN, t), 0, 0]))
         )
-        rotations[f, 0], trans[f] = R_root, pelvis - J[0]
+        rotations[f, 0] = R_root
+        trans[f] = pelvis - J[0]
         for side in ("left", "right"):
             hip, knee, ankle = (index[f"{side}_{part}"] for part in ("hip", "knee", "ankle"))
             place, R_foot = _foot_at(side, t)
@@ -64,7 +66,8 @@ def choreograph(
                 J[knee] - J[hip],
                 J[ankle] - J[knee],
             )
-            rotations[f, hip], rotations[f, knee] = R_hip, R_knee
+            rotations[f, hip] = R_hip
+            rotations[f, knee] = R_knee
             rotations[f, ankle] = (R_root @ R_hip @ R_knee).T @ R_foot
     return rotations, trans
 
@@ -88,7 +91,8 @@ def _beside(along: float, side: str, yaw: float) -> NDArray[np.float64]:
     """Return a place on the floor, ``along`` metres into the walk, half the width of the stance to
     one side.
     """
-    walk, facing = np.radians(TURN), np.radians(yaw)
+    walk = np.radians(TURN)
+    facing = np.radians(yaw)
     ahead = np.array([np.sin(walk), -np.cos(walk)])
     left = np.array([np.cos(facing), np.sin(facing)])
     return START + along * ahead + (FOOT_APART if side == "left" else -FOOT_APART) * left
@@ -110,15 +114,21 @@ _STEPS: dict[str, list[tuple[float, float, NDArray[np.float64], float]]] = {
 
 def _foot_at(side: str, t: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the ankle above its height on the floor (3,), and the foot's rotation in the world."""
-    place, yaw, lift, pitch = _beside(0.0, side, 0.0), 0.0, 0.0, 0.0
+    place = _beside(0.0, side, 0.0)
+    yaw = 0.0
+    lift = 0.0
+    pitch = 0.0
     for begin, end, to, to_yaw in _STEPS[side]:
         if t >= end:
-            place, yaw = to, to_yaw
+            place = to
+            yaw = to_yaw
         elif t > begin:
             s = (t - begin) / (end - begin)
-            place, yaw = place + _ease(s) * (to - place), yaw + _ease(s) * (to_yaw - yaw)
+            place = place + _ease(s) * (to - place)
+            yaw = yaw + _ease(s) * (to_yaw - yaw)
             # toe down first, then heel
-            lift, pitch = 0.10 * np.sin(np.pi * s), 18 * np.sin(2 * np.pi * s)
+            lift = 0.10 * np.sin(np.pi * s)
+            pitch = 18 * np.sin(2 * np.pi * s)
             break
     outward = TOE_OUT if side == "left" else -TOE_OUT
     R_foot = exp(np.radians([0, 0, yaw + outward])) @ R_WORLD_MODEL @ exp(np.radians([pitch, 0, 0]))
@@ -203,7 +213,8 @@ def on_side(side: str, keys: list[Key]) -> list[Key]:
 def _upper_body() -> dict[str, list[Key]]:
     hanging = arm_pose(-74, ahead=10, elbow=14)
     reaching = arm_pose(-8, ahead=78, pitch=42, elbow=12)
-    high_open, high_bent = arm_pose(38, twist=-70, elbow=28), arm_pose(38, twist=-78, elbow=72)
+    high_open = arm_pose(38, twist=-70, elbow=28)
+    high_bent = arm_pose(38, twist=-78, elbow=72)
     left = [(0.0, hanging), (0.35, hanging)]
     left += [(0.95, arm_pose(34, twist=-72, elbow=45)), (1.65, arm_pose(40, twist=-72, elbow=38))]
     right = [(0.0, hanging), (0.35, hanging), (0.90, high_open)]
@@ -211,7 +222,8 @@ def _upper_body() -> dict[str, list[Key]]:
     for arm in (left, right):
         arm += [(SQUAT[0] + 0.1, arm_pose(-50, ahead=40)), (SQUAT[1], reaching)]
         arm += [(SQUAT[2], reaching), (SQUAT[3], hanging)]
-    forward, backward = arm_pose(-76, pitch=26, elbow=32), arm_pose(-76, pitch=-24, elbow=12)
+    forward = arm_pose(-76, pitch=26, elbow=32)
+    backward = arm_pose(-76, pitch=-24, elbow=12)
     left += [(_WALK[1], backward), (_WALK[2], forward), (_WALK[3], backward), (_WALK[4], hanging)]
     right += [(_WALK[1], forward), (_WALK[2], backward), (_WALK[3], forward), (_WALK[4], hanging)]
     keys = arm_keys(left, right)
@@ -273,9 +285,11 @@ def rotation_at(keys: list[Key], t: float) -> NDArray[np.float64]:
 def _curve(keys: list[Key], t: float) -> NDArray[np.float64]:
     """Evaluate the monotone cubic through the keys."""
     i, s = _span(keys, t)
-    (t0, p0), (t1, p1) = keys[i], keys[i + 1]
+    (t0, p0) = keys[i]
+    (t1, p1) = keys[i + 1]
     d = t1 - t0
-    v0, v1 = _velocity(keys, i), _velocity(keys, i + 1)
+    v0 = _velocity(keys, i)
+    v1 = _velocity(keys, i + 1)
     from_start = (1 + 2 * s) * (1 - s) ** 2 * p0 + s * (1 - s) ** 2 * d * v0
     return from_start + s * s * (3 - 2 * s) * p1 + s * s * (s - 1) * d * v1
 

@@ -18,7 +18,8 @@ from .truth import Shot
 
 KBIT_PER_S = 2000  # 5 s: 1.2 MB
 # pixels around the person that are rendered, and over which they are blended with the room
-_MARGIN, _FEATHER = 24, 16
+_MARGIN = 24
+_FEATHER = 16
 
 
 def render_clip(body: Body, shot: Shot, path: Path, scratch: Path) -> None:

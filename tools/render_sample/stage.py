@@ -15,7 +15,8 @@ from ...solver.body import Body
 LAMPS = {  # name: position (metres, world), power in watts, side in metres
     "skylight": ((-0.7, -1.9, 5.0), 230.0, 1.6),
 }
-_SAMPLES_ROOM, _SAMPLES_PERSON = 32, 8
+_SAMPLES_ROOM = 32
+_SAMPLES_PERSON = 8
 Triple = tuple[float, float, float]  # metres, or linear RGB
 
 
@@ -46,9 +47,11 @@ def pose_person(person: bpy.types.Object, vertices_world: NDArray[np.float64]) -
 def render_room(person: bpy.types.Object, path: Path) -> None:
     """Render the empty room to a .png, once and well: nothing in it moves."""
     scene = bpy.context.scene
-    person.hide_render, scene.cycles.samples = True, _SAMPLES_ROOM
+    person.hide_render = True
+    scene.cycles.samples = _SAMPLES_ROOM
     render_to(path)
-    person.hide_render, scene.cycles.samples = False, _SAMPLES_PERSON
+    person.hide_render = False
+    scene.cycles.samples = _SAMPLES_PERSON
 
 
 def render_part(box: tuple[float, float, float, float], path: Path) -> None:
@@ -56,7 +59,8 @@ def render_part(box: tuple[float, float, float, float], path: Path) -> None:
     a .png.
     """
     render = bpy.context.scene.render
-    render.use_border, render.use_crop_to_border = True, False
+    render.use_border = True
+    render.use_crop_to_border = False
     render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = box
     render_to(path)
 
@@ -74,7 +78,8 @@ def encode(
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.view_settings.view_transform = "Standard"
-    scene.frame_start, scene.frame_end = 1, len(frames)
+    scene.frame_start = 1
+    scene.frame_end = len(frames)
     editor = scene.sequence_editor_create()
     strip = editor.strips.new_image("frames", str(frames[0]), channel=1, frame_start=1)
     for frame in frames[1:]:
@@ -82,16 +87,19 @@ def encode(
     render = scene.render
     render.resolution_x, render.resolution_y = size
     render.resolution_percentage = 100
-    render.fps, render.fps_base = fps, 1.0
+    render.fps = fps
+    render.fps_base = 1.0
     render.filepath = str(path)
     render.use_file_extension = False
     settings = render.image_settings
     if hasattr(settings, "media_type"):  # since Blender 5.0
         settings.media_type = "VIDEO"
     settings.file_format = "FFMPEG"
-    render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
+    render.ffmpeg.format = "MPEG4"
+    render.ffmpeg.codec = "H264"
     render.ffmpeg.constant_rate_factor = "NONE"
-    render.ffmpeg.video_bitrate, render.ffmpeg.maxrate = kbit_per_s, 2 * kbit_per_s
+    render.ffmpeg.video_bitrate = kbit_per_s
+    render.ffmpeg.maxrate = 2 * kbit_per_s
     render.ffmpeg.minrate = 0
     render.ffmpeg.gopsize = 30
     bpy.ops.render.render(animation=True)
@@ -107,8 +115,11 @@ def set_up_rendering(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     scene.view_settings.view_transform = "AgX"
     scene.view_settings.look = "AgX - Medium High Contrast"
     cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = _SAMPLES_PERSON, False
-    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 1, 1, 1
+    cycles.samples = _SAMPLES_PERSON
+    cycles.use_adaptive_sampling = False
+    cycles.max_bounces = 1
+    cycles.diffuse_bounces = 1
+    cycles.glossy_bounces = 1
     cycles.use_denoising = True
     cycles.denoiser = "OPENIMAGEDENOISE"
     cycles.denoising_quality = "FAST"
@@ -130,7 +141,8 @@ def add_camera(
     scene.collection.objects.link(camera)
     scene.camera = camera
     width, height = size
-    data.sensor_fit, data.sensor_width = "HORIZONTAL", 36.0
+    data.sensor_fit = "HORIZONTAL"
+    data.sensor_width = 36.0
     data.lens = K[0, 0] / width * 36.0
     data.shift_x = -((K[0, 2] + 0.5) - width / 2) / width
     data.shift_y = ((K[1, 2] + 0.5) - height / 2) / width
@@ -146,13 +158,15 @@ def _light(scene: bpy.types.Scene) -> None:
     background.inputs["Strength"].default_value = 0.42
     for name, (place, watts, width) in LAMPS.items():
         data = bpy.data.lights.new(name, "AREA")
-        data.energy, data.size = watts, width
+        data.energy = watts
+        data.size = width
         lamp = bpy.data.objects.new(name, data)
         scene.collection.objects.link(lamp)
         lamp.location = place
         toward = lamp.constraints.new("TRACK_TO")
         toward.target = scene.objects.get("aim") or _aim(scene)
-        toward.track_axis, toward.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
+        toward.track_axis = "TRACK_NEGATIVE_Z"
+        toward.up_axis = "UP_Y"
 
 
 def _aim(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -217,19 +231,24 @@ def make_material(
     """Return a matt material of one linear colour, or mottled between two."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
     surface = nodes["Principled BSDF"]
     surface.inputs["Base Color"].default_value = (*color, 1)
     surface.inputs["Roughness"].default_value = 0.7
     if second is None:
         return material
-    place, mapping = nodes.new("ShaderNodeNewGeometry"), nodes.new("ShaderNodeMapping")
-    noise, ramp = nodes.new("ShaderNodeTexNoise"), nodes.new("ShaderNodeValToRGB")
+    place = nodes.new("ShaderNodeNewGeometry")
+    mapping = nodes.new("ShaderNodeMapping")
+    noise = nodes.new("ShaderNodeTexNoise")
+    ramp = nodes.new("ShaderNodeValToRGB")
     mapping.inputs["Scale"].default_value = stretch
     noise.inputs["Scale"].default_value = 2.0
     noise.inputs["Detail"].default_value = 2.0
-    ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[1].position = 0.4, 0.6
-    ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (*color, 1), (*second, 1)
+    ramp.color_ramp.elements[0].position = 0.4
+    ramp.color_ramp.elements[1].position = 0.6
+    ramp.color_ramp.elements[0].color = (*color, 1)
+    ramp.color_ramp.elements[1].color = (*second, 1)
     links.new(place.outputs["Position"], mapping.inputs["Vector"])
     links.new(mapping.outputs["Vector"], noise.inputs["Vector"])
     links.new(noise.outputs["Fac"], ramp.inputs["Fac"])

@@ -21,7 +21,8 @@ SIZE = (640, 480)
 INTRINSICS = np.array([[940.0, 0.0, 319.5], [0.0, 940.0, 239.5], [0.0, 0.0, 1.0]])
 BETAS = np.zeros(10)
 _TILT = np.radians(6.3)  # the camera looks slightly down
-_HEIGHT, _DISTANCE = 1.45, 4.9
+_HEIGHT = 1.45
+_DISTANCE = 4.9
 
 WORLD_FROM_CAMERA = world_from_level_camera(
     np.array([0.0, -np.cos(_TILT), -np.sin(_TILT)]), _HEIGHT
@@ -100,7 +101,8 @@ def write_truth(path: Path, body: Body, shot: Shot) -> None:
     R_world, t_world = body.forward_kinematics(shot.rotations, shot.trans, shot.betas)
     joints_cam = shot.to_camera(t_world)
     skin_cam = shot.to_camera(body.keypoints(R_world, t_world, shot.betas))
-    joint, point = body.joint_names.index, body.keypoint_set("blazepose")
+    joint = body.joint_names.index
+    point = body.keypoint_set("blazepose")
     named = {
         s[0].upper() + k: joints_cam[:, joint(f"{s}_{v}")] for k, v in LIMBS.items() for s in _SIDES
     }

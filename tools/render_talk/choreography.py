@@ -33,9 +33,11 @@ _SPEECH = (
     (1.55, 0),
     (1.75, 3),
 )
-_SURPRISE, _SMILE = GRIMACES[3], GRIMACES[0]
+_SURPRISE = GRIMACES[3]
+_SMILE = GRIMACES[0]
 # seconds; weights frame by frame
-_BLINKS, _BLINK = (0.55, 1.5, 3.15), (0.35, 0.9, 1.0, 0.75, 0.4, 0.15)
+_BLINKS = (0.55, 1.5, 3.15)
+_BLINK = (0.35, 0.9, 1.0, 0.75, 0.4, 0.15)
 
 
 def body_motion(
@@ -57,7 +59,8 @@ def body_motion(
 
 def face_motion(times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the weights (T, 52) of the expressions."""
-    weights, fps = np.zeros((len(times), len(EXPRESSIONS))), 1.0 / (times[1] - times[0])
+    weights = np.zeros((len(times), len(EXPRESSIONS)))
+    fps = 1.0 / (times[1] - times[0])
     for start, sound in _SPEECH:
         add_pose(weights, VISEMES[sound], round(start * fps), round(0.24 * fps), 1.1)
     add_pose(weights, _SURPRISE, round(2.1 * fps), round(0.95 * fps), 0.9)
@@ -66,10 +69,8 @@ def face_motion(times: NDArray[np.float64]) -> NDArray[np.float64]:
     left = 0.5 * np.sin(np.pi * np.clip((times - 1.0) / 0.9, 0, 1))
     weights = np.array([with_gaze(w, -a, 0.0) for w, a in zip(weights, left, strict=True)])
     for start in _BLINKS:
-        rows, eyes = (
-            round(start * fps) + np.arange(len(_BLINK)),
-            [INDEX["eyeBlinkLeft"], INDEX["eyeBlinkRight"]],
-        )
+        rows = round(start * fps) + np.arange(len(_BLINK))
+        eyes = [INDEX["eyeBlinkLeft"], INDEX["eyeBlinkRight"]]
         weights[np.ix_(rows, eyes)] = np.maximum(
             weights[np.ix_(rows, eyes)], np.array(_BLINK)[:, None]
         )
@@ -77,10 +78,8 @@ def face_motion(times: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _upper_body() -> dict[str, list[Key]]:
-    ready, raised = (
-        arm_pose(-76, ahead=12, twist=-68, elbow=139),
-        arm_pose(-66, ahead=20, twist=-80, elbow=142),
-    )
+    ready = arm_pose(-76, ahead=12, twist=-68, elbow=139)
+    raised = arm_pose(-66, ahead=20, twist=-80, elbow=142)
     shrug = arm_pose(-74, ahead=14, twist=-78, elbow=124)
     right = [
         (0.0, ready),

@@ -23,7 +23,8 @@ from .shot import TalkShot
 _OVER = 2  # pixels are drawn so many times finer
 _LOOK = 8  # seed of the colours
 _LIGHTS = np.array([[-0.5, -0.7, -0.5], [0.8, -0.2, -0.6]])  # directions to them, camera frame
-_STRENGTH, _AMBIENT = np.array([0.55, 0.18]), 0.42
+_STRENGTH = np.array([0.55, 0.18])
+_AMBIENT = 0.42
 _CONCAVE = 100.0  # per metre: how much darker hollows are
 
 
@@ -31,8 +32,11 @@ class PersonPainter:
     """Draws the person of a shot over a picture of the room."""
 
     def __init__(self, body: Body, shot: TalkShot, room: NDArray[np.uint8]) -> None:
-        self._body, self._shot, self._room = body, shot, room.astype(float)
-        self._triangles, self._colors = body.triangles(), _colors(body)
+        self._body = body
+        self._shot = shot
+        self._room = room.astype(float)
+        self._triangles = body.triangles()
+        self._colors = _colors(body)
         self._edges = np.concatenate([body.faces[:, [k, (k + 1) % 4]] for k in range(4)])
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
@@ -80,7 +84,8 @@ def _colors(body: Body) -> NDArray[np.float32]:
     """Return the colour (F', 3) of each triangle, sRGB 0..1."""
     assert body.face_material is not None  # the built-in bodies have materials
     assert body.material_colors is not None
-    look, names = draw_look(body, np.random.default_rng(_LOOK)), list(body.material_names)
+    look = draw_look(body, np.random.default_rng(_LOOK))
+    names = list(body.material_names)
     colors = np.asarray(body.material_colors)[body.face_material, :3].astype(float)
     skin = body.face_material == names.index("skin")
     colors[skin] = look.skin[body.faces[skin]].mean(axis=1)

@@ -16,10 +16,14 @@ from ..render_sample.truth import Shot, write_truth
 from .choreography import DURATION, body_motion, face_motion
 
 FOLDER = Path(__file__).resolve().parents[2] / "build" / "talk"
-VIDEO, TRUTH = "talk.mp4", "talk_truth.npz"
-FPS, SIZE = 30, (512, 512)
+VIDEO = "talk.mp4"
+TRUTH = "talk_truth.npz"
+FPS = 30
+SIZE = (512, 512)
 INTRINSICS = np.array([[850.0, 0.0, 255.5], [0.0, 850.0, 255.5], [0.0, 0.0, 1.0]])
-_TILT, _HEIGHT, _DISTANCE = np.radians(3.0), 1.41, 1.72
+_TILT = np.radians(3.0)
+_HEIGHT = 1.41
+_DISTANCE = 1.72
 
 
 @dataclass(frozen=True)

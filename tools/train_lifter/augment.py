@@ -48,7 +48,9 @@ JOINT_NOISE = {
 }
 JOINT_NOISE |= {"ankle": 0.2, "foot": 0.1, "spine": 0.08, "neck": 0.15, "head": 0.2}
 UNTURNED_SHARE = 0.25  # of the samples that are not natural, those whose joints are not rotated
-LEAN, STRONG_LEAN, STRONG_LEAN_SHARE = math.radians(7.0), math.radians(45.0), 0.1
+LEAN = math.radians(7.0)
+STRONG_LEAN = math.radians(45.0)
+STRONG_LEAN_SHARE = 0.1
 NATURAL_LEAN = 0.4  # factor on the lean of natural samples
 STRAIGHTENED_SHARE = 0.8  # of the samples of people who stand, those whose legs are straightened
 STRAIGHTENED_PART = (0.4, 1.0)  # of the flexion that is taken out
@@ -56,7 +58,9 @@ STRAIGHTENED_DEG = 22.0  # up to which a knee is bent because of the recording, 
 SQUAT_SHARE = 0.35  # of the samples of people who stand, those who squat, ...
 SQUAT_DEG = (0.0, 80.0)  # ... whose thighs pitch forward by this in the middle of the window, ...
 SQUAT_SPEED_DEG_S = 40.0  # ... and turn by this per second, one standard deviation
-SHANK_PITCH, TRUNK_PITCH = (0.25, 0.75), (0.0, 0.8)  # forward, of the thigh's
+# forward, of the thigh's
+SHANK_PITCH = (0.25, 0.75)
+TRUNK_PITCH = (0.0, 0.8)
 LEGS_DIFFER = 0.1  # spread of the factor between the pitches of the two legs
 # of the squats, those in which arms are stretched forward, as people do to keep their balance
 ARMS_AHEAD_SHARE = 0.4
@@ -84,8 +88,11 @@ class PoseSampler:
         segment_spread: float = 0.0,
         device: str = "cpu",
     ) -> None:
-        self.natural_share, self.segment_spread, self.device = natural_share, segment_spread, device
-        names, on_device = body.joint_names, partial(constant, device=device)
+        self.natural_share = natural_share
+        self.segment_spread = segment_spread
+        self.device = device
+        names = body.joint_names
+        on_device = partial(constant, device=device)
         self.joint_count = len(names)
         self._states = on_device(motions.Omega).reshape(-1, 3, 3)  # row F·24 + k
         self._cumulative = on_device(np.cumsum(motions.share), dtype=torch.float64)
@@ -117,8 +124,10 @@ class PoseSampler:
         ]
         self._segment = on_device(segment, dtype=torch.long)
         at = list(body.keypoint_set("blazepose").values())
-        self._bones, self._bone_shapes = on_device(body.l), on_device(body.S)
-        self._keypoints, self._keypoint_shapes = on_device(body.v_bar[at]), on_device(body.V[at])
+        self._bones = on_device(body.l)
+        self._bone_shapes = on_device(body.S)
+        self._keypoints = on_device(body.v_bar[at])
+        self._keypoint_shapes = on_device(body.V[at])
 
     def mirror(self, Omega: Tensor) -> Tensor:
         """Return the mirror image of poses (..., 24, 3, 3) about the body's (and the world's) x =
@@ -146,7 +155,8 @@ class PoseSampler:
         """
         natural = chance(self._fps, self.natural_share, n)
         frames, mirrored = self._windows(n)
-        frames, mirrored = frames[:, :, None].expand(-1, -1, self.joint_count), mirrored[:, None]
+        frames = frames[:, :, None].expand(-1, -1, self.joint_count)
+        mirrored = mirrored[:, None]
         for part, share in self._parts:
             other, other_mirrored = self._windows(n)
             taken = (chance(self._fps, share, n) & ~natural)[:, None] & part
@@ -319,7 +329,8 @@ def rotation_matrices(phi: Tensor) -> Tensor:
     """Return exp of rotation vectors (..., 3), radians: I + sin θ/θ [φ] + (1 − cos θ)/θ² [φ]²."""
     x, y, z = phi.unbind(-1)
     theta = torch.sqrt(x * x + y * y + z * z) + 1e-8
-    a, b = torch.sin(theta) / theta, (1 - torch.cos(theta)) / (theta * theta)
+    a = torch.sin(theta) / theta
+    b = (1 - torch.cos(theta)) / (theta * theta)
     rows = [1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y]
     rows += [b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x]
     rows += [b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)]

@@ -25,9 +25,13 @@ FARTHEST_M = 12.0
 PITCH_LIMITS = (math.radians(-15.0), math.radians(45.0))
 # Most cameras are hand-held or on a stand: their pitch towards a person follows from height and
 # distance.
-HELD_SHARE, HELD_HEIGHT_M, HELD_SPREAD_M, LOWEST_M = 0.7, 1.3, 0.4, 0.1
+HELD_SHARE = 0.7
+HELD_HEIGHT_M = 1.3
+HELD_SPREAD_M = 0.4
+LOWEST_M = 0.1
 HEIGHTS_M = (0.3, 3.0)  # see `Variety.any_height_share`
-ROLL_SPREAD, ROLLED_SPREAD = math.radians(3.0), math.radians(15.0)
+ROLL_SPREAD = math.radians(3.0)
+ROLLED_SPREAD = math.radians(15.0)
 # one standard deviation, of x/z, y/z and the logarithm of the distance
 DRIFT_PER_S = (0.1, 0.03, 0.08)
 CUT_SHORT_SHARE = 0.06  # of the windows, those truncated at a clip's start, and as many at its end
@@ -91,14 +95,13 @@ class Dataset:
     def __init__(
         self, body: Body, motions: Motions, variety: Variety | None = None, device: str = "cpu"
     ) -> None:
-        self.variety, self.device = variety or Variety(), device
+        self.variety = variety or Variety()
+        self.device = device
         self.sampler = PoseSampler(
             body, motions, self.variety.natural_share, self.variety.segment_spread, device
         )
-        on_device, indices = (
-            partial(constant, device=device),
-            partial(constant, device=device, dtype=torch.long),
-        )
+        on_device = partial(constant, device=device)
+        indices = partial(constant, device=device, dtype=torch.long)
         self._part = indices(body.keypoint_part[list(body.keypoint_set("blazepose").values())])
         parents = np.asarray(body.parents)
         depth = np.zeros(len(parents), int)
@@ -124,7 +127,8 @@ class Dataset:
             `PoseSampler.proportions`; displaced: (n, 33, 3) metres.
         :return: (n, W, 33, 3) twice, in the axes of the root's parent, root joint at 0.
         """
-        R, t = torch.empty_like(Omega), torch.zeros_like(Omega[..., 0])
+        R = torch.empty_like(Omega)
+        t = torch.zeros_like(Omega[..., 0])
         R[:, :, 0] = Omega[:, :, 0]
         for joints, parents in self._levels:
             R_parent = R[:, :, parents]
@@ -146,7 +150,9 @@ class Dataset:
 
     def _before_camera(self, points: Tensor, seen: Tensor) -> Scene:
         """Place people (n, WINDOW, 33, 3), y up, before random cameras."""
-        v, n, middle = self.variety, len(points), hip_center(points)
+        v = self.variety
+        n = len(points)
+        middle = hip_center(points)
         x, y = (uniform(points, (-limit, limit), n) for limit in v.field)
         distance = torch.exp(uniform(points, (math.log(v.nearest_m), math.log(FARTHEST_M)), n))
         above_floor = middle[:, MIDDLE, 0, 1] - points[:, MIDDLE, :, 1].amin(1)
@@ -168,7 +174,8 @@ class Dataset:
 
     def batch(self, n: int) -> Batch:
         """Draw n samples."""
-        scene, persistence = self.scene(n), Persistence.draw(n, self.device)
+        scene = self.scene(n)
+        persistence = Persistence.draw(n, self.device)
         rays = scene.seen[..., :2] / scene.seen[..., 2:].clamp(min=NEAREST_DEPTH_M)
         errors, confidence = detector_noise.image_errors(persistence)
         # Landmark networks see a crop, as of a camera that points at the person.
@@ -203,7 +210,8 @@ def cut_short(x: Tensor, moments: Tensor, still_share: float) -> Tensor:
         chance(x, CUT_SHORT_SHARE, n), MIDDLE + (end * (WINDOW - MIDDLE)).long(), WINDOW - 1
     )
     still = chance(x, still_share, n)
-    first, last = torch.where(still, MIDDLE, first), torch.where(still, MIDDLE, last)
+    first = torch.where(still, MIDDLE, first)
+    last = torch.where(still, MIDDLE, last)
     rows = torch.minimum(torch.maximum(moments[None], first[:, None]), last[:, None])
     return x.gather(1, rows[..., None].expand(-1, -1, x.shape[-1]))
 
@@ -232,7 +240,8 @@ def cameras(pitch: Tensor, rolled_share: float = 0.0) -> Tensor:
 
     :param pitch: (n,) radians;  rolled_share: see `Variety`.
     """
-    n, zero = len(pitch), torch.zeros_like(pitch)
+    n = len(pitch)
+    zero = torch.zeros_like(pitch)
     roll = torch.where(chance(pitch, rolled_share, n), ROLLED_SPREAD, ROLL_SPREAD) * normal(
         pitch, n
     )

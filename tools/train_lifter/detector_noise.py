@@ -29,7 +29,9 @@ from .network_input import hip_center
 
 # Metres, one standard deviation per coordinate, of a person's keypoint offsets.
 PLACEMENT = np.full(33, 0.012)
-PLACEMENT[[11, 12]], PLACEMENT[[23, 24]], PLACEMENT[25:33] = 0.02, 0.025, 0.015
+PLACEMENT[[11, 12]] = 0.02
+PLACEMENT[[23, 24]] = 0.025
+PLACEMENT[25:33] = 0.015
 MEAN_OFFSETS = np.array([offset(name) for name in KEYPOINT_NAMES])
 OFFSETS_FACTOR = (-0.5, 1.5)  # per person, on MEAN_OFFSETS, where they are used
 # of the person's size s (see lifter.py), times a factor per sample of exp(N(0, 0.5))
@@ -45,15 +47,21 @@ CONFIDENCE_LASTS = 0.7  # of the keypoints keep their confidence through the win
 # World landmarks. Depth is mostly too small: on renders by a factor of 0.3 for arms, 0.6 for trunk
 # and legs.
 UNKNOWN_SHARE = 0.3
-TILT, TURN = math.radians(10.0), math.radians(9.0)
+TILT = math.radians(10.0)
+TURN = math.radians(9.0)
 SCALE_SPREAD = 0.07
-ARM_GAIN, LEG_GAIN, TRUNK_GAIN, SHOULDER_GAIN = (0.2, 1.1), (0.5, 1.1), (0.4, 1.1), (0.6, 1.1)
+ARM_GAIN = (0.2, 1.1)
+LEG_GAIN = (0.5, 1.1)
+TRUNK_GAIN = (0.4, 1.1)
+SHOULDER_GAIN = (0.6, 1.1)
 LIMB_DEPTH = 0.25  # error of a bone's slope in depth, over its length
 LIMB_ACROSS = 0.1
 WORLD_NOISE_M = 0.012
 FLIP_SHARE = 0.05  # per limb: its depth relative to shoulder or hip has the wrong sign
 FLIP_LASTS = 0.8  # of the window's moments
-CONSTANT_SHARE, KEPT = (0.2, 0.8), (0.4, 0.9)  # see `Persistence`
+# see `Persistence`
+CONSTANT_SHARE = (0.2, 0.8)
+KEPT = (0.4, 0.9)
 
 # Each limb from the trunk outwards, with the keypoints attached to its ends.
 LIMBS = (
@@ -62,7 +70,9 @@ LIMBS = (
     ((23, 25), (25, 27), (27, 29), (27, 31)),
     ((24, 26), (26, 28), (28, 30), (28, 32)),
 )
-_ARMS, _LEGS = (11, 23), (23, 33)  # first keypoint and one past the last, left and right in turn
+# first keypoint and one past the last, left and right in turn
+_ARMS = (11, 23)
+_LEGS = (23, 33)
 
 
 @dataclass(frozen=True)
@@ -119,8 +129,10 @@ def image_errors(persistence: Persistence) -> tuple[Tensor, Tensor]:
     """Draw errors (n, WINDOW, 33, 2) of 2D keypoints, in units of the person's size s, and
     confidences.
     """
-    like, n = persistence.constant, len(persistence.constant)
-    (constant, lasting), (white, passing) = moment_errors(like, n), moment_errors(like, n, WINDOW)
+    like = persistence.constant
+    n = len(persistence.constant)
+    (constant, lasting) = moment_errors(like, n)
+    (white, passing) = moment_errors(like, n, WINDOW)
     keeps = chance(like, CONFIDENCE_LASTS, n, 1, 33)
     return persistence.mix(constant[:, None], white), torch.where(keeps, lasting[:, None], passing)
 
@@ -131,7 +143,8 @@ def moment_errors(like: Tensor, *n: int) -> tuple[Tensor, Tensor]:
     """
     one = (0.0, 1.0)
     unsure = uniform(like, one, *n, 33) > CONFIDENT_SHARE + 0.18 * uniform(like, one, *n, 1)
-    doubtful, sure = uniform(like, one, *n, 33) ** 0.7, 1 - 0.1 * uniform(like, one, *n, 33) ** 2
+    doubtful = uniform(like, one, *n, 33) ** 0.7
+    sure = 1 - 0.1 * uniform(like, one, *n, 33) ** 2
     confidence = torch.where(unsure, doubtful, sure)
     # Half of the error of a hand or foot is that of the joint before it.
     own = normal(like, *n, 33, 2)
@@ -157,7 +170,8 @@ def cut_by_edge(
     angle = 0.5 * math.pi * sum((drawn >= share).float() for share in CUT_UP_TO)
     outwards = torch.stack([torch.sin(angle), torch.cos(angle)], 1)[:, None, None]  # y down
     height = (rays * outwards).sum(-1)
-    low, high = height[:, MIDDLE].amin(1), height[:, MIDDLE].amax(1)
+    low = height[:, MIDDLE].amin(1)
+    high = height[:, MIDDLE].amax(1)
     edge = low + uniform(rays, (0.35, 1.0), n) * (high - low)
     beyond = (height - edge[:, None, None]).clamp(min=0) * chance(rays, CUT_SHARE, n)[:, None, None]
     guess = persistence.normal(33, 2) * (0.5 * beyond[..., None])
@@ -168,7 +182,8 @@ def cut_by_edge(
 
 def swap_sides(rays: Tensor) -> Tensor:
     """Swap left and right of the arms or the legs of some people (n, WINDOW, 33, 2)."""
-    n, parts = len(rays), [rays[:, :, : _ARMS[0]]]
+    n = len(rays)
+    parts = [rays[:, :, : _ARMS[0]]]
     for first, end in (_ARMS, _LEGS):
         swapped = chance(rays, SWAP_SHARE, n, 1) & chance(rays, SWAP_LASTS, n, WINDOW)
         group = rays[:, :, first:end]
@@ -212,10 +227,12 @@ def _flattened_trunk(points: Tensor, persistence: Persistence) -> list[Tensor]:
     """Return each keypoint (n, WINDOW, 3) after the trunk has tilted in depth as one; shoulders
     turn too little.
     """
-    n, hips = len(points), hip_center(points)
+    n = len(points)
+    hips = hip_center(points)
     upper = points[:, :, :23] - hips
     middle = upper[:, :, 11:13, 2].mean(2, keepdim=True)
-    shoulders, trunk = uniform(points, SHOULDER_GAIN, n, 1, 1), uniform(points, TRUNK_GAIN, n, 1, 1)
+    shoulders = uniform(points, SHOULDER_GAIN, n, 1, 1)
+    trunk = uniform(points, TRUNK_GAIN, n, 1, 1)
     depth = (upper[..., 2] - middle) * shoulders + middle * trunk
     z = hips[..., 2] + depth + 0.1 * persistence.normal(1) * upper[..., 1]
     upper_points = torch.cat([points[:, :, :23, :2], z[..., None]], -1)

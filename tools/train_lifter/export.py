@@ -76,7 +76,8 @@ def export(network: LiftingNetwork, path: Path) -> None:
     array = lambda tensor: tensor.detach().numpy().astype(np.float32)  # noqa: E731
     x = g.add("Sub", ["input", g.constant("mean", array(network.mean))], "centred")
     x = g.add("Div", [x, g.constant("spread", array(network.spread))], "normalized")
-    width, moments = network.leave.in_features, WINDOW
+    width = network.leave.in_features
+    moments = WINDOW
     x = g.reshape(x, "rows", -1, INPUT_SIZE)
     x = g.linear(x, "enter", array(network.enter.weight), array(network.enter.bias))
     for k, merge in enumerate(network.merges):
@@ -98,7 +99,9 @@ def export(network: LiftingNetwork, path: Path) -> None:
         y = g.linear(y, f"second{k}", array(block.second.weight), array(block.second.bias))
         x = g.add("Add", [x, y], f"sum{k}")
     x = g.norm(x, "norm", network.norm)
-    weight, bias, n = array(network.leave.weight), array(network.leave.bias), KEYPOINT_COUNT * 3
+    weight = array(network.leave.weight)
+    bias = array(network.leave.bias)
+    n = KEYPOINT_COUNT * 3
     points = g.linear(x, "flat_points", weight[:n], bias[:n])
     g.add(
         "Reshape", [points, g.constant("points_shape", np.array([-1, KEYPOINT_COUNT, 3]))], "points"

@@ -24,7 +24,8 @@ VARIETIES = {
         nearest_m=1.2, field=(0.75, 0.5), any_height_share=0.5, focal_spread=0.35
     ),
 }
-SEED, COUNT = 99, 8192
+SEED = 99
+COUNT = 8192
 _AT_ONCE = 2048
 # shoulders, elbows, wrists, knees, ankles; the hips' centre is the origin
 _LIMBS = [*range(11, 17), *range(25, 29)]
@@ -37,7 +38,8 @@ def held_out_batches(
     """Draw ``count`` windows of the held-out frames in each of the `VARIETIES`; sets the device's
     generator.
     """
-    held_out, batches = held_out_frames(motions), {}
+    held_out = held_out_frames(motions)
+    batches = {}
     for name, variety in VARIETIES.items():
         torch.manual_seed(SEED)
         batches[name] = Dataset(body, held_out, variety, device).batch(count)

@@ -139,12 +139,15 @@ def load_motions(path: Path) -> Motions:
         raise MotionFileError(
             f"{path}: has no kinds of motion; python -m scope.tools.mocap.fit_body makes a new file"
         )
-    poses, valid, start = data["poses"], data["valid"], data["take_start"]
+    poses = data["poses"]
+    valid = data["valid"]
+    start = data["take_start"]
     take = np.repeat(np.arange(len(start) - 1), np.diff(start))[valid]
     performers = np.array(
         [group_of(*names) for names in zip(data["take_source"], data["take_subject"], strict=True)]
     )
-    kinds, sets = data["take_kind"], data["take_set"]
+    kinds = data["take_kind"]
+    sets = data["take_set"]
     unknown = sorted({*kinds} - {*KIND_SHARES} | {*sets} - {*REPEATED})
     if unknown:
         raise MotionFileError(

@@ -8,16 +8,20 @@ from torch import Tensor, nn
 
 from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT, WINDOW
 
-WIDTH, BLOCKS = 512, 6
+WIDTH = 512
+BLOCKS = 6
 MERGES = 2  # 9 moments, 3, 1
 assert 3**MERGES == WINDOW
 # The loss of a bone of 0.14 rad error, the mean over all bones, has the same gradient as 2 (1 −
 # cos).
 DIRECTION_WEIGHT = 0.3
 LOG_SIGMA_RANGE = (-5.5, 0.5)  # 4 mm .. 1.6 m
-_ARMS, _LEGS = [(11, 13), (13, 15), (12, 14), (14, 16)], [(23, 25), (25, 27), (24, 26), (26, 28)]
+_ARMS = [(11, 13), (13, 15), (12, 14), (14, 16)]
+_LEGS = [(23, 25), (25, 27), (24, 26), (26, 28)]
 BONES = (*_ARMS, *_LEGS, (11, 12), (23, 24), (11, 23), (12, 24))  # start and end
-LIMB_BONES, TRUNK_BONES = slice(0, 8), slice(10, 12)  # of BONES
+# of BONES
+LIMB_BONES = slice(0, 8)
+TRUNK_BONES = slice(10, 12)
 
 
 class Block(nn.Module):
@@ -25,11 +29,9 @@ class Block(nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.norm, self.first, self.second = (
-            nn.LayerNorm(width),
-            nn.Linear(width, width),
-            nn.Linear(width, width),
-        )
+        self.norm = nn.LayerNorm(width)
+        self.first = nn.Linear(width, width)
+        self.second = nn.Linear(width, width)
         nn.init.zeros_(self.second.weight)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -44,11 +46,9 @@ class Merge(nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.norm, self.first, self.second = (
-            nn.LayerNorm(width),
-            nn.Linear(3 * width, width),
-            nn.Linear(width, width),
-        )
+        self.norm = nn.LayerNorm(width)
+        self.first = nn.Linear(3 * width, width)
+        self.second = nn.Linear(width, width)
         nn.init.zeros_(self.second.weight)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -84,7 +84,8 @@ class LiftingNetwork(nn.Module):
         """Return points and log σ."""
         moments = self.merges(self.enter((x - self.mean) / self.spread))
         out = self.leave(self.norm(self.blocks(moments[:, 0]))).float()
-        points, log_sigma = out[:, : KEYPOINT_COUNT * 3], out[:, KEYPOINT_COUNT * 3 :]
+        points = out[:, : KEYPOINT_COUNT * 3]
+        log_sigma = out[:, KEYPOINT_COUNT * 3 :]
         log_sigma = log_sigma.reshape(-1, KEYPOINT_COUNT, 2) - 3.0
         return points.reshape(-1, KEYPOINT_COUNT, 3), log_sigma.clamp(
             *LOG_SIGMA_RANGE

@@ -47,7 +47,8 @@ def network_input(
     R = virtual_camera(rays)
     view = rays @ R[..., :2].transpose(-1, -2) + R[..., None, :, 2]
     u = view[..., :2] / view[..., 2:].clamp(min=0.1)
-    s, known = person_size(u)[..., None], known[..., None]
+    s = person_size(u)[..., None]
+    known = known[..., None]
     parts = [
         (u.flatten(-2) / s).clamp(-6.0, 6.0),
         confidence,

@@ -41,7 +41,8 @@ def normal_equations(body: Body, motion: Motion) -> tuple[NDArray[np.float64], N
     """Return the normal equations (33, 3, 3), (33, 3) of one motion, left and right combined."""
     at = body.keypoint_set("blazepose")
     indices = [at[name] for name in KEYPOINT_NAMES]
-    part, betas = body.keypoint_part[indices], motion.betas.astype(float)
+    part = body.keypoint_part[indices]
+    betas = motion.betas.astype(float)
     rotations = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
     rotations[:, 0] = np.swapaxes(motion.world_from_camera[:, :3, :3], 1, 2) @ rotations[:, 0]
     R, t = body.forward_kinematics(
@@ -49,8 +50,10 @@ def normal_equations(body: Body, motion: Motion) -> tuple[NDArray[np.float64], N
     )
     points = body.keypoints(R, t, betas, indices)
     order = [motion.keypoints2d_names.tolist().index(name) for name in KEYPOINT_NAMES]
-    pixels, confidence = motion.keypoints2d[:, order, :2], motion.keypoints2d[:, order, 2]
-    K, depth = motion.intrinsics, points[..., 2:]
+    pixels = motion.keypoints2d[:, order, :2]
+    confidence = motion.keypoints2d[:, order, 2]
+    K = motion.intrinsics
+    depth = points[..., 2:]
     left_over = (pixels - K[:2, 2]) / [K[0, 0], K[1, 1]] * depth - points[..., :2]
     weight = confidence * motion.valid[:, None] * (np.linalg.norm(left_over, axis=-1) < FARTHEST_M)
     weight = weight / motion.valid.sum()
@@ -70,7 +73,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Find where the landmark network sees keypoints.")
     parser.add_argument("clips", type=Path, help="folder of the clips")
     folder: Path = parser.parse_args().clips
-    body, ablation = load_body("scope"), Ablation(keypoint_offsets=False)
+    body = load_body("scope")
+    ablation = Ablation(keypoint_offsets=False)
     everybody = []
     for clip in CLIPS:
         found = capture(

@@ -39,10 +39,15 @@ from .network import LiftingNetwork, loss
 from .split import training_frames
 
 BATCH = 4096
-PEAK_RATE, WARM_UP, DECAY = 1e-3, 300, 0.01
-BETAS, LARGEST_GRADIENT = (0.9, 0.98), 1.0
+PEAK_RATE = 1e-3
+WARM_UP = 300
+DECAY = 0.01
+BETAS = (0.9, 0.98)
+LARGEST_GRADIENT = 1.0
 MEAN_DECAY = 0.9995
-CHECKPOINT, NETWORK, LOG = "lifter.pt", "lifter.onnx", "log.json"
+CHECKPOINT = "lifter.pt"
+NETWORK = "lifter.onnx"
+LOG = "log.json"
 NORMALIZATION_COUNT = 8192  # windows from which the input's mean and spread are taken
 GRAPH_WARM_UP = 3  # runs before a CUDA graph is recorded, in which libraries allocate their memory
 
@@ -71,7 +76,8 @@ class Trainer:
         self, body: Body, motions: Motions, settings: Settings, start: Path | None, device: str
     ) -> None:
         torch.manual_seed(settings.seed)
-        self.settings, self.device = settings, device
+        self.settings = settings
+        self.device = device
         self.dataset = Dataset(body, training_frames(motions), settings.variety, device)
         self.network = LiftingNetwork() if start is None else read_weights(start)
         self.network.to(device)
@@ -90,7 +96,8 @@ class Trainer:
         )
         self.optimizer = self._optimizer()
         batch = self.dataset.batch(settings.batch)
-        self.input, self.points = batch.input, batch.points
+        self.input = batch.input
+        self.points = batch.points
         self._draw, self._step = (
             graphed(self._draw_batch, device),
             graphed(self._train_batch, device),
@@ -156,7 +163,8 @@ class Trainer:
         else:
             batch = self._ahead.result()
             self._ahead = self._draw_ahead(number + 1)
-            self.input, self.points = batch.input, batch.points
+            self.input = batch.input
+            self.points = batch.points
         self._step()
 
     def take_loss(self) -> float:
@@ -221,7 +229,8 @@ def train(
     held_out = held_out_batches(body, motions, device, COUNT)
     trainer = Trainer(body, motions, settings, start, device)
     log: list[dict[str, Any]] = []
-    began, since = time.perf_counter(), 0
+    began = time.perf_counter()
+    since = 0
     for step in range(settings.steps):
         trainer.step(step)
         since += 1

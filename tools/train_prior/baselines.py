@@ -89,7 +89,8 @@ def _log_c(s: NDArray[np.float64]) -> float:
         v = low + (high - low) * x
         u = 1.0 - 2.0 * v * v
         # i, j, k = 2, 3, 1: both Bessel arguments and the exponent, peak at u = 1 taken out
-        a, b = 0.5 * (s[1] - s[2]) * (1.0 - u), 0.5 * (s[1] + s[2]) * (1.0 + u)
+        a = 0.5 * (s[1] - s[2]) * (1.0 - u)
+        b = 0.5 * (s[1] + s[2]) * (1.0 + u)
         exponent = np.abs(a) + np.abs(b) + s[0] * u - (s[0] + s[1] + s[2])
         total.append(log_i0e(a) + log_i0e(b) + exponent + np.log(2.0 * w * (high - low) * v))
     all_terms = np.concatenate(total)
@@ -107,11 +108,14 @@ def matrix_fisher(rotations: NDArray[np.float64], weights: NDArray[np.float64]) 
     """Fit a matrix Fisher distribution to rotations (n, 3, 3) with probabilities (n,)."""
     U, d, Vt = np.linalg.svd(np.einsum("n,nij->ij", weights, rotations))
     if np.linalg.det(U) < 0:
-        U[:, 2], d[2] = -U[:, 2], -d[2]
+        U[:, 2] = -U[:, 2]
+        d[2] = -d[2]
     if np.linalg.det(Vt) < 0:
-        Vt[2], d[2] = -Vt[2], -d[2]
+        Vt[2] = -Vt[2]
+        d[2] = -d[2]
     s = _from_moments(d)
-    F, constant = U @ np.diag(s) @ Vt, _log_c(s)
+    F = U @ np.diag(s) @ Vt
+    constant = _log_c(s)
     return lambda omega: np.einsum("ij,nij->n", F, omega) - constant
 
 
@@ -149,7 +153,9 @@ def _from_moments(d: NDArray[np.float64]) -> NDArray[np.float64]:
             size *= 0.5
         else:
             return s
-        s, gain, best = trial, best - value, value
+        s = trial
+        gain = best - value
+        best = value
         if gain < 1e-10:
             return s
     return s

@@ -129,7 +129,8 @@ def load_samples(path: Path, joint_names: tuple[str, ...]) -> dict[str, Samples]
             "or ALWAYS"
         )
     lengths = np.diff(motions["take_start"])
-    group, source = np.repeat(groups, lengths), np.repeat(motions["take_source"], lengths)
+    group = np.repeat(groups, lengths)
+    source = np.repeat(motions["take_source"], lengths)
     within = np.concatenate([np.arange(n) for n in lengths])
     chosen = motions["valid"] & (within % STEP == 0)
     phi = motions["poses"].reshape(len(group), -1, 3).astype(np.float64)
@@ -139,10 +140,8 @@ def load_samples(path: Path, joint_names: tuple[str, ...]) -> dict[str, Samples]
             source, [name for name, models in MEASURED.items() if model in models]
         )
         joints = [model] if model in TRUNK else [f"left_{model}", f"right_{model}"]
-        first, second = (
-            exp(phi[keep, joint_names.index(joints[0])]),
-            exp(phi[keep, joint_names.index(joints[-1])]),
-        )
+        first = exp(phi[keep, joint_names.index(joints[0])])
+        second = exp(phi[keep, joint_names.index(joints[-1])])
         rotations = np.concatenate([first, mirrored(second)])
         out[model] = Samples(rotations, np.tile(group[keep], 2))
     return out

@@ -59,8 +59,10 @@ class Flow(torch.nn.Module):
         """Set up near the identity. means (G, 3, 3)."""
         super().__init__()
         g = torch.Generator().manual_seed(seed)
-        G, H = len(means), hidden
-        self.layers, self.hidden = layers, hidden
+        G = len(means)
+        H = hidden
+        self.layers = layers
+        self.hidden = hidden
         self.register_buffer("means", means)
 
         def small(*shape: int, scale: float) -> torch.nn.Parameter:
@@ -70,17 +72,14 @@ class Flow(torch.nn.Module):
         turns[:, 0] = torch.eye(3)
         self.A = torch.nn.Parameter(turns)
         self.b = small(3, scale=0.3)
-        self.W2, self.c2, self.out2 = (
-            small(H, scale=1.0),
-            small(H, scale=1.0),
-            small(2, H, scale=0.02),
-        )
-        self.W3, self.c3, self.out3 = (
-            small(H, 2, scale=0.7),
-            small(H, scale=1.0),
-            small(2, H, scale=0.02),
-        )
-        self.bias2, self.bias3 = small(2, scale=0.0), small(2, scale=0.0)
+        self.W2 = small(H, scale=1.0)
+        self.c2 = small(H, scale=1.0)
+        self.out2 = small(2, H, scale=0.02)
+        self.W3 = small(H, 2, scale=0.7)
+        self.c3 = small(H, scale=1.0)
+        self.out3 = small(2, H, scale=0.02)
+        self.bias2 = small(2, scale=0.0)
+        self.bias3 = small(2, scale=0.0)
         self.beta = small(3, scale=0.1)  # through STEEPEST tanh
         self.A_last = torch.nn.Parameter(torch.eye(3).repeat(G, 1, 1))
         self.b_last = torch.nn.Parameter(torch.zeros(G, 3))
@@ -91,7 +90,8 @@ class Flow(torch.nn.Module):
         """
         with torch.no_grad():
             for k, sample in enumerate(y):
-                mean, cov = sample.mean(0), sample.T.cov()
+                mean = sample.mean(0)
+                cov = sample.T.cov()
                 self.A[k, 0] = torch.linalg.inv(torch.linalg.cholesky(cov))
                 self.b[k, 0] = -self.A[k, 0] @ mean
 
@@ -108,7 +108,8 @@ class Flow(torch.nn.Module):
 
     def forward(self, y: Tensor) -> tuple[Tensor, Tensor]:
         """Return z (G, n, 3) and log |det dz/dy| (G, n)."""
-        x, logdet = y, torch.zeros(y.shape[:-1])
+        x = y
+        logdet = torch.zeros(y.shape[:-1])
         slope = self.slopes()
         for k in range(self.layers):
             x = x @ self.A[:, k].transpose(-1, -2) + self.b[:, None, k]

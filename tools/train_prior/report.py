@@ -50,7 +50,8 @@ def held_out(prior: JointPrior, samples: dict[str, Samples]) -> list[Row]:
     rows = []
     for model in MODELS:
         s = samples[model]
-        states, group = s.rotations[s.is_test], s.group[s.is_test]
+        states = s.rotations[s.is_test]
+        group = s.group[s.is_test]
         joint = model if model in TRUNK else f"left_{model}"
         flow = -prior.log_density(joint, states)
         if model not in TRUNK:  # the right joint on the mirror images is the same number
@@ -84,7 +85,8 @@ def _better(
     """Return the NLL (n,) of the test states under the better of the fits with frames equal and
     performers balanced.
     """
-    training, group = s.rotations[s.is_training], s.group[s.is_training]
+    training = s.rotations[s.is_training]
+    group = s.group[s.is_training]
     found = [-fit(training, balanced(group, balance))(states) for balance in (0.0, 0.7)]
     return min(found, key=np.mean)
 

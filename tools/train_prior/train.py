@@ -28,15 +28,19 @@ from .flow import Flow, chart
 from .rotation_statistics import balanced, blurred, mean_rotation
 
 SEED = 0
-LAYERS, HIDDEN = 4, 4
+LAYERS = 4
+HIDDEN = 4
 # degrees: fits of recordings with one axis scatter by 0.3; 3 hides a performer's habits
 BLURS = (0.3, 1.0, 3.0)
 PENALTIES = (0.05, 0.5)  # penalty on the squares of the parameters that make a layer nonlinear
-STEPS, BATCH, LEARNING_RATE = 800, 256, 3e-3
+STEPS = 800
+BATCH = 256
+LEARNING_RATE = 3e-3
 EVALUATE_EVERY = 50
 AVERAGE = 0.98  # of the parameters over steps
 # degrees of blur of a few samples, which gives every density some tail
-FAR, FAR_SHARE = 10.0, 0.005
+FAR = 10.0
+FAR_SHARE = 0.005
 BALANCE = 0.7  # a performer of n samples counts as n^(1 - BALANCE)
 CONDITIONERS = ("out2", "out3", "bias2", "bias3", "beta")
 
@@ -68,13 +72,12 @@ def train(
     averaged flow).
     """
     rng = np.random.default_rng(SEED)
-    training, chances = {}, {}
+    training = {}
+    chances = {}
     for model in {c.model: None for c in candidates}:
         used = samples[model].is_training & ~np.isin(samples[model].group, left_out)
-        training[model], chances[model] = (
-            samples[model].rotations[used],
-            balanced(samples[model].group[used], BALANCE),
-        )
+        training[model] = samples[model].rotations[used]
+        chances[model] = balanced(samples[model].group[used], BALANCE)
     means = {m: mean_rotation(training[m], chances[m]) for m in training}
     cumulative = {m: np.cumsum(p) for m, p in chances.items()}
     blur = np.array([c.blur for c in candidates])[:, None]

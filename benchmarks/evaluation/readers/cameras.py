@@ -17,9 +17,11 @@ def intrinsics_of_projection(
     :param pixels: (..., 2), u and v.
     :return: None where too few joints are in front of the camera, or the result is no camera.
     """
-    points, uv = joints.reshape(-1, 3), pixels.reshape(-1, 2)
+    points = joints.reshape(-1, 3)
+    uv = pixels.reshape(-1, 2)
     ahead = points[:, 2] > 0
-    points, uv = points[ahead], uv[ahead]
+    points = points[ahead]
+    uv = uv[ahead]
     if len(points) < 4:
         return None
     K = np.eye(3)

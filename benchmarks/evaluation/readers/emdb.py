@@ -50,7 +50,8 @@ def clips(folder: Path, models: Models) -> list[Clip]:
 
 def _truth(path: Path, frames: int, models: Models) -> Truth:
     table = read_table(path)
-    camera, smpl = _inner(path, table, "camera"), _inner(path, table, "smpl")
+    camera = _inner(path, table, "camera")
+    smpl = _inner(path, table, "smpl")
     T_camera_world = array(path, camera, "extrinsics", (None, 4, 4))
     count = len(T_camera_world)
     if count > frames:

@@ -59,7 +59,8 @@ def clips(folder: Path, models: Models) -> list[Clip]:
 
 def _features(subject: Path, name: str) -> Path:
     """Return the folder of one kind of poses, in either layout."""
-    usual, fetched = subject / "MyPoseFeatures" / name, subject / f"Poses_{name}"
+    usual = subject / "MyPoseFeatures" / name
+    fetched = subject / f"Poses_{name}"
     return fetched if fetched.is_dir() else existing_folder(usual, "the 3D positions of Human3.6M")
 
 

@@ -69,14 +69,14 @@ def _truth(folder: Path, sequence: str, camera: str, pictures: list[Path], model
         raise DatasetError(
             f"{bodies} and {pictures[0].parent} have no frame in common; extract both again"
         )
-    poses, trans, betas = [], [], []
+    poses = []
+    trans = []
+    betas = []
     for row in rows:
         path = by_frame[names[row]]
         table = read_table(path)
-        orient, posed = (
-            array(path, table, "global_orient", (1, 3)),
-            array(path, table, "body_pose", (1, 63)),
-        )
+        orient = array(path, table, "global_orient", (1, 3))
+        posed = array(path, table, "body_pose", (1, 63))
         poses.append(np.concatenate([orient, posed], axis=1)[0])
         trans.append(metres(path, "transl", array(path, table, "transl", (1, 3)))[0])
         betas.append(array(path, table, "betas", (1, None))[0][:10])

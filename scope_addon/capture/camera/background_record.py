@@ -78,7 +78,9 @@ class BackgroundRecord:
             optical axis do not change.
         :param image_size: (width, height) in pixels.
         """
-        known, R, times = self.known, self.R_first_camera.copy(), self.times
+        known = self.known
+        R = self.R_first_camera.copy()
+        times = self.times
         if known.sum() < 2:
             return CameraMotion(np.tile(np.eye(3), (len(R), 1, 1)), np.zeros(len(R), bool))
         ratio = followed_with.intrinsics[0, 0] / camera.intrinsics[0, 0]
@@ -138,10 +140,15 @@ def joined_backgrounds(
     :param firsts: of each window, how many of its frames are also the last ones of the window
         before.
     """
-    whole, G = parts[0], np.eye(3)
-    rotations, known = [whole.R_first_camera], [whole.known]
-    times, shares = [whole.times], list(whole.inlier_shares)
-    edges, bars, rows = list(whole.edge_frames), whole.bars, len(whole.times)
+    whole = parts[0]
+    G = np.eye(3)
+    rotations = [whole.R_first_camera]
+    known = [whole.known]
+    times = [whole.times]
+    shares = list(whole.inlier_shares)
+    edges = list(whole.edge_frames)
+    bars = whole.bars
+    rows = len(whole.times)
     for before, part, first in zip(parts, parts[1:], firsts[1:], strict=False):
         G = G @ _link(before, part, first)
         rotations[-1] = _faded(
@@ -178,7 +185,8 @@ def _faded(
     n = len(R_after)
     if not n or n > len(R):
         return R
-    out, rows = R.copy(), np.flatnonzero(known[-n:] & known_after)
+    out = R.copy()
+    rows = np.flatnonzero(known[-n:] & known_after)
     before = R[len(R) - n + rows]
     share = (rows[:, None] + 1) / (n + 1)
     out[len(R) - n + rows] = before @ exp(share * log(np.swapaxes(before, 1, 2) @ R_after[rows]))

@@ -24,7 +24,9 @@ MAX_BRIGHT_SHARE = 0.01  # of a line of a black bar
 MIN_EDGE_SHARE = 0.25
 EDGE_PX = 6  # width of a black bar's edge
 # Any other bar ends in a step along one line of pixels, and has little detail.
-MIN_STEP, MIN_STEP_SHARE = 8, 0.7  # of 255; and the share of the line
+# of 255; and the share of the line
+MIN_STEP = 8
+MIN_STEP_SHARE = 0.7
 MAX_DETAIL = 0.2  # of the picture's, on average
 
 
@@ -34,7 +36,8 @@ def find_bars(image_rgb: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
     :param image_rgb: (H, W, 3).
     :return: (4,) x0, y0, x1, y1 in pixels of each bar, up to the picture between them.
     """
-    bright, grey = image_rgb.max(axis=2) > DARK, cv2.cvtColor(image_rgb, cv2.COLOR_RGB2GRAY)
+    bright = image_rgb.max(axis=2) > DARK
+    grey = cv2.cvtColor(image_rgb, cv2.COLOR_RGB2GRAY)
     height, width = bright.shape
     bars = []
     left, right = _black_bars(bright.mean(axis=0)) or _other_bars(grey) or (0, 0)
@@ -70,11 +73,14 @@ def _black_bars(bright: NDArray[np.floating[Any]]) -> tuple[int, int] | None:
     """Return the widths of black bars at both ends of n lines, from the share (n,) of bright pixels
     in each.
     """
-    n, picture = len(bright), np.flatnonzero(bright > MAX_BRIGHT_SHARE)
+    n = len(bright)
+    picture = np.flatnonzero(bright > MAX_BRIGHT_SHARE)
     if not len(picture):
         return None
-    first, last = int(picture[0]), int(picture[-1])
-    begin, end = first, n - 1 - last
+    first = int(picture[0])
+    last = int(picture[-1])
+    begin = first
+    end = n - 1 - last
     edges = (
         bright[first : first + EDGE_PX].max(),
         bright[max(0, last - EDGE_PX + 1) : last + 1].max(),
@@ -93,7 +99,8 @@ def _other_bars(grey: NDArray[Any]) -> tuple[int, int] | None:
     n = grey.shape[1]
     steps = (cv2.absdiff(grey[:, 1:], grey[:, :-1]) > MIN_STEP).mean(axis=0)
     edges = np.flatnonzero(steps >= MIN_STEP_SHARE) + 1
-    begins, ends = edges[edges < n / 2], n - edges[edges > n / 2]
+    begins = edges[edges < n / 2]
+    ends = n - edges[edges > n / 2]
     is_pair = np.abs(begins[:, None] - ends) <= _tolerance(n)
     pairs = [(int(begins[i]), int(ends[j])) for i, j in np.argwhere(is_pair)]
     pairs = [pair for pair in pairs if min(pair) >= max(MIN_WIDTH * n, 4) and n - sum(pair) > 4]

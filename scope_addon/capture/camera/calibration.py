@@ -79,7 +79,8 @@ class Calibration:
                     f'has {width} x {height} pixels; add "size": [width, height] of the images it '
                     "was calibrated with"
                 )
-            known_width, known_height = float(width), float(height)
+            known_width = float(width)
+            known_height = float(height)
         else:
             known_width, known_height = self.size
         if not _same_proportions((known_width, known_height), (width, height)):

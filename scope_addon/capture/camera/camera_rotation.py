@@ -187,7 +187,8 @@ class BackgroundTracker:
         back, again = _flow(image, self._image, moved, near=self._points)
         good = found & again & (np.abs(back - self._points).max(1) < 0.7)
         good &= ((moved >= 0) & (moved < self._size)).all(1) & ~inside(moved, boxes)
-        self._points, self._key_rays = moved[good], self._key_rays[good]
+        self._points = moved[good]
+        self._key_rays = self._key_rays[good]
         if len(self._points) < MIN_CORNERS:
             return None
         rays = self._rays(self._points)
@@ -201,7 +202,8 @@ class BackgroundTracker:
         """Return the working image, grey; pixels are skipped before areas are averaged, which saves
         time.
         """
-        columns, rows = image_rgb.shape[1] // self._step, image_rgb.shape[0] // self._step
+        columns = image_rgb.shape[1] // self._step
+        rows = image_rgb.shape[0] // self._step
         whole = image_rgb[: rows * self._step, : columns * self._step]
         coarse = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_NEAREST)
         grey = cv2.cvtColor(
@@ -216,7 +218,8 @@ class BackgroundTracker:
         corners = cv2.goodFeaturesToTrack(image, MAX_CORNERS, 0.01, 7, mask=mask)
         self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
         self._key_rays = self._rays(self._points)
-        self._key_count, self._image = len(self._points), image
+        self._key_count = len(self._points)
+        self._image = image
         self._R_key_last = np.eye(3)
 
     def _rays(self, points: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -73,7 +73,8 @@ def remove_heading_drift(
     if support < max(MIN_SUPPORT, MIN_SUPPORT_SHARE * float(edges.weight.sum())):
         return R_first_camera
     axes = axes @ R_first_camera[first.row].T
-    drift, known = np.eye(3), []
+    drift = np.eye(3)
+    known = []
     for frame in edge_frames:
         lines = frame.segments.lines(camera).rotated(R_first_camera[frame.row])
         found, supports = _drift(lines, axes, drift)

@@ -112,14 +112,16 @@ def choose_camera(
                 f"--focal-mm {focal_mm:g} is not a focal length: give 35 mm "
                 "equivalent ones, such as 26"
             )
-        focal_px, source = focal_mm / FILM_WIDTH_MM * longer, f"given, {focal_mm:g} mm"
+        focal_px = focal_mm / FILM_WIDTH_MM * longer
+        source = f"given, {focal_mm:g} mm"
     elif fov_deg is not None:
         if not 1.0 <= fov_deg <= 175.0:
             raise UsageError(
                 f"--fov {fov_deg:g} is not a field of view: give degrees along the longer side, "
                 "such as 60"
             )
-        focal_px, source = _focal_from_fov(longer, fov_deg), f"given, {fov_deg:g} degrees"
+        focal_px = _focal_from_fov(longer, fov_deg)
+        source = f"given, {fov_deg:g} degrees"
     elif metadata_focal_mm:
         focal_px = metadata_focal_mm / FILM_WIDTH_MM * longer
         source = f"the file's metadata, {metadata_focal_mm:g} mm"

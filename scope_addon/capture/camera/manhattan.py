@@ -62,7 +62,8 @@ class Edges:
         :return: the sides of the picture that they explain; their (3, 3) rows u, h, u × h, in
             camera axes.
         """
-        normals, equations = self._normals(focal_px), self._equations(focal_px)
+        normals = self._normals(focal_px)
+        equations = self._equations(focal_px)
         return self._best(self._up_candidates(normals, equations), normals, equations)
 
     def support(self, focal_px: float) -> float:
@@ -73,7 +74,8 @@ class Edges:
         be explained as well as at another focal length for which two happen to: by a camera with
         tilt and no roll.
         """
-        normals, equations = self._normals(focal_px), self._equations(focal_px)
+        normals = self._normals(focal_px)
+        equations = self._equations(focal_px)
         return self._best(
             self._up_candidates(normals, equations) or list(_TILTED), normals, equations
         )[0]
@@ -101,7 +103,8 @@ class Edges:
         if not len(which):
             return 0.0, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         level = level[size > 0.1] / size[size > 0.1, None]
-        across, up_sine2 = np.cross(ups[which], level), _sine2(ups, equations)
+        across = np.cross(ups[which], level)
+        up_sine2 = _sine2(ups, equations)
         explained = []
         for k in range(0, len(level), _BLOCK):
             sine2 = _sine2(level[k : k + _BLOCK], equations)
@@ -127,7 +130,8 @@ class Edges:
         score = np.concatenate(
             [_explained(_sine2(block, equations)) @ self.weight for block in blocks]
         )
-        rest, chosen = found[np.argsort(-score)], list[NDArray[Any]]()
+        rest = found[np.argsort(-score)]
+        chosen = list[NDArray[Any]]()
         while len(rest) and len(chosen) < UP_CANDIDATES:
             chosen.append(rest[0])
             rest = rest[rest @ rest[0] < np.cos(MIN_CANDIDATE_ANGLE)]
@@ -140,11 +144,10 @@ class Edges:
         With m the edge's middle, that is the vector from there to the vanishing point, times d_z:
         x, y, and across.
         """
-        f, zero = np.full_like(self.weight, focal_px), np.zeros_like(self.weight)
-        to_x, to_y = (
-            np.stack([f, zero, -self.middle[:, 0]]),
-            np.stack([zero, f, -self.middle[:, 1]]),
-        )
+        f = np.full_like(self.weight, focal_px)
+        zero = np.zeros_like(self.weight)
+        to_x = np.stack([f, zero, -self.middle[:, 0]])
+        to_y = np.stack([zero, f, -self.middle[:, 1]])
         return np.concatenate(
             [to_x, to_y, to_x * self.along[:, 1] - to_y * self.along[:, 0]], axis=1
         )

@@ -47,7 +47,8 @@ GRID_SIGMA = np.radians(2.2)  # s on the grid; PLANE_SIGMA in the refinement
 MAX_REFINED = 16
 REFINEMENT_STEPS = 8
 # of the lines, explained by chance; standard deviations above it
-CHANCE_SHARE, CHANCE_SIGMAS = 0.25, 1.5
+CHANCE_SHARE = 0.25
+CHANCE_SIGMAS = 1.5
 MIN_VERTICAL = 0.25  # sides of the picture, all vertical lines together
 MIN_HORIZONTAL = 1.0  # likewise, along each horizontal direction, where less is vertical
 MIN_MARGIN = 3.0  # in score, to any other solution
@@ -149,7 +150,8 @@ def _best_with_ups(
     )
     off2 *= scale
     support = np.where(size[..., 0] > 0.1, np.exp(off2, out=off2) @ lines.lengths, -np.inf)
-    rows, best = np.arange(len(ups)), support.argmax(axis=1)
+    rows = np.arange(len(ups))
+    best = support.argmax(axis=1)
     return support[rows, best], np.stack([ups, level[rows, best], across[rows, best]], axis=1)
 
 

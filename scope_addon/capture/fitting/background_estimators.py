@@ -44,7 +44,9 @@ class BackgroundEstimators:
     def __init__(
         self, camera: Camera, width: int, height: int, live: LiveBody, fits: FocalFits
     ) -> None:
-        self._given_camera, self._size, self._fits = camera, (width, height), fits
+        self._given_camera = camera
+        self._size = (width, height)
+        self._fits = fits
         self.pool = ThreadPoolExecutor(_THREADS, "scope-background")
         self._solver = ThreadPoolExecutor(1, "scope-solver")
         # time and largest person of the last frame
@@ -83,7 +85,8 @@ class BackgroundEstimators:
         # The background of this very frame may be followed meanwhile. If it finds the first edges,
         # it has set the bars before, and nobody was seen in the frame before, so they are merely
         # used one frame earlier or later.
-        before, self._largest = self._largest, None if largest is None else (time_s, largest)
+        before = self._largest
+        self._largest = None if largest is None else (time_s, largest)
         if self._given_camera.focal_deviation == 0.0 or not followed.edge_frames:
             return
         if self._by_edges is None:

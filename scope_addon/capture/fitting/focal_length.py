@@ -44,7 +44,10 @@ from .stature import with_population
 from .track_fit import fit_single_frame
 
 KAPPA = 4.0
-LOG_RANGE, COARSE_STEP, FINE_STEP = 0.7, 0.05, 0.0125  # of log(f / f_0)
+# of log(f / f_0)
+LOG_RANGE = 0.7
+COARSE_STEP = 0.05
+FINE_STEP = 0.0125
 FITTED_STEP = 0.0025  # finer, since evaluating the fits' likelihood costs nothing
 MAX_DEVIATION = 0.1  # of log f; a less certain estimate is no better than the assumption
 # logarithms of the tried focal lengths, relative to the camera's
@@ -116,7 +119,8 @@ def _moments(log_ratio: NDArray[np.float64], log_p: NDArray[np.float64]) -> tupl
     values.
     """
     order = np.argsort(log_ratio)
-    x, log_p = log_ratio[order], log_p[order]
+    x = log_ratio[order]
+    log_p = log_p[order]
     p = np.exp(log_p - log_p.max()) * np.gradient(x)
     p /= p.sum()
     mean = float(p @ x)
@@ -127,14 +131,17 @@ class FocalFits:
     """Fits single observations of a clip, in the calling thread."""
 
     def __init__(self, body: Body, ablation: Ablation = NO_ABLATION) -> None:
-        self._body, self._ablation = body, ablation
-        self._next_s, self._gap_s = -np.inf, FIRST_GAP_S
+        self._body = body
+        self._ablation = ablation
+        self._next_s = -np.inf
+        self._gap_s = FIRST_GAP_S
 
     def is_due(self, timestamp_s: float) -> bool:
         """Whether a frame at this time is to be fitted; if so, schedule the next one."""
         if timestamp_s < self._next_s:
             return False
-        self._next_s, self._gap_s = timestamp_s + self._gap_s, 2 * self._gap_s
+        self._next_s = timestamp_s + self._gap_s
+        self._gap_s = 2 * self._gap_s
         return True
 
     def costs(self, observation: Observation, camera: Camera) -> NDArray[np.float64] | None:
@@ -147,7 +154,8 @@ class FocalFits:
         track = single_frame_track(observation)
         if not track.seen[0]:
             return None
-        K, costs = camera.intrinsics, []
+        K = camera.intrinsics
+        costs = []
         for ratio in np.exp(LOG_RATIOS):
             candidate = replace(
                 camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0])

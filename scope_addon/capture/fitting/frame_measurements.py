@@ -42,7 +42,8 @@ HEAD_CONFIDENCE = 1.0 / (np.radians(1.0) ** 2 * WEIGHTS.orientation_field)
 EARS = [KEYPOINT_NAMES.index(f"{side}_ear") for side in ("right", "left")]
 # A fit contradicts a direction of at least this confidence if the angle between the two is larger
 # than 60 degrees.
-MIN_CONFIDENCE, CONTRADICTION_COS = 0.3, np.cos(np.radians(60.0))
+MIN_CONFIDENCE = 0.3
+CONTRADICTION_COS = np.cos(np.radians(60.0))
 ROOT_SIGMA_M = 0.12  # of a pelvis above feet on the floor
 NEAREST_M = 0.3  # the least plausible distance of a person from the camera
 
@@ -54,7 +55,9 @@ class Measurer:
     """
 
     def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
-        self.body, self.intrinsics, self._unproject = body, intrinsics, np.linalg.inv(intrinsics)
+        self.body = body
+        self.intrinsics = intrinsics
+        self._unproject = np.linalg.inv(intrinsics)
         at = body.keypoint_set("blazepose")
         self.indices = np.array([at[name] for name in KEYPOINT_NAMES])
         weights = _RELATIVE_WEIGHT.items()
@@ -153,14 +156,13 @@ class Measurer:
 
         :param joints_cam: (K+1, 3) the fitted joints, camera frame.
         """
-        field, first_joint = measurements.orientation_field, len(self.body.keypoint_names)
+        field = measurements.orientation_field
+        first_joint = len(self.body.keypoint_names)
         if field is None:
             return False
         own = slice(len(self.bone_starts))  # the directions of head and fingers come after these
-        directions, confidence = (
-            np.asarray(field.directions)[own],
-            np.asarray(field.confidence)[own],
-        )
+        directions = np.asarray(field.directions)[own]
+        confidence = np.asarray(field.confidence)[own]
         bones = (
             joints_cam[self.bone_ends - first_joint] - joints_cam[self.bone_starts - first_joint]
         )
@@ -207,8 +209,10 @@ def place(
     """
     w = np.asarray(weight, float) / max(float(np.sum(weight)), 1e-300)
     b = rays * world[:, 2:] - world[:, :2]  # t_xy - x t_z
-    x_mean, b_mean = w @ rays, w @ b
-    x, b = rays - x_mean, b - b_mean
+    x_mean = w @ rays
+    b_mean = w @ b
+    x = rays - x_mean
+    b = b - b_mean
     spread = float(w @ (x * x).sum(axis=1))
     # fewer than two points do not tell it
     z = -float(w @ (x * b).sum(axis=1)) / spread if spread > 1e-12 else 0.0

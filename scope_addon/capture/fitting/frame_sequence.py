@@ -48,11 +48,13 @@ class FittedTrack:
         To the wrist's deviation, theirs adds what wrist and fingers may rotate under the joint
         prior alone.
         """
-        own, whole = prepared.body, prepared.whole_body
+        own = prepared.body
+        whole = prepared.whole_body
         if own is whole:
             return self
         at = [whole.joint_names.index(name) for name in own.joint_names]
-        T, parts = len(self.valid), whole.K + 1
+        T = len(self.valid)
+        parts = whole.K + 1
         rotations = np.tile(np.eye(3, dtype=self.rotations.dtype), (T, parts, 1, 1))
         rotations[:, at] = self.rotations
         confidence = np.zeros((T, parts))
@@ -62,7 +64,8 @@ class FittedTrack:
             sigma = np.empty((T, parts, 2), self.joint_sigma_m.dtype)
             sigma[:, at] = self.joint_sigma_m
             for part in sorted(set(range(parts)) - set(at)):
-                wrist, variance = part, 0.0
+                wrist = part
+                variance = 0.0
                 while wrist not in at:
                     wrist = int(whole.parents[wrist])
                     # A rotation moves a point along two of three axes.
@@ -79,8 +82,10 @@ class FrameSequence:
     """
 
     def __init__(self, prepared: PreparedTrack, betas: NDArray[np.floating[Any]]) -> None:
-        T, body = len(prepared.track), prepared.body
-        self._prepared, self._betas = prepared, betas
+        T = len(prepared.track)
+        body = prepared.body
+        self._prepared = prepared
+        self._betas = betas
         self._tree = with_fixed_shape(make_tree(body), betas)
         self._priors = replace(prepared.priors, shape_mean=None, shape_information=None)
         self._cold, self._warm = (
@@ -93,7 +98,9 @@ class FrameSequence:
         self._rotations: NDArray[np.floating[Any]] = np.tile(
             np.eye(3).astype(precision), (T, body.K + 1, 1, 1)
         )
-        self._root, self._valid, self._cost = np.zeros((T, 3)), np.zeros(T, bool), np.zeros(T)
+        self._root = np.zeros((T, 3))
+        self._valid = np.zeros(T, bool)
+        self._cost = np.zeros(T)
         self._iterations = 0
         self._last: Fit | None = None
         self._last_s = -np.inf
@@ -113,7 +120,8 @@ class FrameSequence:
         """Fit frame ``k`` from its state in another motion, independently of its neighbours."""
         found = self._solve(self._prepared.measure_all(k), initial, self._warm)
         if is_usable(found):
-            self._last, self._valid[k] = found, True
+            self._last = found
+            self._valid[k] = True
 
     def repeat_last(self, k: int) -> None:
         """Give frame ``k`` the state of the last frame that was fitted."""
@@ -122,7 +130,9 @@ class FrameSequence:
 
     def fitted(self) -> FittedTrack:
         """Return the states of all frames."""
-        prepared, rotations, valid = self._prepared, self._rotations, self._valid
+        prepared = self._prepared
+        rotations = self._rotations
+        valid = self._valid
         confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
         if prepared.hand_measurer is not None and prepared.hands is not None:
             confidence = np.maximum(
@@ -157,7 +167,9 @@ class FrameSequence:
         found = self._solve(measurements, initial, self._cold if initial is None else self._warm)
         if not is_usable(found):
             return 0.0
-        self._last, self._last_s, self._valid[k] = found, float(prepared.track.times[k]), True
+        self._last = found
+        self._last_s = float(prepared.track.times[k])
+        self._valid[k] = True
         if initial is None or not prepared.measurer.contradicts(measurements, found.t_camera_part):
             return 0.0
         restarted = self._solve(measurements, initial, self._cold)
@@ -188,8 +200,10 @@ class FrameSequence:
         return found
 
     def _store(self, k: int, fit: Fit) -> None:
-        self._rotations[k, 0], self._rotations[k, 1:] = fit.state.R_camera_root, fit.state.Omega
-        self._root[k], self._cost[k] = fit.state.t_camera_root, fit.cost
+        self._rotations[k, 0] = fit.state.R_camera_root
+        self._rotations[k, 1:] = fit.state.Omega
+        self._root[k] = fit.state.t_camera_root
+        self._cost[k] = fit.cost
 
 
 def is_usable(fit: Fit) -> bool:

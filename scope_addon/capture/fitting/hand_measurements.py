@@ -28,7 +28,8 @@ FINGERS = ("index", "middle", "ring", "pinky", "thumb")
 HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in HAND_NAMES)
 # Weights of keypoints relative to the body's wrist: 21 lie close together, with correlated errors.
 # The hand network places the wrist further into the palm than the body has its joint.
-PIXEL_WEIGHT, WRIST_PIXEL_WEIGHT = 0.3, 0.05
+PIXEL_WEIGHT = 0.3
+WRIST_PIXEL_WEIGHT = 0.05
 # of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
 DIRECTION_WEIGHT = 0.25
 # The smaller a hand is in the image, the less is seen of which way its palm faces, and the weight
@@ -40,7 +41,8 @@ FULL_SIZE_PX = 100.0
 RELIABLE = 0.8
 # Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this
 # axis; radians.
-_KNUCKLE, _HINGE = (-0.5, 1.7, 0.4), (-0.2, 2.0, 0.2)
+_KNUCKLE = (-0.5, 1.7, 0.4)
+_HINGE = (-0.2, 2.0, 0.2)
 _THUMB = (-0.4, 0.4, 1.2)  # rotation of a thumb joint about its own bone, and deviation from it
 # The keypoints that are joints, in the keypoints' order: the wrist, then three per finger, the
 # thumb first.
@@ -57,7 +59,8 @@ _PIXEL_WEIGHTS = np.array([WRIST_PIXEL_WEIGHT, *[PIXEL_WEIGHT] * (HAND_POINTS - 
 _TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 _MIDDLE_KNUCKLE = HAND_NAMES.index("middle_finger_mcp")
 # unseen fingers begin to return to rest after the first, and rest after the second
-SHORT_GAP_S, LONG_GAP_S = 0.3, 1.0
+SHORT_GAP_S = 0.3
+LONG_GAP_S = 1.0
 
 
 def finger_names(side: str) -> list[str]:
@@ -97,7 +100,8 @@ class HandMeasurer:
     """
 
     def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
-        self._body, self._unproject = body, np.linalg.inv(intrinsics)
+        self._body = body
+        self._unproject = np.linalg.inv(intrinsics)
         self.indices = np.array(
             [body.keypoint_names.index(name) for name in HAND_KEYPOINT_NAMES]
         ).reshape(2, -1)
@@ -126,7 +130,8 @@ class HandMeasurer:
         :param hands: (2, 21, 6) undistorted pixels, confidence and world landmarks; confidence 0
             where not seen.
         """
-        first, bones = measured.keypoints2d, measured.orientation_field
+        first = measured.keypoints2d
+        bones = measured.orientation_field
         assert first is not None
         assert bones is not None
         seen = [side for side in range(len(SIDES)) if hands[side, 0, 2] > 0]
@@ -184,7 +189,10 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
 
     :raises UsageError: the body has no finger joints.
     """
-    J, joints, axes, ranges = body.J_template, [], [], []
+    J = body.J_template
+    joints = []
+    axes = []
+    ranges = []
     for side, sign in (("left", -1.0), ("right", 1.0)):
         fingers = finger_joints(body, side)
         wrist = J[body.joint_names.index(f"{side}_wrist")]
@@ -205,7 +213,8 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
         np.array(joints), np.array(axes), lower, upper, swing, ones, ones
     )
     if priors.limits is not None:
-        ints, floats = np.vstack([priors.limits[0], ints]), np.vstack([priors.limits[1], floats])
+        ints = np.vstack([priors.limits[0], ints])
+        floats = np.vstack([priors.limits[1], floats])
     return replace(priors, limits=(ints, floats))
 
 

@@ -48,7 +48,10 @@ class LiveBody:
         ablation: Ablation = NO_ABLATION,
         height_m: float | None = None,
     ) -> None:
-        self._body, self._camera, self._ablation, self._height_m = body, camera, ablation, height_m
+        self._body = body
+        self._camera = camera
+        self._ablation = ablation
+        self._height_m = height_m
         self.is_ready = False  # whether everything is loaded, so that a fit takes some milliseconds
 
     def load(self) -> None:
@@ -69,7 +72,8 @@ class LiveBody:
             [View(measured, np.diag([-1.0, -1.0, 1.0]))],
             measured,
         ]
-        times, stands = np.arange(3) / 30.0, StandingPoints([0], np.ones((3, 1)))
+        times = np.arange(3) / 30.0
+        stands = StandingPoints([0], np.ones((3, 1)))
         options = replace(ROBUST, stages=(Stage(prepared.weights, 1e-4, 1),))
         fit_motion(
             self._body,

@@ -43,13 +43,15 @@ BORDER_PX = 3.0  # of the image, within which contours are its edge
 _WIDTHS_M = {"head": 0.03, "neck": 0.03, "spine": 0.04, "pelvis": 0.04, "collar": 0.04, "hip": 0.03}
 _WIDTH_M = 0.02  # of limbs: how far clothes and hair reach beyond the body
 _LEFT_OUT = ("wrist", "hand", "ankle", "foot", "thumb", "index", "middle", "ring", "pinky")
-OUTSIDE_WEIGHT, INSIDE_WEIGHT = 1.0, 0.5
+OUTSIDE_WEIGHT = 1.0
+INSIDE_WEIGHT = 0.5
 OUTSIDE_SIGMA_M = 0.05
 SIZE = 256  # of the mask
 _NO_MAP = np.zeros(0, np.float32)  # the places are all in the first map
 _NOTHING = np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
 # fewer, such as that of a still image, can mislead, and more add little
-MIN_MASKS, MAX_MASKS = 4, 32
+MIN_MASKS = 4
+MAX_MASKS = 32
 ROUNDS = 3
 THREADS = 2
 # A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says
@@ -67,7 +69,8 @@ class OutlineMeasurer:
     """
 
     def __init__(self, body: Body, camera: Camera) -> None:
-        self._source, self._camera = body, camera
+        self._source = body
+        self._camera = camera
         self._shaped = np.full(body.P, np.nan), body
         part = body.strongest_joints
         names = [body.joint_names[i] for i in part]
@@ -85,17 +88,21 @@ class OutlineMeasurer:
         self._around = self._triangles[np.isin(self._triangles, self.vertices).any(axis=1)]
         self.first = len(body.keypoint_names)
         added = (f"outline/{v}" for v in self.vertices)
-        places, shapedirs = body.v_template[self.vertices], body.shapedirs[self.vertices]
+        places = body.v_template[self.vertices]
+        shapedirs = body.shapedirs[self.vertices]
         self.body = with_keypoints(body, added, self.part, places, shapedirs)
 
     def measure(self, fit: Fit, mask: PersonMask) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the residual's rows for the pose and shape of a fit: int64 (n, 1) and float64 (n,
         11).
         """
-        body, v = self._with_shape(fit.state.beta), self.vertices
-        R, t = fit.R_camera_part, fit.t_camera_part
+        body = self._with_shape(fit.state.beta)
+        v = self.vertices
+        R = fit.R_camera_part
+        t = fit.t_camera_part
         skin = np.ascontiguousarray(body.skin(R, t))
-        normals, points = vertex_normals(skin, self._around)[v], skin[v]
+        normals = vertex_normals(skin, self._around)[v]
+        points = skin[v]
         local = body.v_template[v] - body.J_template[self.part]
         delta = np.einsum("nji,nj->ni", R[self.part], points - t[self.part]) - local
         facing = (normals * points).sum(axis=1) / np.linalg.norm(points, axis=1)
@@ -112,7 +119,9 @@ class OutlineMeasurer:
         inside = ((beside >= 0) & (beside < SIZE)).all(axis=1)
         covered = self._coverage(skin, mask.region)
         free = inside & ~covered[tuple(np.where(inside[:, None], beside, 0).T[::-1])]
-        rows, at, normal = rows[free], at[free], normal[free]
+        rows = rows[free]
+        at = at[free]
+        normal = normal[free]
         if not len(rows):
             return _NOTHING
         found, contour, outward = _crossings(mask.probability, at, normal)
@@ -121,12 +130,10 @@ class OutlineMeasurer:
         visible = ((m_px > BORDER_PX) & (m_px < np.subtract(mask.image_size, 1 + BORDER_PX))).all(
             axis=1
         )
-        rows, contour, outward, m_px = (
-            rows[visible],
-            contour[visible],
-            outward[visible],
-            m_px[visible],
-        )
+        rows = rows[visible]
+        contour = contour[visible]
+        outward = outward[visible]
+        m_px = m_px[visible]
         if not len(rows):
             return _NOTHING
         m = self._camera.rays(m_px)[:, :2]

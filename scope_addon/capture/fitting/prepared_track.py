@@ -86,7 +86,8 @@ class PreparedTrack:
 
         :param root_cam: (3,) known position of the pelvis, camera frame, metres.
         """
-        points, sigma = self.lifted.points[k], self.lifted.sigma_along[k]
+        points = self.lifted.points[k]
+        sigma = self.lifted.sigma_along[k]
         return self.measurer.measure(
             self.pixels[k], self.track.confidence[k], points, sigma, root_cam
         )
@@ -129,10 +130,8 @@ class PreparedTrack:
         :param stance: in each frame's camera.
         :param betas: (P,) shape coefficients.
         """
-        whole, K = (
-            with_contact_points(with_arm_points(self.whole_body), betas),
-            self.measurer.intrinsics,
-        )
+        whole = with_contact_points(with_arm_points(self.whole_body), betas)
+        K = self.measurer.intrinsics
         body = whole if self.body is self.whole_body else without_fingers(whole)
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
         measurer = Measurer(body, K)
@@ -174,7 +173,8 @@ def prepare_track(
     whole_body = body
     if not fingers:
         body = without_fingers(body)
-    measurer, pixels = Measurer(body, camera.intrinsics), camera.undistort(track.keypoints_px)
+    measurer = Measurer(body, camera.intrinsics)
+    pixels = camera.undistort(track.keypoints_px)
     lifted = _lift(measurer, track, pixels, ablation)
     if height_m is not None and height_m < CHILD_BELOW_M:  # the lifting network knows adults alone
         lifted = lifted.scaled(height_m / body.stature())
@@ -183,7 +183,8 @@ def prepare_track(
         priors = with_stature(priors, body, height_m)
     else:
         priors = (with_unknown_stature if ablation.stature else with_population)(priors, body)
-    weights, is_given = ablation.weights(WEIGHTS), height_m is not None
+    weights = ablation.weights(WEIGHTS)
+    is_given = height_m is not None
     prepared = PreparedTrack(
         body,
         whole_body,
@@ -197,10 +198,8 @@ def prepare_track(
         is_stature_given=is_given,
     )
     if track.face is not None:
-        across, ears = (
-            across_head(track.face, camera),
-            lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]],
-        )
+        across = across_head(track.face, camera)
+        ears = lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
         prepared = replace(
             prepared, head=np.column_stack([across, certainty(track.face, across, ears)])
         )
@@ -219,7 +218,8 @@ def _lift(
     if not ablation.lifter:
         sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
         return Lifted(track.world_landmarks, sigma, sigma)
-    rays, windows = measurer.rays(pixels), windows_around(track.times, track.seen)
+    rays = measurer.rays(pixels)
+    windows = windows_around(track.times, track.seen)
     if not (ablation.world_landmarks and track.has_depth):
         return default_lifter().lift(rays, track.confidence, None, windows)
     return default_lifter().lift_mixture(rays, track.confidence, track.world_landmarks, windows)

@@ -14,7 +14,9 @@ from ....solver.loaders.body_file import CHILD_BELOW_M, body_with_children, grow
 from ...errors import UsageError
 
 SIGMA_M = 0.005
-SHORTEST_M, TALLEST_M = 0.5, 2.6  # statures outside are input errors
+# statures outside are input errors
+SHORTEST_M = 0.5
+TALLEST_M = 2.6
 # standard deviations of the population up to which the shapes of a body are realistic
 MAX_DEVIATIONS = 4.5
 # one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
@@ -157,7 +159,9 @@ def _extremes_at(body: Body, height_m: float) -> tuple[float, NDArray[np.float64
     """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this
     height.
     """
-    betas, h0, g = np.zeros(body.P), 0.0, np.zeros(body.P)
+    betas = np.zeros(body.P)
+    h0 = 0.0
+    g = np.zeros(body.P)
     population = _population(body, is_child=height_m < CHILD_BELOW_M)
     for _ in range(_ROUNDS):
         h0, g = _shape_at(body, betas)
@@ -168,6 +172,7 @@ def _extremes_at(body: Body, height_m: float) -> tuple[float, NDArray[np.float64
 def _shape_at(body: Body, betas: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Return h₀ and g (P,) of the highest and the lowest vertex of this shape."""
     heights = body.rest_vertices(betas)[:, 1]
-    top, bottom = int(heights.argmax()), int(heights.argmin())
+    top = int(heights.argmax())
+    bottom = int(heights.argmin())
     h0 = float(body.v_template[top, 1] - body.v_template[bottom, 1])
     return h0, body.shapedirs[top, 1] - body.shapedirs[bottom, 1]

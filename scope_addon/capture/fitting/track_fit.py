@@ -37,8 +37,10 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     :param progress: called with the stage's name, the frames done and the total; 0: unknown.
     """
     progress("finding the shape", 0, 0)
-    shape, track = _fit_shape(prepared), prepared.track
-    frames, T = FrameSequence(prepared, shape.beta), len(track)
+    shape = _fit_shape(prepared)
+    track = prepared.track
+    frames = FrameSequence(prepared, shape.beta)
+    T = len(track)
     for k in range(T):
         if track.seen[k]:
             frames.fit_next(k)
@@ -70,7 +72,9 @@ def ground(
     :param stance: in each frame's camera.
     :return: the measurements, and the states and the shape to start from.
     """
-    prepared, betas, root_cam = prepared.rotated(stance.turn), first.betas, stance.root_cam
+    prepared = prepared.rotated(stance.turn)
+    betas = first.betas
+    root_cam = stance.root_cam
     sigma = first.height_sigma_m
     if first.valid.any():
         new, old = (
@@ -78,7 +82,8 @@ def ground(
         )
         if abs(np.log(np.median(new / np.maximum(old, NEAREST_M)))) > RESIZE:
             shape = _fit_shape(prepared, root_cam)
-            betas, sigma = shape.beta, _height_sigma(prepared, shape)
+            betas = shape.beta
+            sigma = _height_sigma(prepared, shape)
     start = replace(first, t_camera_root=root_cam, betas=betas, height_sigma_m=sigma)
     return prepared.with_stance(stance, betas), start
 

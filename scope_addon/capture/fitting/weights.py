@@ -34,7 +34,9 @@ ROBUST = Options(robust_keypoints2d=0.01, robust_keypoints3d=0.1, robust_orienta
 # the image may weigh more, and the lifted directions, whose errors last for many frames, less. Feet
 # that rest stay on the floor by this weight alone; with ten times as much, renders whose floor is
 # wrong have errors larger by 4 mm.
-_CLIP_KEYPOINTS2D, _CLIP_DIRECTIONS, _CLIP_FLOOR = 2.0, 0.7, 3.0
+_CLIP_KEYPOINTS2D = 2.0
+_CLIP_DIRECTIONS = 0.7
+_CLIP_FLOOR = 3.0
 # 1/m²; with 1e5, feet still drift by 0.7 cm in the sample, with 1e6 other errors grow
 _RESTING_PLACE = 5e5
 # Typical accelerations, rad/s², and of the root's position, m/s²: the root mean square at 30 frames
@@ -59,7 +61,8 @@ _USUAL |= {
     "wrist": 30.0,
     "hand": 11.8,
 }
-_USUAL_ROOT, _USUAL_ROOT_POSITION = 20.3, 3.8
+_USUAL_ROOT = 20.3
+_USUAL_ROOT_POSITION = 3.8
 # Of the weights of legs: they move gently most of the time and suddenly now and then. With 1, the
 # trunk still arched by 20 degrees in a crouch that takes a seventh of a second, now by 8; with
 # less, legs jitter.
@@ -143,7 +146,8 @@ def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, 
     """
     rate = 1.0 / (_RATE_HZ * float(np.median(np.diff(times)))) if len(times) > 1 else 1.0
     scale = _ACCELERATION * min(rate * rate, rate)
-    names, of_fingers = body.joint_names[1:], _USUAL["hand"]
+    names = body.joint_names[1:]
+    of_fingers = _USUAL["hand"]
     usual = np.array(
         [next((_USUAL[end] for end in _USUAL if name.endswith(end)), of_fingers) for name in names]
     )

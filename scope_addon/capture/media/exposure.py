@@ -11,7 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-DARK, BRIGHT = 110.0, 200.0  # of 255: highlights below DARK are raised to BRIGHT
+# of 255: highlights below DARK are raised to BRIGHT
+DARK = 110.0
+BRIGHT = 200.0
 BLACK = 4.0  # highlights below which a frame shows nothing
 MAX_GAIN = 16.0
 # share of the change of gain that is applied per frame, so that brightness does not flicker

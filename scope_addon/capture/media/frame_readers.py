@@ -254,7 +254,8 @@ class PyavReader:
         self._decoded = self._decode()
         self._frames = self._whole(self._decoded)
         self._start = self._stream.start_time or 0  # in units of the stream
-        self.is_mirrored, self.clockwise_deg = False, 0
+        self.is_mirrored = False
+        self.clockwise_deg = 0
         # width of a pixel over its height
         self._aspect = float(self._stream.sample_aspect_ratio or 1)
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
@@ -294,7 +295,8 @@ class PyavReader:
                 return
             # PyAV's, at a stream that begins later, in a recording of television for instance
             except IndexError:
-                packets, damaged = self._container.demux(self._stream), damaged + 1
+                packets = self._container.demux(self._stream)
+                damaged = damaged + 1
             except (self._failure, OSError, ValueError):
                 damaged += 1
 
@@ -363,7 +365,8 @@ class PyavReader:
             if time >= seconds - 1e-6:
                 self._frames = self._whole(itertools.chain([frame], frames), before)
                 break
-            before, before_s = frame, time
+            before = frame
+            before_s = time
             index += 1
         return index, before_s
 

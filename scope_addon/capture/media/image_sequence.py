@@ -99,7 +99,9 @@ class SequenceReader:
     """Reads the pictures in order, with the interface of `PyavReader` that decoding needs."""
 
     def __init__(self, sequence: PictureSequence, fps: Fraction) -> None:
-        self._sequence, self._fps, self._next = sequence, fps, 0
+        self._sequence = sequence
+        self._fps = fps
+        self._next = 0
 
     def read(self) -> tuple[float, NDArray[np.uint8]] | None:
         """Read the next picture.

@@ -83,7 +83,8 @@ class Video:
                 1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times)
             )
         length = self.frame_count / self.source_fps
-        start, end = Fraction(self.wanted.start_s), Fraction(min(self.wanted.end_s, float(length)))
+        start = Fraction(self.wanted.start_s)
+        end = Fraction(min(self.wanted.end_s, float(length)))
         return max(1, round((min(end, length) - start) * self.fps))
 
     def __iter__(self) -> Iterator[Frame]:
@@ -313,7 +314,8 @@ class _Decoder:
             self._put(error)
 
     def _decode(self, reader: PyavReader | SequenceReader) -> None:
-        video, index = self._video, 0
+        video = self._video
+        index = 0
         time: float | None = None
         sampler = FrameSampler(video.wanted.fps)
         resized = False

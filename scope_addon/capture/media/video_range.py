@@ -78,7 +78,8 @@ class TimecodeRange:
         :raises UsageError: a timecode does not exist at this rate, or the end does not come after
             the start.
         """
-        start, end = self.start, self.end
+        start = self.start
+        end = self.end
         if isinstance(start, Timecode):
             start = max(0.0, float((start.frame(fps) - _MARGIN) / fps))
         if isinstance(end, Timecode):
@@ -108,14 +109,16 @@ class FrameSampler:
             yield frame
             return
         if self._start is None:
-            self._start, self._next = frame.timestamp_s, 1
+            self._start = frame.timestamp_s
+            self._next = 1
             yield frame
             return
         due = self._start + float(self._next / self._fps)
         if frame.timestamp_s < due:
             self._waiting = frame
             return
-        before, self._waiting = self._waiting, None
+        before = self._waiting
+        self._waiting = None
         if before is not None and due - before.timestamp_s < frame.timestamp_s - due:
             self._skip_past(before.timestamp_s)
             yield before
@@ -215,7 +218,8 @@ class Timecode:
                 "and the footage has "
                 f"{float(fps):.5g}; write a colon before the frames"
             )
-        dropped, minute = rate // 15, 60 * self.hours + self.minutes
+        dropped = rate // 15
+        minute = 60 * self.hours + self.minutes
         if self.minutes % 10 and self.seconds == 0 and self.frames < dropped:
             raise UsageError(
                 f"{self} does not exist: drop-frame timecode omits the first {dropped} frame "

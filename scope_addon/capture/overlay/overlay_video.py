@@ -250,7 +250,8 @@ class _Painter:
                     f"the motion has {motion.joint_count} joints, but body "
                     f"'{body.name}' has {body.K + 1}"
                 )
-        self._people, self._body = people, body
+        self._people = people
+        self._body = body
         self._rows = [{int(f): row for row, f in enumerate(motion.frames)} for motion in people]
         self._colors = [body_colors(body, i) for i in range(len(people))]
         self._scale = min(1.0, LONGEST_SIDE / max(video.width, video.height))
@@ -357,7 +358,8 @@ def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
 def _write_video(
     temporary: Path, painter: _Painter, video: Video, path: Path, progress: Progress | None
 ) -> None:
-    start_s, shown_s = None, -1.0
+    start_s = None
+    shown_s = -1.0
     with VideoWriter(temporary, video.fps, *painter.size, path) as writer:
         for frame in video:
             start_s = frame.timestamp_s if start_s is None else start_s

@@ -25,9 +25,12 @@ from ....solver.compiled.kernel import cached
 
 NEAR = 0.05  # metres; the near plane, at which triangles are clipped
 _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
-_AMBIENT, _DIFFUSE, _RIM = 0.42, 0.58, 0.30
+_AMBIENT = 0.42
+_DIFFUSE = 0.58
+_RIM = 0.30
 # of a vertex: behind the near plane, beyond the distortion model; 0: visible
-_BEHIND, _OUTSIDE = 1, 2
+_BEHIND = 1
+_OUTSIDE = 2
 
 
 @dataclass
@@ -112,14 +115,12 @@ def fill_silhouette(
     height, width = coverage.shape
     for f in range(len(triangles)):
         a, b, c = triangles[f]
-        ax, ay, bx, by, cx, cy = (
-            screen[a, 0],
-            screen[a, 1],
-            screen[b, 0],
-            screen[b, 1],
-            screen[c, 0],
-            screen[c, 1],
-        )
+        ax = screen[a, 0]
+        ay = screen[a, 1]
+        bx = screen[b, 0]
+        by = screen[b, 1]
+        cx = screen[c, 0]
+        cy = screen[c, 1]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if not (area < 0 and abs(area) < 1e18):
             continue
@@ -127,8 +128,10 @@ def fill_silhouette(
         u1 = int(np.floor(min(max(max(ax, bx, cx), -1.0), width - 1.0)))
         v0 = int(np.ceil(min(max(min(ay, by, cy), 0.0), height)))
         v1 = int(np.floor(min(max(max(ay, by, cy), -1.0), height - 1.0)))
-        du_a, dv_a = -(cy - by) / area, (cx - bx) / area
-        du_b, dv_b = -(ay - cy) / area, (ax - cx) / area
+        du_a = -(cy - by) / area
+        dv_a = (cx - bx) / area
+        du_b = -(ay - cy) / area
+        dv_b = (ax - cx) / area
         for v in range(v0, v1 + 1):
             for u in range(u0, u1 + 1):
                 la = du_a * (u - bx) + dv_a * (v - by)
@@ -151,17 +154,15 @@ def vertex_normals(
     normals = np.zeros_like(vertices)
     for f in range(len(triangles)):
         a, b, c = triangles[f]
-        e0, e1, e2 = (
-            vertices[b, 0] - vertices[a, 0],
-            vertices[b, 1] - vertices[a, 1],
-            vertices[b, 2] - vertices[a, 2],
-        )
-        d0, d1, d2 = (
-            vertices[c, 0] - vertices[a, 0],
-            vertices[c, 1] - vertices[a, 1],
-            vertices[c, 2] - vertices[a, 2],
-        )
-        n0, n1, n2 = e1 * d2 - e2 * d1, e2 * d0 - e0 * d2, e0 * d1 - e1 * d0
+        e0 = vertices[b, 0] - vertices[a, 0]
+        e1 = vertices[b, 1] - vertices[a, 1]
+        e2 = vertices[b, 2] - vertices[a, 2]
+        d0 = vertices[c, 0] - vertices[a, 0]
+        d1 = vertices[c, 1] - vertices[a, 1]
+        d2 = vertices[c, 2] - vertices[a, 2]
+        n0 = e1 * d2 - e2 * d1
+        n1 = e2 * d0 - e0 * d2
+        n2 = e0 * d1 - e1 * d0
         for i in (a, b, c):
             normals[i, 0] += n0
             normals[i, 1] += n1
@@ -276,7 +277,9 @@ def _draw(
             continue
         n = _clip_at_near(cut, vertices, shading, triangles[f], K, lens)
         for k in range(1, n - 1):
-            p, q, r = cut[0], cut[k], cut[k + 1]
+            p = cut[0]
+            q = cut[k]
+            r = cut[k + 1]
             _fill(rgba, depth, p[:3], q[:3], r[:3], p[3:], q[3:], r[3:], colors[f], alpha)
 
 
@@ -295,11 +298,15 @@ def _clip_at_near(
     """
     n = 0
     for i in range(3):
-        a, b = triangle[i], triangle[(i + 1) % 3]
-        za, zb = vertices[a, 2], vertices[b, 2]
+        a = triangle[i]
+        b = triangle[(i + 1) % 3]
+        za = vertices[a, 2]
+        zb = vertices[b, 2]
         if za >= NEAR:
             cut[n, 0], cut[n, 1] = _pixel(vertices[a, 0] / za, vertices[a, 1] / za, K, lens)
-            cut[n, 2], cut[n, 3], cut[n, 4] = 1 / za, shading[a, 0], shading[a, 1]
+            cut[n, 2] = 1 / za
+            cut[n, 3] = shading[a, 0]
+            cut[n, 4] = shading[a, 1]
             n += 1
         if (za >= NEAR) != (zb >= NEAR):
             s = (NEAR - za) / (zb - za)
@@ -339,8 +346,10 @@ def _fill(
     u1 = int(np.floor(min(max(max(a[0], b[0], c[0]), -1.0), width - 1.0)))
     v0 = int(np.ceil(min(max(min(a[1], b[1], c[1]), 0.0), height)))
     v1 = int(np.floor(min(max(max(a[1], b[1], c[1]), -1.0), height - 1.0)))
-    du_a, dv_a = -(c[1] - b[1]) / area, (c[0] - b[0]) / area
-    du_b, dv_b = -(a[1] - c[1]) / area, (a[0] - c[0]) / area
+    du_a = -(c[1] - b[1]) / area
+    dv_a = (c[0] - b[0]) / area
+    du_b = -(a[1] - c[1]) / area
+    dv_b = (a[0] - c[0]) / area
     for v in range(v0, v1 + 1):
         la = du_a * (u0 - b[0]) + dv_a * (v - b[1])
         lb = du_b * (u0 - c[0]) + dv_b * (v - c[1])
@@ -348,7 +357,9 @@ def _fill(
             lc = 1.0 - la - lb
             # The tolerance prevents gaps between neighbours by rounding.
             if la >= -1e-9 and lb >= -1e-9 and lc >= -1e-9:
-                wa, wb, wc = la * a[2], lb * b[2], lc * c[2]
+                wa = la * a[2]
+                wb = lb * b[2]
+                wc = lc * c[2]
                 z = 1.0 / (wa + wb + wc)
                 if z < depth[v, u]:
                     depth[v, u] = z

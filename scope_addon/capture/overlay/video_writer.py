@@ -46,7 +46,8 @@ class VideoWriter:
                 f"cannot write {path}: it needs the package 'av', which is not installed; choose a "
                 ".png or .jpg overlay"
             ) from error
-        self._av, self._path = av, path
+        self._av = av
+        self._path = path
         self._failures = (av.error.FFmpegError, OSError, ValueError)
         # a name that is not UTF-8 is opened by a link to the file, with the first image
         temporary.touch()
@@ -68,7 +69,9 @@ class VideoWriter:
             if codec not in self._av.codecs_available:
                 continue
             stream: Any = self._container.add_stream(codec, rate=rate, options=options)
-            stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+            stream.width = width
+            stream.height = height
+            stream.pix_fmt = "yuv420p"
             return stream
         self.abandon()
         raise OutputError(

@@ -10,7 +10,9 @@ from typing import Any
 
 from ...errors import UsageError
 
-AUTO, CPU, DIRECTML = "auto", "cpu", "directml"
+AUTO = "auto"
+CPU = "cpu"
+DIRECTML = "directml"
 # Our name: onnxruntime's name and the label in messages.
 PROVIDERS = {
     "cuda": ("CUDAExecutionProvider", "CUDA"),
@@ -104,7 +106,8 @@ class SerializedSession:
     """
 
     def __init__(self, session: Any) -> None:
-        self._session, self._lock = session, threading.Lock()
+        self._session = session
+        self._lock = threading.Lock()
 
     def run(self, *arguments: Any) -> list[Any]:
         """Run the network, with the arguments and results of onnxruntime's ``run``."""

@@ -42,7 +42,8 @@ _ARM = np.array(
         for side in SIDES
     ]
 )
-ELBOWS, WRISTS = _ARM[:, 0], _ARM[:, 1]
+ELBOWS = _ARM[:, 0]
+WRISTS = _ARM[:, 1]
 _STATURE = [
     [KEYPOINT_NAMES.index(f"{side}_{name}") for name in ("shoulder", "hip", "knee", "ankle")]
     for side in SIDES
@@ -52,8 +53,11 @@ _MIDDLE = 0.45  # distance from the wrist to the hand's centre, in hand lengths
 # side of the region in hand lengths; large, because the body gives only a rough position
 _BODY_SCALE = 1.5
 # MediaPipe's: side, and shift towards the fingers, in sides of the palm's box
-_PALM_SCALE, _PALM_SHIFT = 2.6, 0.5
-_TRACK_SCALE, _TRACK_SHIFT = 2.0, 0.1  # the same in sides of the box of the keypoints below
+_PALM_SCALE = 2.6
+_PALM_SHIFT = 0.5
+# the same in sides of the box of the keypoints below
+_TRACK_SCALE = 2.0
+_TRACK_SHIFT = 0.1
 # keypoints of the palm and of the finger bases
 _RIGID = np.array([0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18])
 

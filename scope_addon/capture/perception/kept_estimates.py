@@ -42,11 +42,14 @@ class KeptEstimates:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self._folder, self._lock = folder, threading.Lock()
+        self._folder = folder
+        self._lock = threading.Lock()
         self._places: dict[bytes, tuple[Path, int]] = {}
         self._loaded: dict[Path, Values] = {}
         self._new: dict[bytes, Values] = {}
-        self._written_s, self._wrote, self._bytes = time.monotonic(), False, 0
+        self._written_s = time.monotonic()
+        self._wrote = False
+        self._bytes = 0
         if folder is not None:
             for path in sorted(folder.glob("*.npz")):
                 self._read_keys(path)
@@ -114,7 +117,8 @@ class KeptEstimates:
     def _load(self, path: Path) -> None:
         with suppress(ScopeError, OSError, KeyError):
             arrays = read_members(path, ("keys", "values"), "")[0]
-            values, rows = arrays["values"], len(arrays["keys"])
+            values = arrays["values"]
+            rows = len(arrays["keys"])
             if (
                 values.dtype == np.float64
                 and values.ndim == 2

@@ -26,7 +26,8 @@ KEYPOINT_NAMES = BLAZEPOSE  # the network's order
 KEYPOINT_COUNT = 33
 _POINTS = 39  # the keypoints, two auxiliary points and four unused ones
 # auxiliary points: hip centre; a point on the body circle around it
-_HIP_CENTER, _BODY_CIRCLE = 33, 34
+_HIP_CENTER = 33
+_BODY_CIRCLE = 34
 _HIPS = (23, 24)
 _WINDOW = 7  # side in heatmap cells of the window that refines a keypoint
 _HEAT_THRESHOLD = 0.5
@@ -121,8 +122,11 @@ class LandmarkNetwork:
         execution: Execution | None = None,
         kept: KeptEstimates | None = None,
     ) -> None:
-        self._path, self._threads, self._execution = network_path(name), threads, execution
-        self._name, self._kept = name, kept or KeptEstimates()
+        self._path = network_path(name)
+        self._threads = threads
+        self._execution = execution
+        self._name = name
+        self._kept = kept or KeptEstimates()
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
@@ -179,9 +183,11 @@ class LandmarkNetwork:
         values = self._kept.find(key)
         if values is not None and len(values) == _VALUES:
             return _unpacked(values, region)
-        outputs, inputs = list(_OUTPUTS), {"input": _blob(crop_rgb)}
+        outputs = list(_OUTPUTS)
+        inputs = {"input": _blob(crop_rgb)}
         if with_mask:
-            outputs, inputs = [*outputs, "mask"], inputs | _WITH_MASK
+            outputs = [*outputs, "mask"]
+            inputs = inputs | _WITH_MASK
         landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
         if key is not None:
@@ -271,7 +277,8 @@ def refine(points: NDArray[np.float64], heatmaps: NDArray[np.float32]) -> NDArra
     inside = ((cell >= 0) & (cell < size)).all(axis=1)
     reach = np.arange(_WINDOW) - _WINDOW // 2
     x, y = np.where(inside, cell.T, 0)[:, :, None] + reach
-    nearest_y, nearest_x = np.clip(y, 0, rows - 1)[:, :, None], np.clip(x, 0, columns - 1)[:, None]
+    nearest_y = np.clip(y, 0, rows - 1)[:, :, None]
+    nearest_x = np.clip(x, 0, columns - 1)[:, None]
     logits = heatmaps[np.arange(count)[:, None, None], nearest_y, nearest_x]
     heat = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -50.0, 50.0)))
     heat *= ((y >= 0) & (y < rows))[:, :, None] & ((x >= 0) & (x < columns))[:, None]

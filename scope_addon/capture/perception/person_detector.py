@@ -116,10 +116,8 @@ class PersonDetector:
     def _detect_in(
         self, image_rgb: NDArray[np.uint8], threshold: float, corner: tuple[int, int]
     ) -> list[Detection]:
-        fitted, scale = (
-            fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0),
-            INPUT_SIZE / max(image_rgb.shape[:2]),
-        )
+        fitted = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0)
+        scale = INPUT_SIZE / max(image_rgb.shape[:2])
         blob = cv2.dnn.blobFromImage(fitted.picture_rgb, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         boxes, scores = self._session.run(["boxes", "scores"], {"input": blob})
         score, values = decode(boxes[0], scores[0, :, 0], self._anchors, threshold)
@@ -134,7 +132,8 @@ def squares(height: int, width: int) -> list[tuple[int, int, int]]:
     """Calculate (left, top, side) of the overlapping squares that cover an image; none if it is
     nearly square.
     """
-    side, length = min(height, width), max(height, width)
+    side = min(height, width)
+    length = max(height, width)
     if length < _SQUARES_FROM * side:
         return []
     starts = np.linspace(0, length - side, math.ceil(length / side)).astype(int).tolist()
@@ -216,8 +215,10 @@ def decode(
     score = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -_SCORE_LIMIT, _SCORE_LIMIT)))
     chosen = np.flatnonzero(score >= threshold)
     chosen = chosen[np.argsort(-score[chosen], kind="stable")]
-    raw, anchor = boxes[chosen].astype(float), anchors[chosen]
-    center, half = raw[:, :2] + anchor, raw[:, 2:4] / 2
+    raw = boxes[chosen].astype(float)
+    anchor = anchors[chosen]
+    center = raw[:, :2] + anchor
+    half = raw[:, 2:4] / 2
     points = raw[:, 4:] + np.tile(anchor, (1, raw.shape[1] // 2 - 2))
     return score[chosen], np.concatenate([center - half, center + half, points], axis=1)
 
@@ -245,7 +246,8 @@ def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDA
     :param corners: (N, 4 + M) left, top, right, bottom and M more columns; best box first.
     :return: indices of the boxes of each cluster, the best first.
     """
-    low, high = corners[:, :2], corners[:, 2:4]
+    low = corners[:, :2]
+    high = corners[:, 2:4]
     area = np.maximum(high - low, 0).prod(axis=1)
     remaining = np.arange(len(corners))
     clusters = []

@@ -35,7 +35,8 @@ class Region:
     @property
     def R_image_crop(self) -> NDArray[np.float64]:
         """(2, 2) rotation from the square's axes to the image's: [[c, −s], [s, c]]."""
-        c, s = math.cos(self.rotation), math.sin(self.rotation)
+        c = math.cos(self.rotation)
+        s = math.sin(self.rotation)
         return np.array([[c, -s], [s, c]])
 
     def image_from_crop(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -90,7 +91,8 @@ class Region:
         factor of two.
         """
         apart = math.dist(self.center_px, other.center_px)
-        larger, smaller = max(self.side_px, other.side_px), min(self.side_px, other.side_px)
+        larger = max(self.side_px, other.side_px)
+        smaller = min(self.side_px, other.side_px)
         return apart <= distance * larger and larger <= 2 * smaller
 
     def difference(self, other: Region) -> float:
@@ -150,7 +152,8 @@ def box_along(
     """
     R_image_box = Region((0.0, 0.0), 1.0, rotation).R_image_crop
     along = points @ R_image_box
-    low, high = along.min(axis=0), along.max(axis=0)
+    low = along.min(axis=0)
+    high = along.max(axis=0)
     return R_image_box @ ((low + high) / 2), high - low
 
 

@@ -70,7 +70,8 @@ def open_session(
     """
     if threads < 1:
         raise UsageError(f"{threads} threads were requested; at least 1 is needed.")
-    runtime, execution = _runtime(), execution or Execution()
+    runtime = _runtime()
+    execution = execution or Execution()
     for name in execution.candidates(runtime.get_available_providers()):
         try:
             session = (open_on or _open_on)(name, path, threads)

@@ -20,7 +20,8 @@ from ..tracking.track import Track
 SURE = 0.8  # confidence of a hand from which it counts
 # Distances of its wrist from the body's, in hand lengths, up to which the body's is right, and from
 # which it is wrong.
-AGREED, CONTRADICTED = 0.5, 0.8
+AGREED = 0.5
+CONTRADICTED = 0.8
 # Keypoints of the body, and those of a hand at the same places.
 _BODY = np.array(
     [
@@ -53,11 +54,9 @@ def wrists_at_hands(track: Track) -> Track:
     """
     if track.hands is None or not track.seen.any():
         return track
-    px, world, confidence = (
-        track.keypoints_px.copy(),
-        track.world_landmarks.copy(),
-        track.confidence.copy(),
-    )
+    px = track.keypoints_px.copy()
+    world = track.world_landmarks.copy()
+    confidence = track.confidence.copy()
     scale = np.array([pixels_per_metre(*row) for row in zip(px, world, strict=True)])
     for side, points in enumerate(_BODY):
         hands = track.hands[:, side][:, _HAND]

@@ -42,7 +42,9 @@ def make_report(
 
     :param rates: frames per second by stage.
     """
-    motions, camera, motion = solved.motions, footage.camera, footage.camera_motion
+    motions = solved.motions
+    camera = footage.camera
+    motion = footage.camera_motion
     is_still = len(footage.timestamps) == 1
     return {
         "source": str(video.path),
@@ -138,7 +140,8 @@ def face_frames(motion: Motion) -> dict[str, Any]:
     if not motion.face:
         return {}
     names = motion.face["expression_names"].tolist()
-    expressions, seen = motion.face["expressions"], motion.face["expression_confidence"] > 0
+    expressions = motion.face["expressions"]
+    seen = motion.face["expression_confidence"] > 0
     closed = seen & (
         expressions[:, [names.index(f"eyeBlink{side}") for side in ("Left", "Right")]].min(1)
         > CLOSED
@@ -249,7 +252,8 @@ def _steps(who: str, body: Body, motion: Motion) -> list[str]:
     if not rests:
         return []
     first, height = max(rests, key=lambda rest: abs(rest[1]))
-    side, when = "above" if height > 0 else "below", at_times([float(motion.timestamps[first])])
+    side = "above" if height > 0 else "below"
+    when = at_times([float(motion.timestamps[first])])
     return [
         f"the feet of {who} rest {100 * abs(height):.0f} cm {side} the floor {when}, as on a step; "
         "they were put on "

@@ -65,15 +65,14 @@ def solve(
         for k, each in enumerate(prepared)
     ]
     prepared, fits = resize_people(shot, prepared, fits, heights_m, progress)
-    shot, iterations = (
-        replace(shot, path=find_camera_path(shot, prepared[0], fits[0])),
-        fits[0].iterations,
-    )
+    shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
+    iterations = fits[0].iterations
     known = [(each.track, each.whole_body) for each in prepared]
     if shot.ablation.stance and not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
     return_freed_memory()
-    people, placed = [], []
+    people = []
+    placed = []
     for k, (track, body) in enumerate(known):
         raw, finished = refine(
             shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count)
@@ -188,7 +187,8 @@ def ground_all(
     placed = place_each(shot, prepared, fits)
     world = find_world(placed, shot.lines)
     return_freed_memory()
-    grounded, starts = [], []
+    grounded = []
+    starts = []
     for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
         stance = stance_on_ground(placed[k], world.floor_from_camera(k), shot.ablation.balance)
         if not shot.ablation.floor:

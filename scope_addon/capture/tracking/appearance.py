@@ -22,7 +22,8 @@ _LEGS = [
 _TORSO_FRACTIONS = np.linspace(0.15, 0.85, 9)
 _LEG_FRACTIONS = np.linspace(0.1, 0.9, 12)
 _MIN_PIXELS = 6  # of a part; fewer give no histogram
-_HUES, _GREYS = 12, 6
+_HUES = 12
+_GREYS = 6
 SIZE = 2 * (_HUES + _GREYS)
 
 

@@ -93,7 +93,8 @@ def link_cost(end: End, start: End, appearance_distance: float) -> float:
             LONG_GAP_COST * (0.5 + 0.5 * appearance_distance / LONG_GAP_MAX_APPEARANCE)
             + 0.5 * size_change
         )
-    side, elapsed = (start.side_px + end.side_px) / 2, min(gap, _MAX_EXTRAPOLATION_S)
+    side = (start.side_px + end.side_px) / 2
+    elapsed = min(gap, _MAX_EXTRAPOLATION_S)
     forward = np.linalg.norm(start.center_px - end.center_px - end.velocity_px * elapsed)
     backward = np.linalg.norm(start.center_px - start.velocity_px * elapsed - end.center_px)
     position = float(forward + backward) / (2 * side) / (POSITION_SIGMA + SPEED_SIGMA * gap)
@@ -115,7 +116,8 @@ def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]
     links: dict[int, int] = {}
     remaining = set(np.flatnonzero(is_open.any(axis=1)).tolist())
     while remaining:
-        rows, columns = {remaining.pop()}, np.zeros(cost.shape[1], bool)
+        rows = {remaining.pop()}
+        columns = np.zeros(cost.shape[1], bool)
         while True:
             columns = is_open[sorted(rows)].any(axis=0)
             grown = set(np.flatnonzero(is_open[:, columns].any(axis=1)).tolist())
@@ -123,7 +125,8 @@ def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]
                 break
             rows = grown
         remaining -= rows
-        r, c = np.array(sorted(rows)), np.flatnonzero(columns)
+        r = np.array(sorted(rows))
+        c = np.flatnonzero(columns)
         # an extra column for each row that stays without a link
         padded = np.concatenate([cost[np.ix_(r, c)] - max_cost, np.zeros((len(r), len(r)))], axis=1)
         for i, j in enumerate(assign(padded)):
@@ -139,18 +142,22 @@ def assign(cost: NDArray[np.float64]) -> list[int]:
     :return: the column of each row, all different, with the least total cost.
     """
     rows, columns = cost.shape
-    row_price, column_price = np.zeros(rows + 1), np.zeros(columns + 1)
+    row_price = np.zeros(rows + 1)
+    column_price = np.zeros(columns + 1)
     row_of = np.full(columns + 1, -1)  # the last column holds the row that is being added
     for new in range(rows):
-        row_of[columns], at = new, columns
-        shortest, came_from = np.full(columns, np.inf), np.full(columns, columns)
+        row_of[columns] = new
+        at = columns
+        shortest = np.full(columns, np.inf)
+        came_from = np.full(columns, columns)
         visited = np.zeros(columns + 1, bool)
         while row_of[at] >= 0:
             visited[at] = True
             row = row_of[at]
             length = cost[row] - row_price[row] - column_price[:columns]
             better = ~visited[:columns] & (length < shortest)
-            shortest[better], came_from[better] = length[better], at
+            shortest[better] = length[better]
+            came_from[better] = at
             nearest = int(np.where(visited[:columns], np.inf, shortest).argmin())
             step = shortest[nearest]
             row_price[row_of[visited]] += step
@@ -158,7 +165,8 @@ def assign(cost: NDArray[np.float64]) -> list[int]:
             shortest[~visited[:columns]] -= step
             at = nearest
         while at != columns:
-            row_of[at], at = row_of[came_from[at]], int(came_from[at])
+            row_of[at] = row_of[came_from[at]]
+            at = int(came_from[at])
     column_of = [-1] * rows
     for column in range(columns):
         if row_of[column] >= 0:

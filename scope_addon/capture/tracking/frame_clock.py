@@ -29,7 +29,8 @@ class FrameClock:
     """Times of frames that come in order; ``step_s`` is the time since the frame before."""
 
     def __init__(self) -> None:
-        self.time_s, self.step_s = -math.inf, FRAME_S
+        self.time_s = -math.inf
+        self.step_s = FRAME_S
         self.begin_s = 0.0
 
     def advance(self, time_s: float | None) -> None:
@@ -37,7 +38,8 @@ class FrameClock:
 
         :param time_s: when it is shown; None: a thirtieth of a second after the one before.
         """
-        before, is_first = self.time_s, self.time_s == -math.inf
+        before = self.time_s
+        is_first = self.time_s == -math.inf
         if time_s is None:
             time_s = 0.0 if is_first else before + FRAME_S
         if is_first:

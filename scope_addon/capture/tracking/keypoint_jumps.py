@@ -73,8 +73,10 @@ def find_keypoint_jumps(
         is_seen = np.lib.stride_tricks.sliding_window_view(seen, n + 2).all(axis=1)
         for j in range(J):
             p = points[:, j]
-            before, after = p[: T - n - 1], p[n + 1 :]
-            off, limit = is_seen.copy(), np.maximum(np.linalg.norm(after - before, axis=1), least)
+            before = p[: T - n - 1]
+            after = p[n + 1 :]
+            off = is_seen.copy()
+            limit = np.maximum(np.linalg.norm(after - before, axis=1), least)
             for i in range(1, n + 1):
                 line = before + (i / (n + 1)) * (after - before)
                 off &= np.linalg.norm(p[i : T - n - 1 + i] - line, axis=1) > limit
@@ -103,7 +105,8 @@ def _interpolated(
     """Return values (T, J, n) with those that jump interpolated between the frames before and
     after.
     """
-    out, rows = values.copy(), np.arange(len(values))
+    out = values.copy()
+    rows = np.arange(len(values))
     for j in np.flatnonzero(jumps.any(axis=0)):
         good = np.flatnonzero(seen & ~jumps[:, j])
         bad = np.flatnonzero(jumps[:, j])

@@ -59,7 +59,9 @@ CORRECTION_S = 0.13
 
 # How to read a frame; DEPTH_REVERSED: swapped, and with reversed depth, because front and back were
 # confused.
-AS_DETECTED, LEFT_RIGHT_SWAPPED, DEPTH_REVERSED = 0, 1, 2
+AS_DETECTED = 0
+LEFT_RIGHT_SWAPPED = 1
+DEPTH_REVERSED = 2
 
 
 def repair_left_right(track: Track, camera: Camera) -> Track:
@@ -146,7 +148,8 @@ def swap_ratio(before: PoseEstimate, after: PoseEstimate) -> float:
     It is below 1 where they look swapped, about 1 where a body is turned by a right angle, and
     infinite where both are the same.
     """
-    a, b = _centred_body(before), _centred_body(after)
+    a = _centred_body(before)
+    b = _centred_body(after)
     plain = float(_limb_distance(a, b))
     return float(_limb_distance(a[MIRROR_PARTNER], b)) / plain if plain else float("inf")
 
@@ -217,7 +220,8 @@ def _find_lifted_labels(
     The lifting network may move less in one reading than in the other, which means nothing: the
     mean of the two counts. Confidences count in addition to positions.
     """
-    rays, lifter = camera.rays(track.keypoints_px)[..., :2], default_lifter()
+    rays = camera.rays(track.keypoints_px)[..., :2]
+    lifter = default_lifter()
     readings = []
     for order in (np.arange(len(MIRROR_PARTNER)), MIRROR_PARTNER):
         body = lifter.lift(rays[:, order], track.confidence[:, order], None).points

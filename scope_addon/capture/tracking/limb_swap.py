@@ -38,7 +38,9 @@ from .keypoint_jumps import scale_px_per_m
 from .left_right import MIRROR_PARTNER, reorder_keypoints, swap_keypoints
 from .track import Track
 
-SIGMA_M, SIGMA_M_S = 0.02, 0.35  # σ₀ and σ₁ of the prediction
+# σ₀ and σ₁ of the prediction
+SIGMA_M = 0.02
+SIGMA_M_S = 0.35
 VELOCITY_S = 0.2  # τ
 # from one frame to the next: after that a walking leg may be where the other one was
 MAX_STEP_S = 0.15
@@ -164,7 +166,8 @@ def _continuity_cost(
     sigma = SIGMA_M + SIGMA_M_S * step
     cost = np.zeros((len(times), 2, 2, 2))
     for a, b, c in np.ndindex(2, 2, 2):
-        last, second_last = np.roll(f[b], 1, axis=0), np.roll(f[a], 2, axis=0)
+        last = np.roll(f[b], 1, axis=0)
+        second_last = np.roll(f[a], 2, axis=0)
         off = f[c] - last - extrapolation[:, None, None] * (last - second_last)
         r = np.minimum(np.linalg.norm(off, axis=-1) / sigma[:, None], LIMIT).mean(axis=-1)
         cost[:, a, b, c] = np.where(

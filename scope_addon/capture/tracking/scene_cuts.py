@@ -41,13 +41,12 @@ class SceneCuts:
         """
         now = _thumbnail(image_rgb) if self._upcoming is None else self._upcoming
         self._upcoming = None if upcoming_rgb is None else _thumbnail(upcoming_rgb)
-        before, self._before = self._before, now
+        before = self._before
+        self._before = now
         if before is None:
             return False
-        change, usual = (
-            _difference(before, now),
-            float(np.median(self._differences)) if self._differences else 0.0,
-        )
+        change = _difference(before, now)
+        usual = float(np.median(self._differences)) if self._differences else 0.0
         has_contrast = min(before.std(), now.std()) >= MIN_CONTRAST
         if self._upcoming is not None:
             if (

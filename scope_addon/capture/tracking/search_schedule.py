@@ -40,7 +40,8 @@ class SearchSchedule:
 
     def __init__(self, clock: FrameClock, people: int | None) -> None:
         self._clock = clock
-        self._largest_only, self._wanted = people is None, people or 1
+        self._largest_only = people is None
+        self._wanted = people or 1
         self.forget()
 
     def forget(self) -> None:
@@ -48,7 +49,9 @@ class SearchSchedule:
         self._search_s = self._close_search_s = self._small_search_s = (
             self._parts_search_s
         ) = -math.inf
-        self._parts_beside, self._parts_interval_s = 0, SEARCH_LOST_S  # see `begin_parts`
+        # see `begin_parts`
+        self._parts_beside = 0
+        self._parts_interval_s = SEARCH_LOST_S
 
     def is_due(
         self,
@@ -108,7 +111,8 @@ class SearchSchedule:
         number changes: somebody whom a close search missed is mostly there from the start.
         """
         if len(live) != self._parts_beside:
-            self._parts_beside, self._parts_interval_s = len(live), SEARCH_LOST_S
+            self._parts_beside = len(live)
+            self._parts_interval_s = SEARCH_LOST_S
         if self._largest_only or not 0 < len(live) < self._wanted:
             return False
         if not self._clock.has_passed(

@@ -165,7 +165,8 @@ def make_track(
     keypoints, confidence, world = (
         np.zeros((len(frames), KEYPOINT_COUNT, n), np.float32) for n in (2, 1, 3)
     )
-    seen, acquired = np.zeros(len(frames), bool), np.zeros(len(frames), bool)
+    seen = np.zeros(len(frames), bool)
+    acquired = np.zeros(len(frames), bool)
     references: list[tuple[int, NDArray[Any]]] = []
     shapes = {hands.shape for tracklet in tracklets for hands in tracklet.hands[:1]}
     hands = np.zeros((len(frames), *shapes.pop()), np.float32) if shapes else None

@@ -21,7 +21,8 @@ from .left_right import mean_distance
 OCCLUSION_INNOVATION = 0.08  # see `TrackedTarget.innovation`
 CONFIDENCE_DROP = 0.8  # share of the recent confidence below which it has dropped
 # over which confidence is remembered, and the least number of frames
-RECENT_S, RECENT_FRAMES = 0.5, 5
+RECENT_S = 0.5
+RECENT_FRAMES = 5
 # from where the person is predicted, or was last seen, in sides of the region
 OCCLUSION_DISTANCE = 0.5
 MIN_VELOCITY_FRAMES = 2  # after which the velocity is meaningful
@@ -116,8 +117,10 @@ class TrackedTarget:
         memory = min(_VELOCITY_MEMORY, self.age / (self.age + 1))
         self.velocity_px = memory * self.velocity_px + (1 - memory) * step
         self.swapped |= swapped
-        self.estimate, self.age = estimate, self.age + 1
-        self.seen_s, self.tracked_s = time_s, self.tracked_s + step_s
+        self.estimate = estimate
+        self.age = self.age + 1
+        self.seen_s = time_s
+        self.tracked_s = self.tracked_s + step_s
         self._remember_confidence(time_s)
 
 

@@ -66,7 +66,9 @@ APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _JUST_LOST_FRAMES = 2  # within which a detected body at the prediction continues the tracklet
 # distances of regions in sides, see `Region.resembles`
-_SAME_TARGET, _LOST_TARGET, _REPLACED_TARGET = 0.12, 0.5, 0.35
+_SAME_TARGET = 0.12
+_LOST_TARGET = 0.5
+_REPLACED_TARGET = 0.35
 # Of the regions in which somebody who was lost is looked for, see `redetect_rotated`, and of what
 # is found there.
 _REDETECTION_ROTATIONS = tuple(k * math.pi / 6 for k in range(12))
@@ -229,7 +231,8 @@ class PeopleTracker:
         """Start a tracklet for everybody in the given regions, also for those who would lose
         against others.
         """
-        regions, self._given = self._given, []
+        regions = self._given
+        self._given = []
         for estimate in self._estimator.estimate(image_rgb, regions) if regions else ():
             if estimate is not None and not any(
                 is_same_body(estimate, f.estimate) for f in self._live
@@ -400,7 +403,8 @@ class PeopleTracker:
         return TrackedTarget(self._tracklets - 1, estimate, np.zeros(2), self._clock.time_s)
 
     def _lose(self, target: TrackedTarget) -> None:
-        target.frames_lost, target.pending = 1, None
+        target.frames_lost = 1
+        target.pending = None
         self._lost.append(target)
 
     def _begin_references(self, image_rgb: NDArray[np.uint8]) -> dict[int, PendingReference]:
@@ -413,7 +417,8 @@ class PeopleTracker:
         for target in self._live:
             interval_s = REFERENCE_SWAPPED_S if target.swapped else REFERENCE_S
             if self._clock.has_passed(interval_s, target.tracked_s - target.reference_s):
-                target.reference_s, target.swapped = target.tracked_s, False
+                target.reference_s = target.tracked_s
+                target.swapped = False
                 calls[target.tracklet] = self._reference.submit(image_rgb, target.estimate.region)
         return calls
 

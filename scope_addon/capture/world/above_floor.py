@@ -34,7 +34,8 @@ from ...kinematics.smoothing import gaussian_smooth
 from .placement import PlacedTrack
 
 SOFTNESS_M = 0.007  # τ
-LIFT_CUTOFF_HZ, ROOT_CUTOFF_HZ = 6.0, 4.0
+LIFT_CUTOFF_HZ = 6.0
+ROOT_CUTOFF_HZ = 4.0
 # contact probability from which on a foot or a palm carries weight and stays where it is
 RESTING = 0.9
 ROUNDS = 4  # of smoothing without going below what is needed
@@ -64,7 +65,8 @@ def raise_feet(
     # A foot in the air goes up with the body, one that rests stays where it is.
     wanted = lifts + (1 - supports[:, :2]) * np.maximum(rise[:, None] - lifts, 0.0)
     shift = wanted - rise[:, None]
-    body, pelvis_at_rest = placed.body, placed.body.rest_joints(placed.betas)[0]
+    body = placed.body
+    pelvis_at_rest = placed.body.rest_joints(placed.betas)[0]
 
     def bend(
         rotations: NDArray[np.floating[Any]],
@@ -84,8 +86,10 @@ def raise_feet(
 
 def _heights(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the (T, 4) heights of the feet's parts above the floor."""
-    body, betas = placed.body, placed.betas
-    skin, pelvis_at_rest = FootSkin(body, betas), body.rest_joints(betas)[0]
+    body = placed.body
+    betas = placed.betas
+    skin = FootSkin(body, betas)
+    pelvis_at_rest = body.rest_joints(betas)[0]
 
     def heights(
         rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]

@@ -46,12 +46,10 @@ def assemble_motion(
     :param contact: (T, 6) probability that each sole point and palm rests on something.
     :param T_world_camera: (4, 4) the first frame's camera to the world that all people share.
     """
-    track, betas, path, J0 = (
-        person.track,
-        placed.betas,
-        shot.path,
-        shot.body.rest_joints(placed.betas)[0],
-    )
+    track = person.track
+    betas = placed.betas
+    path = shot.path
+    J0 = shot.body.rest_joints(placed.betas)[0]
     raw = person.raw
     poses_raw, trans_raw = _to_world(
         T_world_camera, J0, raw.R_first_root, raw.t_first_root, raw.joints
@@ -71,7 +69,8 @@ def assemble_motion(
             [keypoints, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1
         )
         names += HAND_KEYPOINT_NAMES
-    sigma, face = raw.joint_sigma_m, {}
+    sigma = raw.joint_sigma_m
+    face = {}
     if track.face is not None:
         face = expression_motion(
             with_expressions(track.face, placed.times), placed.times, shot.smoothing
@@ -119,7 +118,8 @@ def _to_world(
     """Return poses (T, 3 (K+1)) and trans (T, 3) of a root and the rotation vectors (T, K, 3) of
     its joints.
     """
-    R_world_camera, t_world_camera = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    R_world_camera = T_world_camera[:3, :3]
+    t_world_camera = T_world_camera[:3, 3]
 
     def to_world(
         R: NDArray[Any], t: NDArray[Any], joints: NDArray[Any]
@@ -140,10 +140,14 @@ def reprojection_error(
 
     :param placed: the motion: its rotations and root, in the first frame's camera axes.
     """
-    body, betas, track, camera = person.body, placed.betas, person.track, shot.camera
+    body = person.body
+    betas = placed.betas
+    track = person.track
+    camera = shot.camera
     at = body.keypoint_set("blazepose")
     order = [at[name] for name in KEYPOINT_NAMES]
-    K, J0 = camera.intrinsics, body.rest_joints(betas)[0]
+    K = camera.intrinsics
+    J0 = body.rest_joints(betas)[0]
 
     def error(
         rotation: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]], *rows: NDArray[Any]

@@ -35,7 +35,8 @@ STANDING_M_S = 0.5
 CUTOFF_HZ = 1.0
 # How far a sole extends behind its heel point and beyond its toe point, in units of the distance
 # between the two.
-BEHIND, BEYOND = 1.2, 0.4
+BEHIND = 1.2
+BEYOND = 0.4
 DOUBT = 0.2  # share of nearby frames in contact at which the correction is halved, roughly
 GRAVITY_M_S2 = 9.81
 LARGEST_TURN = np.radians(10.0)
@@ -48,7 +49,8 @@ _LIMBS = (
     (0.0465, "knee", "ankle", 0.433),
     (0.0145, "ankle", "foot", 0.5),
 )
-_HEAD, _TRUNK = 0.081, 0.497
+_HEAD = 0.081
+_TRUNK = 0.497
 # Knees bent by more than the first angle do not support the body; knees bent by less than the
 # second one do.
 RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))
@@ -63,7 +65,8 @@ def center_of_mass(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.
     ].mean(axis=1)
     for mass, start, end, share in _LIMBS:
         for side in ("left", "right"):
-            a, b = joints[:, at[f"{side}_{start}"]], joints[:, at[f"{side}_{end}"]]
+            a = joints[:, at[f"{side}_{start}"]]
+            b = joints[:, at[f"{side}_{end}"]]
             total = total + mass * ((1 - share) * a + share * b)
     return total / (_HEAD + _TRUNK + 2 * sum(mass for mass, *_ in _LIMBS))
 
@@ -171,7 +174,8 @@ def _sole_ends(contact_points: NDArray[np.floating[Any]]) -> NDArray[np.floating
     contact points.
     """
     soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
-    heel, toe = soles[:, 0::2], soles[:, 1::2]
+    heel = soles[:, 0::2]
+    toe = soles[:, 1::2]
     ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(
         soles.shape
     )

@@ -150,7 +150,8 @@ def camera_travel(
     height = soles @ up
     lowest = height.argmin(axis=1)
     row = np.arange(T)
-    v, h = velocity[row, lowest], height[row, lowest]
+    v = velocity[row, lowest]
+    h = height[row, lowest]
     carries: NDArray[np.bool_] = valid & (np.abs(v @ up) < MAX_VERTICAL_M_S)
     if not uneven_ground:
         carries &= h < np.median(h[valid]) + MAX_HEIGHT_M

@@ -33,7 +33,8 @@ from .camera_path import CameraPath
 VISIBLE_CONFIDENCE = 0.1
 MIN_SOLE_WEIGHT = 1e-9
 # between two frames of one scene; the second in units of the median step
-MAX_STEP_S, MAX_STEP = 1.0, 1.5
+MAX_STEP_S = 1.0
+MAX_STEP = 1.5
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,9 @@ def place_track(
     :param path: of the camera; None: it is static.
     """
     path = path or CameraPath.static(len(track))
-    times, valid, betas = track.times, fitted.valid, fitted.betas
+    times = track.times
+    valid = fitted.valid
+    betas = fitted.betas
     rotations, root = without_gaps(track, fitted, path)
     if smoothing:
         rotations = smooth_rotations(rotations, times)

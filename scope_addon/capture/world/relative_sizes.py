@@ -26,15 +26,21 @@ from .placement import PlacedTrack
 from .world_frame import floor_height
 
 STATURE_SIGMA = 0.06  # σ, of adults: 10 cm
-HEIGHT_SIGMA, FLOOR_SIGMA_M = 0.03, 0.05  # n_k = hypot of the first and of the second over h_k
+# n_k = hypot of the first and of the second over h_k
+HEIGHT_SIGMA = 0.03
+FLOOR_SIGMA_M = 0.05
 # Densities per unit of log r: a tenth of all people is small, anywhere between adults and S_min;
 # one in fifty of those who are seen together stands on another floor.
-ADULTS, SMALL, OTHER_FLOOR = 0.88, 0.15, 0.02
+ADULTS = 0.88
+SMALL = 0.15
+OTHER_FLOOR = 0.02
 SHORTEST_M = 0.8  # S_min
 MIN_CAMERA_M = 0.4  # of a camera nearer to the floor, errors of depth are as large as h_k
 MIN_CONTACT_S = 0.2
 _STEPS = np.arange(-0.8, 0.8, 0.004)  # of log C
-_SMALL, _ELSEWHERE = 1, 2  # rows of `_log_densities`, after those who are as estimated
+# rows of `_log_densities`, after those who are as estimated
+_SMALL = 1
+_ELSEWHERE = 2
 
 
 @dataclass(frozen=True)
@@ -64,7 +70,8 @@ def relative_sizes(people: Sequence[Stander]) -> NDArray[np.float64]:
     models = [_log_densities(people[k], log_c - at) for k, at in zip(usable, heights, strict=True)]
     best = int(np.argmax(sum(np.logaddexp.reduce(model, axis=0) for model in models)))
     for k, at, model in zip(usable, heights, models, strict=True):
-        kind, log_r = int(np.argmax(model[:, best])), log_c[best] - at
+        kind = int(np.argmax(model[:, best]))
+        log_r = log_c[best] - at
         if kind == _ELSEWHERE or people[k].is_known:
             continue
         share = (
@@ -97,7 +104,8 @@ def stander(placed: PlacedTrack, up: NDArray[np.floating[Any]], is_known: bool) 
     :param placed: seen by a camera that does not travel, the first frame's centre at the origin.
     :param up: (3,) unit vector, in the first frame's camera axes.
     """
-    valid, stature_m = placed.valid, placed.body.stature(placed.betas)
+    valid = placed.valid
+    stature_m = placed.body.stature(placed.betas)
     contact = placed.contact(up)[valid, : len(SOLES)]
     height_m = -floor_height(placed.soles[valid], contact, up)
     if len(placed.times) > 1:

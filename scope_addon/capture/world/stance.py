@@ -37,7 +37,8 @@ def stance_on_ground(
     :param T_floor_camera: (4, 4) camera to world, with this person's floor at z = 0.
     :param balanced: whether the zero moment point has to lie between the contact points.
     """
-    root, up = placed.root, T_floor_camera[2, :3]
+    root = placed.root
+    up = T_floor_camera[2, :3]
     contact = placed.contact(up)
     one_floor = not placed.uneven_ground
     shift_m = correct_depth(
@@ -85,13 +86,15 @@ def correct_depth(
     :param one_floor: False: f_t = 0, as on stairs.
     """
     T = len(times)
-    R, height0 = T_world_camera[:3, :3], T_world_camera[2, 3]
+    R = T_world_camera[:3, :3]
+    height0 = T_world_camera[2, 3]
     ray_world = line_of_sight(root_cam) @ R.T
     points_world = points_cam @ R.T
     height = points_world[..., 2] + height0
     # A foot that is probably in the air says nothing about the floor.
     certainty = np.clip(2 * contact - 1, 0, 1) * floor_probability(height) * one_floor
-    g, d = ray_world[:, 2], ray_world[:, :2]
+    g = ray_world[:, 2]
+    d = ray_world[:, :2]
 
     diagonal = np.full(T, 1 / DEPTH_SIGMA_M**2) + certainty.sum(1) * g**2 / FLOOR_SIGMA_M**2
     right = -(certainty * height).sum(1) * g / FLOOR_SIGMA_M**2
@@ -120,7 +123,8 @@ def _solve_tridiagonal(
     :param diagonal, off, right: (T,) diagonal, (T−1,) off-diagonal and (T,) right-hand side.
     """
     n = len(diagonal)
-    c, x = np.zeros(n), np.zeros(n)
+    c = np.zeros(n)
+    x = np.zeros(n)
     pivot = diagonal[0]
     x[0] = right[0] / pivot
     for k in range(1, n):

@@ -101,7 +101,8 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
     :return: (3,) unit vector, camera axes.
     """
     start = up_from_standing(people)
-    level, up = np.array(LEVEL_UP), start
+    level = np.array(LEVEL_UP)
+    up = start
     masses = [center_of_mass(each.body, each.joints) for each in people]
     support = [leg_support(each.body, each.joints) for each in people]
     for _ in range(ROUNDS):

@@ -132,7 +132,8 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
         new = turned | (after.root != before.root).any(1)
         changed |= new
         poses, trans = ("poses_raw", "trans_raw") if raw else ("poses", "trans")
-        values[poses], values[trans] = getattr(base, poses).copy(), getattr(base, trans).copy()
+        values[poses] = getattr(base, poses).copy()
+        values[trans] = getattr(base, trans).copy()
         values[poses][turned] = log(after.rotations[turned]).reshape(values[poses][turned].shape)
         values[trans][new] = after.root[new] - body.rest_joints(base.betas)[0]
         if not raw:
@@ -143,7 +144,8 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
     out = replace(wanted, **values)
     transform = world_of(corrections)
     if transform is not None:
-        out, changed = moved_motion(out, body, transform), np.ones(len(base), bool)
+        out = moved_motion(out, body, transform)
+        changed = np.ones(len(base), bool)
     rows = np.flatnonzero(changed)
     kept = {f"uncorrected_{name}": getattr(base, name)[rows] for name in _KEPT}
     if transform is not None:
@@ -164,7 +166,8 @@ def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
 
 def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     """Apply the edits, then the contacts and pins, in the captured world."""
-    corrections, shot = corrections_of(motion), shot_of(uncorrected(motion))
+    corrections = corrections_of(motion)
+    shot = shot_of(uncorrected(motion))
     clip = edited(clip, body, motion.betas, corrections, shot)
     wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
     if not wanted:
@@ -194,7 +197,8 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
     exchanges = [c for c in corrections_of(motion) if isinstance(c, Exchange)]
     if not exchanges:
         return base
-    raw, finished = clip_from_motion(body, base, raw=True), clip_from_motion(body, base, raw=False)
+    raw = clip_from_motion(body, base, raw=True)
+    finished = clip_from_motion(body, base, raw=False)
     mixed = np.zeros(len(base), bool)
     for exchange in exchanges:
         span = np.flatnonzero((base.frames >= exchange.first) & (base.frames <= exchange.last))

@@ -333,10 +333,8 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
 
     spans = column("contact_spans", 2), column("exchange_spans", 2)
     floors = column("floor_frames"), column("floor_heights")
-    interpolated, snaps = (
-        column("interpolated_spans", 2),
-        (column("snap_level"), column("snap_lift")),
-    )
+    interpolated = column("interpolated_spans", 2)
+    snaps = (column("snap_level"), column("snap_lift"))
     if len(interpolated) > _MAX_INTERPOLATIONS:
         raise MotionFileError(
             f"the motion has {len(interpolated)} interpolated spans, but may have at most "

@@ -43,7 +43,8 @@ def edited(
     """
     corrections = tuple(corrections)
     out = interpolated(clip, [c for c in corrections if isinstance(c, Interpolation)], shot)
-    feet, world = feet_on_floor(corrections), world_of(corrections)
+    feet = feet_on_floor(corrections)
+    world = world_of(corrections)
     if feet is None:
         return out
     height = floor_above(corrections, feet)
@@ -74,7 +75,8 @@ def interpolated(
         # two keys on each side have the velocities
         around = slice(max(span[0] - 2, 0), span[-1] + 3)
         part = interpolate(out.rows(around), out.times[span[0]], out.times[span[-1]])
-        out.rotations[around], out.root[around] = part.rotations, part.root
+        out.rotations[around] = part.rotations
+        out.root[around] = part.root
     return out
 
 

@@ -30,7 +30,8 @@ def faded(
     """
     flat = values.reshape(len(values), -1)
     zero = np.zeros((1, flat.shape[1]))
-    at, rows = [np.array([known[0] - reach[0]])], [zero]
+    at = [np.array([known[0] - reach[0]])]
+    rows = [zero]
     for k in range(len(known)):
         at.append(known[k : k + 1])
         rows.append(flat[k : k + 1])
@@ -55,10 +56,12 @@ def _monotone_cubic(
     step = np.diff(x)[:, None]
     slope = np.diff(y, axis=0) / step
     m = np.zeros_like(y)
-    before, after = slope[:-1], slope[1:]
+    before = slope[:-1]
+    after = slope[1:]
     # the harmonic mean, where both have the same sign
     with np.errstate(divide="ignore", invalid="ignore"):
-        w0, w1 = 2 * step[1:] + step[:-1], step[1:] + 2 * step[:-1]
+        w0 = 2 * step[1:] + step[:-1]
+        w1 = step[1:] + 2 * step[:-1]
         mean = (w0 + w1) / (w0 / before + w1 / after)
     m[1:-1] = np.where(before * after > 0, mean, 0.0)
     k = np.clip(np.searchsorted(x, times, side="right") - 1, 0, len(x) - 2)

@@ -32,10 +32,17 @@ from .rays import Camera, point_at_depth
 
 # Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared
 # image coordinate.
-FREE, GIRDLE, STIFF = 1.0, 10.0, 100.0
-PELVIS_ROTATION, PELVIS_POSITION = 400.0, 400.0
-PINNED, PINNED_2D = 1e6, 1e7  # 1 mm; 0.3 pixels at a focal length of 1000
-STANDING, HELD = 1e4, 1e3  # 1 cm, 3 cm
+FREE = 1.0
+GIRDLE = 10.0
+STIFF = 100.0
+PELVIS_ROTATION = 400.0
+PELVIS_POSITION = 400.0
+# 1 mm; 0.3 pixels at a focal length of 1000
+PINNED = 1e6
+PINNED_2D = 1e7
+# 1 cm, 3 cm
+STANDING = 1e4
+HELD = 1e3
 ABOVE_FLOOR = 1e5  # 3 mm for each point of the skin that is under the floor
 FLOOR_M = -0.8 * UNDER_FLOOR_M  # a capture leaves feet nearly a centimetre under the floor, too
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
@@ -117,7 +124,8 @@ class PoseRefit:
 
         :param betas: (P,) shape coefficients.
         """
-        self.betas, self.skin = np.asarray(betas, float), FootSkin(body, betas)
+        self.betas = np.asarray(betas, float)
+        self.skin = FootSkin(body, betas)
         self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
         self.names = list(body.joint_names)
         self._solver = compiled_solver()
@@ -183,10 +191,12 @@ class PoseRefit:
         """
         root_prior = root + self._shift_in_image(rotations, root, points, camera)
         T = np.eye(4) if camera is None else camera[0]
-        R_camera_world, center = T[:3, :3].T, T[:3, 3]
+        R_camera_world = T[:3, :3].T
+        center = T[:3, 3]
         in_space = [k for k, v in enumerate(points.values) if len(v) == 3]
         in_image = [k for k, v in enumerate(points.values) if len(v) == 2]
-        numbers, weights = np.array(points.numbers, int), np.array(points.weights)
+        numbers = np.array(points.numbers, int)
+        weights = np.array(points.weights)
         measured = self._solver.Measurements(
             pose_priors=self._root_prior(
                 R_camera_world @ rotations[0], R_camera_world @ (root_prior - center), joints
@@ -204,7 +214,8 @@ class PoseRefit:
                 numbers[in_image], uv, weights[in_image]
             )
         if points.floor is not None:
-            numbers, up = self._skin_points, R_camera_world[:, 2]
+            numbers = self._skin_points
+            up = R_camera_world[:, 2]
             measured.floor = self._solver.Floor(
                 numbers, up, points.floor - center[2], np.zeros(len(numbers))
             )

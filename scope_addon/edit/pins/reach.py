@@ -65,13 +65,15 @@ def _first_joint(
     """Return the joint that a limb turns about, or a pinned one nearer to its end, and the limb's
     length from there.
     """
-    rest, parents = refit.body.rest_joints(refit.betas), refit.body.parents
+    rest = refit.body.rest_joints(refit.betas)
+    parents = refit.body.parents
     side = joint.partition("_")[0]
     ends = {f"{side}_arm": f"{side}_shoulder", f"{side}_leg": f"{side}_hip"}
     root = (
         "pelvis" if joint.endswith(("shoulder", "collar")) else ends.get(limb_of(joint), "pelvis")
     )
-    part, length = refit.joint(joint), 0.0
+    part = refit.joint(joint)
+    length = 0.0
     while True:
         parent = int(parents[part])
         length += float(np.linalg.norm(rest[part] - rest[parent]))

@@ -39,7 +39,9 @@ from .reach import SLACK_M, within_reach
 
 _CONTACT_REACH_S = 0.25
 _FLOOR_M = 0.12  # a foot that stands within this height of z = 0 is put on it
-_SWEEPS, _MET_M, _MET_PX = 6, 0.002, 0.5
+_SWEEPS = 6
+_MET_M = 0.002
+_MET_PX = 0.5
 _STANDS = 0.05  # probability from which on a sole point is held
 _AROUND_S = 0.5  # beyond the span, to tell which feet stand
 
@@ -129,10 +131,14 @@ class _Correction:
     def __init__(
         self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float, floor: float
     ) -> None:
-        self._refit, self._clip, self._tracks, self._slack = refit, clip, tracks, slack
+        self._refit = refit
+        self._clip = clip
+        self._tracks = tracks
+        self._slack = slack
         self._spans = [_keys_within_reach(clip, track) for track in tracks]
         times = clip.times
-        first, last = min(s[0] for s in self._spans), max(s[-1] for s in self._spans)
+        first = min(s[0] for s in self._spans)
+        last = max(s[-1] for s in self._spans)
         around = np.flatnonzero(
             (times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S)
         )
@@ -160,7 +166,9 @@ class _Correction:
 
     def _treat(self, index: int, joints: list[str]) -> None:
         """Correct joints of a limb by the keys at which any of them is pinned."""
-        track, span, clip = self._tracks[index], self._spans[index], self._clip
+        track = self._tracks[index]
+        span = self._spans[index]
+        clip = self._clip
         before = clip.rows(span)  # a copy, as of every selection by indices
         _, at, soles = self._refit.place(before.rotations, before.root)
         self._limit(index, at)
@@ -169,17 +177,16 @@ class _Correction:
             h for h, points in enumerate(track.points) if any(joint in points for joint in joints)
         ]
         turn, shift = self._changes(track, hard, span, before, held)
-        known, reach = (
-            clip.times[[track.keys[h] for h in hard]],
-            np.array([track.reach[h] for h in hard]),
-        )
+        known = clip.times[[track.keys[h] for h in hard]]
+        reach = np.array([track.reach[h] for h in hard])
         rotations = before.rotations @ exp(faded(before.times, known, turn, reach))
         root = before.root + faded(before.times, known, shift, reach)
         R, at, soles = self._refit.place(rotations, root)
         rise = self._rise(track, span, self._refit.skin.heights(R, at, UP))
         pinned = {track.keys[h]: h for h in hard}
         for k, key in enumerate(span):
-            points, camera = _copied(held[k]), None
+            points = _copied(held[k])
+            camera = None
             if int(key) in pinned:
                 camera = track.cameras[pinned[int(key)]]
                 for measured in track.points[pinned[int(key)]].values():
@@ -199,7 +206,8 @@ class _Correction:
         if index in self._limited:
             return
         self._limited.add(index)
-        track, first = self._tracks[index], self._spans[index][0]
+        track = self._tracks[index]
+        first = self._spans[index][0]
         for h, key in enumerate(track.keys):
             pinned: dict[str, NDArray[np.float64]] = {}
             moved: dict[str, Points] = {}
@@ -227,7 +235,8 @@ class _Correction:
         """Fit the pinned keys; return the rotation vectors (H, K+1, 3) and shifts (H, 3) that this
         takes.
         """
-        turns, shifts = [], []
+        turns = []
+        shifts = []
         for h in hard:
             k = int(track.keys[h] - span[0])
             points = _copied(held[k])
@@ -245,7 +254,9 @@ class _Correction:
         self, index: int, key: int, joints: NDArray[np.float64], soles: NDArray[np.float64]
     ) -> Points:
         """Return the points of other limbs, which stay where they are while a limb is corrected."""
-        refit, own, points = self._refit, self._tracks[index].joints, Points()
+        refit = self._refit
+        own = self._tracks[index].joints
+        points = Points()
         limb = limb_of(own[0])
         if not limb.endswith("arm") and np.isfinite(self._floor[key]):
             points.floor = float(self._floor[key])
@@ -280,7 +291,8 @@ class _Correction:
 
     def _share(self, index: int, key: int) -> float:
         """Return 1 at a track's pinned keys, fading to 0 at the ends of its span."""
-        track, times = self._tracks[index], self._clip.times
+        track = self._tracks[index]
+        times = self._clip.times
         ones = np.ones(len(track.keys))
         return float(faded(times[key : key + 1], times[track.keys], ones, np.array(track.reach))[0])
 

@@ -25,7 +25,8 @@ from ..clip import clip_from_motion
 from .corrected_motion import shot_of
 
 _LARGEST = np.radians(40.0)
-_SHORTEST_PX, _SHORTEST_M = 10.0, 0.1
+_SHORTEST_PX = 10.0
+_SHORTEST_M = 0.1
 _SIDE = np.radians(30.0)  # from level, up to which a view is one from a side
 
 

@@ -55,7 +55,8 @@ class ClipProcesses:
             )
             assert process.stdin is not None
             # Taken from the process, because communicate() would close it immediately.
-            lifeline, process.stdin = process.stdin, None
+            lifeline = process.stdin
+            process.stdin = None
             self._running[process] = lifeline
         try:
             with lifeline:

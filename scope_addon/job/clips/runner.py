@@ -54,7 +54,8 @@ class LocalRunner:
     """
 
     def __init__(self, program: Sequence[str], jobs: int) -> None:
-        self._program, self._processes = list(program), ClipProcesses()
+        self._program = list(program)
+        self._processes = ClipProcesses()
         self._threads = None if jobs == 1 else max(1, (os.cpu_count() or 1) // jobs)
         self._pool = ThreadPoolExecutor(jobs)
         self._names: dict[Future[Entry], str] = {}

@@ -22,8 +22,11 @@ from .find import OVERLAY
 from .finished import FINISHED_FILE, finished_file, read_finished, remove_finished
 
 # options that only a batch passes
-SHOWN_COMMAND, STOP_WITH_STDIN = "--shown-command", "--stop-with-stdin"
-WINDOWS, WINDOWS_FOLDER = "--windows", "--windows-folder"  # likewise, only on a cluster
+SHOWN_COMMAND = "--shown-command"
+STOP_WITH_STDIN = "--stop-with-stdin"
+# likewise, only on a cluster
+WINDOWS = "--windows"
+WINDOWS_FOLDER = "--windows-folder"
 # value of WINDOWS: capture the clip, or only say into how many windows it can be divided
 COUNT = "count"
 FINISHED = ("done", "skipped", "no_person")  # statuses of clips that need not be captured again
@@ -120,7 +123,8 @@ def capture_clip(
     :param threads: of the networks; None if no number is to be given.
     """
     start = time.monotonic()
-    footage, out = Path(task.footage), Path(task.out)
+    footage = Path(task.footage)
+    out = Path(task.out)
     entry: Entry = {"file": task.file, "name": task.name}
     try:
         entry["key"] = task.key or _key(task.basis, footage)

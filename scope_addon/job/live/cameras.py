@@ -23,13 +23,20 @@ from ...errors import VideoError
 from ...live.sources.camera_modes import described
 from ...live.sources.system_cameras import camera_names, camera_with_modes
 
-NAMES, DEVICES = Path("/sys/class/video4linux"), Path("/dev")
+NAMES = Path("/sys/class/video4linux")
+DEVICES = Path("/dev")
 LONGEST_NAME = 60  # characters
-_MAX_CAMERAS, _MAX_FORMATS, _MAX_SIZES = 64, 16, 64
+_MAX_CAMERAS = 64
+_MAX_FORMATS = 16
+_MAX_SIZES = 64
 # Of linux/videodev2.h: the requests, the structures' layouts, and the two constants that are
 # needed.
-_QUERYCAP, _ENUM_FMT, _ENUM_FRAMESIZES = 0x80685600, 0xC0405602, 0xC02C564A
-_CAPABILITY, _FORMAT, _SIZE = "16s32s32sIII12x", "III32sI16x", "III6I8x"
+_QUERYCAP = 0x80685600
+_ENUM_FMT = 0xC0405602
+_ENUM_FRAMESIZES = 0xC02C564A
+_CAPABILITY = "16s32s32sIII12x"
+_FORMAT = "III32sI16x"
+_SIZE = "III6I8x"
 _CAPTURE = 1  # V4L2_CAP_VIDEO_CAPTURE and V4L2_BUF_TYPE_VIDEO_CAPTURE
 _DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
 

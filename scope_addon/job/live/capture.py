@@ -39,7 +39,8 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     from ...live.clock import Clock
 
     chosen = request.values
-    source, body = open_source(request.source, online=request.online), load_body(chosen["body"])
+    source = open_source(request.source, online=request.online)
+    body = load_body(chosen["body"])
     options = LiveOptions.of(chosen)
     clock = Clock()
     clock.stopped = commands.stopped
@@ -100,7 +101,10 @@ class _Recorder:
         footage: Footage | None = None,
     ) -> None:
         self._footage = footage
-        self._paths, self._body, self._source, self._commands = paths, body, source, commands
+        self._paths = paths
+        self._body = body
+        self._source = source
+        self._commands = commands
         self._people: tuple[LivePeople, tuple[int, int]] | None = None
         self.recording: PeopleRecording | None = None
 

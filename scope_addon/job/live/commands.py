@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import threading
 
-RECORD, STOP = b"record\n", b"stop\n"
+RECORD = b"record\n"
+STOP = b"stop\n"
 _LONGEST = 4096  # bytes without an end of line, which is no command
 
 
@@ -13,7 +14,8 @@ class Commands:
     """The commands so far. ``receive`` may be called from another thread."""
 
     def __init__(self) -> None:
-        self.recording, self.stopped = threading.Event(), threading.Event()
+        self.recording = threading.Event()
+        self.stopped = threading.Event()
         self._unfinished = b""
 
     def receive(self, piece: bytes) -> None:

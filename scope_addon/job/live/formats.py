@@ -54,7 +54,8 @@ class FormatsProcess(WorkerProcess):
         :param source: as `camera_source` gives it.
         :raises SetupError: the process cannot be started.
         """
-        self.source, self._began_s = source, time.monotonic()
+        self.source = source
+        self._began_s = time.monotonic()
         super().__init__(FormatsRequest(source), job_folder, None, python, script)
         self._fields = _FIELDS
 

@@ -13,7 +13,8 @@ from ..request import LineRequest
 class FormatsRequest(LineRequest):
     """A camera, by number or device."""
 
-    called, first_key = "the request for a camera's formats", "formats_of"
+    called = "the request for a camera's formats"
+    first_key = "formats_of"
 
     def __init__(self, formats_of: str) -> None:
         """Check it.

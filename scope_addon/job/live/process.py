@@ -21,7 +21,8 @@ from .request import LiveRequest
 
 PRESENCES = ("seen", "held", "lost")
 _POSE = re.compile(rb'\{"event": "pose", "person": (\d),')
-_FARTHEST_M, _LARGEST_BETA = 1e4, 1e3
+_FARTHEST_M = 1e4
+_LARGEST_BETA = 1e3
 _UNIT_TOLERANCE = 0.01  # of a quaternion's length, which is rounded
 
 
@@ -120,7 +121,9 @@ def parse_pose(line: bytes, joints: int, coefficients: int) -> ShownPose | None:
         rotations = np.array(message["rotations"], float)
         pelvis = np.array(message["positions"][0], float)
         betas = np.array(message["betas"], float)
-        person, frame, presence = message["person"], message["frame"], message["presence"]
+        person = message["person"]
+        frame = message["frame"]
+        presence = message["presence"]
     except (ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError) as error:
         raise unreadable("a pose that is none") from error
     if rotations.shape != (joints, 4) or pelvis.shape != (3,) or betas.shape != (coefficients,):

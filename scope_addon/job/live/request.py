@@ -14,7 +14,8 @@ from ..request import LineRequest, checked_values
 class LiveRequest(LineRequest):
     """A source, whether it may be a stream, and a value for each option of `Place.LIVE_WORKER`."""
 
-    called, first_key = "the request of a live capture", "live"
+    called = "the request of a live capture"
+    first_key = "live"
 
     def __init__(self, live: str, *, online: bool = False, **values: Any) -> None:
         """Check the values, and fill in the defaults of the others.
@@ -28,7 +29,8 @@ class LiveRequest(LineRequest):
             raise UsageError(
                 "a live capture's request needs a source, and whether the network may be used"
             )
-        self.source, self.online = live, online
+        self.source = live
+        self.online = online
         self.values: dict[str, Any] = checked_values(values, Place.LIVE_WORKER)
 
     def to_json(self) -> str:

@@ -27,7 +27,9 @@ FIRST_ONLY = (COMPILING,)
 BUILDING = "building the scene"  # after the worker has ended
 
 _SHAPE = "finding the shape"  # the first stage for each person; of several people it says how many
-_MEASURED_S, _MEASURED_STEPS = 4.0, 12  # of a stage, before its speed is believed
+# of a stage, before its speed is believed
+_MEASURED_S = 4.0
+_MEASURED_STEPS = 12
 _STEADY = 1.5  # largest ratio between the speeds of the last two thirds of that time
 _MAX_MARKS = 512
 
@@ -57,7 +59,9 @@ class JobProgress:
         self._reached: dict[str, tuple[float, float]] = {}
         self.seconds: dict[str, float] = {}  # of each stage that has ended
         self.frames = 0  # of the footage, as far as known
-        self.stage, self.done, self.total = "starting", 0, 0
+        self.stage = "starting"
+        self.done = 0
+        self.total = 0
         # of the whole job, 0..1; it never decreases, although stages repeat for each person
         self.fraction = 0.0
 
@@ -67,8 +71,12 @@ class JobProgress:
         if stage != self.stage:
             self.seconds[self.stage] = self.seconds.get(self.stage, 0.0) + now - self._stage_start
             self._repeated |= stage in self.seconds and stage in STAGES
-            self.stage, self._stage_start, self._stage_first, self._marks = stage, now, done, []
-        self.done, self.total = done, total
+            self.stage = stage
+            self._stage_start = now
+            self._stage_first = done
+            self._marks = []
+        self.done = done
+        self.total = total
         if stage == FINDING:
             self.frames = total
         elif stage == _SHAPE:
@@ -92,7 +100,8 @@ class JobProgress:
     @property
     def frames_per_second(self) -> float | None:
         """Speed of the current stage; None until it can be measured."""
-        elapsed, frames = self._clock() - self._stage_start, self.done - self._stage_first
+        elapsed = self._clock() - self._stage_start
+        frames = self.done - self._stage_first
         is_measured = (
             self.total > 1 and frames > 0 and elapsed > 0.5 and self.stage not in FIRST_ONLY
         )
@@ -162,7 +171,8 @@ class JobProgress:
             self._marks[bisect_right(self._marks, (start + k * third, 1 << 60)) - 1][1]
             for k in (1, 2)
         ]
-        before, after = marks[1] - marks[0], self.done - marks[1]
+        before = marks[1] - marks[0]
+        after = self.done - marks[1]
         if min(before, after) <= 0 or max(before, after) > _STEADY * min(before, after):
             return None
         return after / third
@@ -193,7 +203,8 @@ class JobProgress:
                 stage=stage, done=self.done, total=self.total
             )
         lines = [stage]
-        speed, left = [], []
+        speed = []
+        left = []
         if rate := self.frames_per_second:
             speed = [translate("{rate:.1f} frames/s").format(rate=rate)]
         if self.seconds_left is not None:

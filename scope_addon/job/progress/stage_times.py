@@ -10,7 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-_WHAT, _FILE = "stage times", "times.json"
+_WHAT = "stage times"
+_FILE = "times.json"
 _SETTINGS = (
     "quality",
     "hands",

@@ -38,7 +38,8 @@ def read_face_file(path: Path, what: str, forms: Mapping[str, Form]) -> dict[str
     :raises ModelFileError: the file cannot be read, or an array is missing, of another kind or
         shape, or not finite.
     """
-    data, wanted = read_npz(path, ModelFileError, what), _MOVES | dict(forms)
+    data = read_npz(path, ModelFileError, what)
+    wanted = _MOVES | dict(forms)
     with told_to_install():
         if missing := [key for key in wanted if key not in data]:
             raise ModelFileError(f"{path} lacks {', '.join(missing)}")
@@ -56,7 +57,9 @@ def moves_of(data: Mapping[str, NDArray[Any]], count: int, path: Path) -> tuple[
     :param count: of the vertices that it may move.
     :raises ModelFileError: the arrays contradict each other.
     """
-    starts, vertices, moves = data["starts"].astype(np.intp), data["vertices"], data["moves"]
+    starts = data["starts"].astype(np.intp)
+    vertices = data["vertices"]
+    moves = data["moves"]
     if len(vertices) != len(moves):
         raise ModelFileError(
             f"{path}: vertices must be as many as moves, but are {len(vertices)} for {len(moves)}"

@@ -54,7 +54,8 @@ def with_teeth_and_tongue(body: Body) -> Body:
 
     :raises ModelFileError: the file of teeth and tongue is damaged.
     """
-    mouth, count = read_mouth(), len(body.v_template)
+    mouth = read_mouth()
+    count = len(body.v_template)
     head = np.zeros((len(mouth.vertices), 4), body.skin_joints.dtype)
     head[:, 0] = body.joint_names.index(_HEAD)
     of_head = np.zeros(head.shape)
@@ -87,11 +88,9 @@ def read_mouth() -> Mouth:
     :raises ModelFileError: the file is damaged.
     """
     data = read_face_file(FILE, "file of teeth and tongue", _FORMS)
-    count, quads, materials = (
-        len(data["v_template"]),
-        len(data["faces"]),
-        len(data["material_names"]),
-    )
+    count = len(data["v_template"])
+    quads = len(data["faces"])
+    materials = len(data["material_names"])
     forms: dict[str, Form] = {
         "shapedirs": ("numbers", (count, 3, 11)),
         "uv": ("numbers", (count, 2)),

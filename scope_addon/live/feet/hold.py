@@ -47,16 +47,22 @@ from .transition import Transition
 
 WINDOW_S = 0.6
 SPEED_FRAMES = 3  # at least in the window, from which speeds can be computed
-BEGIN, END = 0.5, 0.3  # probability of contact
+# probability of contact
+BEGIN = 0.5
+END = 0.3
 LONGEST_STRETCH_M = 0.15  # between a held point and where the body has it
 # time constants of the places, while the estimates settle and afterwards
-EARLY_DRIFT_S, DRIFT_S = 0.5, 3.0
+EARLY_DRIFT_S = 0.5
+DRIFT_S = 3.0
 TRANSITION_HZ = 6.0
 MOVED_M = 0.06  # in the image since the frame before: more than noise of a foot at rest
 SWING_M_S = 0.7  # in the image, of a foot that swings past the other one
-PASSED_S, RISE_M = 0.15, 0.03  # for which, and up to which height, the other one is not let go
+# for which, and up to which height, the other one is not let go
+PASSED_S = 0.15
+RISE_M = 0.03
 # of a place from where the image shows the foot, and for how long
-DISPLACED_M, DISPLACED_S = 0.12, 0.3
+DISPLACED_M = 0.12
+DISPLACED_S = 0.3
 REHOLD_DELAY_S = 0.5  # after that, in which smoothing has come to where the foot really is
 SOFT_M = 0.005  # the floor raises soles from about this height on
 
@@ -123,9 +129,11 @@ class FootHold:
         moved_m = np.linalg.norm(soles - last.rays, axis=1) * last.points[: len(SOLES), 2]
         contact = self._probability.copy()
         contact[: len(SOLES)] *= logistic(8 * (1 - moved_m / MOVED_M))
-        R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+        R = T_world_camera[:3, :3]
+        t = T_world_camera[:3, 3]
         by_height = floor_probability(last.points @ R[2] + t[2])
-        on_floor, stands = contact * by_height, float(by_height[: len(SOLES)].max())
+        on_floor = contact * by_height
+        stands = float(by_height[: len(SOLES)].max())
         # Points that are not in contact may be below the floor as well as above it, as on stairs.
         rests = self._is_held * contact
         return Support(
@@ -149,7 +157,8 @@ class FootHold:
         """
         if self._betas is None or np.abs(betas - self._betas).max(initial=0.0) > SAME_SHAPE:
             self._betas, self._with_points = betas, with_contact_points(self._body, betas)
-        body, pelvis_at_rest = self._with_points, self._with_points.rest_joints(betas)[0]
+        body = self._with_points
+        pelvis_at_rest = self._with_points.rest_joints(betas)[0]
         R_parts, t_parts = body.forward_kinematics(
             frame.rotations, frame.root_cam - pelvis_at_rest, betas
         )
@@ -162,7 +171,8 @@ class FootHold:
         while len(self._window) > SPEED_FRAMES and self._window[0].time_s < time_s - WINDOW_S:
             self._window.popleft()
         self._probability = self._contact(T_world_camera[2, :3])
-        R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+        R = T_world_camera[:3, :3]
+        t = T_world_camera[:3, 3]
         points_world = points @ R.T + t
         before = self._points_world if self._points_world is not None else points_world
         old = self._away(before), self._away(points_world)
@@ -206,7 +216,8 @@ class FootHold:
 
     def _release_displaced(self, T_world_camera: NDArray[np.float64], step_s: float) -> None:
         """Let go of the feet that the image has shown elsewhere for long."""
-        newest, n = self._window[-1], len(SOLES)
+        newest = self._window[-1]
+        n = len(SOLES)
         places = (self._anchors[:n] - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
         depth = np.maximum(places[:, 2:], 1e-6)
         away_m = np.linalg.norm(places[:, :2] - newest.rays * depth, axis=1)

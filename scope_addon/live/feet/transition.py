@@ -25,7 +25,8 @@ class Transition:
     def __init__(self, n: int, hz: float) -> None:
         self._omega = 2 * np.pi * hz
         self._r: NDArray[np.float64] = np.zeros((n, 3))
-        self._v, self._a = np.zeros((n, 3)), np.zeros((n, 3))
+        self._v = np.zeros((n, 3))
+        self._a = np.zeros((n, 3))
 
     @property
     def remainder(self) -> NDArray[np.float64]:
@@ -34,14 +35,16 @@ class Transition:
 
     def advance(self, step_s: float) -> None:
         """Let time pass."""
-        w, t = self._omega, step_s
-        c0, c1, c2 = (
-            self._r,
-            self._v + w * self._r,
-            (self._a + 2 * w * self._v + w * w * self._r) / 2,
-        )
-        value, slope, decay = c0 + (c1 + c2 * t) * t, c1 + 2 * c2 * t, np.exp(-w * t)
-        self._r, self._v = value * decay, (slope - w * value) * decay
+        w = self._omega
+        t = step_s
+        c0 = self._r
+        c1 = self._v + w * self._r
+        c2 = (self._a + 2 * w * self._v + w * w * self._r) / 2
+        value = c0 + (c1 + c2 * t) * t
+        slope = c1 + 2 * c2 * t
+        decay = np.exp(-w * t)
+        self._r = value * decay
+        self._v = (slope - w * value) * decay
         self._a = (2 * c2 - 2 * w * slope + w * w * value) * decay
 
     def change(

@@ -31,12 +31,14 @@ class Footage:
     """
 
     def __init__(self, path: Path, fps: Fraction) -> None:
-        self._path, self._fps = path, fps
+        self._path = path
+        self._fps = fps
         self.origin: tuple[int, float] | None = None  # number and time of the first picture
         self.lost = 0  # pictures that were left out
         self._size: tuple[int, ...] = ()
         self._waiting: queue.Queue[Picture | None] = queue.Queue(_WAITING)
-        self._is_wanted, self._problem = True, ""
+        self._is_wanted = True
+        self._problem = ""
         self._thread = threading.Thread(target=self._run, name="scope-live-footage", daemon=True)
 
     def add(self, picture: Picture) -> None:
@@ -100,7 +102,9 @@ class Footage:
             self._problem = f"cannot write {self._path} ({reason(error)})"
 
     def _write(self, temporary: Path) -> None:
-        height, width = self._size[0] // 2 * 2, self._size[1] // 2 * 2  # as the encoder needs it
+        # as the encoder needs it
+        height = self._size[0] // 2 * 2
+        width = self._size[1] // 2 * 2
         assert self.origin is not None
         with VideoWriter(temporary, self._fps, width, height, self._path) as writer:
             while (picture := self._waiting.get()) is not None and self._is_wanted:

@@ -17,7 +17,8 @@ from ....solver.rotations import exp, log
 from ...kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..pose import LivePose
 
-_SAME_TIME_S, _SAME_SHAPE = 1e-3, 0.01
+_SAME_TIME_S = 1e-3
+_SAME_SHAPE = 0.01
 
 
 def at_frames(poses: Sequence[LivePose], delay_s: float) -> list[LivePose]:
@@ -43,12 +44,15 @@ def _between(poses: Sequence[LivePose], k: int, after: int, since: NDArray[np.fl
 
     :param since: (n,) seconds since each given pose.
     """
-    later, earlier = poses[after], poses[max(after - 1, 0)]
+    later = poses[after]
+    earlier = poses[max(after - 1, 0)]
     span = float(since[max(after - 1, 0)] - since[after])
     share = float(np.clip(since[max(after - 1, 0)] / span, 0.0, 1.0)) if span > 0 else 1.0
     # In the world, which may have moved between the two.
-    R, t = later.T_world_camera[:3, :3], later.T_world_camera[:3, 3]
-    R_earlier, t_earlier = earlier.T_world_camera[:3, :3], earlier.T_world_camera[:3, 3]
+    R = later.T_world_camera[:3, :3]
+    t = later.T_world_camera[:3, 3]
+    R_earlier = earlier.T_world_camera[:3, :3]
+    t_earlier = earlier.T_world_camera[:3, 3]
     before = earlier.rotations.copy()
     before[0] = R.T @ R_earlier @ before[0]
     root_before = (R_earlier @ earlier.root_cam + t_earlier - t) @ R

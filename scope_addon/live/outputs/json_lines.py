@@ -41,7 +41,8 @@ class JsonServer:
     """
 
     def __init__(self, body: Body, address: str, port: int, people: int = 1) -> None:
-        self._header, self._people = line(description(body)), people
+        self._header = line(description(body))
+        self._people = people
         self._clients: list[_Client] = []
         self._lock = threading.Lock()
         self._is_over = False
@@ -110,7 +111,8 @@ class _Client:
     """One connection, with a thread of its own."""
 
     def __init__(self, connection: socket.socket, header: bytes, queued_lines: int) -> None:
-        self._connection, self._header = connection, header
+        self._connection = connection
+        self._header = header
         self._lines: deque[bytes] = deque(maxlen=queued_lines)
         self._changed = threading.Condition()
         self._is_finishing = self.is_gone = False

@@ -39,7 +39,10 @@ _MAX_KEPT = 12  # pictures; at 720p, 33 MB
 _QUALITY = 80  # of the JPEG pictures
 _CLOSING_S = 0.4  # for which the end waits for browsers
 _POLLING_INTERVAL_S = 0.1  # in which the server sees that it is to end
-_LEFT, _RIGHT, _MIDDLE, _JOINT = (255, 140, 40), (40, 150, 255), (235, 235, 235), (255, 255, 255)
+_LEFT = (255, 140, 40)
+_RIGHT = (40, 150, 255)
+_MIDDLE = (235, 235, 235)
+_JOINT = (255, 255, 255)
 _PAGE = (
     '<!DOCTYPE html><html lang="en"><meta charset="utf-8"><title>Scope live</title>'
     '<body style="margin:0;background:#1d1d1d"><img src="{token}.mjpeg" alt="Live capture"'
@@ -61,7 +64,8 @@ class PreviewPage:
         self._session: LiveSession | None = None
         self._pictures: deque[Picture] = deque(maxlen=_MAX_KEPT)
         self._poses: dict[int, LivePose] = {}  # the newest of each person
-        self._viewers, self._is_over = 0, threading.Event()
+        self._viewers = 0
+        self._is_over = threading.Event()
         self._changed = threading.Condition()
         token = secrets.token_urlsafe(9)
         try:
@@ -123,17 +127,16 @@ class PreviewPage:
 
     def pictures(self) -> Iterator[bytes]:
         """Yield JPEG pictures until the capture ends, the newest one last."""
-        shown, is_over = -np.inf, False
+        shown = -np.inf
+        is_over = False
         while not is_over:
             is_over = self._is_over.wait(INTERVAL_S)
             with self._changed:
                 while not self._is_over.is_set() and self._newest_s() <= shown:
                     self._changed.wait(1.0)
                 poses = list(self._poses.values())
-            picture, newest = (
-                self._picture_of(poses),
-                max((pose.timestamp_s for pose in poses), default=-np.inf),
-            )
+            picture = self._picture_of(poses)
+            newest = max((pose.timestamp_s for pose in poses), default=-np.inf)
             if picture is not None and newest > shown:
                 shown = newest
                 yield self._drawn(picture, poses)
@@ -164,11 +167,13 @@ class PreviewPage:
 
     def _draw(self, image: NDArray[Any], pose: LivePose, camera: Camera, scale: float) -> None:
         """Draw the bones of a pose into an image, in place."""
-        R, t = pose.T_world_camera[:3, :3], pose.T_world_camera[:3, 3]
+        R = pose.T_world_camera[:3, :3]
+        t = pose.T_world_camera[:3, 3]
         joints = (pose.joints - t) @ R
         if joints[:, 2].min() <= 0.1:  # beside or behind the camera
             return
-        intrinsics, nothing = scaled_intrinsics(camera.intrinsics, scale), np.zeros(3)
+        intrinsics = scaled_intrinsics(camera.intrinsics, scale)
+        nothing = np.zeros(3)
         pixels = cv2.projectPoints(joints, nothing, nothing, intrinsics, camera.dist)[0][:, 0]
         points = np.clip(np.round(pixels), -30000, 30000).astype(int).tolist()
         for k, parent, color in self._bones:

@@ -37,14 +37,17 @@ class Recording:
     """Keeps every pose, some 3 kB each."""
 
     def __init__(self, path: Path, body: Body, source: Source) -> None:
-        self._path, self._body, self._source = path, body, source
+        self._path = path
+        self._body = body
+        self._source = source
         self._poses: list[LivePose] = []
         self._session: LiveSession | None = None
         self._size = (1, 1)
 
     def begin(self, session: LiveSession, size: tuple[int, int]) -> None:
         """Note where the poses come from."""
-        self._session, self._size = session, size
+        self._session = session
+        self._size = size
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
         """Keep a pose in which the person is seen."""
@@ -111,7 +114,8 @@ class Recording:
         return assemble_motion(shot, person, placed, contact, T_world_frame[0])
 
     def _track(self, poses: list[LivePose], rows: NDArray[np.intp], T: int) -> Track:
-        first, times = poses[0].index, np.array([pose.timestamp_s for pose in poses])
+        first = poses[0].index
+        times = np.array([pose.timestamp_s for pose in poses])
         keypoints = np.zeros((T, KEYPOINT_COUNT, 3), np.float32)
         keypoints[rows] = _stacked(poses, "keypoints")
         seen = np.zeros(T, bool)

@@ -55,7 +55,8 @@ BONES = {
     },
 }
 LARGEST_DATAGRAM = 1400  # bytes; larger ones are split on their way through a network
-_CALIBRATING, _CALIBRATED = 2, 3
+_CALIBRATING = 2
+_CALIBRATED = 3
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -98,7 +99,8 @@ class VmcSender:
             raise OutputError(
                 f"{host} is unknown ({error}); give --vmc the receiver's name or address"
             ) from error
-        self._body, self._address = body, address
+        self._body = body
+        self._address = address
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._bones = {
@@ -148,7 +150,8 @@ def datagrams(messages: list[OscMessage]) -> list[bytes]:
     """Put messages, in their order, into as few bundles as do not exceed `LARGEST_DATAGRAM`."""
     from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 
-    bundles, size = [], LARGEST_DATAGRAM
+    bundles = []
+    size = LARGEST_DATAGRAM
     for message in messages:
         if size + message.size + 4 > LARGEST_DATAGRAM:
             bundles.append(OscBundleBuilder(IMMEDIATELY))

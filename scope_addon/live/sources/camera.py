@@ -31,9 +31,11 @@ _OPEN_ERRORS = {
     errno.ENXIO: "is not plugged in any more",
 }
 # Of linux/videodev2.h: the request for what a device can do, and where its answer says so.
-_QUERYCAP, _CAPABILITY = 0x80685600, "16s32s32sIII12x"
+_QUERYCAP = 0x80685600
+_CAPABILITY = "16s32s32sIII12x"
 # the camera's nodes together can do what the first answer says
-_CAPTURE, _OF_THIS_NODE = 1, 1 << 31
+_CAPTURE = 1
+_OF_THIS_NODE = 1 << 31
 
 
 class CameraSource:
@@ -46,7 +48,8 @@ class CameraSource:
 
         :raises VideoError: it does not.
         """
-        self._device, self.name = device, f"camera {device}"
+        self._device = device
+        self.name = f"camera {device}"
         self._path = Path(f"/dev/video{device}" if isinstance(device, int) else device)
         self.fps = DEFAULT_FPS
         self.focal_35mm: float | None = None

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 LONGEST_LOG = 1 << 18  # characters, beyond which nothing is read
 MAX_MODES = 256
-_SIDES, _HIGHEST_FPS = range(16, 16385), 1000.0
+_SIDES = range(16, 16385)
+_HIGHEST_FPS = 1000.0
 _FPS = 30.0  # of the mode to ask for, as near as the camera has it
 _NUMBER = r"([0-9.einf+]{1,20})"  # drivers that leave an interval out give infinite rates
 _OF_DSHOW = re.compile(

@@ -98,4 +98,5 @@ class Damage:
         return self.is_broken
 
     def _break(self) -> None:
-        self.is_broken, self._has_key = True, False
+        self.is_broken = True
+        self._has_key = False

@@ -24,9 +24,11 @@ class FileSource:
 
         :raises VideoError: it cannot be used.
         """
-        self._path, self.name = path, path.name
+        self._path = path
+        self.name = path.name
         with open_video(path) as video:
-            self.fps, self.focal_35mm = video.fps, video.focal_35mm
+            self.fps = video.fps
+            self.focal_35mm = video.focal_35mm
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:
         """See `Source`."""
@@ -36,7 +38,8 @@ class FileSource:
                 due_s = began_s + frame.timestamp_s
                 clock.sleep(due_s - clock.now())
                 if (late_s := clock.now() - due_s) > LEAP_S:
-                    began_s, due_s = began_s + late_s, due_s + late_s
+                    began_s = began_s + late_s
+                    due_s = due_s + late_s
                 yield Picture(
                     frame.index, frame.timestamp_s, max(due_s, clock.now()), frame.image_rgb
                 )

@@ -17,11 +17,16 @@ from collections import deque
 from collections.abc import Iterator
 from itertools import islice
 
-_SLICE, _IDR_SLICE, _PARAMETERS = 1, 5, 7  # nal_unit_type
+# nal_unit_type
+_SLICE = 1
+_IDR_SLICE = 5
+_PARAMETERS = 7
 _BUILT_ON = 0x60  # nal_ref_idc in the first byte, not zero where other pictures build on this one
 _MAX_UNITS = 64  # of a packet that are looked at; one has some parameters and slices
 _HEAD_BYTES = 64  # of a slice, more than what comes before its frame_num
-_RECENT, _MANY = 16, 8  # pictures, and gaps among them from which these are no losses
+# pictures, and gaps among them from which these are no losses
+_RECENT = 16
+_MANY = 8
 _PARAMETER_BYTES = 1024  # of a sequence parameter set, which may have scaling lists
 # profile_idc of those whose parameters tell more of colours and scaling.
 _HIGH_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128, 138, 139, 134, 135)
@@ -75,7 +80,8 @@ class FrameNumbers:
             number = bits.take(self._bits)
         except IndexError:
             return False
-        last, following = self._last, 1 << self._bits
+        last = self._last
+        following = 1 << self._bits
         is_gap = last is not None and number not in (last, (last + 1) % following)
         if unit[0] & _BUILT_ON:
             self._last = number
@@ -118,7 +124,9 @@ class FrameNumbers:
         except IndexError:
             return
         if number_bits <= 16:
-            self._bits, self._has_planes, self._may_miss = number_bits, has_planes, may_miss
+            self._bits = number_bits
+            self._has_planes = has_planes
+            self._may_miss = may_miss
 
 
 def _skip_colours(bits: _Bits) -> bool:
@@ -138,7 +146,8 @@ def _skip_colours(bits: _Bits) -> bool:
 
 
 def _skip_scaling_list(bits: _Bits, size: int) -> None:
-    last, following = 8, 8
+    last = 8
+    following = 8
     for _ in range(size):
         if following:
             following = (last + bits.signed_exp_golomb()) % 256

@@ -56,18 +56,27 @@ class NewestFrame:
         received: Callable[[Picture], None] = lambda _: None,
     ) -> None:
         self._received = received
-        self._source, self._clock, self._reconnect_s, self._say = source, clock, reconnect_s, say
+        self._source = source
+        self._clock = clock
+        self._reconnect_s = reconnect_s
+        self._say = say
         self._changed = threading.Condition()
         self._newest: Picture | None = None
         self._error: BaseException | None = None
         self._is_over = False
         self._said = ""  # what was said of the interruption that lasts
-        self._next_index, self._last_s, self._began_s = 0, 0.0, 0.0
+        self._next_index = 0
+        self._last_s = 0.0
+        self._began_s = 0.0
         self._size: tuple[int, int] | None = None  # of the pictures that are given
         self._last_image: NDArray[Any] | None = None  # as it came
-        self._changed_s, self._is_frozen = 0.0, False  # when it last differed from the one before
+        # when it last differed from the one before
+        self._changed_s = 0.0
+        self._is_frozen = False
         self._arrived_s = 0.0  # of the last one
-        self._pace, self._taken_s = Pace(), 0.0  # when the last one was taken
+        # when the last one was taken
+        self._pace = Pace()
+        self._taken_s = 0.0
         self._damage_said_s = -np.inf
         self.received = self.dropped = self.damaged = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
@@ -102,7 +111,8 @@ class NewestFrame:
                 self._changed.wait(_POLLING_INTERVAL_S)
             if self._newest is None and self._error is not None:
                 raise self._error
-            taken, self._newest = self._newest, None
+            taken = self._newest
+            self._newest = None
             if taken is not None:
                 self._pace.take(taken.timestamp_s)
                 self._taken_s = self.now()
@@ -179,7 +189,8 @@ class NewestFrame:
             self.dropped += self._newest is not None or not is_due
             self.received += 1
             self._newest = picture if is_due else self._newest
-            self._next_index, self._last_s = index + 1, time_s
+            self._next_index = index + 1
+            self._last_s = time_s
             self._changed.notify_all()
 
     def _note_damage(self) -> None:
@@ -208,13 +219,15 @@ class NewestFrame:
         """Say that a source shows the same picture again and again, as servers do that have lost
         their camera.
         """
-        last, image = self._last_image, picture.image_rgb
+        last = self._last_image
+        image = picture.image_rgb
         self._last_image = image
         # Some pixels first, which mostly differ.
         if last is None or not (
             np.array_equal(last[::16, ::16], image[::16, ::16]) and np.array_equal(last, image)
         ):
-            self._changed_s, self._is_frozen = picture.arrived_s, False
+            self._changed_s = picture.arrived_s
+            self._is_frozen = False
         elif (
             picture.arrived_s - self._changed_s > STALLED_S
             and not self._is_frozen
@@ -228,7 +241,8 @@ class NewestFrame:
 
     def _in_first_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a picture in the size of the first one, unless its shape is another one."""
-        size, wanted = (image.shape[1], image.shape[0]), self._size
+        size = (image.shape[1], image.shape[0])
+        wanted = self._size
         if wanted is None or abs(size[0] * wanted[1] / (size[1] * wanted[0]) - 1) > SAME_SHAPE:
             self._size = size
         if wanted is None or self._size == size:

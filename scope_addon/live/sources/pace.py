@@ -22,11 +22,15 @@ from numpy.typing import NDArray
 # between frames: n is not raised beyond it without need, so that no slow source becomes slower
 SLOWEST_S = 1 / 28
 # between even frames beyond that, over uneven ones: to begin with n, and to keep it
-MORE_TIME, MAX_TIME = 1.25, 1.35
+MORE_TIME = 1.25
+MAX_TIME = 1.35
 # over which it is seen that frames take too long, and the least number of them
-RECENT_S, FEWEST = 1.0, 8
+RECENT_S = 1.0
+FEWEST = 8
 IN_TIME_S = 4.0  # the same, that they would be processed in time with a lower n
-LATE_SHARE, RARE_SHARE = 0.15, 0.08  # of the frames in these times, that take too long
+# of the frames in these times, that take too long
+LATE_SHARE = 0.15
+RARE_SHARE = 0.08
 # distance of the source's frames, over that for which n was chosen, from which n is chosen anew
 SLOWER = 1.5
 # of the time between two frames, which all but a few have to leave some of for n to be lowered
@@ -118,7 +122,8 @@ class Pace:
         return every * self._interval_s <= more_time * uneven_s
 
     def _change(self, every: int) -> None:
-        self.every, self._chosen_for_s = every, self._interval_s
+        self.every = every
+        self._chosen_for_s = self._interval_s
         self._took.clear()
 
     @property

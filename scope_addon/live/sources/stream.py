@@ -46,7 +46,9 @@ class StreamSource:
     ends = False
 
     def __init__(self, url: str) -> None:
-        self._url, self.name = url, re.sub(r"//[^/@]*@", "//", url)  # without a password
+        # without a password
+        self._url = url
+        self.name = re.sub(r"//[^/@]*@", "//", url)
         self.fps = DEFAULT_FPS
         self.focal_35mm: float | None = None
 
@@ -96,7 +98,8 @@ class StreamSource:
         """
         import av
 
-        has_begun, began_s = False, clock.now()
+        has_begun = False
+        began_s = clock.now()
         seen_s = began_s
         damaged_s: float | None = None  # since when pictures have been damaged
         damage = Damage(stream.codec_context.name, stream.codec_context.extradata)

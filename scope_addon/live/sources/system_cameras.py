@@ -37,7 +37,8 @@ _REQUESTED_MODES: tuple[dict[str, str], ...] = ({"framerate": "30"}, {})
 # picture.
 _LISTING = {"dshow": {"list_options": "true"}, "avfoundation": {"video_size": "1x1"}}
 # for the next picture, and without one, after which a camera counts as gone
-_WAITING_S, _GONE_S = 0.002, 5.0
+_WAITING_S = 0.002
+_GONE_S = 5.0
 
 
 def camera_names(platform: str) -> list[str]:
@@ -56,7 +57,8 @@ def open_camera(number: int, size: tuple[int, int], platform: str) -> InputConta
     """
     import av
 
-    device, problem = _device(number, platform), ""
+    device = _device(number, platform)
+    problem = ""
     for wanted in _wanted(device, size, platform):
         try:
             return av.open(
@@ -84,7 +86,8 @@ def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uin
     import av
 
     with container as opened:
-        seen_s, is_open = clock.now(), True
+        seen_s = clock.now()
+        is_open = True
         while is_open and clock.now() - seen_s < _GONE_S:
             try:
                 for frame in opened.decode(video=0):
@@ -114,7 +117,9 @@ def _wanted(device: DeviceInfo, size: tuple[int, int], platform: str) -> Iterato
 def _modes(device: DeviceInfo, platform: str) -> list[Mode]:
     import av
 
-    kind, level, skips = FORMATS[platform], av.logging.get_level(), av.logging.get_skip_repeated()
+    kind = FORMATS[platform]
+    level = av.logging.get_level()
+    skips = av.logging.get_skip_repeated()
     av.logging.set_level(av.logging.INFO)
     # the note of a repetition has no end of line, and spoils the next one
     av.logging.set_skip_repeated(False)

@@ -98,16 +98,20 @@ def _motion(
 
     :param sums: (T,) of each channel of the map.
     """
-    rest, still = bones[bone], np.zeros(len(next(iter(sums.values()))))
+    rest = bones[bone]
+    still = np.zeros(len(next(iter(sums.values()))))
     to_face = rest.rotation.T @ frame.axes
     moved, turned = (
         np.stack([sums.get(name, still) for name in names], axis=1) for names in (MOVED, TURNED)
     )
     moved = moved * frame.length(bone)
-    moves, turns = not sums.keys().isdisjoint(MOVED), not sums.keys().isdisjoint(TURNED)
+    moves = not sums.keys().isdisjoint(MOVED)
+    turns = not sums.keys().isdisjoint(TURNED)
     eye = pivot(bones, bone)
     if eye is not None and turns:
-        moved, moves, turns = moved + _around(eye, rest.head, turned, frame), True, False
+        moved = moved + _around(eye, rest.head, turned, frame)
+        moves = True
+        turns = False
     location_axes = to_face if rest.local_location else frame.axes
     return ControlMotion(
         bone,

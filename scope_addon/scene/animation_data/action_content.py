@@ -93,6 +93,7 @@ def _restore_curves(owner: Any, wanted: Any) -> None:
 
 
 def _restore_keys(curve: bpy.types.FCurve, source: bpy.types.FCurve) -> None:
-    wanted, present = read_whole_keys(source), read_whole_keys(curve)
+    wanted = read_whole_keys(source)
+    present = read_whole_keys(curve)
     if not all(np.array_equal(present[name], wanted[name]) for name in wanted):
         write_whole_keys(curve, wanted)

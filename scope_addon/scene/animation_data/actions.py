@@ -142,7 +142,8 @@ def bone_path(bone_name: str, channel: str) -> str:
 
 def bone_property_path(bone_name: str, name: str) -> str:
     """Return the RNA path of a pose bone's custom property."""
-    bone, key = bpy.utils.escape_identifier(bone_name), bpy.utils.escape_identifier(name)
+    bone = bpy.utils.escape_identifier(bone_name)
+    key = bpy.utils.escape_identifier(name)
     return f'pose.bones["{bone}"]["{key}"]'
 
 
@@ -220,7 +221,8 @@ def change_keys(
     after = np.searchsorted(coordinates[:, 0], wanted)
     around = np.clip(np.stack([after, after - 1]), 0, len(coordinates) - 1)
     off = np.abs(coordinates[around, 0] - wanted)
-    at, present = np.where(off[0] <= off[1], *around), off.min(axis=0) <= _SAME_FRAME
+    at = np.where(off[0] <= off[1], *around)
+    present = off.min(axis=0) <= _SAME_FRAME
     coordinates[at[present], 1] = values[present]
     keys.foreach_set("co", coordinates.ravel())
     if not present.all():
@@ -243,7 +245,8 @@ def _insert_keys(curve: bpy.types.FCurve, new: NDArray[np.float32]) -> None:
         return
     whole = read_whole_keys(curve)
     frames = whole["co"][:, 0]
-    first, places = int(np.searchsorted(frames, new[0, 0])), np.searchsorted(frames, others[:, 0])
+    first = int(np.searchsorted(frames, new[0, 0]))
+    places = np.searchsorted(frames, others[:, 0])
     for name, rows in whole.items():
         whole[name] = np.insert(rows, places, others if name in _POINTS else rows[first], axis=0)
     write_whole_keys(curve, whole)
@@ -336,14 +339,17 @@ def push_to_nla(datablock: bpy.types.ID) -> bpy.types.NlaStrip:
     :param datablock: with an action, and not in the NLA's Tweak Mode.
     """
     animation = datablock.animation_data
-    action, slot = animation.action, getattr(animation, "action_slot", None)
+    action = animation.action
+    slot = getattr(animation, "action_slot", None)
     first, last = action.frame_range
     track = animation.nla_tracks.new()
     track.name = action.name
     strip = track.strips.new(action.name, int(first), action)
     if slot is not None:
         strip.action_slot = slot
-    strip.frame_end, strip.frame_start = last, first  # keys may lie between whole frames
+    # keys may lie between whole frames
+    strip.frame_end = last
+    strip.frame_start = first
     animation.action = None
     return strip
 
@@ -405,7 +411,8 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
         yield
     finally:
         for animation, action, slot, blend_type in kept:
-            animation.use_nla, animation.action = True, action
+            animation.use_nla = True
+            animation.action = action
             if slot is not None:
                 animation.action_slot = slot
             animation.action_blend_type = blend_type

@@ -72,5 +72,7 @@ def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
     start, end, first, last = (retiming.frame(frame) for frame in ends)
     # Blender keeps the end after the start
     strip.action_frame_end = max(last, strip.action_frame_start + 1.0)
-    strip.action_frame_start, strip.action_frame_end = first, last
-    strip.frame_start_raw, strip.frame_end_raw = start, end
+    strip.action_frame_start = first
+    strip.action_frame_end = last
+    strip.frame_start_raw = start
+    strip.frame_end_raw = end

@@ -53,7 +53,8 @@ def blender_rate(frames_per_second: float) -> tuple[int, float]:
 
 def scene_rate(scene: bpy.types.Scene) -> float:
     """Return the frame rate of a scene, frames per second."""
-    fps, base = scene.render.fps, scene.render.fps_base
+    fps = scene.render.fps
+    base = scene.render.fps_base
     # fps_base is a 32-bit float; the exact value is known for broadcast rates.
     exact = min(BROADCAST, key=lambda rate: abs(float(rate) - fps / base))
     return float(exact) if abs(float(exact) - fps / base) < 1e-5 else fps / base
@@ -112,7 +113,8 @@ def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
 
 def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
     """Set the scene's frame range to that of the keys, rounded outwards to whole frames."""
-    start, end = math.floor(first), math.ceil(last)
+    start = math.floor(first)
+    end = math.ceil(last)
     scene.frame_end = max(end, scene.frame_start)  # Blender keeps start <= end at every step
     scene.frame_start = start
     scene.frame_end = end
@@ -125,7 +127,8 @@ def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, l
     cycle, before = _stored_ranges(armature)
     if cycle != (scene.frame_start, scene.frame_end):
         before = scene.frame_start, scene.frame_end
-    scene.frame_start, scene.frame_end = first, last
+    scene.frame_start = first
+    scene.frame_end = last
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
 
 
@@ -136,7 +139,8 @@ def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: R
     cycle, before = _stored_ranges(armature)
     if len(cycle) != 2 or len(before) != 2:
         return
-    start, end = math.ceil(retiming.frame(cycle[0])), math.floor(retiming.frame(cycle[1] + 1)) - 1
+    start = math.ceil(retiming.frame(cycle[0]))
+    end = math.floor(retiming.frame(cycle[1] + 1)) - 1
     if cycle == (scene.frame_start, scene.frame_end):
         set_frame_range(scene, start, end)
     armature[_CYCLE] = "{} {} {} {}".format(start, end, *retiming.span(*before))

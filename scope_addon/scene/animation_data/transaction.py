@@ -74,7 +74,8 @@ class _SavedScene:
     """A scene's settings and markers, the selection, and the active object's mode."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
-        self._scene, self._layer = scene, bpy.context.view_layer
+        self._scene = scene
+        self._layer = bpy.context.view_layer
         self._settings = {name: getattr(scene, name) for name in _SCENE}
         self._render = {name: getattr(scene.render, name) for name in _RENDER}
         self._current = scene.frame_current, scene.frame_subframe
@@ -115,7 +116,8 @@ class _SavedTransform:
     """
 
     def __init__(self, obj: bpy.types.Object) -> None:
-        self._obj, self._parent = obj, obj.parent
+        self._obj = obj
+        self._parent = obj.parent
         self._parenting = obj.parent_type, obj.parent_bone
         self._matrices = obj.matrix_parent_inverse.copy(), obj.matrix_basis.copy()
         owners = [obj, *(obj.pose.bones if obj.pose else ())]
@@ -141,7 +143,8 @@ class _SavedAnimation:
     """
 
     def __init__(self, obj: bpy.types.Object | bpy.types.Key) -> None:
-        self._obj, data = obj, obj.animation_data
+        self._obj = obj
+        data = obj.animation_data
         self._had_data = data is not None
         self._action: bpy.types.Action | None = data.action if data else None
         slot = getattr(data, "action_slot", None)
@@ -154,7 +157,9 @@ class _SavedAnimation:
         if not self._had_data:
             self._obj.animation_data_clear()
             return
-        data, action, copy = self._obj.animation_data, self._action, self._copy
+        data = self._obj.animation_data
+        action = self._action
+        copy = self._copy
         if action is None or copy is None:
             data.action = None
             return

@@ -87,7 +87,8 @@ def build_armature(
     try:
         for i, joint_name in enumerate(body.joint_names):
             bone = data.edit_bones.new(joint_name)
-            bone.head, bone.tail = rest.joints[i], rest.tails[i]
+            bone.head = rest.joints[i]
+            bone.tail = rest.tails[i]
             along = rest.tails[i] - rest.joints[i]
             points_forward = abs(along @ _FRONT) > 0.8 * np.linalg.norm(along)
             bone.align_roll(UP if points_forward else _FRONT)

@@ -71,7 +71,8 @@ def skin_to_armature(mesh: bpy.types.Object, armature: bpy.types.Object, body: B
     """Add vertex groups with the body's skin weights and a linear Armature modifier, and set the
     armature as parent.
     """
-    joints, weights = body.skin_joints, body.skin_weights
+    joints = body.skin_joints
+    weights = body.skin_weights
     for k, joint_name in enumerate(body.joint_names):
         group = mesh.vertex_groups.new(name=joint_name)
         weight = np.where(joints == k, weights, 0.0).sum(axis=1)

@@ -19,7 +19,9 @@ RING = "scope_bone_ring"
 # Left blue, right red, as is conventional; brighter than Blender's palettes, which are hard to see
 # on the dark suit.
 SIDES = {"Left": (0.12, 0.56, 1.0), "Right": (1.0, 0.22, 0.16), "Middle": (1.0, 0.76, 0.1)}
-_SELECTED, _ACTIVE = 0.5, 0.8  # shares of white in the colours of selected and active bones
+# shares of white in the colours of selected and active bones
+_SELECTED = 0.5
+_ACTIVE = 0.8
 _RING_POINTS = 32
 _CLEARANCE = 1.12  # ratio of the ring's radius to that of the body's surface
 _MIN_RADIUS = 0.008  # metres
@@ -44,7 +46,9 @@ def show_bones(
     collections = {side: armature.data.collections.new(side) for side in SIDES}
     radii = surface_radii(body, rest, rest_orientations(armature, body), vertices)
     for i, name in enumerate(body.joint_names):
-        side, bone, posed = side_of(name), armature.data.bones[name], armature.pose.bones[name]
+        side = side_of(name)
+        bone = armature.data.bones[name]
+        posed = armature.pose.bones[name]
         collections[side].assign(bone)
         _color(bone, SIDES[side])
         radius = _CLEARANCE * float(radii[i])

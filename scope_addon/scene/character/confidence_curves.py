@@ -19,7 +19,9 @@ from ...motion import Motion
 from ...review_spans import REASONS, find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
 
-CONFIDENCE, CONTACT, SIGMA = "confidence", "contact", "sigma_cm"
+CONFIDENCE = "confidence"
+CONTACT = "contact"
+SIGMA = "sigma_cm"
 # The bones that carry the columns of ``Motion.foot_contact``.
 CONTACT_BONES = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 _DESCRIPTIONS = {
@@ -59,7 +61,8 @@ def key_measurements(
         known = np.isfinite(values)
         if not known.any():
             continue
-        bone, most = armature.pose.bones[bone_name], 1000.0 if name == SIGMA else 1.0
+        bone = armature.pose.bones[bone_name]
+        most = 1000.0 if name == SIGMA else 1.0
         bone[name] = float(values[known][0])
         bone.id_properties_ui(name).update(
             min=0.0, max=most, soft_min=0.0, soft_max=most, description=_DESCRIPTIONS[name]
@@ -91,7 +94,8 @@ def add_review_markers(
     )[:_MAX_MARKERS]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
-        first, last = round(float(frames[span.first])), round(float(frames[span.last]))
+        first = round(float(frames[span.first]))
+        last = round(float(frames[span.last]))
         at = f"{first}" if first == last else f"{first}-{last}"
         name = f"{prefix}{MARKER_NAMES[span.reason]} {at}"
         if (name, first) not in there:

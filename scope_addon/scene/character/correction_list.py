@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from ...motion import Motion
 
 _LIST = "scope_corrections"  # custom property of the armature
-_MISSED_PX, _MISSED_M = 2.0, 0.01
+_MISSED_PX = 2.0
+_MISSED_M = 0.01
 _ENTRY = {"kind": str, "text": str, "joint": str, "first": int, "last": int}
 
 
@@ -87,28 +88,34 @@ def _entry(
 
     whole = int(motion.frames[0]), int(motion.frames[-1])
     if isinstance(correction, Pin):
-        kind, text, span = (
-            "PIN",
-            correction.joint.replace("_", " ").title(),
-            (correction.frame,) * 2,
-        )
+        kind = "PIN"
+        text = correction.joint.replace("_", " ").title()
+        span = (correction.frame,) * 2
     elif isinstance(correction, Contact):
-        kind, text, span = (
-            "CONTACT",
-            f"{correction.foot.title()} Foot Stands",
-            (correction.first, correction.last),
-        )
+        kind = "CONTACT"
+        text = f"{correction.foot.title()} Foot Stands"
+        span = (correction.first, correction.last)
     elif isinstance(correction, Interpolation):
-        kind, text, span = "INTERPOLATION", "Interpolated", (correction.first, correction.last)
+        kind = "INTERPOLATION"
+        text = "Interpolated"
+        span = (correction.first, correction.last)
     elif isinstance(correction, Upright):
-        kind, text, span = "UPRIGHT", "Upright Line", whole
+        kind = "UPRIGHT"
+        text = "Upright Line"
+        span = whole
     elif isinstance(correction, FeetOnFloor):
-        kind, text, span = "FEET", "Feet on the Floor", whole
+        kind = "FEET"
+        text = "Feet on the Floor"
+        span = whole
     elif isinstance(correction, Floor):
-        kind, text, span = "FLOOR", "Floor", (correction.frame,) * 2
+        kind = "FLOOR"
+        text = "Floor"
+        span = (correction.frame,) * 2
     else:
         what = {"both": "Sides", "arms": "Arms", "legs": "Legs"}[correction.limbs]
-        kind, text, span = "EXCHANGE", f"{what} Exchanged", (correction.first, correction.last)
+        kind = "EXCHANGE"
+        text = f"{what} Exchanged"
+        span = (correction.first, correction.last)
     first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
     joint = correction.joint if isinstance(correction, Pin) else ""
     return {"kind": kind, "text": text, "first": first, "last": last, "joint": joint}

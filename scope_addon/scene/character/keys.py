@@ -34,7 +34,8 @@ from ..animation_data.timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
 
-ROTATION, LOCATION = "rotation_quaternion", "location"
+ROTATION = "rotation_quaternion"
+LOCATION = "location"
 
 
 def read_clip(

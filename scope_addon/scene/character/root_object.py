@@ -79,21 +79,25 @@ def parent_to_root_object(
             "parent, or keep the root motion in the bones"
         )
     empty = bpy.data.objects.new(f"{armature.name}_root", None)
-    empty.empty_display_type, empty.empty_display_size = "ARROWS", 0.3
+    empty.empty_display_type = "ARROWS"
+    empty.empty_display_size = 0.3
     empty[ROOT_TAG] = armature.name
     own = [c for c in armature.users_collection if c.library is None and c.override_library is None]
     for collection in own or [bpy.context.scene.collection]:  # linked collections cannot be changed
         collection.objects.link(empty)
-    empty.location, empty.rotation_euler = positions[0], (0.0, 0.0, angles[0])
+    empty.location = positions[0]
+    empty.rotation_euler = (0.0, 0.0, angles[0])
     if in_place:
         rows = np.concatenate([frames[:, None], positions[:, :2], angles[:, None]], axis=1)
         empty[_UNUSED_TRAJECTORY] = rows.ravel().tolist()
     else:
-        channels, zero = Channels(empty, bpy.data.actions.new(empty.name)), np.zeros_like(angles)
+        channels = Channels(empty, bpy.data.actions.new(empty.name))
+        zero = np.zeros_like(angles)
         channels.write("location", frames, positions)
         channels.write("rotation_euler", frames, np.stack([zero, zero, angles], axis=1))
     _copy_parenting(empty, former or top)
-    top.parent, top.parent_type = empty, "OBJECT"
+    top.parent = empty
+    top.parent_type = "OBJECT"
     top.matrix_parent_inverse.identity()
     if former is not None:
         _remove(former)
@@ -105,7 +109,8 @@ def remove_root_object(armature: bpy.types.Object) -> None:
     """Remove the root object; the armature gets its former transform and parent and keeps the
     motion of its bones.
     """
-    top, empty = topmost(armature), root_object(armature)
+    top = topmost(armature)
+    empty = root_object(armature)
     if empty is None:
         return
     if _PLACE in empty:
@@ -140,7 +145,8 @@ def move_root_motion_to_object(
             f"'{armature.name}' has the scale 0, so its motion cannot be moved; give "
             "it another one first"
         )
-    clip, former = clip_with_root_motion(armature, clip, frames), root_object(armature)
+    clip = clip_with_root_motion(armature, clip, frames)
+    former = root_object(armature)
     if former is None:  # the armature's own transform becomes part of the trajectory
         bpy.context.view_layer.update()
         seen = armature.matrix_world
@@ -150,7 +156,8 @@ def move_root_motion_to_object(
         armature.matrix_basis = Matrix.Scale(seen.median_scale, 4)
     else:
         place = _place(former)
-    size, height = armature.matrix_basis.median_scale, place.translation.z
+    size = armature.matrix_basis.median_scale
+    height = place.translation.z
     clip = _moved(clip, Matrix.Translation((0, 0, -height)) @ place, size)
     positions, angles = floor_trajectory(clip, heading=heading)
     write_clip(armature, body, relative_to_trajectory(clip, positions, angles), frames)
@@ -184,10 +191,8 @@ def clip_with_root_motion(
     :param frames: (T,) scene frames of the clip's keys.
     :raises UsageError: the stored trajectory was changed, or is in the NLA.
     """
-    whole, empty = (
-        with_trajectory(clip, *removed_root_motion(armature, frames)),
-        root_object(armature),
-    )
+    whole = with_trajectory(clip, *removed_root_motion(armature, frames))
+    empty = root_object(armature)
     if empty is None:
         return whole
     return _moved(whole, _place(empty).inverted(), armature.matrix_basis.median_scale)
@@ -288,7 +293,8 @@ def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:
     obj.matrix_parent_inverse.identity()
     if other.parent is not None:
         obj.parent_type = other.parent_type
-        obj.parent_bone, obj.parent_vertices = other.parent_bone, other.parent_vertices
+        obj.parent_bone = other.parent_bone
+        obj.parent_vertices = other.parent_vertices
         obj.matrix_parent_inverse = other.matrix_parent_inverse
 
 

@@ -51,7 +51,8 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floatin
         offset = body.shapedirs[:, :, p] @ R_WORLD_MODEL.T
         key.data.foreach_set("co", (rest + offset.ravel()).astype(np.float32))
         # Must come first: Blender silently clamps values and keys to this range.
-        key.slider_min, key.slider_max = -SLIDER_LIMIT, SLIDER_LIMIT
+        key.slider_min = -SLIDER_LIMIT
+        key.slider_max = SLIDER_LIMIT
         key.value = float(beta)
 
 
@@ -86,7 +87,8 @@ def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> NDAr
     blocks = mesh.data.shape_keys.key_blocks
     basis = np.empty(3 * len(mesh.data.vertices), np.float32)
     blocks[0].data.foreach_get("co", basis)
-    mixed, key = basis.astype(float), np.empty_like(basis)
+    mixed = basis.astype(float)
+    key = np.empty_like(basis)
     for block in blocks[1:]:
         if not block.mute and block.name not in without:
             block.data.foreach_get("co", key)

@@ -36,7 +36,8 @@ def turn_camera(
     try:
         before, after = json.loads(camera.get(_TURNED, ""))
     except (TypeError, ValueError, RecursionError):
-        before, after = now, now
+        before = now
+        after = now
     if after != now or not _is_like(before, now):
         before = None  # moved by the user, or a .blend file that somebody has prepared
     if to_captured and before is not None:
@@ -82,8 +83,10 @@ def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
         curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")
     ]
     if own := place[0]:
-        camera.location, camera.rotation_quaternion = own[:3], own[3:7]
-        camera.rotation_euler, camera.scale = own[7:10], own[10:13]
+        camera.location = own[:3]
+        camera.rotation_quaternion = own[3:7]
+        camera.rotation_euler = own[7:10]
+        camera.scale = own[10:13]
     for curve, values in zip(keys, place[1:], strict=True):
         frames, numbers = np.array(values).reshape(-1, 2).T
         rewrite_keys(curve, frames, numbers)
@@ -97,7 +100,8 @@ def move_camera(
     :param transform: (4, 4) rigid, of the captured world, in which the armature's keys are.
     """
     bpy.context.view_layer.update()
-    world, above = armature.matrix_world, parent_transform(camera)
+    world = armature.matrix_world
+    above = parent_transform(camera)
     move = (
         above.inverted_safe() @ world @ Matrix(transform.tolist()) @ world.inverted_safe() @ above
     )

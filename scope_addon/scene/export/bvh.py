@@ -81,7 +81,8 @@ def _subtree(children: list[list[int]], i: int) -> list[int]:
 
 def _joint_lines(children: list[list[int]], pose: SampledPose, i: int, depth: int) -> list[str]:
     """Return the lines of a joint and its descendants."""
-    pad, parent = "\t" * depth, pose.parents[i]
+    pad = "\t" * depth
+    parent = pose.parents[i]
     offset = np.zeros(3) if parent < 0 else R_GLTF_WORLD @ (pose.heads[i] - pose.heads[parent])
     position = "6 Xposition Yposition Zposition" if parent < 0 else "3"
     lines = [f"{pad}{'ROOT' if parent < 0 else 'JOINT'} {pose.names[i]}", f"{pad}{{"]
@@ -105,11 +106,13 @@ def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
     """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles
     in degrees.
     """
-    turned, parents = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T, np.array(pose.parents)
+    turned = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T
+    parents = np.array(pose.parents)
     local = turned.copy()
     child = parents >= 0
     local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
-    angles, positions = euler_zyx_degrees(local), pose.joints @ R_GLTF_WORLD.T
+    angles = euler_zyx_degrees(local)
+    positions = pose.joints @ R_GLTF_WORLD.T
     columns = [
         part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))
     ]

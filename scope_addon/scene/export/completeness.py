@@ -14,7 +14,8 @@ _CRATE = b"PXR-USDC"
 _SECTION = struct.Struct("<16sqq")  # name, start, size
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
 # magic numbers around the table of a seekable Zstandard file
-_TABLE, _TABLE_END = 0x184D2A5E, 0x8F92EAB1
+_TABLE = 0x184D2A5E
+_TABLE_END = 0x8F92EAB1
 _HAS_CHECKSUMS = 0x80
 
 

@@ -144,18 +144,17 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
             channels.write("rotation_quaternion", frames, on_one_hemisphere(turn))
             channels.write("scale", frames, size)
             scene.collection.objects.link(empty)
-            obj.parent, obj.parent_type = empty, "OBJECT"
+            obj.parent = empty
+            obj.parent_type = "OBJECT"
             obj.matrix_parent_inverse.identity()
         scene.frame_set(scene.frame_start)
         yield
     finally:
         for obj, parent, kind, bone, inverse in kept:
-            obj.parent, obj.parent_type, obj.parent_bone, obj.matrix_parent_inverse = (
-                parent,
-                kind,
-                bone,
-                inverse,
-            )
+            obj.parent = parent
+            obj.parent_type = kind
+            obj.parent_bone = bone
+            obj.matrix_parent_inverse = inverse
         bpy.data.batch_remove(created)
 
 
@@ -176,7 +175,8 @@ def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
         yield
     finally:
         for obj, inverse in tops:
-            obj.parent, obj.matrix_parent_inverse = None, inverse
+            obj.parent = None
+            obj.matrix_parent_inverse = inverse
         bpy.data.objects.remove(empty)
 
 
@@ -223,7 +223,8 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
         for armature, position in positions:
             armature.pose_position = position
         for each, in_viewports, in_renders in hidden:
-            each.hide_viewport, each.hide_render = in_viewports, in_renders
+            each.hide_viewport = in_viewports
+            each.hide_render = in_renders
 
 
 @contextmanager
@@ -242,7 +243,8 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
     try:
         for action in extended:
             action.use_frame_range = True
-            action.frame_start, action.frame_end = scene.frame_start, scene.frame_end
+            action.frame_start = scene.frame_start
+            action.frame_end = scene.frame_end
         yield
     finally:
         for action in extended:
@@ -260,7 +262,8 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
     meshes = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
     bodies = [obj for obj in meshes if shape_key_name(0) in obj.data.shape_keys.key_blocks]
     shaped = [(obj, obj.data, obj.data.name) for obj in bodies]
-    baked, actions_made = [], []
+    baked = []
+    actions_made = []
     try:
         for obj, mesh, name in shaped:
             expressions = expression_offsets(obj)

@@ -18,7 +18,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-_HEADER, _CHUNK_HEADER = 12, 8  # bytes: magic, version, length of the file; length, type of a chunk
+# bytes: magic, version, length of the file; length, type of a chunk
+_HEADER = 12
+_CHUNK_HEADER = 8
 
 
 @contextmanager
@@ -52,7 +54,8 @@ def _scale_times(path: Path, factor: float) -> None:
         )
         times = np.frombuffer(binary, "<f4", accessor["count"], _CHUNK_HEADER + start)
         times *= np.float32(factor)
-        accessor["min"], accessor["max"] = [float(times.min())], [float(times.max())]
+        accessor["min"] = [float(times.min())]
+        accessor["max"] = [float(times.max())]
     text = json.dumps(gltf, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
     total = begin + len(text) + len(binary)

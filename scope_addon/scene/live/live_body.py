@@ -38,10 +38,13 @@ class LiveBody:
     """
 
     def __init__(self, scene: bpy.types.Scene, name: str, body: Body) -> None:
-        self._scene_uid, self._name, self._body = scene.session_uid, name, body
+        self._scene_uid = scene.session_uid
+        self._name = name
+        self._body = body
         self._blocks: set[tuple[str, int]] = set()
         self._armature = self._mesh = ("", 0)
-        self._betas, self._names = np.zeros(body.P), list[str]()
+        self._betas = np.zeros(body.P)
+        self._names = list[str]()
 
     @property
     def armature(self) -> bpy.types.Object | None:
@@ -68,7 +71,8 @@ class LiveBody:
         :raises UsageError: it has to be created, and its scene was removed.
         """
         betas = np.clip(np.asarray(betas, float), -shape_keys.SLIDER_LIMIT, shape_keys.SLIDER_LIMIT)
-        rig, mesh = self.armature, found("objects", *self._mesh)
+        rig = self.armature
+        mesh = found("objects", *self._mesh)
         if rig is not None and rig.mode == "EDIT":
             return False
         created = False
@@ -98,8 +102,10 @@ class LiveBody:
         rig = self.armature
         if rig is None:
             return
-        shown, layer = self._shown, bpy.context.view_layer
-        was_active, was_selected = layer.objects.active == rig, rig.select_get(view_layer=layer)
+        shown = self._shown
+        layer = bpy.context.view_layer
+        was_active = layer.objects.active == rig
+        was_selected = rig.select_get(view_layer=layer)
         rig, _ = self._create(self._betas)
         rig.select_set(was_selected, view_layer=layer)
         if was_active:
@@ -117,11 +123,14 @@ class LiveBody:
 
         :raises UsageError: the scene was removed.
         """
-        scene, body, new = scene_of(self._scene_uid), self._body, NewDatablocks(KINDS)
+        scene = scene_of(self._scene_uid)
+        body = self._body
+        new = NewDatablocks(KINDS)
         remove(self._blocks)
         collection = bpy.data.collections.new(self._name)
         scene.collection.children.link(collection)
-        rest, layer = armature.rest_pose(body, betas), bpy.context.view_layer
+        rest = armature.rest_pose(body, betas)
+        layer = bpy.context.view_layer
         active = layer.objects.active
         rig = armature.build_armature(self._name, body, rest, collection)
         layer.objects.active = active or rig
@@ -137,8 +146,11 @@ class LiveBody:
         shared = {("objects", ring.session_uid), ("meshes", ring.data.session_uid)}
         # Former ones stay in it, since redo may bring them back.
         self._blocks |= {(kind, block.session_uid) for kind, block in new.all()} - shared
-        self._armature, self._mesh = (rig.name, rig.session_uid), (mesh.name, mesh.session_uid)
-        self._betas, self._rest_joints, self._head = betas, body.rest_joints(betas), rest.joints[0]
+        self._armature = (rig.name, rig.session_uid)
+        self._mesh = (mesh.name, mesh.session_uid)
+        self._betas = betas
+        self._rest_joints = body.rest_joints(betas)
+        self._head = rest.joints[0]
         self._M = armature.rest_orientations(rig, body)
         self._names = [bone.name for bone in rig.pose.bones]
         self._order = np.array([body.joint_names.index(name) for name in self._names])

@@ -30,7 +30,8 @@ from .datablocks import found
 
 # The proportions are compared again for such a change of a shape coefficient, but not at every pose
 # while these settle.
-_MIN_CHANGE, _MIN_PAUSE_S = 0.05, 0.25
+_MIN_CHANGE = 0.05
+_MIN_PAUSE_S = 0.25
 
 
 class LiveRig:
@@ -49,11 +50,9 @@ class LiveRig:
         :raises UsageError: when the rig lacks a mapped bone.
         :raises InputError: when the map cannot be used, or a mapped bone does not move.
         """
-        self._rig, self._body, self._options = (
-            (rig.name, rig.session_uid),
-            body,
-            options or RetargetOptions(),
-        )
+        self._rig = (rig.name, rig.session_uid)
+        self._body = body
+        self._options = options or RetargetOptions()
         self._map = usable_map(None, body, rig, bone_map)
         self._before = [
             (
@@ -66,10 +65,8 @@ class LiveRig:
         self._position = rig.data.pose_position
         try:
             with at_rest(rig):
-                self._skeleton, place = (
-                    probe(rig, self._map.parts),
-                    np.array(rig.matrix_world, float),
-                )
+                self._skeleton = probe(rig, self._map.parts)
+                place = np.array(rig.matrix_world, float)
         except BaseException:
             self.restore()
             raise
@@ -84,9 +81,12 @@ class LiveRig:
         self._location = root_locations(
             rig, place, self._skeleton, self._root, self._rest + np.eye(3)
         )
-        self._names, self._places = list[str](), dict[str, int]()  # of all the rig's bones
+        # of all the rig's bones
+        self._names = list[str]()
+        self._places = dict[str, int]()
         self._transfer: Transfer | None = None
-        self._betas, self._due_s = np.zeros(body.P), 0.0
+        self._betas = np.zeros(body.P)
+        self._due_s = 0.0
 
     @property
     def rig(self) -> bpy.types.Object | None:
@@ -130,9 +130,11 @@ class LiveRig:
         :param turns: (B, 3, 3) of the mapped bones.
         :param location: (3,) of the root bone.
         """
-        bones, values = rig.pose.bones, quaternion_from_matrix(turns)
+        bones = rig.pose.bones
+        values = quaternion_from_matrix(turns)
         if (names := bones.keys()) != self._names:
-            self._names, self._places = names, {name: place for place, name in enumerate(names)}
+            self._names = names
+            self._places = {name: place for place, name in enumerate(names)}
         quaternions = np.empty((len(names), 4), np.float32)
         locations, scales = np.empty((2, len(names), 3), np.float32)
         bones.foreach_get("rotation_quaternion", quaternions.ravel())
@@ -142,7 +144,8 @@ class LiveRig:
             place = self._places.get(name)
             if place is None:
                 continue
-            locations[place], scales[place] = location if b == self._root else 0.0, 1.0
+            locations[place] = location if b == self._root else 0.0
+            scales[place] = 1.0
             if (bone := bones[name]).rotation_mode == "QUATERNION":
                 quaternions[place] = values[b]
             else:
@@ -158,8 +161,10 @@ class LiveRig:
         now_s = time.monotonic()
         is_due = np.abs(betas - self._betas).max(initial=0.0) > _MIN_CHANGE and now_s > self._due_s
         if self._transfer is None or is_due:
-            self._betas, self._due_s = np.array(betas, float), now_s + _MIN_PAUSE_S
-            feet, travel = self._options.feet, self._options.travel
+            self._betas = np.array(betas, float)
+            self._due_s = now_s + _MIN_PAUSE_S
+            feet = self._options.feet
+            travel = self._options.travel
             self._transfer = Transfer(
                 self._body, self._betas, self._skeleton, self._map, feet=feet, travel=travel
             )

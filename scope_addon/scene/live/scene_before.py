@@ -20,7 +20,8 @@ class SceneBefore:
     def __init__(self) -> None:
         layer = bpy.context.view_layer
         layer.update()
-        self._scene_uid, self._layer = bpy.context.scene.session_uid, layer.name
+        self._scene_uid = bpy.context.scene.session_uid
+        self._layer = layer.name
         active = layer.objects.active
         self._active: str = active.name if active else ""
         self._mode: str = active.mode if active else "OBJECT"

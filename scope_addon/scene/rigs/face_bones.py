@@ -154,7 +154,8 @@ def _channels(rig: bpy.types.Object, motion: ControlMotion) -> dict[str, NDArray
     """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none
     of those at rest.
     """
-    bone, found = rig.pose.bones[motion.bone], []
+    bone = rig.pose.bones[motion.bone]
+    found = []
     if motion.locations is not None:
         found.append(("location", motion.locations, np.zeros(3), _STILL * bone.length))
     if motion.rotations is not None:

@@ -129,7 +129,8 @@ def _write(
     channels = Channels(keys, bpy.data.actions.new("Face"))
     for key, column in values.items():
         block = keys.key_blocks[key]
-        block.slider_max, block.mute = max(block.slider_max, 1.0), False
+        block.slider_max = max(block.slider_max, 1.0)
+        block.mute = False
         block.value = float(column[0])
         if np.ptp(column) >= MOVES:
             channels.write(shape_key_path(key), frames, column, group="Face")

@@ -21,7 +21,8 @@ from ..character.animation import on_one_hemisphere
 
 # Custom properties of an action: the checksum of its keys when they were written, and the captured
 # armature's name.
-_CHECKSUM, _SOURCE = "scope_keys", "scope_keys_of"
+_CHECKSUM = "scope_keys"
+_SOURCE = "scope_keys_of"
 # channels of a bone beside its rotation, and their values at rest
 _OFFSETS = {"location": 0.0, "scale": 1.0}
 
@@ -139,7 +140,8 @@ def override_nla(animation: bpy.types.AnimData) -> None:
     """Make the active action replace the NLA tracks below it for its bones, whatever the former
     action's blending.
     """
-    animation.action_blend_type, animation.action_influence = "REPLACE", 1.0
+    animation.action_blend_type = "REPLACE"
+    animation.action_influence = 1.0
     for track in animation.nla_tracks:
         track.is_solo = False  # a solo track would silence the action
 
@@ -200,12 +202,14 @@ def channel_of_rotation(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray
         size = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
         axis = np.where(size > 1e-9, q[:, 1:] / np.maximum(size, 1e-9), [0.0, 1.0, 0.0])
         return "rotation_axis_angle", np.concatenate([2 * np.arctan2(size, q[:, :1]), axis], axis=1)
-    values, before = np.empty((len(R), 3)), None
+    values = np.empty((len(R), 3))
+    before = None
     for t, matrix in enumerate(R):
         euler = (
             Matrix(matrix.tolist()).to_euler(mode, before)
             if before
             else Matrix(matrix.tolist()).to_euler(mode)
         )
-        values[t], before = euler, euler
+        values[t] = euler
+        before = euler
     return "rotation_euler", values

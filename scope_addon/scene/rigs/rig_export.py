@@ -73,7 +73,8 @@ def export_on_rig(
                         body, [each.motion.betas for each in result.people], rig, bones
                     )
                 rig.name = f"{rig.name}_person{number}"
-            betas, rate = person.motion.betas, result.frame_rate
+            betas = person.motion.betas
+            rate = result.frame_rate
             faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
             retargeting = RetargetOptions(
                 root=options.root, face=_face_of_bones(rig, faces, source), travel=travel
@@ -115,7 +116,8 @@ def _retarget_face(
     :param bones_move_it: whether bones show the expressions, so that there may be no shape keys.
     :raises UsageError: when an expression map was given, and no mesh has any of its shape keys.
     """
-    captured, given = captured_expressions(armature), source.expression_map
+    captured = captured_expressions(armature)
+    given = source.expression_map
     if captured is None or (bones_move_it and not (given and given.keys)):
         return []
     try:
@@ -141,10 +143,8 @@ def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> lis
     options = replace(
         options, take=options.take or (action.name if action else rig.name), unit=unit
     )
-    collection, parts = (
-        bpy.data.collections.new(rig.name),
-        with_meshes(rig, bpy.context.scene.objects),
-    )
+    collection = bpy.data.collections.new(rig.name)
+    parts = with_meshes(rig, bpy.context.scene.objects)
     try:
         for obj in parts:
             below = obj.children_recursive

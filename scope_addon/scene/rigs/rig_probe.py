@@ -27,7 +27,8 @@ SWITCHES = ("IK_FK", "neck_follow", "head_follow")
 _CARRIER_TOLERANCE = 0.02
 # change of a rotation matrix's entries; the probe changes them by more than 0.3
 _MIN_RESPONSE = 0.1
-_CHECKED_FRAMES, _MAX_DEVIATION = 5, np.radians(20)
+_CHECKED_FRAMES = 5
+_MAX_DEVIATION = np.radians(20)
 
 
 def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
@@ -158,7 +159,8 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
 
     :raises InputError: when it cannot.
     """
-    bone, rest = rig.pose.bones[name], _matrices(rig, [name])
+    bone = rig.pose.bones[name]
+    rest = _matrices(rig, [name])
     bone.matrix_basis = Matrix.Translation((bone.length,) * 3)
     moved = np.linalg.norm(
         np.linalg.solve(np.array(rig.matrix_world), _matrices(rig, [name]) - rest)[0, :3, 3]
@@ -254,17 +256,20 @@ class _RigState:
         self._slot = getattr(self._animation, "action_slot", None)
         self._nla = self._animation.use_nla if self._animation else False
         self._bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
-        self._top, self._empty = topmost(rig), root_object(rig)
+        self._top = topmost(rig)
+        self._empty = root_object(rig)
 
     def clear(self) -> None:
         """Show the rig without animation, pose and root object, and switch limbs to FK."""
         rig = self._rig
         if not self._linked:
             self._shown.link(rig)
-        rig.hide_viewport, rig.data.pose_position = False, "POSE"
+        rig.hide_viewport = False
+        rig.data.pose_position = "POSE"
         self._top.parent = None
         if self._animation:
-            self._animation.action, self._animation.use_nla = None, False
+            self._animation.action = None
+            self._animation.use_nla = False
         for bone, _ in self._bases:
             bone.matrix_basis = Matrix()
             for switch in SWITCHES:
@@ -278,7 +283,8 @@ class _RigState:
         for bone, matrix in self._bases:
             bone.matrix_basis = matrix
         self._top.parent = self._empty
-        rig.hide_viewport, rig.data.pose_position = self._hidden, self._position
+        rig.hide_viewport = self._hidden
+        rig.data.pose_position = self._position
         if not self._linked:
             self._shown.unlink(rig)
         if self._animation:

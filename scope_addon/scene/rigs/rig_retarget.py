@@ -159,7 +159,8 @@ def retarget(
     leave_tweak_mode(rig)
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with at_rest(rig):
-            skeleton, place = probe(rig, bone_map.parts), np.array(rig.matrix_world, float)
+            skeleton = probe(rig, bone_map.parts)
+            place = np.array(rig.matrix_world, float)
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
             one_floor = not source.get("scope_uneven_ground", False)
             travel = options.travel or leg_ratio(body, betas, skeleton, bone_map)
@@ -262,8 +263,10 @@ def _placed(
     if options.root == "in-place":
         heads[:, :2] = skeleton.heads[root, :2]
     elif options.root == "object":
-        positions, angles = heads * [1.0, 1.0, 0.0], floor_trajectory(clip)[1] + yaw + pose.facing
-        turn, origin = about_z(angles), place[:3, 3] * [1.0, 1.0, 0.0]
+        positions = heads * [1.0, 1.0, 0.0]
+        angles = floor_trajectory(clip)[1] + yaw + pose.facing
+        turn = about_z(angles)
+        origin = place[:3, 3] * [1.0, 1.0, 0.0]
         rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
         heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
         return _PlacedMotion(rotations, heads, (positions - turn @ origin, angles))

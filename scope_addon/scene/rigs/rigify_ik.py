@@ -87,7 +87,8 @@ def _shown_at_the_mouse(count: int) -> Iterator[int]:
 
 def _limbs(rig: bpy.types.Object) -> list[_Limb]:
     """Return the limbs of a generated rig that switch between FK and IK."""
-    bones, found = rig.pose.bones, []
+    bones = rig.pose.bones
+    found = []
     for base, middle, end, toe in _LIMBS:
         for side in ("L", "R"):
             names = [base, middle, end, *([toe] if f"{toe}_ik.{side}" in bones else [])]
@@ -141,10 +142,8 @@ def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -
     L = np.array(
         (bones[limb.ik[0]].matrix_local.inverted() @ bones[limb.ik[1]].matrix_local).to_3x3()
     )
-    middle, spread = (
-        np.arctan2(L[1, 2], L[1, 1]),
-        np.arccos(np.clip(wanted[1] / np.hypot(L[1, 1], L[1, 2]), -1, 1)),
-    )
+    middle = np.arctan2(L[1, 2], L[1, 1])
+    spread = np.arccos(np.clip(wanted[1] / np.hypot(L[1, 1], L[1, 2]), -1, 1))
     found = []
     for bend in (middle + spread, middle - spread):
         has = L @ (0.0, np.cos(bend), np.sin(bend))
@@ -187,7 +186,8 @@ def _place_pole(
 
 def _set(rig: bpy.types.Object, name: str, matrix: Matrix, bases: dict[str, list[Matrix]]) -> None:
     """Pose a control at a matrix in the armature's space, and append its channels to ``bases``."""
-    bone, above = rig.pose.bones[name], rig.pose.bones[name].parent
+    bone = rig.pose.bones[name]
+    above = rig.pose.bones[name].parent
     matrices = (
         {"parent_matrix": above.matrix, "parent_matrix_local": above.bone.matrix_local}
         if above

@@ -115,7 +115,8 @@ class CaptureJob:
             elif message["event"] == "preview":
                 self._show_preview(message)
             elif message["event"] == "result":
-                self._result, self._result_s = message, time.monotonic()
+                self._result = message
+                self._result_s = time.monotonic()
         if self._result is None or (
             self._worker.alive and time.monotonic() - self._result_s < _ENDING_S
         ):
@@ -212,7 +213,8 @@ def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
 
     :raises UsageError: no body file is chosen.
     """
-    settings, chosen = scene.scope, preferences()
+    settings = scene.scope
+    chosen = preferences()
     values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
     if values["body"] == "file":
         path = settings.body_file or (chosen.body_file if chosen else "")

@@ -122,11 +122,9 @@ class SCOPE_OT_capture(JobOperator):
 
     def start(self, context: bpy.types.Context) -> bool:
         """Start the job; return whether that worked."""
-        state.message, state.scene_uid, state.started = (
-            "",
-            context.scene.session_uid,
-            time.monotonic(),
-        )
+        state.message = ""
+        state.scene_uid = context.scene.session_uid
+        state.started = time.monotonic()
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
             from .capture_job import CaptureJob
@@ -149,7 +147,8 @@ class SCOPE_OT_capture(JobOperator):
         assert job is not None
         outcome = self._advance()
         progress = ", ".join(job.progress.lines(iface_))
-        shown, now_s = (job.progress.stage, progress, job.messages), time.monotonic()
+        shown = (job.progress.stage, progress, job.messages)
+        now_s = time.monotonic()
         if not self._pause_s:  # the first step after a drawing: its delay is the drawing's
             delay_s = now_s - self._drawn_s
             self._pause_s = 5.0 * delay_s if delay_s > 1.5 * self.timer_s else DRAWN_EVERY_S
@@ -157,7 +156,9 @@ class SCOPE_OT_capture(JobOperator):
         # Drawing costs time in which Blender does not react: without a graphics card 0.1 s, and
         # more on a busy machine.
         if shown != self._shown and is_due:
-            self._shown, self._drawn_s, self._pause_s = shown, now_s, 0.0
+            self._shown = shown
+            self._drawn_s = now_s
+            self._pause_s = 0.0
             context.workspace.status_text_set(
                 iface_(
                     "Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress

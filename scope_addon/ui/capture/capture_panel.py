@@ -52,7 +52,8 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, settings = self.layout, context.scene.scope
+        layout = self.layout
+        settings = context.scene.scope
         column = layout.column()
         column.enabled = state.job is None
         if not settings.footage:
@@ -99,7 +100,8 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, settings = _split(self.layout), context.scene.scope
+        layout = _split(self.layout)
+        settings = context.scene.scope
         layout.enabled = state.job is None
         layout.prop(settings, "take")
         layout.prop(settings, "people")
@@ -138,7 +140,8 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, settings = _split(self.layout), context.scene.scope
+        layout = _split(self.layout)
+        settings = context.scene.scope
         layout.enabled = state.job is None
         layout.prop(settings, "frame_rate")
         layout.prop(settings, "start_frame")

@@ -23,9 +23,12 @@ if TYPE_CHECKING:
 CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
 # Widths in pixels at a scale of 1: what surrounds a row of the list in the sidebar, an icon, and
 # what the text may be.
-_AROUND, _ICON, _DEFAULT_WIDTH = 62.0, 22.0, 260.0
+_AROUND = 62.0
+_ICON = 22.0
+_DEFAULT_WIDTH = 260.0
 # of a text; of a sidebar with room for the words beside the number of people
-_PADDING, _WIDE = 10.0, 340.0
+_PADDING = 10.0
+_WIDE = 340.0
 
 
 def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
@@ -167,7 +170,8 @@ class SCOPE_UL_captures(bpy.types.UIList):
 
         A name that is too long is drawn without its middle, and whole in its tooltip.
         """
-        people, result = people_of(item), item.scope_result
+        people = people_of(item)
+        result = item.scope_result
         scale = context.preferences.system.ui_scale
         sidebar = context.region.width / scale if context.region else _DEFAULT_WIDTH
         text = people_text(len(people)) if people else iface_("removed")
@@ -197,7 +201,8 @@ class SCOPE_UL_captures(bpy.types.UIList):
         """Show only the captures of the scene, and of these the ones whose name contains the typed
         filter.
         """
-        shown, typed = captures_of(context.scene), self.filter_name.lower()
+        shown = captures_of(context.scene)
+        typed = self.filter_name.lower()
         flags = [
             self.bitflag_filter_item if each in shown and typed in each.name.lower() else 0
             for each in getattr(data, property_name)

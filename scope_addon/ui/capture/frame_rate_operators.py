@@ -82,7 +82,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         )
         library = _library(linked) if linked is not None else None
         if linked is not None and library is not None:
-            name, file = linked.name, library.filepath
+            name = linked.name
+            file = library.filepath
             cls.poll_message_set(
                 tip_("'{name}' is linked from {file}: make it local", name=name, file=file)
             )
@@ -97,7 +98,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         from ...scene.match_rate import change_rate, other_animation
 
         scene = context.scene
-        people, former = captured_people(context), scene_rate(scene)
+        people = captured_people(context)
+        former = scene_rate(scene)
         rate = _exact(scene.scope.result.footage_rate)
         bodies = {person: body_of(person) for person in people if person.get("scope_resampled")}
         for person, body in bodies.items():  # which fails without keys, before anything is changed
@@ -151,10 +153,8 @@ def _update_results(
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:
-        result, person = (
-            collection.scope_result,
-            next((p for p in keyed if holds(collection, p)), None),
-        )
+        result = collection.scope_result
+        person = next((p for p in keyed if holds(collection, p)), None)
         if person is None:
             continue
         shown = result.warnings

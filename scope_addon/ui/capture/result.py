@@ -90,11 +90,13 @@ def _text(spans: list[Span], frames: NDArray[np.float64]) -> str:
     longest = sorted(spans, key=lambda span: span.first - span.last)[:_MAX_SPANS]
     texts = []
     for span in sorted(longest, key=lambda span: span.first):
-        a, b = round(float(frames[span.first])), round(float(frames[span.last]))
+        a = round(float(frames[span.first]))
+        b = round(float(frames[span.last]))
         texts.append(f"{a}" if a == b else f"{a}-{b}")
     return ",".join(texts)
 
 
 def _add_warning(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
     warning = shown.warnings.add()
-    warning.text, warning.spans = text, spans
+    warning.text = text
+    warning.spans = spans

@@ -35,7 +35,8 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings of the capture in the sidebar of the file browser."""
-        layout, settings = self.layout, context.scene.scope
+        layout = self.layout
+        settings = context.scene.scope
         layout.use_property_split = True
         layout.use_property_decorate = False
         for name in ("quality", "people", "hands", "face", "height_cm", "take"):

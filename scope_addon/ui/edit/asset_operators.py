@@ -55,7 +55,8 @@ class SCOPE_OT_mark_asset(ActionOperator):
         assert armature is not None  # checked by poll
         data = armature.animation_data.action.asset_data
         if data is not None:
-            self.author, self.description_text = data.author, data.description
+            self.author = data.author
+            self.description_text = data.description
         else:
             self.description_text = self.catalog = ""
         outcome: set[str] = context.window_manager.invoke_props_dialog(self)
@@ -89,7 +90,8 @@ class SCOPE_OT_mark_asset(ActionOperator):
         from ...scene.animation_data.timing import keyed_rate
 
         first, last = armature.animation_data.action.frame_range
-        frame, person = float(context.scene.frame_current), _captured(armature)
+        frame = float(context.scene.frame_current)
+        person = _captured(armature)
         if not self.current_pose:
             frame = first
             try:

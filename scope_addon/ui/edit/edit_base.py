@@ -99,7 +99,8 @@ class SpanOperator(EditOperator):
         """Ask for the span; suggest the preview range, if there is one."""
         scene = context.scene
         if scene.use_preview_range:
-            self.start, self.end = scene.frame_preview_start, scene.frame_preview_end
+            self.start = scene.frame_preview_start
+            self.end = scene.frame_preview_end
         else:
             self.start, self.end = self.default_span(scene)
         outcome: set[str] = context.window_manager.invoke_props_dialog(self)

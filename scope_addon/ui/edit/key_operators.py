@@ -78,7 +78,8 @@ class SCOPE_OT_loop(SpanOperator):
             clip, body, betas, self.start / rate, self.end / rate, self.shortest, self.movement
         )
         closed: Clip = close_cycle(clip, cycle, self.blend)
-        first, last = float(frames[cycle.first]), float(frames[cycle.last])
+        first = float(frames[cycle.first])
+        last = float(frames[cycle.last])
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
         if self.repeat:
             add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
@@ -163,7 +164,8 @@ class SCOPE_OT_bake_rate(EditOperator):
             clip, frames = read_clip(armature, body, rate)
             baked = resample(clip, self.rate)
             write_clip(armature, body, baked, baked.times * rate)
-            before, after = len(frames), len(baked)
+            before = len(frames)
+            after = len(baked)
         else:
             before, after = bake_whole_frames(armature, body, rate)
         return rpt_(

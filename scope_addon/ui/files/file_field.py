@@ -115,10 +115,8 @@ def draw_file(
         return row
     button = row.operator("scope.choose_file", text="", icon="FILEBROWSER")
     is_preferences = isinstance(settings, bpy.types.AddonPreferences)
-    button.owner, button.setting = (
-        "preferences" if is_preferences else settings.path_from_id(),
-        path,
-    )
+    button.owner = "preferences" if is_preferences else settings.path_from_id()
+    button.setting = path
     return row
 
 
@@ -142,10 +140,8 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         settings = self._settings(context)
         if settings is None:
             return {"CANCELLED"}
-        self.filepath, self.filter_glob = (
-            present(getattr(settings, self.setting)),
-            _FILTERS[self.setting],
-        )
+        self.filepath = present(getattr(settings, self.setting))
+        self.filter_glob = _FILTERS[self.setting]
         self.filter_movie = self.filter_glob == _VIDEOS
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}

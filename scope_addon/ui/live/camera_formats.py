@@ -44,7 +44,8 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
         from ...job.live.formats import FormatsProcess
 
         typed = context.scene.scope_live.camera
-        state.message, state.scene_uid = "", context.scene.session_uid
+        state.message = ""
+        state.scene_uid = context.scene.session_uid
         python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
         try:
             if (source := camera_source(typed)) is None:

@@ -138,14 +138,16 @@ class LiveJob:
             and time.monotonic() >= self._record_at_s
             and not self.finishing
         ):
-            self._record_at_s, self.recording = None, True
+            self._record_at_s = None
+            self.recording = True
             self._worker.record()
 
     def stop(self) -> None:
         """End the capture; ``step`` returns False when all is done. Without a recording, the last
         pose stays.
         """
-        self.finishing, self._stopped_s = True, time.monotonic()
+        self.finishing = True
+        self._stopped_s = time.monotonic()
         if self.recording:
             self._worker.stop()
         else:
@@ -212,12 +214,14 @@ class LiveJob:
                 for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
                     setattr(self.status, name, message[name])
             elif message["event"] == "notice":
-                self.status.notice, self._notice_s = display_text(message["text"]), time.monotonic()
+                self.status.notice = display_text(message["text"])
+                self._notice_s = time.monotonic()
             elif message["event"] == "ended":  # the source has, and nothing was recorded
                 self.recording = False
                 self.stop()
             elif message["event"] == "result":
-                self._result, self._result_s = message, time.monotonic()
+                self._result = message
+                self._result_s = time.monotonic()
 
     def _show(self, scene: bpy.types.Scene, poses: Sequence[ShownPose]) -> None:
         """Show the newest pose of each person."""
@@ -268,7 +272,8 @@ class LiveJob:
         self._worker.wait(0.0)
         paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
-        body, options = self._request.values["body"], build_options(scene)
+        body = self._request.values["body"]
+        options = build_options(scene)
         if self._kept and Path(self._kept).is_file():
             # Capture then captures the take once more
             self._footage = scene.scope.footage = str(self._kept)
@@ -314,7 +319,8 @@ def kept_footage(scene: bpy.types.Scene) -> Path:
             "the footage is written beside the .blend file; save that first, or "
             "switch off Keep Footage"
         )
-    folder, stem = Path(bpy.data.filepath).parent, bpy.path.clean_name(scene.scope.take or "Live")
+    folder = Path(bpy.data.filepath).parent
+    stem = bpy.path.clean_name(scene.scope.take or "Live")
     return folder / f"{stem} {time.strftime('%Y-%m-%d %H.%M.%S')}.mp4"
 
 
@@ -341,7 +347,8 @@ def live_request(scene: bpy.types.Scene) -> LiveRequest:
             )
         if not bpy.app.online_access:
             raise OfflineError
-        online, source = True, with_login(source)
+        online = True
+        source = with_login(source)
     else:
         source = camera_source(settings.camera) or ""
         if not source:

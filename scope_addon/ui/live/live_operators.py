@@ -54,7 +54,8 @@ class SCOPE_OT_live(JobOperator):
 
     def start(self, context: bpy.types.Context) -> bool:
         """Start the job; return whether that worked."""
-        state.message, state.scene_uid = "", context.scene.session_uid
+        state.message = ""
+        state.scene_uid = context.scene.session_uid
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
             from .live_job import LiveJob

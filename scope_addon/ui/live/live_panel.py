@@ -22,7 +22,9 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, settings, job = self.layout, context.scene.scope_live, state.job
+        layout = self.layout
+        settings = context.scene.scope_live
+        job = state.job
         column = layout.column()
         column.enabled = job is None
         column.row(align=True).prop(settings, "source", expand=True)

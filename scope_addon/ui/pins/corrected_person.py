@@ -150,7 +150,8 @@ def pin_at(
     from ...edit.pins.corrections import Pin, world_of
     from ...scene.character.corrections.corrected_keys import captured_points
 
-    scene, (location, in_image, reach) = context.scene, place
+    scene = context.scene
+    (location, in_image, reach) = place
     context.view_layer.update()
     current = scene.frame_current + scene.frame_subframe
     frame = shown_frame(scene, armature, motion)

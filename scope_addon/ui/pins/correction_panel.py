@@ -37,7 +37,8 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, armature = self.layout, captured_armature(context)
+        layout = self.layout
+        armature = captured_armature(context)
         if armature is None:
             return
         layout.operator("scope.pin_limb", icon="PINNED", depress=is_running())

@@ -45,7 +45,8 @@ class SCOPE_OT_floor_here(CorrectionOperator):
         from ...edit.pins.corrections import Floor, added
         from ...scene.character.corrections.corrected_keys import heights_of_foot
 
-        scene, motion = context.scene, motion_of(armature)
+        scene = context.scene
+        motion = motion_of(armature)
         frame = shown_frame(scene, armature, motion)
         height, shown = heights_of_foot(armature, body, rate, motion, (frame, self.foot))
         floor = Floor(frame, height)

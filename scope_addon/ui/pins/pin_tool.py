@@ -26,13 +26,14 @@ from .pointer import Pointer
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))
-_RADIUS, _NEAR, _MOVED = 6.0, 16.0, 3.0  # pixels
-_FREE, _HOVERED, _PINNED, _LINE = (
-    (1.0, 1.0, 1.0, 0.8),
-    (1.0, 0.8, 0.2, 1.0),
-    (0.9, 0.2, 0.2, 1.0),
-    (1.0, 0.8, 0.2, 0.9),
-)
+# pixels
+_RADIUS = 6.0
+_NEAR = 16.0
+_MOVED = 3.0
+_FREE = (1.0, 1.0, 1.0, 0.8)
+_HOVERED = (1.0, 0.8, 0.2, 1.0)
+_PINNED = (0.9, 0.2, 0.2, 1.0)
+_LINE = (1.0, 0.8, 0.2, 0.9)
 _MISSED = (1.0, 0.5, 0.1, 1.0)
 _HELP = (
     "Drag a handle to where the joint is.  Scrub or play to go to other frames.  Esc or Enter: done"
@@ -47,7 +48,8 @@ class _Session:
 
         :param area: ``as_pointer`` of the viewport with the mouse.
         """
-        self.armature, self.area = armature, area
+        self.armature = armature
+        self.area = area
         self.hovered = self.dragged = ""
         self.start: tuple[float, float] = (0.0, 0.0)
         self.mouse: tuple[float, float] = (0.0, 0.0)
@@ -59,7 +61,8 @@ class _Session:
     def follow(self, active: bpy.types.Object | None) -> None:
         """Show the handles of the active person, whom a click on the body may have changed."""
         if active is not None and active.name != self.armature:
-            self.armature, self.hovered = active.name, ""
+            self.armature = active.name
+            self.hovered = ""
             _redraw()
 
     def end(self) -> None:
@@ -141,7 +144,8 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         busy = bool(session.dragged)
         if event.type == "LEFTMOUSE" and event.value == "PRESS" and inside:
             session.hovered = _nearest(session, area, region)
-            session.dragged, session.start = session.hovered, session.mouse
+            session.dragged = session.hovered
+            session.start = session.mouse
             context.workspace.status_text_set(iface_(_HELP))  # in place of the last pin's warnings
             busy = bool(session.dragged)
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and busy:
@@ -166,7 +170,9 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
         from bpy_extras.view3d_utils import location_3d_to_region_2d, region_2d_to_location_3d
 
         session = self._session
-        joint, session.dragged, session.hovered = session.dragged, "", ""
+        joint = session.dragged
+        session.dragged = ""
+        session.hovered = ""
         _redraw()
         if math.dist(session.mouse, session.start) < _MOVED:
             return
@@ -212,7 +218,8 @@ def _move_to_viewport(session: _Session, window: bpy.types.Window, at: tuple[int
     for shown, area in viewports():
         inside = 0 <= at[0] - area.x < area.width and 0 <= at[1] - area.y < area.height
         if shown == window and inside and area.as_pointer() != session.area:
-            session.hovered, session.area = "", area.as_pointer()
+            session.hovered = ""
+            session.area = area.as_pointer()
             _redraw()
 
 
@@ -227,11 +234,13 @@ def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) 
     """Return the handle under the mouse, or an empty name."""
     from bpy_extras.view3d_utils import location_3d_to_region_2d
 
-    best, found = _NEAR * bpy.context.preferences.system.ui_scale, ""
+    best = _NEAR * bpy.context.preferences.system.ui_scale
+    found = ""
     for name, place in _joint_positions(session).items():
         at = location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
         if at is not None and math.dist(at, session.mouse) < best:
-            best, found = math.dist(at, session.mouse), name
+            best = math.dist(at, session.mouse)
+            found = name
     return found
 
 
@@ -242,7 +251,8 @@ def _draw(session: _Session) -> None:
     from bpy_extras.view3d_utils import location_3d_to_region_2d
 
     context = bpy.context
-    armature, space = bpy.data.objects.get(session.armature), context.space_data
+    armature = bpy.data.objects.get(session.armature)
+    space = context.space_data
     if armature is None or context.area is None or context.region_data is None:
         return
     if space.local_view and not armature.evaluated_get(context.view_layer.depsgraph).local_view_get(
@@ -250,7 +260,8 @@ def _draw(session: _Session) -> None:
     ):
         return  # only evaluated objects know in which local views they are
     here = context.area.as_pointer() == session.area
-    frame, scale = context.scene.frame_current, context.preferences.system.ui_scale
+    frame = context.scene.frame_current
+    scale = context.preferences.system.ui_scale
     pins = [e for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame]
     # how far away the joint stays; empty where it does not
     missed = {e["joint"]: e["missed"] for e in pins}

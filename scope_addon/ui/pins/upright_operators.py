@@ -51,7 +51,8 @@ class SCOPE_OT_set_upright(CorrectionOperator):
         from ...edit.pins.corrections import Upright, added
         from ...edit.pins.upright import upright_transform
 
-        scene, motion = context.scene, motion_of(armature)
+        scene = context.scene
+        motion = motion_of(armature)
         frame = shown_frame(scene, armature, motion)
         transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
         change_world(scene, armature, rate, lambda present: added(present, Upright.of(transform)))
@@ -89,7 +90,8 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
         from ...edit.pins.upright import upright_transform_in_view
         from ...scene.character.corrections.corrected_keys import captured_points
 
-        scene, motion = context.scene, motion_of(armature)
+        scene = context.scene
+        motion = motion_of(armature)
         points = np.array([self.start, self.end, self.start])
         points[2] += self.direction
         current = scene.frame_current + scene.frame_subframe
@@ -195,7 +197,8 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
 
         from ....solver.errors import ScopeError
 
-        view, ends = area.spaces.active.region_3d, self._line.ends
+        view = area.spaces.active.region_3d
+        ends = self._line.ends
         origins = [region_2d_to_origin_3d(region, view, at) for at in ends]
         directions = [region_2d_to_vector_3d(region, view, at) for at in ends]
         try:
@@ -252,10 +255,12 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
     from ...errors import UsageError
     from ...scene.character.corrections.corrected_keys import captured_points
 
-    armature, scene = captured_armature(context), context.scene
+    armature = captured_armature(context)
+    scene = context.scene
     if armature is None:  # since the line was begun
         raise UsageError("the captured person was removed; select another one")
-    motion, current = motion_of(armature), scene.frame_current + scene.frame_subframe
+    motion = motion_of(armature)
+    current = scene.frame_current + scene.frame_subframe
     frame = shown_frame(scene, armature, motion)
     at = captured_points(armature, current, np.array(points, float))
     u, v = (shot_of(motion).project(frame, point) for point in at)

@@ -34,7 +34,9 @@ def fill_list(settings: bpy.types.PropertyGroup, bone_map: BoneMap) -> None:
     settings.pairs.clear()
     for bone, part in sorted(bone_map.parts.items(), key=lambda pair: PARTS.index(pair[1])):
         pair = settings.pairs.add()
-        pair.bone, pair.part, pair.confidence = bone, part, bone_map.confidence.get(bone, 1.0)
+        pair.bone = bone
+        pair.part = part
+        pair.confidence = bone_map.confidence.get(bone, 1.0)
     settings.active = 0
 
 

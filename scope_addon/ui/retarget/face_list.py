@@ -81,7 +81,10 @@ def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: Expressi
     for key, channel, factors in entries:
         for expression, factor in factors.items():
             pair = settings.face_pairs.add()
-            pair.key, pair.channel, pair.expression, pair.factor = key, channel, expression, factor
+            pair.key = key
+            pair.channel = channel
+            pair.expression = expression
+            pair.factor = factor
     settings.face_active = 0
 
 

@@ -111,7 +111,8 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         from ...scene.rigs.face_bones import retarget_face_bones
         from ...scene.rigs.face_retarget import captured_expressions, retarget_expressions
 
-        settings, source = context.scene.scope_retarget, captured_armature(context)
+        settings = context.scene.scope_retarget
+        source = captured_armature(context)
         assert source is not None  # checked by poll
         captured = captured_expressions(source)
         if captured is None:

@@ -57,7 +57,8 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, settings = self.layout, context.scene.scope_retarget
+        layout = self.layout
+        settings = context.scene.scope_retarget
         layout.prop(settings, "face")
         if not has_targets(settings.face):
             return

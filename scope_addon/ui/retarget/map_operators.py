@@ -57,7 +57,8 @@ class SaveMapOperator(MapFileOperator):
         overwritten.
         """
         path: str = bpy.path.ensure_ext(self.filepath, ".json")
-        changed, self.filepath = path != self.filepath, path
+        changed = path != self.filepath
+        self.filepath = path
         return bool(changed)
 
     def work(self, context: bpy.types.Context) -> str:

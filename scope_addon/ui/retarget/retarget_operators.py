@@ -96,7 +96,8 @@ class SCOPE_OT_retarget(_RigOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Write the rig's keys."""
-        settings, source = context.scene.scope_retarget, captured_armature(context)
+        settings = context.scene.scope_retarget
+        source = captured_armature(context)
         assert source is not None  # checked by poll
         result = retarget_to_chosen_rig(context, source)
         if result.warnings:
@@ -122,7 +123,8 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     from ...scene.rigs.rig_retarget import guess_bone_map, retarget
     from ...scene.visibility import hide, show
 
-    settings, body = context.scene.scope_retarget, body_of(source)
+    settings = context.scene.scope_retarget
+    body = body_of(source)
     face = face_map(settings)
     guessed = None if len(settings.pairs) else guess_bone_map(settings.rig)
     result = retarget(

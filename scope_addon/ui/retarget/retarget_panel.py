@@ -54,7 +54,8 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout, settings = self.layout, context.scene.scope_retarget
+        layout = self.layout
+        settings = context.scene.scope_retarget
         draw_active_person(layout, context)
         layout.prop(settings, "rig")
         if settings.rig is None:

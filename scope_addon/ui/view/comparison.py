@@ -144,7 +144,8 @@ def _is_side(space: bpy.types.SpaceView3D) -> bool:
 
 def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     """Split a viewport, and show the capture from its side in the new one."""
-    window, screen = context.window, context.window.screen
+    window = context.window
+    screen = context.window.screen
     before = {each.as_pointer() for each in screen.areas}
     # What the sidebar and the toolbar leave is shared equally.
     covered = sum(
@@ -157,7 +158,8 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     with _in(window, area):
         bpy.ops.screen.area_split(direction="VERTICAL", factor=factor)
     side = next(each for each in screen.areas if each.as_pointer() not in before)
-    collection, camera = context.scene.scope.result.collection, camera_of(context.scene)
+    collection = context.scene.scope.result.collection
+    camera = camera_of(context.scene)
     people = [o for o in collection.all_objects if "scope_source" in o]
     active = captured_armature(context)
     if camera is None or not people:
@@ -235,7 +237,8 @@ def _show_alone(
     """
     from ...scene.visibility import show
 
-    selected, active = context.selected_objects, context.view_layer.objects.active
+    selected = context.selected_objects
+    active = context.view_layer.objects.active
     if active and active.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     with _in(context.window, area):

@@ -24,7 +24,8 @@ def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
     visible.
     """
     region = next((each for each in area.regions if each.type == "WINDOW"), None)
-    camera, space = scene.camera, area.spaces.active
+    camera = scene.camera
+    space = area.spaces.active
     if (
         region is None
         or camera is None
@@ -70,11 +71,15 @@ def _visible(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, flo
     """Return the left, right, bottom and top of what no other region covers, in pixels of the
     viewport's region.
     """
-    left, right, bottom, top = 0.0, float(region.width), 0.0, float(region.height)
+    left = 0.0
+    right = float(region.width)
+    bottom = 0.0
+    top = float(region.height)
     for other in area.regions:
         if min(other.width, other.height) < 2:  # hidden
             continue
-        x, y = other.x - region.x, other.y - region.y
+        x = other.x - region.x
+        y = other.y - region.y
         if other.type == "TOOLS":
             left = max(left, x + other.width)
         elif other.type == "UI":

@@ -35,7 +35,8 @@ def side_extent(
     """
     from ...scene.animation_data.timing import scene_rate
 
-    rate, far = scene_rate(bpy.context.scene), np.zeros(2)
+    rate = scene_rate(bpy.context.scene)
+    far = np.zeros(2)
     path = _pelvis_path(followed, rate)
     paths = [_pelvis_path(person, rate) for person in people if person != followed]
     if path is not None:

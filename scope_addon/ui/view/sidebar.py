@@ -15,7 +15,8 @@ def viewport_of(context: bpy.types.Context) -> bpy.types.Area | None:
     """Return the context's viewport, or else, as in a menu at the top, the largest of its
     window.
     """
-    window, area = context.window, context.area
+    window = context.window
+    area = context.area
     if window is None or (area is not None and area.type == "VIEW_3D"):
         return area if window is not None else None
     viewports = [each for each in window.screen.areas if each.type == "VIEW_3D"]

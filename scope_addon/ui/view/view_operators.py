@@ -98,7 +98,8 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         from ...scene.datablock_names import holds
         from ...scene.visibility import hide_again
 
-        scene, camera = context.scene, camera_of(context.scene)
+        scene = context.scene
+        camera = camera_of(context.scene)
         if is_looking_through(context):
             comparison.end(context.window, context.area)
             if side := comparison.side_area(context.window.screen):
@@ -190,7 +191,8 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         from ...scene.animation_data.timing import scene_rate
         from ...scene.footage_strip import add_footage_strips, strips_of
 
-        scene, result = context.scene, context.scene.scope.result
+        scene = context.scene
+        result = context.scene.scope.result
         armatures = (o for o in result.collection.all_objects if "scope_start" in o)
         start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()

@@ -65,11 +65,16 @@ def measured(seconds: float, what: str) -> Iterator[float]:
     The viewport is hidden meanwhile: without a graphics card, one drawing of it takes a second on a
     busy machine.
     """
-    job, steps, own, gaps = state().job, [], [], []
+    job = state().job
+    steps = []
+    own = []
+    gaps = []
     original = job.step
 
     def step() -> bool:
-        before, began, used = job.poses, time.perf_counter(), time.thread_time()
+        before = job.poses
+        began = time.perf_counter()
+        used = time.thread_time()
         running = original()
         if job.poses != before:
             steps.append(time.perf_counter() - began)
@@ -80,7 +85,8 @@ def measured(seconds: float, what: str) -> Iterator[float]:
     area = viewport()["area"]
     area.type = "TEXT_EDITOR"
     yield 0.5
-    poses, began = job.poses, time.monotonic()
+    poses = job.poses
+    began = time.monotonic()
     last = began
     while last - began < seconds or not steps:
         assert last - began < 60, "no pose comes"
@@ -117,7 +123,8 @@ def prepared() -> Iterator[float]:
     assert "Camera 99 does not exist" in state().message, state().message
     yield 0.5
     picture("19_live_formats")
-    settings.source, settings.stream = "STREAM", ADDRESS.replace("//", "//me:secret@")
+    settings.source = "STREAM"
+    settings.stream = ADDRESS.replace("//", "//me:secret@")
     assert settings.stream == ADDRESS, settings.stream
     bpy.context.preferences.system.use_online_access = False
     try:
@@ -216,11 +223,15 @@ def stopped() -> Iterator[float]:
     source = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
     rig = bpy.data.objects.new("rig", source.data.copy())
     bpy.context.scene.collection.objects.link(rig)
-    rig.scale, rig.location = (1.2, 1.2, 1.2), (2.0, 0.0, 0.0)
+    rig.scale = (1.2, 1.2, 1.2)
+    rig.location = (2.0, 0.0, 0.0)
     settings = bpy.context.scene.scope_retarget
-    settings.rig, settings.captured, bpy.context.scene.scope_live.with_rig = rig, "beside", True
+    settings.rig = rig
+    settings.captured = "beside"
+    bpy.context.scene.scope_live.with_rig = True
     use(bpy.ops.ed.undo_push, message="A rig")
-    before, posed = inventory(), rig_pose()
+    before = inventory()
+    posed = rig_pose()
     yield from start()
     yield from measured(MEASURED_S, "body_and_rig")
     worker = state().job.worker

@@ -19,7 +19,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 RATE = 30.0
-_SET_FLAGS, _UP_AND_RUNNING = 0x8914, 0x41  # of Linux
+# of Linux
+_SET_FLAGS = 0x8914
+_UP_AND_RUNNING = 0x41
 
 
 def enable_loopback() -> None:

@@ -14,7 +14,8 @@ from pathlib import Path
 import bpy
 from shared.session import OUT, addon, until, use
 
-ADDRESS, PORT = "http://127.0.0.1:8099/video", "8099"
+ADDRESS = "http://127.0.0.1:8099/video"
+PORT = "8099"
 CLIENTS = OUT / "live_clients.txt"
 # What ends at once takes tenths of a second on an idle machine, and a drawing or two on a busy one;
 # what waits for one of the product's own time limits takes five seconds.

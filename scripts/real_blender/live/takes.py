@@ -25,7 +25,8 @@ from live.session import (
 )
 from shared.session import FOOTAGE, OUT, addon, captured, invoke, picture, until, use
 
-SAVED, TAKE = OUT / "live.blend", OUT / "live_take.blend"
+SAVED = OUT / "live.blend"
+TAKE = OUT / "live_take.blend"
 RECORDED_S = 5.0
 
 
@@ -36,7 +37,8 @@ def recorded() -> Iterator[float]:
     assert b"secret" not in SAVED.read_bytes()
     yield from moving()
     settings = bpy.context.scene.scope_live
-    settings.countdown_s, settings.with_scene = 1, True
+    settings.countdown_s = 1
+    settings.with_scene = True
     pressed = time.monotonic()
     use(bpy.ops.scope.record_live)
     assert not state().job.recording
@@ -45,7 +47,8 @@ def recorded() -> Iterator[float]:
     yield from until(plays, 60, "the scene to play")
     yield RECORDED_S
     picture("23_live_recording")
-    worker, stopped = state().job.worker, time.monotonic()
+    worker = state().job.worker
+    stopped = time.monotonic()
     least_s = 0.5 * (stopped - began)
     use(bpy.ops.scope.stop_live)
     yield from connection_closed(stopped, "Stop of a recording")
@@ -114,7 +117,9 @@ def captured_again() -> Iterator[float]:
     timeline.
     """
     settings = bpy.context.scene.scope_live
-    settings.keep_footage, settings.with_scene, settings.countdown_s = True, False, 0
+    settings.keep_footage = True
+    settings.with_scene = False
+    settings.countdown_s = 0
     count = len(captures())
     yield from start()
     use(bpy.ops.scope.record_live)
@@ -144,8 +149,10 @@ def played() -> Iterator[float]:
     """Record a video that is played in real time and ends by itself, with its own times; undo
     that.
     """
-    settings, count = bpy.context.scene.scope_live, len(captures())
-    settings.source, settings.file = "FILE", FOOTAGE
+    settings = bpy.context.scene.scope_live
+    count = len(captures())
+    settings.source = "FILE"
+    settings.file = FOOTAGE
     begin()
     job = state().job
     yield from until(lambda: job.has_body or state().job is None, 300, "the first pose")
@@ -166,7 +173,8 @@ def played() -> Iterator[float]:
     yield 0.5
     assert len(captures()) == count, "one undo does not remove the recording of a video"
     settings = bpy.context.scene.scope_live
-    settings.source, settings.stream = "STREAM", ADDRESS
+    settings.source = "STREAM"
+    settings.stream = ADDRESS
 
 
 def frames_of(collection: bpy.types.Collection) -> tuple[float, float]:

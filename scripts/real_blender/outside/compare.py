@@ -107,10 +107,8 @@ def headless(clips: Path, out: Path, shell_out: Path, report: dict) -> list[str]
             f"the shell's batch ends with {status}, {fates[0]}; Blender's with {fates[1]}"
         )
     for one, other in zip(ours["files"], theirs["files"], strict=True):
-        said, expected = (
-            other.get("message", ""),
-            one.get("message", "").replace(str(clips), "/scope/clips"),
-        )
+        said = other.get("message", "")
+        expected = one.get("message", "").replace(str(clips), "/scope/clips")
         if said != expected:
             problems.append(f"of {one['file']} Blender says {said!r} and the shell {expected!r}")
     for name in ("command.npz", "batch/walk.npz"):

@@ -13,7 +13,8 @@ from pathlib import Path
 import av
 import cv2
 
-FRAMES, HEIGHT = 75, 720
+FRAMES = 75
+HEIGHT = 720
 
 
 def main(clip: str, target: str, pictures: str) -> None:

@@ -35,7 +35,8 @@ def stream(address: str) -> Iterator[float]:
     """Capture a stream live, until the body follows; return what it does."""
     bpy.context.preferences.system.use_online_access = True
     settings = bpy.context.scene.scope_live
-    settings.source, settings.stream = "STREAM", address
+    settings.source = "STREAM"
+    settings.stream = address
     use(bpy.ops.scope.live, "INVOKE_DEFAULT")
     state = sys.modules[
         addon().__name__.replace("capture.capture_operators", "live.live_state")

@@ -135,7 +135,8 @@ def _curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
 
 def _asset(action: bpy.types.Action) -> object:
     """Return the metadata and picture of an asset; None of other actions."""
-    data, preview = action.asset_data, action.preview
+    data = action.asset_data
+    preview = action.preview
     if data is None:
         return None
     pixels = [round(value, 2) for value in preview.image_pixels_float] if preview else []

@@ -14,7 +14,8 @@ from pathlib import Path
 import bpy
 
 ARGUMENTS = sys.argv[sys.argv.index("--") + 1 :]
-FOOTAGE, OUT = ARGUMENTS[0], Path(ARGUMENTS[1])
+FOOTAGE = ARGUMENTS[0]
+OUT = Path(ARGUMENTS[1])
 
 
 def viewport() -> dict:

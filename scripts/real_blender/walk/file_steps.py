@@ -37,7 +37,8 @@ class FileSteps:
 
     def __init__(self, chance: random.Random, folder: Path) -> None:
         """Choose with ``chance``, and save files to ``folder``."""
-        self.random, self.folder = chance, folder
+        self.random = chance
+        self.folder = folder
         self.next: list[Step] = []
         self.actions = [name[5:] for name in dir(self) if name.startswith("step_")]
 
@@ -73,7 +74,8 @@ class FileSteps:
         saved = sorted(self.folder.glob("saved*.blend"))
         if not saved:
             return self.step_save()
-        path, load_ui = str(self.random.choice(saved)), self.random.random() < 0.5
+        path = str(self.random.choice(saved))
+        load_ui = self.random.random() < 0.5
         return Step(
             f"open({path}, {load_ui})",
             lambda: bpy.ops.wm.open_mainfile(filepath=path, load_ui=load_ui),
@@ -92,7 +94,8 @@ class FileSteps:
         )
         if not saved:
             return self.step_save()
-        path, link = str(self.random.choice(saved)), self.random.random() < 0.5
+        path = str(self.random.choice(saved))
+        link = self.random.random() < 0.5
         kind = self.random.choice(
             ("objects", "objects", "collections", "scenes", "actions", "armatures", "meshes")
         )
@@ -166,10 +169,8 @@ class FileSteps:
         """Reload, remove or make local what is linked."""
         if not len(bpy.data.libraries):
             return self.step_import_file()
-        index, what = (
-            self.random.randrange(len(bpy.data.libraries)),
-            self.random.choice(("reload", "remove", "local")),
-        )
+        index = self.random.randrange(len(bpy.data.libraries))
+        what = self.random.choice(("reload", "remove", "local"))
 
         def take() -> object:
             library = bpy.data.libraries[index]
@@ -341,7 +342,8 @@ class FileSteps:
         if not count:
             return self.step_undo()
         block = getattr(bpy.data, kind)[self.random.randrange(count)]
-        name, library = block.name, block.library.filepath if block.library else None
+        name = block.name
+        library = block.library.filepath if block.library else None
 
         def take() -> object:
             try:

@@ -27,7 +27,8 @@ from shared.session import ARGUMENTS, OUT, show_tab
 from walk import steps as walk_steps
 from walk.file_steps import Step
 
-SEED, COUNT = int(ARGUMENTS[2]), int(ARGUMENTS[3])
+SEED = int(ARGUMENTS[2])
+COUNT = int(ARGUMENTS[3])
 PAUSE_S = 0.02
 # Blender crashes when a script chooses a tab before the new file's window is drawn
 OPENED_PAUSE_S = 0.5
@@ -101,7 +102,8 @@ class Walk:
         self.last = f"{self.taken} {step.text}"
         self.log.write(f"{time.monotonic() - self.began:.1f} s: {self.last}")
         self.log.flush()
-        before, present = everything() if step.checked else {}, objects()
+        before = everything() if step.checked else {}
+        present = objects()
         try:
             outcome = str(step.take())
         except RuntimeError as error:  # reported by an operator

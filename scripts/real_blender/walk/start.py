@@ -27,7 +27,8 @@ def main(seed: int, steps: int) -> int:
     """Walk; return 1 if Blender crashed, hung, or printed a traceback."""
     subprocess.run(["rm", "-rf", str(FOLDER)], check=True)
     FOLDER.mkdir(parents=True)
-    log, printed = FOLDER / "steps.log", FOLDER / "printed.log"
+    log = FOLDER / "steps.log"
+    printed = FOLDER / "printed.log"
     print(f"walk: seed {seed}, {steps} steps", flush=True)
     script = str(Path(__file__).with_name("session.py"))
     command = ["blender", "--enable-event-simulate", "--window-geometry", "0", "0", *_WINDOW]
@@ -45,7 +46,8 @@ def main(seed: int, steps: int) -> int:
             ended = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGABRT)  # faulthandler prints where it hangs
-            status, ended = process.wait(), f"no end within {LONGEST_S:.0f} s"
+            status = process.wait()
+            ended = f"no end within {LONGEST_S:.0f} s"
     results = FOLDER / "results.json"
     report = (
         json.loads(results.read_text("utf-8"))

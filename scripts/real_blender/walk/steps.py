@@ -62,7 +62,8 @@ class Steps(FileSteps):
     def settings(self) -> None:
         """Choose the settings whose capture is in the cache."""
         scene = bpy.context.window_manager.windows[0].scene
-        scene.scope.footage, scene.scope.quality = self.footage, "FAST"
+        scene.scope.footage = self.footage
+        scene.scope.quality = "FAST"
 
     def restore_cache(self) -> None:
         """Copy the cache back, except when a capture uses it."""
@@ -144,7 +145,8 @@ class Steps(FileSteps):
 
         def take() -> object:
             context = viewport()
-            region, window = context["region"], context["window"]
+            region = context["region"]
+            window = context["window"]
             place = [region.x + share[0] * region.width, region.y + share[1] * region.height]
             active = window.view_layer.objects.active
             if bone and active is not None and active.pose and bone in active.pose.bones:
@@ -177,7 +179,8 @@ class Steps(FileSteps):
 
     def likely(self, name: str) -> dict[str, object]:
         """Choose values with which an operator can do its work on the walk's capture."""
-        chance, folder = self.random, self.folder
+        chance = self.random
+        folder = self.folder
         first = chance.randrange(3, 30)
         span = {"start": first, "end": first + chance.randrange(1, 12)}
         place = [chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(0.2, 1.5)]
@@ -227,7 +230,8 @@ class Steps(FileSteps):
             items = [item.identifier for item in prop.enum_items]
             return {chance.choice(items)} if prop.is_enum_flag else chance.choice(items)
         if prop.type in ("INT", "FLOAT"):
-            low, high = max(prop.soft_min, -20), min(prop.soft_max, 120)
+            low = max(prop.soft_min, -20)
+            high = min(prop.soft_max, 120)
             if low > high:
                 return None
             count = prop.array_length if prop.is_array else 1

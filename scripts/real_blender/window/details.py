@@ -37,7 +37,9 @@ from shared.session import (
 
 # On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two
 # captures in the list.
-FBX_BUTTON, RAW_BUTTON, FOLD = (1090, 453), (1085, 622), 768
+FBX_BUTTON = (1090, 453)
+RAW_BUTTON = (1085, 622)
+FOLD = 768
 FOLDER_BUTTON = (1252, 128)  # beside the footage
 # Names of files, and by operator which of them the file browser shows at first.
 FOOTAGE_FILES = ("a.mp4", "b.MTS", "c.ts", "d.webm", "e.flv", "f.heic", "g_0001.png")
@@ -51,8 +53,10 @@ BROWSERS = (
     ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:5]),
     ("choose_file", {"owner": "preferences", "setting": "detector_file"}, ("net.onnx",)),
 )
-STILL, LOW = OUT / "still.npz", OUT / "low.npz"
-FRAMES, RATE = 120, 60.0
+STILL = OUT / "still.npz"
+LOW = OUT / "low.npz"
+FRAMES = 120
+RATE = 60.0
 # words, how many of Blender's own entries they find first, the operator after these, and its format
 SEARCHED = (
     ("motion capture", 2, "import_video", ""),
@@ -84,7 +88,9 @@ def two_captures() -> Iterator[float]:
     the clip.
     """
     scene = bpy.context.scene
-    scene.render.fps, scene.scope.quality, scene.scope.frame_rate = 20, "FAST", "KEEP"
+    scene.render.fps = 20
+    scene.scope.quality = "FAST"
+    scene.scope.frame_rate = "KEEP"
     bpy.ops.scope.choose_footage(filepath=FOOTAGE)
     for take in ("first", "second"):
         scene.scope.take = take
@@ -212,11 +218,9 @@ def file_browsers() -> Iterator[float]:
     """Open the file browsers: at first they show what fits, and with the filter off, all that there
     is.
     """
-    windows, settings, folder = (
-        bpy.context.window_manager.windows,
-        bpy.context.scene.scope,
-        OUT / "files",
-    )
+    windows = bpy.context.window_manager.windows
+    settings = bpy.context.scene.scope
+    folder = OUT / "files"
     folder.mkdir()
     for name in FILES:
         shutil.copy(FOOTAGE, folder / name)
@@ -255,7 +259,8 @@ def listed(folder: Path) -> Generator[float, None, list[str]]:
         region = next(each for each in area.regions if each.type == "WINDOW")
         with bpy.context.temp_override(window=window, area=area, region=region):
             bpy.ops.file.select_all(action="SELECT")
-            before, found = found, sorted(each.name for each in bpy.context.selected_files)
+            before = found
+            found = sorted(each.name for each in bpy.context.selected_files)
             bpy.ops.file.select_all(action="DESELECT")
         area.tag_redraw()
         if found and found == before:
@@ -271,7 +276,8 @@ def popup() -> bytes:
 
 def rigs() -> None:
     """Choose one rig after another: the list of bones is always that of the chosen rig."""
-    settings, found = bpy.context.scene.scope_retarget, []
+    settings = bpy.context.scene.scope_retarget
+    found = []
     for prefix in ("mixamorig:", "DEF-"):
         data = bpy.data.objects["first"].data.copy()
         for bone in data.bones:
@@ -349,7 +355,8 @@ def imported() -> None:
     """Import a motion without a cycle, of which no loop can be made, and one with two floors, which
     is warned of.
     """
-    poses, trans = np.zeros((FRAMES, 24, 3)), np.zeros((FRAMES, 3))
+    poses = np.zeros((FRAMES, 24, 3))
+    trans = np.zeros((FRAMES, 3))
     poses[:, 0, 0] = np.pi / 2  # AMASS: z is up
     poses[:, 16, 2] = np.linspace(0.0, 0.8, FRAMES)  # an arm that rises once
     np.savez(STILL, poses=poses.reshape(FRAMES, -1), trans=trans, mocap_framerate=np.array(RATE))

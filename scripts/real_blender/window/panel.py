@@ -36,7 +36,8 @@ from shared.session import (
 )
 
 # Where the panel's buttons are on a screen of 1600 x 1000, in pixels from its top left.
-FAST_BUTTON, CAPTURE_BUTTON = (1086, 151), (1174, 183)
+FAST_BUTTON = (1086, 151)
+CAPTURE_BUTTON = (1174, 183)
 OVER_PANEL = (1174, 300)
 KEEP_BUTTON = (1087, 301)  # of the question, which opens where the mouse is: over the panel
 ASKS_AFTER_S = 11.0
@@ -63,8 +64,11 @@ def cancel_after_the_question() -> Iterator[float]:
 
     Neither Escape nor Keep Capturing ends it. The worker stands still meanwhile.
     """
-    operator, asked, kept = addon().SCOPE_OT_cancel, [], []
-    invoke_itself, keep = operator.invoke, addon().SCOPE_OT_keep_capturing
+    operator = addon().SCOPE_OT_cancel
+    asked = []
+    kept = []
+    invoke_itself = operator.invoke
+    keep = addon().SCOPE_OT_keep_capturing
     keep_itself = keep.execute
 
     def counted(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -93,7 +97,8 @@ def cancel_after_the_question() -> Iterator[float]:
         if answer != "Return":
             assert addon().state.job is not None, f"{answer} did not decline to stop the capture"
     yield from until(lambda: addon().state.job is None, 20, "the capture to stop")
-    operator.invoke, keep.execute = invoke_itself, keep_itself
+    operator.invoke = invoke_itself
+    keep.execute = keep_itself
     report["question"] = "asked, declined, asked, kept, asked, stopped"
 
 
@@ -101,7 +106,9 @@ def frame_covered() -> float:
     """Return how far the frame of the scene's camera reaches under the sidebar or the toolbar,
     pixels.
     """
-    area, region, camera = viewport()["area"], viewport()["region"], bpy.context.scene.camera
+    area = viewport()["area"]
+    region = viewport()["region"]
+    camera = bpy.context.scene.camera
     corners = [
         camera.matrix_world @ corner for corner in camera.data.view_frame(scene=bpy.context.scene)
     ]
@@ -115,7 +122,8 @@ def frame_covered() -> float:
 
 def lowest_skin(armature: bpy.types.Object) -> float:
     """Return the height of the lowest vertex of the body over all frames, metres."""
-    scene, lowest = bpy.context.scene, float("inf")
+    scene = bpy.context.scene
+    lowest = float("inf")
     body = next(
         o
         for o in armature.users_collection[0].objects
@@ -170,7 +178,8 @@ def steps() -> Iterator[float]:
     before = inventory()
     yield from press(CAPTURE_BUTTON, lambda: addon().state.job is not None)
     worker = addon().state.job.worker
-    folder, pid = worker.job_folder, worker.pid
+    folder = worker.job_folder
+    pid = worker.pid
     yield from until(
         lambda: addon().state.job is None or addon().state.job.progress.done > 0, 120, "the worker"
     )
@@ -198,7 +207,9 @@ def steps() -> Iterator[float]:
 
     scene.scope.quality = "FAST"
     yield from press(CAPTURE_BUTTON, lambda: addon().state.job is not None)
-    began, last, gaps = time.monotonic(), clocks(), []
+    began = time.monotonic()
+    last = clocks()
+    gaps = []
     pictures = 0
     while addon().state.job is not None:
         yield 0.02
@@ -227,7 +238,8 @@ def steps() -> Iterator[float]:
     picture("6_result")
     assert scene.scope.result.collection is not None, addon().state.message
     result = scene.scope.result
-    report["people"], report["frames"] = result.people, result.frames
+    report["people"] = result.people
+    report["frames"] = result.frames
     report["reprojection_px"] = round(result.reprojection_px, 2)
     report["warnings"] = [w.text for w in result.warnings]
     report["scene_rate"] = [scene.render.fps, round(scene.render.fps_base, 4)]

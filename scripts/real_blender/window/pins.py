@@ -38,13 +38,14 @@ from shared.session import (
 )
 
 # On a screen of 1600 x 1000, in the comparison of the only capture.
-DOCUMENTATION, RAW, NORMAL, STRONG = (1222, 97), (1086, 529), (1165, 529), (1244, 529)
-LEFT_FOOT_STANDS, EXCHANGE, UPRIGHT_LINE, FLOOR_HERE = (
-    (1105, 811),
-    (1175, 836),
-    (1175, 863),
-    (1175, 888),
-)
+DOCUMENTATION = (1222, 97)
+RAW = (1086, 529)
+NORMAL = (1165, 529)
+STRONG = (1244, 529)
+LEFT_FOOT_STANDS = (1105, 811)
+EXCHANGE = (1175, 836)
+UPRIGHT_LINE = (1175, 863)
+FLOOR_HERE = (1175, 888)
 report: dict[str, object] = {"blender": bpy.app.version_string}
 
 
@@ -62,7 +63,8 @@ def on_screen(joint: str, area: bpy.types.Area | None = None) -> tuple[float, fl
     """Return where a joint is on the screen, in pixels from the top left, by default in the first
     viewport.
     """
-    here, armature = viewport(), rig()
+    here = viewport()
+    armature = rig()
     here["window"].view_layer.update()
     place = armature.matrix_world @ armature.pose.bones[joint].head
     area = area or here["area"]
@@ -147,7 +149,8 @@ def steps() -> Iterator[float]:
 
 def pressed() -> Iterator[float]:
     """Press the buttons of the panel with the mouse, and the OK of their dialogs; undo each."""
-    browser, opened = OUT / "browser.sh", OUT / "opened"
+    browser = OUT / "browser.sh"
+    opened = OUT / "opened"
     browser.write_text(f'#!/bin/sh\necho "$1" >{opened}\n')
     browser.chmod(0o755)
     os.environ["BROWSER"] = str(browser)
@@ -201,12 +204,15 @@ def upright_line_from_the_side() -> Iterator[float]:
     """
     use(bpy.ops.scope.side_view)
     yield 2.0
-    window, camera, before = viewport()["window"], bpy.context.scene.camera, keys()
+    window = viewport()["window"]
+    camera = bpy.context.scene.camera
+    before = keys()
     area = next(
         a for a in window.screen.areas if a.type == "VIEW_3D" and a.spaces.active.lock_object
     )
     yield from press(UPRIGHT_LINE, lambda: len(window.modal_operators) > 0)
-    was, (x, y) = camera.matrix_world.copy(), on_screen("left_ankle", area)
+    was = camera.matrix_world.copy()
+    (x, y) = on_screen("left_ankle", area)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, "sleep", "0.3", *move(x + 12, y - 180))
     yield 2.0
     xdotool(*move(x + 20, y - 300))
@@ -292,7 +298,8 @@ def dragged_in_side_view(joint: str, by: tuple[int, int]) -> Iterator[float]:
         30,
         "the handles in both views",
     )
-    before, (x, y) = len(listed()), on_screen(joint, area)
+    before = len(listed())
+    (x, y) = on_screen(joint, area)
     xdotool(
         *move(x - 3, y),
         *move(x, y),
@@ -369,7 +376,8 @@ def dragged_while_busy(joint: str, by: tuple[int, int]) -> Iterator[float]:
     """Drag a handle while Blender does not react: the drag is over before Blender handles the
     press.
     """
-    before, (x, y) = len(listed()), on_screen(joint)
+    before = len(listed())
+    (x, y) = on_screen(joint)
     xdotool(*move(x - 3, y), *move(x, y), "mousedown", 1, *move(x + by[0], y + by[1]), "mouseup", 1)
     time.sleep(3.0)
     yield from until(lambda: len(listed()) > before, 30, "the correction of a drag that was over")
@@ -384,7 +392,9 @@ def dragged_out_of_reach() -> Iterator[float]:
     """Drag a wrist farther away than the arm is long: its handle is orange, as long as the pin is
     there.
     """
-    before, wrist, shoulder = len(listed()), on_screen("right_wrist"), on_screen("right_shoulder")
+    before = len(listed())
+    wrist = on_screen("right_wrist")
+    shoulder = on_screen("right_shoulder")
     yield from drag("right_wrist", (round(wrist[0] - shoulder[0]), round(wrist[1] - shoulder[1])))
     assert [bool(e["missed"]) for e in listed()[before:]] == [True], listed()
     yield from until(lambda: is_orange("right_wrist"), 20, "the orange handle")
@@ -422,7 +432,8 @@ def upright_line() -> None:
     """Turn the world by a line near the image's middle; without it, the keys are the same to the
     bit.
     """
-    before, (width, height) = keys(), bpy.context.scene.scope.result.resolution
+    before = keys()
+    (width, height) = bpy.context.scene.scope.result.resolution
     use(
         bpy.ops.scope.set_upright,
         start=(0.5 * width, 0.2 * height),
@@ -440,7 +451,8 @@ def floor_here(frame: int) -> Iterator[float]:
     correction is removed.
     """
     use(bpy.ops.scope.smooth, strength=1.0)  # writes keys as below
-    scene, before = bpy.context.scene, keys()
+    scene = bpy.context.scene
+    before = keys()
     scene.frame_set(frame)
     camera = scene.camera.matrix_world.translation.z
     use(bpy.ops.scope.floor_here)
@@ -464,7 +476,8 @@ def kept_edits(first: int, frame: int) -> Iterator[float]:
     """Interpolate frames, swap sides and put feet on the floor, which smoothing keeps, until they
     are taken back.
     """
-    before, frames = keys(), (first + 8, frame - 2, frame, frame + 2, frame + 10)
+    before = keys()
+    frames = (first + 8, frame - 2, frame, frame + 2, frame + 10)
     captured_there = places(frames)
     use(bpy.ops.scope.interpolate_span, start=frame - 4, end=frame + 4)
     use(bpy.ops.scope.swap_sides, start=first + 5, end=first + 12, limbs="legs")
@@ -532,7 +545,9 @@ def out_of_reach() -> None:
     """Pin a wrist a metre away: the body stays, and without the pin the keys are the same to the
     bit.
     """
-    before, shoulder, pelvis = keys(), place("left_shoulder"), place("pelvis")
+    before = keys()
+    shoulder = place("left_shoulder")
+    pelvis = place("pelvis")
     use(
         bpy.ops.scope.add_pin,
         joint="left_wrist",

@@ -74,7 +74,8 @@ def prepared() -> Iterator[float]:
 def capturing() -> Iterator[float]:
     """Begin a capture."""
     settings = bpy.context.scene.scope
-    settings.footage, settings.quality = FOOTAGE, "BEST"
+    settings.footage = FOOTAGE
+    settings.quality = "BEST"
     assert use(bpy.ops.scope.capture, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
     yield from until(lambda: addon().state.job.messages > 0, 120, "the worker")
 
@@ -82,7 +83,8 @@ def capturing() -> Iterator[float]:
 def live(footage: str = FOOTAGE) -> Iterator[float]:
     """Begin a live capture of a file."""
     settings = bpy.context.scene.scope_live
-    settings.source, settings.file = "FILE", footage
+    settings.source = "FILE"
+    settings.file = footage
     assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
     state = module("live.live_state").state
     yield from until(lambda: state.job is None or state.job.has_body, 120, "the first pose")
@@ -151,7 +153,8 @@ def steps() -> Iterator[float]:
     show_tab()
     yield 1.0
     settings = bpy.context.scene.scope
-    settings.footage, settings.quality = FOOTAGE, "FAST"
+    settings.footage = FOOTAGE
+    settings.quality = "FAST"
     yield from captured()
     bpy.ops.wm.save_as_mainfile(filepath=str(SAVED))
     yield from removed_in_another_scene()

@@ -44,7 +44,8 @@ def opened(kind: str) -> tuple[float, float]:
     """Return the seconds from the start of the process to the window's first timer, and those of
     the processor.
     """
-    began, used = time.monotonic(), processor_s()
+    began = time.monotonic()
+    used = processor_s()
     done = subprocess.run(
         ["blender", "--python-expr", END],
         env=dict(os.environ, HOME=str(HOMES[kind])),

@@ -18,7 +18,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shared.session import OUT, invoke, picture, run, show_tab, use
 
-SAVED, WALK, JUMP = OUT / "stored.blend", OUT / "walk.npz", OUT / "jump_poses.npz"
+SAVED = OUT / "stored.blend"
+WALK = OUT / "walk.npz"
+JUMP = OUT / "jump_poses.npz"
 report: dict[str, list[str]] = {"worked": []}
 
 
@@ -64,9 +66,11 @@ def two_captures() -> Iterator[float]:
     """
     for path, speed in ((WALK, 1.0), (JUMP, 2.0)):
         phase = 2 * np.pi * speed * np.arange(120) / 60.0
-        poses, trans = np.zeros((120, 24, 3)), np.zeros((120, 3))
+        poses = np.zeros((120, 24, 3))
+        trans = np.zeros((120, 3))
         poses[:, 0, 0] = np.pi / 2
-        poses[:, 1, 0], poses[:, 2, 0] = 0.4 * np.sin(phase), -0.4 * np.sin(phase)
+        poses[:, 1, 0] = 0.4 * np.sin(phase)
+        poses[:, 2, 0] = -0.4 * np.sin(phase)
         trans[:, 1] = -speed * np.arange(120) / 60.0
         np.savez(path, poses=poses.reshape(120, -1), trans=trans, mocap_framerate=np.array(60.0))
     use(bpy.ops.scope.import_motion, filepath=str(WALK))

@@ -101,7 +101,8 @@ def killed_worker() -> Iterator[float]:
 
 def removed_footage() -> Iterator[float]:
     """Remove the video while it is being read."""
-    scene, video = bpy.context.scene, Path("/scope/gone.mp4")
+    scene = bpy.context.scene
+    video = Path("/scope/gone.mp4")
     shutil.copy(FOOTAGE, video)
     scene.scope.footage = str(video)
     yield from begun()

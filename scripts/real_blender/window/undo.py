@@ -108,9 +108,11 @@ def add_rig() -> None:
 def add_face(rig: bpy.types.Object) -> None:
     """Give a rig bones that move its face, and leave the active object as it was."""
     layer = bpy.context.view_layer
-    active, layer.objects.active = layer.objects.active, rig
+    active = layer.objects.active
+    layer.objects.active = rig
     invoke(bpy.ops.object.mode_set, mode="EDIT")
-    bones, head = rig.data.edit_bones, rig.data.edit_bones["head"]
+    bones = rig.data.edit_bones
+    head = rig.data.edit_bones["head"]
     for name, ends in FACE.items():
         for side in (1, -1) if name.endswith(".L") else (1,):
             bone = bones.new(name if side == 1 else name.replace(".L", ".R"))
@@ -171,7 +173,8 @@ def set_rate() -> None:
 def retarget_beside() -> None:
     """Retarget with root motion, next to the captured person."""
     settings = bpy.context.scene.scope_retarget
-    settings.root, settings.captured = "object", "beside"
+    settings.root = "object"
+    settings.captured = "beside"
     use(bpy.ops.scope.retarget)
 
 
@@ -180,7 +183,8 @@ def capturing() -> Iterator[float]:
     yield from tried(
         "choose footage", lambda: use(bpy.ops.scope.choose_footage, filepath=FOOTAGE), keep=True
     )
-    bpy.context.scene.scope.quality, bpy.context.scene.scope.face = "FAST", True
+    bpy.context.scene.scope.quality = "FAST"
+    bpy.context.scene.scope.face = True
     invoke(bpy.ops.ed.undo_push, message="Quality")
     before = state()
     yield from captured()
@@ -214,8 +218,10 @@ def failing() -> Iterator[float]:
     # only the scene changes, so that undoing this does not read the armature again
     use(bpy.ops.scope.use_sample)
     yield 0.2
-    before, there = state(), identities()
-    meet_pin, keys._meet_pin = keys._meet_pin, fail
+    before = state()
+    there = identities()
+    meet_pin = keys._meet_pin
+    keys._meet_pin = fail
     try:
         use(bpy.ops.scope.add_pin, joint="left_wrist", location=(0.5, 0.0, 1.5), frame=20)
     except RuntimeError:

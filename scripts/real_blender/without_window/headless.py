@@ -76,7 +76,8 @@ def name_that_is_not_utf8() -> None:
     subprocess.run(["convert", "pictures/0030.jpg", "out/person.png"], check=True)
     (OUT / "person.png").rename(OUT / os.fsdecode(b"caf\xe9.png"))
     for suffix in ("mp4", "png"):
-        clip, motion = OUT / os.fsdecode(b"caf\xe9." + suffix.encode()), OUT / f"latin_{suffix}.npz"
+        clip = OUT / os.fsdecode(b"caf\xe9." + suffix.encode())
+        motion = OUT / f"latin_{suffix}.npz"
         command("capture", str(clip), *FAST, "-o", str(motion), status=0)
         assert motion.stat().st_size > 1000
 

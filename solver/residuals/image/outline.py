@@ -38,7 +38,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         f = floats[k]
         j = ints[k, 0]
         i = tree.point_part[j]
-        R, t = pose.R[i], pose.t[i]
+        R = pose.R[i]
+        t = pose.t[i]
         lx, ly, lz = lever(tree, pose, j)
         lx += R[0, 0] * f[0] + R[0, 1] * f[1] + R[0, 2] * f[2]
         ly += R[1, 0] * f[0] + R[1, 1] * f[1] + R[1, 2] * f[2]
@@ -46,7 +47,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         z = lz + t[2]
         if z <= Z_MIN:
             continue
-        u, v = (lx + t[0]) / z, (ly + t[1]) / z
+        u = (lx + t[0]) / z
+        v = (ly + t[1]) / z
         d = f[5] * (u - f[3]) + f[6] * (v - f[4])
         side = 0 if d > 0.0 else 1
         rho, w = geman_mcclure(d * d, f[9 + side])
@@ -54,7 +56,9 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
         w *= weight * f[7 + side]
         if w <= 0.0:
             continue
-        a, b, c = f[5] / z, f[6] / z, -(f[5] * u + f[6] * v) / z
+        a = f[5] / z
+        b = f[6] / z
+        c = -(f[5] * u + f[6] * v) / z
         add_to_point(
             tree,
             pose,

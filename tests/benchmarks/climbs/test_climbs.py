@@ -25,7 +25,8 @@ BOX_M = 0.5
 def takes(body: Body) -> list[Take]:
     """One recording of somebody who is lifted onto a box half-way, in a world with y up."""
     frames = 130
-    poses, trans = np.zeros((frames, 3 * (body.K + 1))), np.zeros((frames, 3))
+    poses = np.zeros((frames, 3 * (body.K + 1)))
+    trans = np.zeros((frames, 3))
     trans[:, 1] = 1.0 + BOX_M * np.clip((np.arange(frames) - 50) / 30, 0, 1)
     return [Take(0, "up_0", poses, trans, np.ones(frames, bool), np.zeros(body.P), FPS * 2)]
 
@@ -39,7 +40,8 @@ def captured(body: Body, scene: Scene, share: float) -> SimpleNamespace:
     """Return the true motion as a capture would, but with a share of the rise alone, in the world
     and in the image.
     """
-    person, T = scene.people[0], len(scene)
+    person = scene.people[0]
+    T = len(scene)
     trans = person.trans.copy()
     trans[:, 2] = trans[0, 2] + share * (trans[:, 2] - trans[0, 2])
     joints = scene.to_camera(replace(person, trans=trans).joints(body))

@@ -102,7 +102,8 @@ def table_3dpw(name: str, joints_world: list[np.ndarray], T_camera_world: np.nda
 
 def write_3dpw(root: Path, table: dict, pictures: bool = False) -> Path:
     """A sequence as Python 2 pickled it, and its images."""
-    name, count = table["sequence"], len(table["cam_poses"])
+    name = table["sequence"]
+    count = len(table["cam_poses"])
     path = root / "sequenceFiles" / "test" / f"{name}.pkl"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(dump_python2(table, 2))
@@ -143,7 +144,8 @@ def write_emdb(root: Path, count: int = 6, gender: str = "female", **flags: obje
 
 
 def write_rich(root: Path, count: int = 5) -> None:
-    sequence, camera = "Gym_011_pushup1", "cam_02"
+    sequence = "Gym_011_pushup1"
+    camera = "cam_02"
     write_blank(
         root / "images" / "test" / sequence / camera,
         [f"{k:05d}_02.jpeg" for k in range(10, 10 + count)],
@@ -253,7 +255,8 @@ def write_3dhp(root: Path, joints_mm: np.ndarray, valid: np.ndarray) -> None:
             file["valid_frame"] = valid[:, None].astype(np.float64)
             file["activity_annotation"] = np.full((len(valid), 1), 2.0)
             file["univ_annot3"] = 0.9 * joints_mm[:, None]
-            file["annot3"], file["annot2"] = joints_mm[:, None], pixels[:, None]
+            file["annot3"] = joints_mm[:, None]
+            file["annot2"] = pixels[:, None]
             cells = file.create_group("#refs#")
             cells["a"] = np.arange(3.0)
             file.create_dataset("cameras", data=[[cells["a"].ref]], dtype=h5py.ref_dtype)

@@ -19,7 +19,8 @@ def by_quaternion(source, target, with_scale=True):
     """Horn's closed form (1987): the rotation is the eigenvector of a 4 × 4 matrix, which no
     reflection can be.
     """
-    a, b = source - source.mean(axis=0), target - target.mean(axis=0)
+    a = source - source.mean(axis=0)
+    b = target - target.mean(axis=0)
     S = a.T @ b
     N = np.zeros((4, 4))
     N[0, 0] = np.trace(S)

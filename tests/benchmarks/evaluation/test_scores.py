@@ -113,7 +113,8 @@ def test_a_step_between_frames_and_a_late_start_are_matched_by_number(body):
 
 
 def test_people_are_told_apart_by_the_image(body):
-    left, right = walking(body, -0.8, 1), walking(body, 0.8, 2)
+    left = walking(body, -0.8, 1)
+    right = walking(body, 0.8, 2)
     truth = Truth([person(body, left), person(body, right, "b")], K)
     assert module.assign(clip(alone=False), truth, [right, left]) == [left, right]
     assert module.assign(clip(alone=False), truth, [right]) == [None, right]
@@ -135,10 +136,8 @@ def test_nobody_was_found(body):
 
 
 def test_means_are_over_frames_not_clips():
-    scores, other = (
-        module.Scores({"mpjpe": [np.array([1.0, 1.0, 1.0])]}),
-        module.Scores({"mpjpe": [np.array([5.0])]}),
-    )
+    scores = module.Scores({"mpjpe": [np.array([1.0, 1.0, 1.0])]})
+    other = module.Scores({"mpjpe": [np.array([5.0])]})
     scores.add(other)
     assert scores.means() == {"mpjpe": 2.0}
     scores.add(module.Scores({"mpjpe": [np.array([np.nan])]}))

@@ -13,7 +13,8 @@ def test_every_frame_of_a_clip_there_and_back_gets_the_truth_of_the_frame_that_i
     tmp_path: Path,
 ) -> None:
     """Of four frames, the second has no truth; they are shown as 0 1 2 3 2 1 0 1."""
-    truth, target = tmp_path / "truth.npz", tmp_path / "looped.npz"
+    truth = tmp_path / "truth.npz"
+    target = tmp_path / "looped.npz"
     np.savez(
         truth,
         frame_index=[0, 2, 3],

@@ -31,7 +31,8 @@ def test_jerk_of_cubics_does_not_depend_on_which_frames_are_there() -> None:
 @pytest.fixture
 def walking(body: Body) -> Motion:
     """A body that turns and moves, as a camera sees it that is not at the origin."""
-    rng, T = np.random.default_rng(0), 12
+    rng = np.random.default_rng(0)
+    T = 12
     poses = np.cumsum(rng.normal(0, 0.02, (T, body.K + 1, 3)), axis=0)
     trans = np.cumsum(rng.normal(0, 0.02, (T, 3)), axis=0) + [0, 0, 1.0]
     motion = made_motion(body, poses, trans)

@@ -121,7 +121,8 @@ def test_time_and_accuracy_of_a_method_are_a_point_for_each_clip():
     }
     drawn = time_against_accuracy(figures)
     (dense, scope) = re.findall(r'class="points" d="([^"]*)"', drawn)
-    low, high = math.log(4.0 / 1.3), math.log(400.0 * 1.3)
+    low = math.log(4.0 / 1.3)
+    high = math.log(400.0 * 1.3)
 
     def at(ms: float) -> float:
         return 1000 * (math.log(ms) - low) / (high - low)

@@ -25,7 +25,8 @@ def capture(body, tmp_path):
     """A motion, and the file with its ground truth, from which it is off in three frames, and which
     the last lacks.
     """
-    poses, trans = np.zeros((COUNT, 3 * (body.K + 1))), np.zeros((COUNT, 3))
+    poses = np.zeros((COUNT, 3 * (body.K + 1)))
+    trans = np.zeros((COUNT, 3))
     motion = made_motion(body, poses, trans, rate=5.0)
     _, t = body.forward_kinematics(exp(poses.reshape(COUNT, -1, 3)), trans, np.zeros(body.P))
     T = np.linalg.inv(motion.world_from_camera[0])

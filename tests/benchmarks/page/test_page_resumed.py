@@ -128,10 +128,8 @@ def test_all_that_an_unfinished_run_lacks_is_named():
 
 
 def test_the_page_says_what_each_command_costs():
-    gate, solver = (
-        Outcome(Command("", "gate", ()), "", "", {}, 61.5, 0, 122.9, 3.14),
-        Outcome(Command("", "bench", ("solver",)), "", "", {}, 3600.0, 0),
-    )
+    gate = Outcome(Command("", "gate", ()), "", "", {}, 61.5, 0, 122.9, 3.14)
+    solver = Outcome(Command("", "bench", ("solver",)), "", "", {}, 3600.0, 0)
     text = "".join(module.costs([gate, solver]))
     assert "./scripts/gate</th><td>1:01</td><td>2:02</td><td>3.1</td>" in text
     assert "./scripts/bench solver</th><td>60:00</td><td>–</td><td>–</td>" in text

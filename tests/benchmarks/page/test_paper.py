@@ -50,7 +50,8 @@ def test_without_real_frames_only_the_exponents_are_there():
 def test_the_papers_time_is_a_line_above_ours():
     shown = convergence_plot({"convergence": CONVERGENCE})
     assert "4 ms: the paper" in shown
-    low, high = math.log(0.1 / 1.3), math.log(4 * 1.3)
+    low = math.log(0.1 / 1.3)
+    high = math.log(4 * 1.3)
     heights = {
         name: [float(y) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", path)]
         for path, name in re.findall(r'class="curve" d="([^"]*)"[^>]*><title>(\w+)', shown)

@@ -27,13 +27,15 @@ def test_a_person_in_t_pose_is_narrow_from_the_side(body):
     trans = np.array([[0, 0, 0.95]]) - body.rest_joints()[0]
     motion = made_motion(body, poses, trans)
     drawn = np.ptp(side_view([motion], body, 0).astype(int), axis=2) > 10
-    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    rows = np.flatnonzero(drawn.any(axis=1))
+    columns = np.flatnonzero(drawn.any(axis=0))
     assert np.ptp(rows) > 200  # 1.7 of 2.4 m in 360 pixels
     assert np.ptp(columns) < 90  # the arms point at the camera
 
 
 def test_everybody_is_in_the_view_from_the_side(body):
-    poses, apart = np.zeros((1, 3 * (body.K + 1))), np.array([[0.0, 4.0, 0.0]])
+    poses = np.zeros((1, 3 * (body.K + 1)))
+    apart = np.array([[0.0, 4.0, 0.0]])
     one, other = (made_motion(body, poses, trans) for trans in (np.zeros((1, 3)), apart))
     alone = np.ptp(side_view([one], body, 0).astype(int), axis=2) > 10
     drawn = np.ptp(side_view([one, other], body, 0).astype(int), axis=2) > 10

@@ -77,7 +77,8 @@ def test_a_forearm_that_flips_in_two_frames_fitted_alone(body):
     """The camera looks along y, at a person whose forearm points at it; in two frames it points
     away.
     """
-    T, elbow = 6, body.joint_names.index("left_elbow")
+    T = 6
+    elbow = body.joint_names.index("left_elbow")
     states = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     states[:, 0] = exp(np.array([np.pi / 2, 0, 0]))  # y up becomes z up; the person faces -y
     # the left arm points to +x: the forearm swings to the front

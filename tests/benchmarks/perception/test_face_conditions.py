@@ -7,7 +7,8 @@ from scope.tools.calibrate_face.observe import SeenFaces
 
 
 def test_pieces_are_as_long_as_asked_and_belong_to_one_person():
-    seconds, person = np.tile(np.arange(360) / 30, 2), np.repeat([0, 1], 360)
+    seconds = np.tile(np.arange(360) / 30, 2)
+    person = np.repeat([0, 1], 360)
     seen = SeenFaces(
         {"seconds": seconds, "person": person},
         np.zeros((720, 478, 3)),

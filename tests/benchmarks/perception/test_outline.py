@@ -17,7 +17,8 @@ def test_figures_of_two_rectangles() -> None:
     """The body covers 6 x 4 pixels, the mask 6 x 8, of which 2 columns lie outside the image; 12
     are common.
     """
-    shape, mask = np.ones((256, 256), np.uint8), np.zeros((256, 256), bool)
+    shape = np.ones((256, 256), np.uint8)
+    mask = np.zeros((256, 256), bool)
     shape[10:16, 20:24] = 2
     mask[10:16, 22:30] = True
     shape[:, 28:] = 0
@@ -32,8 +33,10 @@ def test_a_body_fills_the_region_where_it_projects_to(body: Body) -> None:
     """By OpenCV's projection of the vertices: all lie inside the silhouette, up to a pixel, and it
     is no larger.
     """
-    T, betas = np.array([0.2, 0.1, 2.9]), np.zeros(body.P)
-    turn, dist = np.diag([1.0, -1.0, -1.0]), np.array([-0.1, 0.02, 0.001, 0.001, 0.0])
+    T = np.array([0.2, 0.1, 2.9])
+    betas = np.zeros(body.P)
+    turn = np.diag([1.0, -1.0, -1.0])
+    dist = np.array([-0.1, 0.02, 0.001, 0.001, 0.0])
     vertices = (body.rest_vertices(betas) - body.rest_joints(betas)[0]) @ turn.T + T
     K = np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]])
     pixels = cv2.projectPoints(vertices, np.zeros(3), np.zeros(3), K, dist)[0][:, 0]

@@ -90,7 +90,8 @@ def test_frames_that_the_fit_calls_broken_are_left_out(body, take):
 
 
 def test_only_every_tenth_take_is_drawn(tmp_path, body):
-    count, path = 21, tmp_path / "motions.npz"
+    count = 21
+    path = tmp_path / "motions.npz"
     np.savez(
         path,
         poses=np.zeros((2 * count, 72)),

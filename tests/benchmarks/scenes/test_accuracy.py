@@ -11,7 +11,8 @@ from scope.benchmarks.scenes import accuracy
 from scope.benchmarks.scenes.people import LIMB_JOINTS
 from scope.scope_addon.errors import NoPersonError
 
-T, FOCAL = 6, 500.0
+T = 6
+FOCAL = 500.0
 K = np.array([[FOCAL, 0, 320], [0, FOCAL, 240], [0, 0, 1.0]])
 
 
@@ -161,7 +162,8 @@ def test_a_group_of_which_nobody_was_found_has_dashes_in_the_tables(
 
 
 def test_variants_are_compared_where_both_found_the_person(body, truth, monkeypatch):
-    right, wrong = truth["limbs_cam"][0], truth["limbs_cam"][0].copy()
+    right = truth["limbs_cam"][0]
+    wrong = truth["limbs_cam"][0].copy()
     wrong[:, LIMB_JOINTS.index("left_wrist"), 2] += 0.12
     default = evaluate(body, truth, [motion(body, right, np.arange(T) > 1)], monkeypatch)
     other = evaluate(

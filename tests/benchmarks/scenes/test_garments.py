@@ -15,8 +15,10 @@ from scope.solver.rotations import exp
 
 def test_a_skirt_encloses_hips_and_thighs_and_flares(body: Body) -> None:
     betas = np.zeros(body.P)
-    points, skin = skirt(body, betas, (0.02, 0.1)).points, body.rest_vertices(betas)
-    joints, names = body.rest_joints(betas), body.joint_names
+    points = skirt(body, betas, (0.02, 0.1)).points
+    skin = body.rest_vertices(betas)
+    joints = body.rest_joints(betas)
+    names = body.joint_names
     assert points[:, 1].min() == pytest.approx(joints[names.index("left_knee"), 1], abs=0.02)
     assert points[:, 1].max() == pytest.approx(joints[names.index("spine1"), 1], abs=1e-9)
     levels = np.unique(points[:, 1].round(9))
@@ -31,11 +33,13 @@ def test_a_skirt_encloses_hips_and_thighs_and_flares(body: Body) -> None:
 def test_a_coat_is_open_in_front(body: Body) -> None:
     betas = np.zeros(body.P)
     points = coat(body, betas).points
-    joints, names = body.rest_joints(betas), body.joint_names
+    joints = body.rest_joints(betas)
+    names = body.joint_names
     assert points[:, 1].max() == pytest.approx(joints[names.index("left_collar"), 1])
     for level in np.unique(points[:, 1].round(9)):
         ring = points[np.isclose(points[:, 1], level)]
-        middle, radius = ring[:, 0].mean(), np.ptp(ring[:, 0]) / 2
+        middle = ring[:, 0].mean()
+        radius = np.ptp(ring[:, 0]) / 2
         front = ring[ring[:, 2] > np.quantile(ring[:, 2], 0.97)]
         assert np.abs(front[:, 0] - middle).min() >= 0.95 * radius * np.sin(
             np.radians(COAT_OPEN_DEG)
@@ -43,7 +47,9 @@ def test_a_coat_is_open_in_front(body: Body) -> None:
 
 
 def test_a_garment_moves_with_the_pelvis(body: Body) -> None:
-    betas, R, t = np.zeros(body.P), exp(np.array([0.1, 0.7, -0.2])), np.array([0.3, -0.1, 3.0])
+    betas = np.zeros(body.P)
+    R = exp(np.array([0.1, 0.7, -0.2]))
+    t = np.array([0.3, -0.1, 3.0])
     garment = skirt(body, betas)
     placed = garment.placed(body, betas, R, t)
     np.testing.assert_allclose(
@@ -59,7 +65,8 @@ def test_girths_and_mass_grow_with_the_body(body: Body) -> None:
     waist, hips = girths_m(body, betas)
     assert 0.65 < waist < 0.95
     assert waist < hips < 1.15
-    template, joints = 1.1 * body.v_template, 1.1 * body.J_template
+    template = 1.1 * body.v_template
+    joints = 1.1 * body.J_template
     larger = replace(body, v_template=template, J_template=joints)
     assert girths_m(larger, betas) == pytest.approx((1.1 * waist, 1.1 * hips), rel=0.02)
     assert mass_kg(larger, betas) == pytest.approx(1.331 * mass_kg(body, betas))

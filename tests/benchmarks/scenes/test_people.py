@@ -26,14 +26,16 @@ def test_all_of_a_person_scales(body, person):
 
 def test_a_childs_head_is_larger_about_its_joint(body, person):
     large = replace(person, head_scale=1.2)
-    top, joint = (body.v_template[:, 1].argmax(), body.joint_names.index("head"))
+    top = body.v_template[:, 1].argmax()
+    joint = body.joint_names.index("head")
     above = [p.skin(body, 0)[top] - p.joints(body)[0, joint] for p in (person, large)]
     np.testing.assert_allclose(above[1], 1.2 * above[0], rtol=1e-3)
     np.testing.assert_array_equal(person.limbs(body), large.limbs(body))
 
 
 def test_clothes_stand_off_outwards_and_bare_skin_does_not(body, person):
-    bare, dressed = person.skin(body, 0), person.dressed(body, 0, person.offsets(body))
+    bare = person.skin(body, 0)
+    dressed = person.dressed(body, 0, person.offsets(body))
     off = np.linalg.norm(dressed - bare, axis=1)
     assert 0.015 < off.max() <= 0.02 + 1e-9
     corners = body.faces[body.face_material == body.material_names.index("skin")]

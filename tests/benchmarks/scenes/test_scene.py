@@ -64,7 +64,8 @@ def test_who_walks_past_hides_the_other(body, scene):
 def test_a_box_hides_what_a_walk_along_the_ray_meets():
     rng = np.random.default_rng(2)
     box = Block(np.array([-0.5, 1.0, 0.0]), np.array([0.5, 1.6, 1.0]))
-    eye, points = np.array([0.2, -3.0, 1.2]), rng.uniform([-2, -1, 0], [2, 4, 2], (500, 3))
+    eye = np.array([0.2, -3.0, 1.2])
+    points = rng.uniform([-2, -1, 0], [2, 4, 2], (500, 3))
     steps = eye + np.linspace(0, 1, 2001)[:, None, None] * (points - eye)
     met = ((steps > box.low) & (steps < box.high)).all(axis=-1).any(axis=0)
     assert 20 < met.sum() < 480

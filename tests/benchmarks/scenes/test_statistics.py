@@ -33,7 +33,8 @@ def test_people_without_a_value_do_not_count():
 
 
 def test_people_of_one_performer_count_together():
-    values, performers = np.repeat([10.0, 20.0, 60.0], 50), np.repeat(["a", "b", "c"], 50)
+    values = np.repeat([10.0, 20.0, 60.0], 50)
+    performers = np.repeat(["a", "b", "c"], 50)
     found = mean_over_performers(values, performers)
     assert (found.mean, found.people) == (30.0, 150)
     assert (found.low, found.high) == (10.0, 60.0)  # one performer in 27 draws is drawn alone

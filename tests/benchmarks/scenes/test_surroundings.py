@@ -44,9 +44,11 @@ def test_the_person_is_drawn_where_the_ground_truth_says(body, tmp_path):
         render_to(tmp_path / "picture.png")
         pictures.append(cv2.imread(str(tmp_path / "picture.png")).astype(int))
     drawn = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 25
-    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    rows = np.flatnonzero(drawn.any(axis=1))
+    columns = np.flatnonzero(drawn.any(axis=0))
     pixels = scene.project(scene.to_camera(skin[None]))[0]
-    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    low = pixels.min(axis=0)
+    high = pixels.max(axis=0)
     found = [columns[0], rows[0], columns[-1], rows[-1]]
     np.testing.assert_allclose(found, [*low, *high], atol=3.0)
 
@@ -56,7 +58,8 @@ def test_the_person_is_drawn_where_the_ground_truth_says(body, tmp_path):
 def test_nothing_stands_between_camera_and_person(body, surroundings, seed):
     scene = scene_of(body, surroundings, seed)
     build_scene(scene, body)
-    eye, middle = scene.world_from_camera[0, :3, 3], scene.people[0].joints(body)[0].mean(axis=0)
+    eye = scene.world_from_camera[0, :3, 3]
+    middle = scene.people[0].joints(body)[0].mean(axis=0)
     others = [
         thing
         for thing in bpy.data.objects

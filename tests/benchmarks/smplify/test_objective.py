@@ -34,7 +34,9 @@ def prior(body):
 def truth(body, prior):
     """Somebody who has turned by 100°, at 4 m, in the mean pose."""
     x = np.zeros(ROOT + 3 * body.K + body.P)
-    x[1], x[3:ROOT], x[ROOT : ROOT + 3 * body.K] = np.radians(100.0), [0.2, 0.1, 4.0], prior.mean
+    x[1] = np.radians(100.0)
+    x[3:ROOT] = [0.2, 0.1, 4.0]
+    x[ROOT : ROOT + 3 * body.K] = prior.mean
     return x
 
 

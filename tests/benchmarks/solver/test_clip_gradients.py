@@ -11,7 +11,8 @@ def test_gradients_and_elimination_agree():
     problem, poses = make_clip(23, 6, gap=1, fixed=True, contacts=0)
     system = problem.make_system()
     problem.linearize(0, poses, system)
-    factor, used = make_factor(system), 75
+    factor = make_factor(system)
+    used = 75
     solve_clip(problem.tree, system, 1.0, problem.settings.root_scale, factor)
     gradients = ConjugateGradients(problem, poses, 1.0, problem.settings.root_scale)
     d, iterations = gradients.solve(np.ascontiguousarray(system.N[:, :used, 0]), 1e-11)

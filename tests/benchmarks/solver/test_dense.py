@@ -16,12 +16,10 @@ from scope.solver.gauss_newton.recursion import make_workspace, step
 )
 def test_dense_and_sparse_steps_agree(K, P, N, prior):
     p = make_problem(K, P, N, prior)
-    pose, blocks, work, dense = (
-        make_pose(p.tree),
-        make_blocks(p.tree),
-        make_workspace(p.tree),
-        Dense(p),
-    )
+    pose = make_pose(p.tree)
+    blocks = make_blocks(p.tree)
+    work = make_workspace(p.tree)
+    dense = Dense(p)
     for k in (0, 5):
         put(p.bank, k, pose)
         linearize(p.tree, p.terms, p.stage, 0.0, pose, blocks, work.scratch)

@@ -22,7 +22,8 @@ def _cameras() -> NDArray[np.float64]:
     """Four cameras 4 m from the origin, a quarter turn apart, each looking at it."""
     T = np.tile(np.eye(4), (4, 1, 1))
     for k in range(4):
-        T[k, :3, :3], T[k, 2, 3] = exp(np.array([0.0, k * np.pi / 2 + 0.2, 0.0])), 4.0
+        T[k, :3, :3] = exp(np.array([0.0, k * np.pi / 2 + 0.2, 0.0]))
+        T[k, 2, 3] = 4.0
     return T
 
 
@@ -57,7 +58,8 @@ def test_a_wrong_camera_is_left_out(points: NDArray[np.float64]) -> None:
 
 
 def test_points_need_three_good_views(points: NDArray[np.float64]) -> None:
-    x, confidence = project(points, _cameras()), np.ones((4, len(points)))
+    x = project(points, _cameras())
+    confidence = np.ones((4, len(points)))
     confidence[0, :10] = 0.0
     confidence[:2, :5] = 0.0
     found = triangulate(x, confidence, _cameras(), FOCAL_PX)
@@ -83,15 +85,14 @@ def test_cameras_that_are_slightly_wrong_are_corrected(points: NDArray[np.float6
     """The same shape is found, whatever the correction that all cameras share, to the scale that
     the start gives.
     """
-    true, x = _cameras(), project(points, _cameras())
+    true = _cameras()
+    x = project(points, _cameras())
     moved = true.copy()
     rng = np.random.default_rng(5)
     for k in range(4):
         turned = np.eye(4)
-        turned[:3, :3], turned[:3, 3] = (
-            exp(np.radians(1.0) * rng.normal(size=3)),
-            0.03 * rng.normal(size=3),
-        )
+        turned[:3, :3] = exp(np.radians(1.0) * rng.normal(size=3))
+        turned[:3, 3] = 0.03 * rng.normal(size=3)
         moved[k] = turned @ true[k]
     wrong = triangulate(x, np.ones(x.shape[:2]), moved, FOCAL_PX)
     assert np.nanmedian(wrong.error_px) > 5.0

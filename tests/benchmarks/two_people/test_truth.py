@@ -30,7 +30,8 @@ def _cameras() -> dict[str, Camera]:
     found = {}
     for k in range(4):
         T = np.eye(4)
-        T[:3, :3], T[2, 3] = exp(np.array([0.0, 0.3 + k * np.pi / 2, 0.0])), 4.0
+        T[:3, :3] = exp(np.array([0.0, 0.3 + k * np.pi / 2, 0.0]))
+        T[2, 3] = 4.0
         K = np.array([[1660.0 + 10 * k, 0, 540.0], [0, 1660.0, 960.0], [0, 0, 1]])
         found[f"cam{k + 1}"] = Camera(
             f"cam{k + 1}", K, DIST, T, (1088, 1920), np.array([0.0, -1.0, 0.0]), 0, 0.0
@@ -43,12 +44,14 @@ def _joints() -> NDArray[np.float64]:
     frames.
     """
     joints = np.random.default_rng(0).uniform([-0.3, -0.8, -0.3], [0.3, 0.8, 0.3], (3, 33, 3))
-    joints[:, [11, 12], 1], joints[:, [23, 24], 1] = -0.5, 0.0
+    joints[:, [11, 12], 1] = -0.5
+    joints[:, [23, 24], 1] = 0.0
     return joints
 
 
 def test_joints_are_found_again_through_distorting_lenses() -> None:
-    cameras, joints = _cameras(), _joints()
+    cameras = _cameras()
+    joints = _joints()
     seen = np.stack(
         [pixels(joints.reshape(-1, 3), camera).reshape(3, 33, 2) for camera in cameras.values()]
     )
@@ -61,8 +64,10 @@ def test_joints_are_found_again_through_distorting_lenses() -> None:
 
 
 def test_projection_agrees_with_opencv_and_keeps_what_is_not_known() -> None:
-    camera, points = _cameras()["cam2"], _joints()[0]
-    rotation, shift = cv2.Rodrigues(camera.T_camera_world[:3, :3])[0], camera.T_camera_world[:3, 3]
+    camera = _cameras()["cam2"]
+    points = _joints()[0]
+    rotation = cv2.Rodrigues(camera.T_camera_world[:3, :3])[0]
+    shift = camera.T_camera_world[:3, 3]
     expected = cv2.projectPoints(points, rotation, shift, camera.K, camera.dist)[0].reshape(-1, 2)
     points[3] = np.nan
     got = pixels(points, camera)
@@ -71,7 +76,8 @@ def test_projection_agrees_with_opencv_and_keeps_what_is_not_known() -> None:
 
 
 def test_regions_hold_everybody_also_where_joints_are_not_known() -> None:
-    camera, joints = _cameras()["cam1"], _joints()
+    camera = _cameras()["cam1"]
+    joints = _joints()
     joints[1, 24] = np.nan
     for region, points in zip(regions_of(joints, camera), joints, strict=True):
         inside = region.crop_from_image(pixels(points, camera))
@@ -136,7 +142,8 @@ def test_an_interrupted_extraction_leaves_no_video(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The videos that exist are not extracted again: half a video would stay."""
-    wheel, folder = tmp_path / "a.whl", tmp_path / "videos"
+    wheel = tmp_path / "a.whl"
+    folder = tmp_path / "videos"
     with zipfile.ZipFile(wheel, "w") as archive:
         for k in range(1, 5):
             archive.writestr(f"Pose2Sim/Demo_MultiPerson/videos/cam0{k}.mp4", f"video {k}")
@@ -159,7 +166,8 @@ def test_an_interrupted_extraction_leaves_no_video(
 def test_an_interrupted_write_leaves_the_truth_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cameras, joints = _cameras(), _joints()
+    cameras = _cameras()
+    joints = _joints()
     nothing: Any = None
     save(tmp_path, "woman", TruePerson(joints, nothing, nothing, cameras))
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}

@@ -41,7 +41,8 @@ def test_windows_that_disagree_go_over_into_each_other_without_a_jump() -> None:
     """The second window has drifted: by half a degree a second, which is 0.25 degrees over the
     common frames.
     """
-    first, second = followed(0, 60, 1), followed(45, 90, 1)
+    first = followed(0, 60, 1)
+    second = followed(45, 90, 1)
     drift = exp(np.radians(0.5) * np.stack([np.zeros(45), TIMES[:45], np.zeros(45)], axis=1))
     second = replace(second, R_first_camera=second.R_first_camera @ drift)
     whole = joined_backgrounds([first, second], [0, 15])

@@ -14,7 +14,8 @@ from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
 from scope.scope_addon.capture.fitting.focal_length import camera_by_edges
 
-WIDTH, HEIGHT = 960, 540
+WIDTH = 960
+HEIGHT = 540
 
 
 def scene(width: int, height: int, seed: int = 0) -> np.ndarray:
@@ -109,10 +110,8 @@ def test_the_assumed_field_of_view_is_that_of_the_content() -> None:
 
 def test_edges_of_bars_are_neither_lines_nor_corners() -> None:
     """A picture that moves between fixed bars: a camera that rotates."""
-    camera, wide = (
-        choose_camera(WIDTH, HEIGHT),
-        np.kron(scene(80, 36), np.ones((15, 15, 1), np.uint8)),
-    )
+    camera = choose_camera(WIDTH, HEIGHT)
+    wide = np.kron(scene(80, 36), np.ones((15, 15, 1), np.uint8))
     person = [np.array([[470.0, 200.0], [490.0, 340.0]])]
     tracker = BackgroundTracker(camera, WIDTH, HEIGHT)
     for k in range(12):

@@ -60,7 +60,9 @@ def test_undistorted_points_project_back_through_the_distortion(path):
         )
     )
     camera = choose_camera(640, 480, calibration=path)
-    x, y = 0.2, -0.15  # normalized point; the Brown model written out
+    # normalized point; the Brown model written out
+    x = 0.2
+    y = -0.15
     k1, k2, p1, p2, _ = camera.dist
     r2 = x * x + y * y
     q = 1 + k1 * r2 + k2 * r2 * r2

@@ -8,7 +8,9 @@ from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker, 
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.solver.rotations import exp, log
 
-WIDTH, HEIGHT, FOCAL = 960, 540, 900.0
+WIDTH = 960
+HEIGHT = 540
+FOCAL = 900.0
 K = pinhole(WIDTH, HEIGHT, FOCAL)
 CAMERA = Camera(K, np.zeros(5), "given")
 FPS = 30.0

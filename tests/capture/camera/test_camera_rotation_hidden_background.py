@@ -15,7 +15,9 @@ from scope.scope_addon.capture.camera.line_segments import Lines
 from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
 from scope.solver.rotations import exp
 
-WIDTH, HEIGHT, FPS = 720, 720, 12.0
+WIDTH = 720
+HEIGHT = 720
+FPS = 12.0
 K = pinhole(WIDTH, HEIGHT, 750.0)
 CAMERA = Camera(K, np.zeros(5), "given")
 R_CAMERA_LEVEL = exp([np.radians(8.0), 0.0, 0.0])
@@ -43,7 +45,8 @@ def office() -> NDArray[np.uint8]:
         (x0, y0), (x1, y1) = np.round(ends[:, :2] / ends[:, 2:] * 16).astype(int).tolist()
         cv2.line(picture, (x0, y0), (x1, y1), (30, 30, 30), 3, cv2.LINE_AA, shift=4)
 
-    up, post = np.array([0.0, -1.0, 0.0]), np.array([-1.2, 0.0, 4.0])
+    up = np.array([0.0, -1.0, 0.0])
+    post = np.array([-1.2, 0.0, 4.0])
     shelf = np.cross(up, post) / np.linalg.norm(post)
     book = exp(np.radians(LEAN_DEG) * shelf) @ up
     for x in (-0.06, 0.0, 0.06):
@@ -128,7 +131,8 @@ def test_a_camera_that_turns_keeps_to_the_first_edges() -> None:
 
 
 def test_another_scene_adds_no_edges() -> None:
-    first, other = office(), office()[:, ::-1]
+    first = office()
+    other = office()[:, ::-1]
     positions = [560.0, *np.linspace(560.0, 300.0, 24)]
     lines = lines_after(positions, lambda k: other if k >= 1 else first, cut=1)
     assert len(lines.lengths) == len(lines_after(positions[:1]).lengths)

@@ -13,7 +13,8 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.solver import load_body
 from scope.solver.rotations import exp, log
 
-WIDTH, HEIGHT = 1280, 720
+WIDTH = 1280
+HEIGHT = 720
 CAMERA = Camera(pinhole(WIDTH, HEIGHT, 1100.0), np.zeros(5), "given")
 
 

@@ -10,7 +10,8 @@ from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
 from scope.solver.rotations import exp
 
-WIDTH, HEIGHT = 800, 600
+WIDTH = 800
+HEIGHT = 600
 LINES = [((100, 80), (620, 130)), ((150, 520), (700, 430)), ((400, 200), (410, 390))]
 
 
@@ -66,7 +67,8 @@ def test_an_image_without_edges_has_none() -> None:
 
 def test_the_plane_of_a_segment_contains_the_line_that_it_shows() -> None:
     camera = choose_camera(WIDTH, HEIGHT)
-    a, b = np.array([-1.0, 0.4, 5.0]), np.array([0.8, -0.5, 3.0])
+    a = np.array([-1.0, 0.4, 5.0])
+    b = np.array([0.8, -0.5, 3.0])
     ends = np.stack([a, b]) @ camera.intrinsics.T
     lines = Segments((ends[:, :2] / ends[:, 2:])[None], np.array([0.4])).lines(camera)
     R = exp(np.array([0.1, 0.5, -0.2]))

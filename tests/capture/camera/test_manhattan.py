@@ -9,7 +9,9 @@ from scope.scope_addon.capture.camera.line_segments import Lines, Segments
 from scope.scope_addon.capture.camera.manhattan import EDGE_SIGMA, Edges, line_normal_equations
 from scope.solver.rotations import exp
 
-WIDTH, HEIGHT, FOCAL_PX = 1280, 720, 1000.0
+WIDTH = 1280
+HEIGHT = 720
+FOCAL_PX = 1000.0
 
 
 def projected(R_camera_room: np.ndarray, rng: np.random.Generator, others: int) -> Segments:
@@ -78,10 +80,8 @@ def test_steps_lead_to_the_directions_of_the_lines() -> None:
     lines = Lines(
         normals / np.linalg.norm(normals, axis=1, keepdims=True), rng.uniform(0.1, 0.5, 60)
     )
-    found, supports = (
-        np.asarray(true @ exp(np.array([0.02, -0.03, 0.015])).T, np.float64),
-        np.zeros(3),
-    )
+    found = np.asarray(true @ exp(np.array([0.02, -0.03, 0.015])).T, np.float64)
+    supports = np.zeros(3)
     for _ in range(8):
         H, g, supports = line_normal_equations(lines, found, sigma=0.05)
         found = found @ exp(np.linalg.solve(H, g)).T
@@ -98,10 +98,8 @@ def test_directions_without_value_do_not_count() -> None:
 
 def test_several_sets_of_directions_at_once() -> None:
     rng = np.random.default_rng(11)
-    lines, several = (
-        Lines(rng.normal(size=(20, 3)) / 2, rng.uniform(0.1, 0.5, 20)),
-        exp(rng.normal(size=(4, 3))),
-    )
+    lines = Lines(rng.normal(size=(20, 3)) / 2, rng.uniform(0.1, 0.5, 20))
+    several = exp(rng.normal(size=(4, 3)))
     together = line_normal_equations(lines, several, 0.3, np.array([2.0, 1.0, 1.0]))
     for k, directions in enumerate(several):
         for all_of_them, one in zip(

@@ -12,7 +12,8 @@ from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
 from scope.scope_addon.capture.world.world_frame import BODIES, up_from_scene
 from scope.solver.rotations import exp
 
-WIDTH, HEIGHT = 1280, 720
+WIDTH = 1280
+HEIGHT = 720
 K = pinhole(WIDTH, HEIGHT, 1100.0)
 CAMERA = Camera(K, np.zeros(5), "given")
 LEVEL_UP = np.array([0.0, -1.0, 0.0])
@@ -38,10 +39,12 @@ def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
             )
 
     for _ in range(posts):
-        x, z = rng.uniform(-4, 4), rng.uniform(4, 9)
+        x = rng.uniform(-4, 4)
+        z = rng.uniform(4, 9)
         line([x, -1.5, z], [x, 1.2, z], (30, 30, 30))
     for _ in range(across):
-        y, z = rng.uniform(-1.5, 1.2), rng.uniform(4, 9)
+        y = rng.uniform(-1.5, 1.2)
+        z = rng.uniform(4, 9)
         line([-4, y, z], [4, y, z], (220, 220, 220))
     for k in range(tiles):
         x = 8 * (k + 0.5) / tiles
@@ -161,7 +164,8 @@ def test_few_posts_are_enough_where_horizontal_edges_agree():
 @pytest.mark.parametrize("seed", range(4))
 def test_random_lines_determine_nothing(count, seed):
     rng = np.random.default_rng(seed)
-    middle, angle = rng.uniform([0, 0], [WIDTH, HEIGHT], (count, 2)), rng.uniform(0, np.pi, count)
+    middle = rng.uniform([0, 0], [WIDTH, HEIGHT], (count, 2))
+    angle = rng.uniform(0, np.pi, count)
     lengths = np.sort(0.03 + rng.exponential(0.08, count))[::-1]
     half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)

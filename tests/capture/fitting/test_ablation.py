@@ -39,7 +39,8 @@ def test_a_source_of_depth_is_required() -> None:
 
 def test_the_mean_shape_stays_when_the_shape_is_left_out(body: Body) -> None:
     betas = np.random.default_rng(2).uniform(-1.2, 1.2, body.P)
-    track, camera = seen_in(body, betas, None), Camera(K, np.zeros(5), "test")
+    track = seen_in(body, betas, None)
+    camera = Camera(K, np.zeros(5), "test")
     found = {}
     for shape in (True, False):
         given = Ablation(lifter=False, keypoint_offsets=False, shape=shape)
@@ -57,7 +58,8 @@ def test_without_its_own_prior_proportions_and_stature_go_together_as_in_the_pop
     """As in the population, where short people have relatively long trunks: see
     `with_unknown_stature`.
     """
-    track, camera = seen_in(body, np.zeros(body.P), None), Camera(K, np.zeros(5), "test")
+    track = seen_in(body, np.zeros(body.P), None)
+    camera = Camera(K, np.zeros(5), "test")
     information = [
         prepare_track(body, track, camera, Ablation(stature=own)).priors.shape_information
         for own in (True, False)
@@ -72,7 +74,8 @@ def test_limbs_are_not_searched_for_when_the_search_is_left_out(
 ) -> None:
     calls: list[int] = []
     monkeypatch.setattr(clip_fit, "search_limbs", lambda *_: calls.append(1))
-    track, camera = seen_in(body, np.zeros(body.P), None), Camera(K, np.zeros(5), "test")
+    track = seen_in(body, np.zeros(body.P), None)
+    camera = Camera(K, np.zeros(5), "test")
     prepared = prepare_track(body, track, camera, Ablation(lifter=False))
     start = fit_track(prepared, lambda *_: None)
     path = CameraPath.static(len(track))

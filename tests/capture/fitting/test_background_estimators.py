@@ -21,7 +21,8 @@ class SlowBody:
     """Loads until told."""
 
     def __init__(self):
-        self.may_end, self.is_ready = threading.Event(), False
+        self.may_end = threading.Event()
+        self.is_ready = False
 
     def load(self):
         assert self.may_end.wait(300)
@@ -30,7 +31,9 @@ class SlowBody:
 
 @pytest.mark.parametrize("compiled", [0, 7])
 def test_only_compiling_is_reported(monkeypatch, compiled):
-    live, reported, asked = SlowBody(), [], []
+    live = SlowBody()
+    reported = []
+    asked = []
 
     def count():
         asked.append(compiled)
@@ -77,7 +80,8 @@ class RecordedFits(FocalFits):
 
     def __init__(self):
         super().__init__(None)
-        self.times, self.cameras = [], []
+        self.times = []
+        self.cameras = []
 
     def costs(self, observation, camera):
         self.times.append(observation.time_s)
@@ -89,7 +93,8 @@ class Background:
     """A background that is searched for edges in the first frame in which somebody is seen."""
 
     def __init__(self):
-        self.edge_frames, self.bars = [], []
+        self.edge_frames = []
+        self.bars = []
 
     def add(self, row):
         if SEEN[row] and not self.edge_frames:

@@ -14,7 +14,8 @@ from scope.scope_addon.capture.camera.manhattan import Edges
 from scope.scope_addon.capture.fitting.focal_length import focal_from_edges
 from scope.solver.rotations import exp
 
-WIDTH, HEIGHT = 1280, 720
+WIDTH = 1280
+HEIGHT = 720
 ASSUMED = choose_camera(WIDTH, HEIGHT).intrinsics[0, 0]
 
 

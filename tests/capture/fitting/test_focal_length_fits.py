@@ -22,7 +22,8 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.solver.rotations import exp
 
-WIDTH, HEIGHT = 1080, 1920
+WIDTH = 1080
+HEIGHT = 1920
 ASSUMED = assumed_camera(WIDTH, HEIGHT, float(HEIGHT))
 POSES = [  # axis-angle of joints; arms and legs reach towards the camera and away from it
     {
@@ -83,7 +84,8 @@ def test_a_nearby_person_determines_the_focal_length(body):
         for ratio in ratios
     ]
     assert log_f[0] < log_f[1] - 0.1 < log_f[2] - 0.2
-    before, after = np.log(ratios), np.log(ratios) - log_f
+    before = np.log(ratios)
+    after = np.log(ratios) - log_f
     assert np.square(after).mean() < 0.7 * np.square(before).mean()
 
 

@@ -95,7 +95,8 @@ def hands_of(body, points):
         ]
         p = points[at]
         pixels = p @ K.T
-        hands[side, :, :2], hands[side, :, 2] = pixels[:, :2] / pixels[:, 2:], 1.0
+        hands[side, :, :2] = pixels[:, :2] / pixels[:, 2:]
+        hands[side, :, 2] = 1.0
         hands[side, :, 3:] = (p - p.mean(axis=0)) @ line_of_sight(p).T
     return hands
 

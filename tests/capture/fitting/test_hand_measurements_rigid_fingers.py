@@ -10,10 +10,12 @@ from scope.solver.rotations import exp
 
 
 def test_everything_is_where_it_is_with_fingers_at_rest():
-    body, rng = load_body("scope_h"), np.random.default_rng(0)
+    body = load_body("scope_h")
+    rng = np.random.default_rng(0)
     palms = without_fingers(body)
     assert palms.K == body.K - 30
-    root, betas = rng.standard_normal(3), rng.standard_normal(body.P)
+    root = rng.standard_normal(3)
+    betas = rng.standard_normal(body.P)
     at = [body.joint_names.index(name) for name in palms.joint_names]
     rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
     rotations[at] = exp(0.4 * rng.standard_normal((len(at), 3)))

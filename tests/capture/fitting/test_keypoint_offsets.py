@@ -39,7 +39,8 @@ def test_left_and_right_are_mirror_images(body):
 
 
 def test_only_the_networks_keypoints_move(body):
-    seen, at = with_keypoint_offsets(body), body.keypoint_set("blazepose")
+    seen = with_keypoint_offsets(body)
+    at = body.keypoint_set("blazepose")
     moved = np.flatnonzero((seen.keypoint_template != body.keypoint_template).any(axis=1))
     np.testing.assert_array_equal(moved, sorted(at.values()))
     np.testing.assert_array_equal(seen.J_template, body.J_template)
@@ -119,17 +120,16 @@ def test_known_offsets_are_recovered(body):
     at = [body.keypoint_set("blazepose")[name] for name in BLAZEPOSE]
     template = body.keypoint_template.copy()
     template[at] += np.array(shifts)
-    seen, T, K = (
-        replace(body, keypoint_template=template),
-        24,
-        np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]]),
-    )
+    seen = replace(body, keypoint_template=template)
+    T = 24
+    K = np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]])
     poses = rng.normal(0, 0.2, (T, body.K + 1, 3))
     poses[:, 0] = np.linspace(0, 2 * np.pi, T)[:, None] * np.array([0.1, 1.0, 0.0])
     R_world_camera = exp(np.array([2.8, 0.1, 0.2]))
     trans = np.tile(R_world_camera @ np.array([0.0, 0.0, 4.0]), (T, 1))
     R, t = body.forward_kinematics(exp(poses), trans)
-    R, t = R_world_camera.T @ R, t @ R_world_camera
+    R = R_world_camera.T @ R
+    t = t @ R_world_camera
     points = seen.keypoints(R, t)[:, at]
     pixels = points @ K.T
     motion = Recorded(
@@ -152,7 +152,8 @@ def test_known_offsets_are_recovered(body):
 
 
 def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(shared, body):
-    video, wanted = shared / "data" / "pose2sim" / "cam3.mp4", VideoRange(end_s=0.6)
+    video = shared / "data" / "pose2sim" / "cam3.mp4"
+    wanted = VideoRange(end_s=0.6)
     left_over = []
     for which, ablation in (
         (body, Ablation(keypoint_offsets=False)),

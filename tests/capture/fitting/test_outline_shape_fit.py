@@ -27,7 +27,9 @@ from scope.solver import Body
 
 from ..silhouettes import K, seen_in
 
-GIRTH_M, MASS_KG = {"skirt": 0.078, "coat": 0.38}, {"skirt": 5.0, "coat": 38.0}  # what they may add
+# what they may add
+GIRTH_M = {"skirt": 0.078, "coat": 0.38}
+MASS_KG = {"skirt": 5.0, "coat": 38.0}
 HEMS = (0.5, 1.0, 2.0, 3.0)  # times as far off the body as the garment's own
 SHAPES = (None, 0)  # seeds; None: the mean shape
 
@@ -44,10 +46,12 @@ def added_by(
     """The larger gain of waist and hips, metres, and of mass, kg, of the captured shape over the
     true one.
     """
-    betas, key = shape_of(body, seed), (name, times, seed)
+    betas = shape_of(body, seed)
+    key = (name, times, seed)
     if key not in seen:
         seen[key] = seen_in(body, betas, garment_of(body, betas, name, times) if name else None)
-    camera, exact = Camera(K, np.zeros(5), "test"), Ablation(lifter=False, keypoint_offsets=False)
+    camera = Camera(K, np.zeros(5), "test")
+    exact = Ablation(lifter=False, keypoint_offsets=False)
     prepared = prepare_track(body, seen[key], camera, exact)
     found = fit_shape_to_outline(prepared, usable_masks(prepared), None).beta
     girth = np.subtract(girths_m(body, found), girths_m(body, betas)).max()

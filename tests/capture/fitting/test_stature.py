@@ -46,7 +46,8 @@ def test_an_unknown_stature_depends_less_on_proportions_and_varies_among_people(
     under N(0, I).
     """
     body = load_body("scope")
-    before, after = default_priors(body), with_unknown_stature(default_priors(body), body)
+    before = default_priors(body)
+    after = with_unknown_stature(default_priors(body), body)
     assert before.shape_information is None
     covariance = np.linalg.inv(np.asarray(after.shape_information))
     np.testing.assert_allclose(covariance, covariance.T)
@@ -140,7 +141,8 @@ def test_below_the_stature_of_adults_the_most_probable_shape_is_a_childs(height_
     assert np.ptp(body.rest_vertices(betas)[:, 1]) == pytest.approx(height_m, abs=0.003)
     assert np.linalg.norm(betas[:-1]) < 0.5  # no unusual adult
     share = np.interp(height_m, [0.75, 0.87, 1.15, 1.5], [0.62, 0.585, 0.548, 0.52])
-    J, low = body.rest_joints(betas), body.rest_vertices(betas)[:, 1].min()
+    J = body.rest_joints(betas)
+    low = body.rest_vertices(betas)[:, 1].min()
     hip = J[body.joint_names.index("left_hip"), 1] - low
     # the joint is above the seat, as in adults
     assert hip / height_m == pytest.approx(1.0535 - share, abs=0.04)

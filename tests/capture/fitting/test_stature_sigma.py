@@ -16,15 +16,18 @@ from scope.scope_addon.capture.tracking.track import Track
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
-PEOPLE, FRAMES = 24, 4
-BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
+PEOPLE = 24
+FRAMES = 4
+BODY = load_body("scope")
+CAMERA = choose_camera(1080, 1920)
 
 
 def _track(rng: np.random.Generator, betas: np.ndarray) -> Track:
     """A person of a shape, 4 m away, at arbitrary angles of view, by keypoints with 4 pixels of
     noise.
     """
-    flip, J = np.diag([1.0, -1.0, -1.0]), len(KEYPOINT_NAMES)
+    flip = np.diag([1.0, -1.0, -1.0])
+    J = len(KEYPOINT_NAMES)
     rotations = np.tile(np.eye(3), (FRAMES, BODY.K + 1, 1, 1))
     rotations[:, 0] = flip @ exp(
         np.outer(rng.uniform(-1.0, 1.0) + 0.1 * np.arange(FRAMES), [0.0, 1.0, 0.0])

@@ -81,7 +81,8 @@ def test_a_child_is_lifted_in_its_size():
     """The same pixels of a person of 1.1 m: of a size that no person had whom the lifting network
     was trained on.
     """
-    body, camera = load_body("scope_child"), choose_camera(1080, 1920)
+    body = load_body("scope_child")
+    camera = choose_camera(1080, 1920)
     prepared = prepare_track(body, _standing_track(body, camera), camera, height_m=1.1)
     ends = [KEYPOINT_NAMES.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]
     leg = np.linalg.norm(np.diff(prepared.lifted.points[:, ends], axis=1), axis=2).sum(axis=1)
@@ -93,7 +94,8 @@ def test_a_child_is_lifted_in_its_size():
 
 
 def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
-    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    body = load_body("scope")
+    camera = choose_camera(1080, 1920)
     track = _standing_track(body, camera)
     lifts = []
 
@@ -119,7 +121,8 @@ def test_a_person_nearer_than_first_estimated_is_smaller():
     """The floor that others stand on determines the distance, and so the size; the image stays the
     same.
     """
-    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    body = load_body("scope")
+    camera = choose_camera(1080, 1920)
     prepared = prepare_track(body, _standing_track(body, camera), camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
 
@@ -138,8 +141,11 @@ def test_a_person_nearer_than_first_estimated_is_smaller():
 
 
 def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_is_upright():
-    body, camera, lean_deg = load_body("scope"), choose_camera(1080, 1920), 15.0
-    track, response = _standing_track(body, camera), load_response()
+    body = load_body("scope")
+    camera = choose_camera(1080, 1920)
+    lean_deg = 15.0
+    track = _standing_track(body, camera)
+    response = load_response()
     face = 30.0 * response.reference @ exp(np.radians([0.0, 0.0, lean_deg])).T * [1, -1, -1]
     landmarks = np.tile([*track.keypoints_px[0, :11].mean(axis=0), 0.0], (FACE_POINTS, 1))
     landmarks[response.landmarks] += face
@@ -162,14 +168,16 @@ def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
     """A leg in front of the body looks like one behind it, and the first frames are lifted to the
     wrong one.
     """
-    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    body = load_body("scope")
+    camera = choose_camera(1080, 1920)
     track = _standing_track(body, camera, (("right_hip", 0.15), ("right_knee", 0.9)))
     prepared = prepare_track(body, track, camera)
     leg = [
         KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")
     ]
     hip = KEYPOINT_NAMES.index("right_hip")
-    truth, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    truth = track.world_landmarks.copy()
+    sigma = np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     lifted = truth.copy()
     # the leg's mirror image in depth
     lifted[:2, leg, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, leg, 2]
@@ -188,7 +196,8 @@ def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
 
 def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
     """Seen from above, a foot lifted too near is in the air; the image alone does not show this."""
-    body, camera = load_body("scope"), choose_camera(1080, 1920)
+    body = load_body("scope")
+    camera = choose_camera(1080, 1920)
     down = exp(np.array([0.35, 0.0, 0.0]))  # the camera looks down on the person
     level = _standing_track(body, camera)
     points = level.world_landmarks[0] + [0.0, 0.0, 4.0]
@@ -205,7 +214,8 @@ def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
     leg = [
         KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")
     ]
-    lifted, sigma = track.world_landmarks.copy(), np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
+    lifted = track.world_landmarks.copy()
+    sigma = np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     good = track_fit.fit_track(
         replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None
     )

@@ -6,7 +6,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-W, H = 64, 48
+W = 64
+H = 48
 
 
 def corner_image(width: int = W, height: int = H) -> np.ndarray:

@@ -30,7 +30,9 @@ def replace_mp4_box(data: bytes, path: tuple[bytes, ...], payload: bytes) -> byt
     Only for files whose sample data lies before the index, as OpenCV writes them: offsets then stay
     true.
     """
-    at, end, outer = 0, len(data), []
+    at = 0
+    end = len(data)
+    outer = []
     for name in path:
         while data[at + 4 : at + 8] != name:
             at += struct.unpack_from(">I", data, at)[0]

@@ -17,7 +17,8 @@ from scope.scope_addon.errors import VideoError
 
 from .made_video import with_time_table, write_video
 
-COUNT, FPS = 24, 12.0
+COUNT = 24
+FPS = 12.0
 
 
 @pytest.fixture(scope="module")
@@ -60,11 +61,9 @@ def test_the_duration_of_matroska_is_without_what_lies_before_its_first_frame(tm
         for k in range(5):
             frame = av.VideoFrame(48, 32, "yuvj420p")
             for packet in stream.encode(frame):
-                packet.time_base, packet.pts, packet.dts = (
-                    Fraction(1, 1000),
-                    3000 + 100 * k,
-                    3000 + 100 * k,
-                )
+                packet.time_base = Fraction(1, 1000)
+                packet.pts = 3000 + 100 * k
+                packet.dts = 3000 + 100 * k
                 packet.duration = 100
                 container.mux(packet)
     assert shown_s(path) == pytest.approx(0.5)
@@ -82,7 +81,8 @@ def test_the_duration_of_a_stream_without_a_container_is_unknown(tmp_path):
 
 @pytest.mark.parametrize("reason", ["only audio", "can be read"])
 def test_a_video_that_is_refused_is_closed(tmp_path, monkeypatch, video, reason):
-    path, opened = video, []
+    path = video
+    opened = []
     if reason == "only audio":
         path = tmp_path / "sound.mp4"
         with av.open(str(path), "w") as container:
@@ -137,7 +137,9 @@ def test_without_the_decoder_a_video_is_refused(video, monkeypatch):
 
 
 def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):
-    path, size = tmp_path / "recorded.ts", 188  # bytes of a packet
+    # bytes of a packet
+    path = tmp_path / "recorded.ts"
+    size = 188
     with av.open(str(path), "w", format="mpegts") as container:
         stream = container.add_stream("mpeg2video", rate=25, width=64, height=48, pix_fmt="yuv420p")
         for k in range(60):

@@ -139,10 +139,14 @@ def test_a_frame_larger_than_its_container_says_is_not_decoded(tmp_path, monkeyp
     picture = cv2.imencode(".jpg", np.zeros((480, 640, 3), np.uint8))[1].tobytes()
     with av.open(str(path), "w") as out:
         stream = out.add_stream("mjpeg", rate=10)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuvj420p"
+        stream.width = 64
+        stream.height = 48
+        stream.pix_fmt = "yuvj420p"
         for k in range(2):
             packet = av.Packet(picture)
-            packet.stream, packet.pts, packet.dts = stream, k, k
+            packet.stream = stream
+            packet.pts = k
+            packet.dts = k
             out.mux(packet)
     assert open_video(path).width == 640
     monkeypatch.setattr(frame_readers, "MAX_PIXELS", 640 * 480 - 1)

@@ -85,7 +85,8 @@ def test_a_video_has_its_focal_length(tmp_path: Path):
     writer.release()
     assert open_video(path).focal_35mm is None
     data = bytearray(path.read_bytes())
-    extra, start = meta(67, struct.pack(">i", 26)), data.rindex(b"moov") - 4
+    extra = meta(67, struct.pack(">i", 26))
+    start = data.rindex(b"moov") - 4
     struct.pack_into(">I", data, start, struct.unpack_from(">I", data, start)[0] + len(extra))
     path.write_bytes(bytes(data) + extra)  # the index is the last box of the file
     video = open_video(path)

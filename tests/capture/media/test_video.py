@@ -83,11 +83,9 @@ def write_times(path: Path, shown_ms: np.ndarray) -> Path:
         stream = container.add_stream("mjpeg", rate=25, width=W, height=H, pix_fmt="yuvj420p")
         for time_ms, image in zip(shown_ms, ramp(len(shown_ms)), strict=True):
             for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
-                packet.time_base, packet.pts, packet.dts = (
-                    Fraction(1, 1000),
-                    int(time_ms),
-                    int(time_ms),
-                )
+                packet.time_base = Fraction(1, 1000)
+                packet.pts = int(time_ms)
+                packet.dts = int(time_ms)
                 container.mux(packet)
     return path
 
@@ -177,7 +175,8 @@ def test_pixels_become_square(tmp_path, display_width, matrix, size):
 
 def test_opencvs_ffmpeg_decodes_the_same(tmp_path):
     path = write_video(tmp_path / "a.mp4", [corner_image(), 255 - corner_image()] * 10, fps=25)
-    reader, other = PyavReader(path), cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    reader = PyavReader(path)
+    other = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     assert reader.rate == other.get(cv2.CAP_PROP_FPS) == 25
     assert reader.frame_count == other.get(cv2.CAP_PROP_FRAME_COUNT) == 20
     frames = [other.read()[1] for _ in range(20)]
@@ -198,7 +197,9 @@ def test_a_colour_tag_alone_changes_no_pixel(tmp_path):
             stream = out.add_stream(
                 "libx264", rate=10, options={"x264-params": f"colormatrix={path.stem}"}
             )
-            stream.width, stream.height, stream.pix_fmt = W, H, "yuv420p"
+            stream.width = W
+            stream.height = H
+            stream.pix_fmt = "yuv420p"
             out.mux(stream.encode(frame))
             out.mux(stream.encode())
     with av.open(str(paths[0])) as tagged:
@@ -219,7 +220,8 @@ def test_odd_sizes(tmp_path):
 
 
 def test_ending_an_iteration_early_ends_the_decoding_thread(tmp_path):
-    path, before = write_video(tmp_path / "a.mp4", ramp(50)), threading.enumerate()
+    path = write_video(tmp_path / "a.mp4", ramp(50))
+    before = threading.enumerate()
 
     def decoding() -> bool:
         return any(t.name == "scope-decode" for t in threading.enumerate() if t not in before)
@@ -438,13 +440,17 @@ def test_seeking_in_containers_with_unreliable_frame_counts(
     path = tmp_path / name
     with av.open(str(path), "w", options=options) as out:
         stream = out.add_stream(codec, rate=25)
-        stream.width, stream.height, stream.pix_fmt, stream.gop_size = 64, 48, "yuv420p", 25
+        stream.width = 64
+        stream.height = 48
+        stream.pix_fmt = "yuv420p"
+        stream.gop_size = 25
         stream.time_base = Fraction(1, 25)
         for k in range(100):
             frame = av.VideoFrame.from_ndarray(
                 np.full((48, 64, 3), 2 * k, np.uint8), format="rgb24"
             )
-            frame.pts, frame.time_base = k + round(25 * start_s), Fraction(1, 25)
+            frame.pts = k + round(25 * start_s)
+            frame.time_base = Fraction(1, 25)
             out.mux(stream.encode(frame))
         out.mux(stream.encode(None))
     video = open_video(path, VideoRange(start_s=2.0))

@@ -14,7 +14,10 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError
 
-WIDTH, HEIGHT, FRAMES, RATE = 320, 192, 12, 25
+WIDTH = 320
+HEIGHT = 192
+FRAMES = 12
+RATE = 25
 CODECS = {  # container, codec, suffix, bits a colour
     "h264": ("MPEG4", "H264", "mp4", 8),
     "h265": ("MPEG4", "H265", "mp4", 8),

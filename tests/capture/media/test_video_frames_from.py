@@ -17,7 +17,9 @@ from scope.scope_addon.capture.media.video_range import VideoRange
 from ...required import need_encoder, package
 
 av = package("av")
-FPS, SECONDS, STARTS_S = 4, 45, (3.0, 33.25)
+FPS = 4
+SECONDS = 45
+STARTS_S = (3.0, 33.25)
 
 
 def write(path: Path, codec: str, form: str, times: list[float], options: dict[str, str]) -> Path:
@@ -25,14 +27,17 @@ def write(path: Path, codec: str, form: str, times: list[float], options: dict[s
     noise = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=FPS, options=options)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, form
+        stream.width = 64
+        stream.height = 48
+        stream.pix_fmt = form
         stream.codec_context.thread_count = 1
         stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
         for k, time_s in enumerate(times):
             image = noise.copy()
             image[k % 40 : k % 40 + 8, k % 56 : k % 56 + 8] = 255
             frame = av.VideoFrame.from_ndarray(image, format="rgb24").reformat(format=form)
-            frame.pts, frame.time_base = round(1000 * time_s), Fraction(1, 1000)
+            frame.pts = round(1000 * time_s)
+            frame.time_base = Fraction(1, 1000)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     return path

@@ -117,7 +117,9 @@ def rounded_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(("name", "nominal"), [("long_video", 25), ("rounded_video", 30)])
 def test_timecodes_select_frames(name: str, nominal: int, request: pytest.FixtureRequest) -> None:
     """From 3 s and 12 frames to 4 s and 7 frames, both included."""
-    path, first, last = request.getfixturevalue(name), 3 * nominal + 12, 4 * nominal + 7
+    path = request.getfixturevalue(name)
+    first = 3 * nominal + 12
+    last = 4 * nominal + 7
     with open_video(path, parse_range("00:00:03:12", "00:00:04:07", None)) as video:
         assert [shown(f) for f in video] == list(range(first, last + 1))
         assert video.expected_frames == pytest.approx(last + 1 - first, abs=1)

@@ -31,7 +31,8 @@ from scope.solver.errors import ShapeError
 from ...made_motion import made_face, made_motion
 from ..media.made_video import with_time_table
 
-W, H = 160, 120
+W = 160
+H = 120
 K = np.array([[130.0, 0, 80.0], [0, 130.0, 60.0], [0, 0, 1]])
 GREY = 90
 
@@ -42,7 +43,8 @@ def standing(
     """Create a person in T-pose ``y`` metres in front of a level camera at 1 m, seen in every
     frame.
     """
-    T, K1 = len(frames), body.K + 1
+    T = len(frames)
+    K1 = body.K + 1
     poses = np.zeros((T, K1, 3), np.float32)
     poses[:, 0] = cv2.Rodrigues(R_WORLD_MODEL)[0].ravel()
     trans = np.tile(np.array([x, y, 0.95]) - body.J_template[0], (T, 1))
@@ -149,7 +151,8 @@ def test_two_people_have_different_colours_and_the_nearer_occludes_the_other(bod
         image, [near, far], body.faces, K, colors=[(0.2, 0.75, 1.0), (1.0, 0.55, 0.15)], opacity=1.0
     )
     np.testing.assert_array_equal(out, other)
-    in_front, behind = silhouette(body, 0.0, 2.5), silhouette(body, 0.2, 4.0)
+    in_front = silhouette(body, 0.0, 2.5)
+    behind = silhouette(body, 0.2, 4.0)
     inside, only_far = (
         cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (in_front, behind & ~in_front)
     )
@@ -214,7 +217,8 @@ def test_the_video_has_the_times_of_footage_with_a_variable_rate(tmp_path, foota
 )
 def test_the_video_of_footage_with_a_constant_rate_has_exactly_that(tmp_path, body, suffix, rate):
     """Also where the container rounds its times to milliseconds, as Matroska does."""
-    footage, out = tmp_path / f"footage{suffix}", tmp_path / "overlay.mp4"
+    footage = tmp_path / f"footage{suffix}"
+    out = tmp_path / "overlay.mp4"
     writer = VideoWriter(footage, rate, W, H, footage)
     for _ in range(10):
         writer.write(np.full((H, W, 3), GREY, np.uint8))

@@ -16,14 +16,17 @@ from scope.scope_addon.capture.overlay.rasterizer import (
     vertex_normals,
 )
 
-WIDTH, HEIGHT = 160, 120
+WIDTH = 160
+HEIGHT = 120
 K = np.array([[150.0, 0.0, 80.5], [0.0, 140.0, 60.25], [0.0, 0.0, 1.0]])
-RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+RED = (1.0, 0.0, 0.0)
+BLUE = (0.0, 0.0, 1.0)
 
 
 def sphere(center, radius: float, rows: int = 48) -> tuple[np.ndarray, np.ndarray]:
     """Create vertices and triangles, counter-clockwise seen from outside."""
-    theta, phi = np.linspace(0, np.pi, rows), np.linspace(0, 2 * np.pi, 2 * rows, endpoint=False)
+    theta = np.linspace(0, np.pi, rows)
+    phi = np.linspace(0, 2 * np.pi, 2 * rows, endpoint=False)
     t, p = np.meshgrid(theta, phi, indexing="ij")
     points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
     i, j = np.meshgrid(np.arange(rows - 1), np.arange(2 * rows), indexing="ij")
@@ -45,14 +48,17 @@ def sphere_depth(center, radius: float) -> np.ndarray:
     """Calculate z (H, W) of the nearer intersection of each pixel's ray with a sphere, inf where
     there is none.
     """
-    d, c = rays(), np.asarray(center)
-    a, b = (d * d).sum(-1), d @ c
+    d = rays()
+    c = np.asarray(center)
+    a = (d * d).sum(-1)
+    b = d @ c
     inside = b * b - a * (c @ c - radius**2)
     return np.where(inside >= 0, (b - np.sqrt(np.maximum(inside, 0))) / a, np.inf)
 
 
 def test_a_sphere_has_the_depth_and_outline_of_ray_casting():
-    center, radius = (0.2, -0.1, 3.0), 0.7
+    center = (0.2, -0.1, 3.0)
+    radius = 0.7
     canvas = Canvas.blank(WIDTH, HEIGHT)
     rasterize(canvas, *sphere(center, radius), RED, K)
     expected = sphere_depth(center, radius)
@@ -81,7 +87,8 @@ def test_a_silhouette_covers_the_pixels_that_opencv_fills_but_for_their_edge():
 
 
 def test_the_nearer_surface_wins_in_either_order():
-    near, far = sphere((0.0, 0.0, 2.0), 0.3), sphere((0.15, 0.0, 3.0), 0.8)
+    near = sphere((0.0, 0.0, 2.0), 0.3)
+    far = sphere((0.15, 0.0, 3.0), 0.8)
     pictures = []
     for order in ((near, far), (far, near)):
         canvas = Canvas.blank(WIDTH, HEIGHT)
@@ -170,7 +177,8 @@ def test_vertices_behind_the_camera_or_nan_are_not_drawn():
     "dist", [[-0.25, 0.06, 0.002, -0.001, 0.0], [0.3], [0.1, -0.05, 0.0, 0.0, 0.01]]
 )
 def test_distortion_agrees_with_opencv(dist):
-    rng, inside = np.random.default_rng(5), 0
+    rng = np.random.default_rng(5)
+    inside = 0
     for _ in range(30):
         center = rng.uniform([-0.9, -0.6, 2.5], [0.9, 0.6, 3.0])
         canvas = Canvas.blank(WIDTH, HEIGHT)

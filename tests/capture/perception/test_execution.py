@@ -32,7 +32,9 @@ class FakeRuntime:
     def __init__(
         self, available: list[str], broken: tuple[str, ...] = (), silent: tuple[str, ...] = ()
     ) -> None:
-        self.available, self.broken, self.silent = available, broken, silent
+        self.available = available
+        self.broken = broken
+        self.silent = silent
         self.asked: list[list[str]] = []
         self.threads: list[int] = []
 
@@ -78,7 +80,8 @@ def runtime(monkeypatch: pytest.MonkeyPatch):
 def test_the_best_available_provider_is_used(
     runtime, available: tuple[str, ...], asked: str, used: str
 ) -> None:
-    fake, execution = runtime(*available), Execution(asked)
+    fake = runtime(*available)
+    execution = Execution(asked)
     open_session(Path("m.onnx"), 3, execution)
     assert execution.used == [used]
     assert execution.warnings == []
@@ -87,7 +90,8 @@ def test_the_best_available_provider_is_used(
 
 
 def test_an_unavailable_provider_gives_one_warning(runtime) -> None:
-    fake, execution = runtime("coreml"), Execution("cuda")
+    fake = runtime("coreml")
+    execution = Execution("cuda")
     open_session(Path("m.onnx"), 1, execution)
     open_session(Path("m.onnx"), 1, execution)
     assert fake.asked == [[CPU_NAME]] * 2
@@ -97,7 +101,8 @@ def test_an_unavailable_provider_gives_one_warning(runtime) -> None:
 
 @pytest.mark.parametrize("how", ["broken", "silent"])
 def test_a_failing_provider_is_not_tried_again(runtime, how: str) -> None:
-    fake, execution = runtime("cuda", **{how: (PROVIDERS["cuda"][0],)}), Execution("auto")
+    fake = runtime("cuda", **{how: (PROVIDERS["cuda"][0],)})
+    execution = Execution("auto")
     for _ in range(3):
         open_session(Path("m.onnx"), 1, execution)
     assert len([a for a in fake.asked if a[0] != CPU_NAME]) == 1

@@ -21,7 +21,8 @@ from scope.scope_addon.capture.perception.region import Region
 
 def turned(points, angle, center=(0.0, 0.0), size=1.0):
     """Rotate points (n, 2) clockwise on screen, scale and shift them."""
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     return size * np.asarray(points, float) @ np.array([[c, s], [-s, c]]) + center
 
 
@@ -92,7 +93,8 @@ def test_keypoints_predict_the_next_region(angle):
 
 
 def test_bending_fingers_does_not_move_the_region():
-    open_hand, fist = flat_hand() * 100, flat_hand() * 100
+    open_hand = flat_hand() * 100
+    fist = flat_hand() * 100
     fist[[8, 12, 16, 20]] = fist[[5, 9, 13, 17]]
     assert region_from_landmarks(fist) == region_from_landmarks(open_hand)
     askew = open_hand.copy()
@@ -102,7 +104,8 @@ def test_bending_fingers_does_not_move_the_region():
 
 def test_a_palm_gives_the_region_also_in_a_rotated_square():
     points = np.zeros((7, 2))
-    points[0], points[2] = (96, 120), (96, 72)
+    points[0] = (96, 120)
+    points[2] = (96, 72)
     upright = region_from_palm(np.array([72.0, 72, 120, 120]), points)
     assert upright.side_px == pytest.approx(2.6 * 48)
     assert upright.center_px == pytest.approx((96, 96 - 24))

@@ -28,7 +28,8 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def keep(folder: Path, rows: int = 3) -> np.ndarray:
     """Keep some estimates, of which the regions differ, and return them."""
-    values, kept = np.random.default_rng(0).normal(size=(rows, 7)), KeptEstimates(folder)
+    values = np.random.default_rng(0).normal(size=(rows, 7))
+    kept = KeptEstimates(folder)
     for side, row in enumerate(values):
         kept.add(kept.key("net", CROP, replace(REGION, side_px=side)), row)
     return values
@@ -45,7 +46,8 @@ def test_estimates_are_found_again(tmp_path):
 
 
 def test_only_the_same_network_region_and_pixels_count(tmp_path):
-    kept, other = KeptEstimates(tmp_path), CROP.copy()
+    kept = KeptEstimates(tmp_path)
+    other = CROP.copy()
     other[128, 128] += 1
     key = kept.key("net", CROP, REGION)
     kept.add(key, np.ones(7))
@@ -106,10 +108,12 @@ def test_on_a_full_disk_nothing_is_kept_and_nothing_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A half-written zip file printed a traceback when it was destroyed."""
-    resource, unraisable = pytest.importorskip("resource"), list[object]()
+    resource = pytest.importorskip("resource")
+    unraisable = list[object]()
     gc.collect()  # what other tests have left
     monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
-    before, kept = resource.getrlimit(resource.RLIMIT_FSIZE), KeptEstimates(tmp_path)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    kept = KeptEstimates(tmp_path)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
     try:
         kept.add(kept.key("net", CROP, REGION), np.ones(9000))

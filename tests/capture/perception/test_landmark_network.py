@@ -104,7 +104,8 @@ def test_agrees_with_measured_ground_truth(
     (estimate,) = network.estimate(image, [first.next_region])
     columns = [list(truth["names"]).index(name) for name in TRUTH_NAMES]
     numbers = [KEYPOINT_NAMES.index(name) for name in TRUTH_NAMES.values()]
-    joints, uv = truth["joints"][row, columns], truth["uv"][row, columns]
+    joints = truth["joints"][row, columns]
+    uv = truth["uv"][row, columns]
     height = np.nanmax(uv[:, 1]) - np.nanmin(uv[:, 1])
     distance_px = np.linalg.norm(estimate.keypoints_px[numbers] - uv, axis=1)
     assert np.nanmedian(distance_px) < 0.04 * height
@@ -151,11 +152,14 @@ def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
     """
     cv2 = package("cv2")
     with np.load(SAMPLE / "sample_truth.npz") as truth:
-        joints, K = truth["joints_cam"][0], truth["intrinsics"]
+        joints = truth["joints_cam"][0]
+        K = truth["intrinsics"]
     _, image = cv2.VideoCapture(str(SAMPLE / "sample.mp4")).read()
     pixels = (joints @ K.T)[:, :2] / (joints @ K.T)[:, 2:]
-    low, high = pixels.min(axis=0), pixels.max(axis=0)
-    center, height = (low + high) / 2, float((high - low)[1])
+    low = pixels.min(axis=0)
+    high = pixels.max(axis=0)
+    center = (low + high) / 2
+    height = float((high - low)[1])
     region = Region((float(center[0]), float(center[1])), 1.6 * height, 0.0)
     mask = network.mask(np.ascontiguousarray(image[:, :, ::-1]), region)
     assert mask.shape == (256, 256)
@@ -165,10 +169,8 @@ def test_mask_covers_the_person_alone(network: LandmarkNetwork) -> None:
     assert mask[:, -20:].mean() < 0.05
     assert 0.05 < (mask > 0.5).mean() < 0.4
     rgb = np.ascontiguousarray(image[:, :, ::-1])
-    (alone,), (masked,) = (
-        network.estimate(rgb, [region]),
-        network.estimate(rgb, [region], with_masks=True),
-    )
+    (alone,) = network.estimate(rgb, [region])
+    (masked,) = network.estimate(rgb, [region], with_masks=True)
     assert alone.mask is None
     assert masked.mask is not None
     np.testing.assert_allclose(masked.mask, mask, atol=1e-3)

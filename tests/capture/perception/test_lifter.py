@@ -43,10 +43,8 @@ def before_camera(body, R, heading):
     keypoint offsets.
     """
     R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0])) @ R[0]
-    pose, at = (
-        body.forward_kinematics(R, np.array([0.3, 0.1, 5.0])),
-        list(body.keypoint_set("blazepose").values()),
-    )
+    pose = body.forward_kinematics(R, np.array([0.3, 0.1, 5.0]))
+    at = list(body.keypoint_set("blazepose").values())
     return np.array([which.keypoints(*pose)[at] for which in (body, with_keypoint_offsets(body))])
 
 
@@ -60,7 +58,8 @@ def people(body):
     """Create keypoints of the body in camera axes (T, 33, 3) and their image (T, 33, 2) at z = 1:
     walking-like poses, every heading, a camera 5 m away.
     """
-    rng, out = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    out = []
     for k in range(48):
         pose = rng.normal(0, 0.05, (body.K + 1, 3))
         swing = 0.5 * np.sin(k)
@@ -81,7 +80,8 @@ def people(body):
 @pytest.fixture(scope="module")
 def walkers(body):
     """Create the same for a walk on the spot that turns once, 4 s at 30 fps, and the times."""
-    times, out = np.arange(120) / 30, []
+    times = np.arange(120) / 30
+    out = []
     for t in times:
         pose = np.zeros((body.K + 1, 3))
         swing = 0.5 * np.sin(2 * np.pi * 0.9 * t)
@@ -122,7 +122,8 @@ def test_true_world_landmarks_improve_the_estimate(lifter, people):
     ones = np.ones(people.shape[:2])
     R = virtual_camera(rays)
     given = relative(people) @ np.swapaxes(R, 1, 2)  # landmark networks look straight at the person
-    without, informed = lifter.lift(rays, ones, None), lifter.lift(rays, ones, given)
+    without = lifter.lift(rays, ones, None)
+    informed = lifter.lift(rays, ones, given)
     error = [
         np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)
     ]
@@ -132,11 +133,13 @@ def test_true_world_landmarks_improve_the_estimate(lifter, people):
 def test_neighbouring_frames_improve_the_estimate(lifter, walkers):
     """With independent image errors per frame and three seeds: smaller errors and less jitter."""
     points, seen, times = walkers
-    truth, ones = relative(points), np.ones(points.shape[:2])
+    truth = relative(points)
+    ones = np.ones(points.shape[:2])
     windows = windows_around(times, np.ones(len(times), bool))
     for seed in range(3):
         rays = seen + np.random.default_rng(seed).normal(0, 0.004, seen.shape)
-        error, unrest = [], []
+        error = []
+        unrest = []
         for around in (None, windows):
             lifted = lifter.lift(rays, ones, None, around).points
             error.append(np.linalg.norm(lifted - truth, axis=-1).mean())
@@ -180,7 +183,8 @@ def estimates(shared, frames):
 
     The true joints are in the camera's axes, NaN where not measured.
     """
-    detector, network = PersonDetector(threads=1), LandmarkNetwork("pose_landmark_heavy", threads=1)
+    detector = PersonDetector(threads=1)
+    network = LandmarkNetwork("pose_landmark_heavy", threads=1)
     found = []
     for camera in range(1, 5):
         truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
@@ -273,7 +277,8 @@ def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_m
     keypoints; with the body's hip joints there instead of where anatomy has them, 28.4 and 32.5 mm.
     """
     plain = load_body("scope")
-    body, names = with_keypoint_offsets(plain), plain.joint_names
+    body = with_keypoint_offsets(plain)
+    names = plain.joint_names
     at = body.keypoint_set("blazepose")
     index = [at[name] for name in KEYPOINT_NAMES]
     true = {(camera, frame): joints for camera, frame, _, _, joints in estimates}
@@ -286,7 +291,8 @@ def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_m
     for camera, frame, seen, truth, joints in estimates:
         if frame not in common or camera not in cameras:
             continue
-        K, first = truth["intrinsics"], true[1, frame]
+        K = truth["intrinsics"]
+        first = true[1, frame]
         both = [n for n in joints if np.isfinite(joints[n] + first[n]).all()]
         a, b = (np.array([side[n] for n in both]) for side in (first, joints))
         R, t = rigid(a, b)
@@ -311,7 +317,8 @@ def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_m
 
 def test_disagreement_widens_the_deviation_along_its_own_axis(people):
     people, rays = people
-    rng, R = np.random.default_rng(1), virtual_camera(rays)
+    rng = np.random.default_rng(1)
+    R = virtual_camera(rays)
     sigma = rng.uniform(0.02, 0.1, (2, *people.shape[:2]))
     # of the virtual camera, in camera axes
     depth = np.swapaxes(R, 1, 2) @ np.array([0.0, 0.0, 0.2])
@@ -348,15 +355,18 @@ def test_panning_the_camera_changes_neither_input_nor_shape(lifter, people):
     """A pan around the camera's centre moves the person in the image; the lifted keypoints rotate
     with it.
     """
-    turn, (_, rays) = exp(np.array([0.0, 0.35, 0.0])), people
+    turn = exp(np.array([0.0, 0.35, 0.0]))
+    (_, rays) = people
     turned = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=-1) @ turn.T
     other = turned[..., :2] / turned[..., 2:]
-    ones, none = np.ones(rays.shape[:2]), np.zeros((*rays.shape[:2], 3))
+    ones = np.ones(rays.shape[:2])
+    none = np.zeros((*rays.shape[:2], 3))
     x, _ = network_input(rays, ones, none, np.zeros(len(rays)))
     y, _ = network_input(other, ones, none, np.zeros(len(rays)))
     # The mean of rays is not quite the ray of a mean, so the two cameras differ a little.
     assert np.abs(x - y).max() < 0.1
-    a, b = lifter.lift(rays, ones, None).points, lifter.lift(other, ones, None).points
+    a = lifter.lift(rays, ones, None).points
+    b = lifter.lift(other, ones, None).points
     assert np.linalg.norm(a @ turn.T - b, axis=-1).mean() < 0.03
 
 

@@ -64,12 +64,12 @@ def test_overlapping_boxes_become_their_weighted_mean() -> None:
 
 @pytest.mark.parametrize(("height", "width"), [(1080, 1920), (640, 360), (31, 29), (1, 500)])
 def test_letterbox_shows_the_whole_image_centred(height: int, width: int) -> None:
-    fitted, scale = (
-        fit_in(np.full((height, width, 3), 255, np.uint8), 224, 224, border=0),
-        224 / max(height, width),
-    )
-    square, offset = fitted.picture_rgb, fitted.offset
-    rows, columns = np.flatnonzero(square.any(axis=(1, 2))), np.flatnonzero(square.any(axis=(0, 2)))
+    fitted = fit_in(np.full((height, width, 3), 255, np.uint8), 224, 224, border=0)
+    scale = 224 / max(height, width)
+    square = fitted.picture_rgb
+    offset = fitted.offset
+    rows = np.flatnonzero(square.any(axis=(1, 2)))
+    columns = np.flatnonzero(square.any(axis=(0, 2)))
     np.testing.assert_allclose([columns[0], rows[0]], offset)
     np.testing.assert_allclose(
         [len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51
@@ -117,7 +117,8 @@ def test_a_small_person_is_found_in_the_small_squares_alone(
 def test_a_small_person_beside_a_larger_one_is_found_in_the_parts_alone(
     detector: PersonDetector, first_frame: Callable[[str], np.ndarray]
 ) -> None:
-    large, small = first_frame("clips/gesture_square"), first_frame("clips/squats_5fps")
+    large = first_frame("clips/gesture_square")
+    small = first_frame("clips/squats_5fps")
     (person,) = detector.detect(small)
     image = beside(large, small)
     (other,) = detector.detect(image, closely=True)

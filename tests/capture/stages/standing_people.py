@@ -21,7 +21,10 @@ from scope.solver.rotations import exp
 
 BODY = load_body("scope")
 BLAZEPOSE = list(BODY.keypoint_set("blazepose").values())
-RATE, STAYS_S, STEPS_S, DEEPER_M = 15.0, 1.5, 0.4, 0.3
+RATE = 15.0
+STAYS_S = 1.5
+STEPS_S = 0.4
+DEEPER_M = 0.3
 K = np.array([[900.0, 0, 640], [0, 900.0, 360], [0, 0, 1]])
 T_CAMERA_WORLD = np.linalg.inv(world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.3))
 
@@ -33,7 +36,8 @@ def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0
     betas = np.zeros(BODY.P) if betas is None else betas
     times = np.arange(round((2 * STAYS_S + STEPS_S) * RATE)) / RATE
     share = np.clip((times - STAYS_S) / STEPS_S, 0.0, 1.0)
-    bent, pose = np.sin(np.pi * share), np.zeros((len(times), BODY.K + 1, 3))
+    bent = np.sin(np.pi * share)
+    pose = np.zeros((len(times), BODY.K + 1, 3))
     for side, sign in (("left", 1.0), ("right", -1.0)):
         pose[:, BODY.joint_names.index(f"{side}_hip"), 0] = -0.8 * bent
         pose[:, BODY.joint_names.index(f"{side}_knee"), 0] = 1.4 * bent

@@ -12,7 +12,8 @@ from scope.solver import Body
 from scope.solver.rotations import exp
 
 # degrees; of cameras around the person, and downwards
-AZIMUTHS, PITCHES = (0, 30, 60, 90, 150, 180), (0, 12)
+AZIMUTHS = (0, 30, 60, 90, 150, 180)
+PITCHES = (0, 12)
 DISTANCE_M = 3.5
 K = np.array([[1000.0, 0, 640], [0, 1000.0, 500], [0, 0, 1]])
 
@@ -47,7 +48,8 @@ def standing_views(
     points = _keypoints(body, _pose(body, bend_deg, betas), betas)
     for azimuth in AZIMUTHS:
         for pitch in PITCHES:
-            around, down = np.radians(azimuth), np.radians(pitch)
+            around = np.radians(azimuth)
+            down = np.radians(pitch)
             R = (
                 exp(np.array([down, 0.0, 0.0]))
                 @ np.diag([1.0, -1.0, -1.0])
@@ -80,7 +82,8 @@ def _pose(body: Body, bend_deg: float, betas: np.ndarray) -> np.ndarray:
     """Return (24, 3) rotation vectors; the knee's rest angle is taken out, so that 0 is a straight
     leg.
     """
-    names, rest = list(body.joint_names), body.rest_joints(betas)
+    names = list(body.joint_names)
+    rest = body.rest_joints(betas)
     thigh, shank = _leg(rest, tuple(names), "left")
     rest_bend = np.arctan2(shank[1], shank[2]) - np.arctan2(thigh[1], thigh[2])
     turn = np.radians(bend_deg) - rest_bend

@@ -13,7 +13,8 @@ from scope.scope_addon.capture.stages.repair import wrists_at_hands
 
 from ..walking import someone_walking, track_without_depth
 
-LEFT, RIGHT = 0, 1
+LEFT = 0
+RIGHT = 1
 WRISTS = [KEYPOINT_NAMES.index(f"{side}_wrist") for side in ("left", "right")]
 
 OTHERS = [

@@ -9,7 +9,8 @@ from scope.solver import load_body
 
 from ...made_motion import made_face, made_motion
 
-T, RATE = 300, 30.0
+T = 300
+RATE = 30.0
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,8 @@ def test_a_motion_without_a_face_says_nothing_of_one(motion):
 
 
 def test_blinks_are_counted_and_related_to_the_time_in_which_the_face_was_seen(motion):
-    lids, jaw = np.zeros(T), np.zeros(T)
+    lids = np.zeros(T)
+    jaw = np.zeros(T)
     lids[10:14] = lids[100:103] = lids[200:210] = 0.9  # the last one while the face is not seen
     jaw[:20] = 0.8  # a tenth of the frames, so the 95th percentile is there
     motion.face = made_face(T, eyeBlinkLeft=lids, eyeBlinkRight=lids, jawOpen=jaw)

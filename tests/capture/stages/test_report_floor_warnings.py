@@ -53,7 +53,8 @@ def test_another_floor(body, height, where):
     [(0, "give everybody's height"), (1, "give everybody's height"), (2, "in another order")],
 )
 def test_somebody_off_the_floor_of_another_all_the_time_may_have_another_size(body, given, cause):
-    low, other = standing(body, np.zeros(90)), standing(body, np.full(90, 0.5))
+    low = standing(body, np.zeros(90))
+    other = standing(body, np.full(90, 0.5))
     (found,) = floor_warnings("a.mp4", body, [low, other], given)
     assert found.startswith(
         "a.mp4: person 2 stands up to 0.5 m above the floor at 0.0 s, so either "

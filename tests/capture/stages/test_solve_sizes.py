@@ -13,7 +13,8 @@ from scope.solver import default_priors
 
 from .standing_people import BODY, seen, steps
 
-TALL_M, SHORT_M = 1.95, 1.5
+TALL_M = 1.95
+SHORT_M = 1.5
 
 
 def shape(height_m: float) -> np.ndarray:

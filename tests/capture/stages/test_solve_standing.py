@@ -19,7 +19,9 @@ from scope.solver.loaders.body_file import load_body
 
 from .standing_views import K, knee_flexion, standing_views
 
-RATE, FRAMES, NOISE_PX = 30, 60, 3.0
+RATE = 30
+FRAMES = 60
+NOISE_PX = 3.0
 
 
 def captured_flexion(body, view, rng):

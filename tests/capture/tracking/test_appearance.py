@@ -8,7 +8,9 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.appearance import SIZE, appearance, distance
 
-RED, BLUE, GREY = (200, 30, 30), (30, 30, 200), (120, 120, 120)
+RED = (200, 30, 30)
+BLUE = (30, 30, 200)
+GREY = (120, 120, 120)
 BODY = np.full((33, 2), 200.0)
 for _side, _x in (("left", 230.0), ("right", 170.0)):
     for _name, _y in (("shoulder", 80.0), ("hip", 190.0), ("knee", 270.0), ("ankle", 350.0)):

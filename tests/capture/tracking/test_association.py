@@ -12,7 +12,8 @@ from scope.scope_addon.capture.tracking.association import assign, cheapest_link
 from scope.scope_addon.capture.tracking.track import Tracklet
 
 RATE = 30.0
-RED, BLUE = np.eye(SIZE)[0] + np.eye(SIZE)[SIZE // 2], np.eye(SIZE)[3] + np.eye(SIZE)[SIZE // 2 + 3]
+RED = np.eye(SIZE)[0] + np.eye(SIZE)[SIZE // 2]
+BLUE = np.eye(SIZE)[3] + np.eye(SIZE)[SIZE // 2 + 3]
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (3, 3), (4, 6)])
@@ -62,7 +63,8 @@ def test_a_crossing_is_resolved_by_motion() -> None:
     seen.
     """
     times = (np.arange(120) / RATE).tolist()
-    right, left = (0.0, 8.0), (880.0, -8.0)
+    right = (0.0, 8.0)
+    left = (880.0, -8.0)
     tracklets = [
         tracklet(*rows, *motion, RED) for rows in ((0, 50), (60, 120)) for motion in (right, left)
     ]
@@ -75,7 +77,8 @@ def test_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
 ) -> None:
     """They come towards each other and leave again; nobody is seen between frames 50 and 60."""
     times = (np.arange(120) / RATE).tolist()
-    right, left = (0.0, 8.0), (880.0, -8.0)
+    right = (0.0, 8.0)
+    left = (880.0, -8.0)
     before = [tracklet(0, 50, *right, RED), tracklet(0, 50, *left, others)]
     after = [tracklet(60, 120, *left, RED), tracklet(60, 120, *right, others)]
     assert sorted(link(before + after, times)) == people
@@ -89,7 +92,8 @@ def test_a_child_and_an_adult_in_the_same_place_are_told_apart_by_size(
 ) -> None:
     """Where they are apart, somebody of another size in the same place bends over or stands up."""
     times = (np.arange(120) / RATE).tolist()
-    here, there = 400.0, 400.0 + apart_px
+    here = 400.0
+    there = 400.0 + apart_px
     before = [tracklet(0, 50, here, 0.0, RED, 200.0), tracklet(0, 50, there, 0.0, RED, 100.0)]
     after = [tracklet(60, 120, there, 0.0, RED, 200.0), tracklet(60, 120, here, 0.0, RED, 100.0)]
     assert sorted(link(before + after, times)) == people

@@ -14,7 +14,8 @@ from scope.scope_addon.capture.tracking.keypoint_jumps import (
 )
 from scope.scope_addon.capture.tracking.track import Track
 
-WRIST, ANKLE = KEYPOINT_NAMES.index("left_wrist"), KEYPOINT_NAMES.index("right_ankle")
+WRIST = KEYPOINT_NAMES.index("left_wrist")
+ANKLE = KEYPOINT_NAMES.index("right_ankle")
 PX = 400.0  # per metre
 
 
@@ -49,7 +50,8 @@ def standing(count: int, rate: float) -> Track:
 @pytest.mark.parametrize("frames", [1, 2])
 def test_a_jump_is_moved_back_onto_the_path(rate: float, frames: int) -> None:
     track = standing(90, rate)
-    right, off = track.keypoints_px.copy(), slice(40, 40 + frames)
+    right = track.keypoints_px.copy()
+    off = slice(40, 40 + frames)
     track.keypoints_px[off, ANKLE] += [0.6 * PX, 0.0]
     repaired = repair_keypoint_jumps(track)
     np.testing.assert_allclose(repaired.keypoints_px[off, ANKLE], right[off, ANKLE], atol=0.03 * PX)

@@ -28,7 +28,10 @@ def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
     body = rng.normal(0, 0.3, (33, 3))
     body[:, 0] = [0.2 if "left" in n else -0.2 if "right" in n else 0.0 for n in KEYPOINT_NAMES]
     angle = np.linspace(0, turn_rad, count)
-    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros(count), np.ones(count)
+    c = np.cos(angle)
+    s = np.sin(angle)
+    zero = np.zeros(count)
+    one = np.ones(count)
     turns = np.stack([c, zero, s, zero, one, zero, -s, zero, c], axis=1).reshape(-1, 3, 3)
     return np.einsum("tij,kj->tki", turns, body) + rng.normal(0, 0.01, (count, 33, 3))
 
@@ -81,7 +84,8 @@ def test_few_reference_frames_overrule_the_majority(turn_rad: float) -> None:
 
 def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
     right = walker(90)
-    wrong, seen = right.copy(), np.ones(90, bool)
+    wrong = right.copy()
+    seen = np.ones(90, bool)
     wrong[10:70] = wrong[10:70][:, MIRROR_PARTNER]
     wrong[80:85] += [0.0, 0.0, 0.5]  # the reference differs
     seen[40:44] = False

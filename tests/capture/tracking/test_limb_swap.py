@@ -117,7 +117,8 @@ def test_hands_go_with_the_arms() -> None:
 
 
 def test_another_person_need_not_continue_the_motion() -> None:
-    one, other = walker(0.0, count=40), walker(np.pi, count=50)
+    one = walker(0.0, count=40)
+    other = walker(np.pi, count=50)
     both = replace(
         walker(0.0),
         keypoints_px=np.concatenate([one.keypoints_px, other.keypoints_px]),

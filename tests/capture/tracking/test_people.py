@@ -27,7 +27,8 @@ from ..composites import composite
 from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
 from ..followed_people import FollowedPeople
 
-RED, BLUE = (200, 40, 40), (40, 60, 200)
+RED = (200, 40, 40)
+BLUE = (40, 60, 200)
 FPS = 30
 
 
@@ -44,7 +45,8 @@ def follow(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Track]]:
             lambda name, *_: FakeLandmarks(people, "heavy" in name),
         )
         monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
-        tracker, followed = PeopleTracker("fast", 1, wanted), FollowedPeople()
+        tracker = PeopleTracker("fast", 1, wanted)
+        followed = FollowedPeople()
         for t, image in enumerate(pictures(people, count)):
             followed.add(t / fps, tracker.step(image, time_s=t / fps))
         return followed.tracks(wanted or 1)
@@ -186,7 +188,8 @@ def test_a_newcomer_is_found_equally_soon_at_any_rate(
     second = Person(lambda t: (900, 200) if t >= fps else None, RED)
     tracks = follow([first, second], 6 * fps, wanted, fps)
     (track,) = (track for track in tracks if identities(track, [first, second]) == {1})
-    comes, found = np.ceil(fps) / fps, track.times[track.seen][0]
+    comes = np.ceil(fps) / fps
+    found = track.times[track.seen][0]
     assert comes <= found <= 1 + within_s + 0.5 / fps
 
 
@@ -238,7 +241,8 @@ def test_searches_are_less_frequent_once_all_wanted_people_are_tracked(
         landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
     )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: detector)
-    tracker, calls = PeopleTracker("fast", 1, people=2), []
+    tracker = PeopleTracker("fast", 1, people=2)
+    calls = []
     for t, image in enumerate(pictures(people, 184)):
         before = detector.calls
         tracker.step(image, time_s=t / FPS)
@@ -277,7 +281,8 @@ def test_every_search_for_a_person_who_was_just_lost_is_close(
             landmark_estimator, "LandmarkNetwork", lambda *_, d=detector: FakeLandmarks(d.people)
         )
         monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_, d=detector: d)
-        tracker, searches = PeopleTracker("fast", 1, 2), []
+        tracker = PeopleTracker("fast", 1, 2)
+        searches = []
         for t, image in enumerate(pictures([stays, leaves], 2 * fps)):
             before = detector.calls, detector.close_calls
             tracker.step(image, time_s=t / fps)
@@ -336,7 +341,8 @@ def test_a_rival_at_the_start_is_searched_for_closely(
         landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
     )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector(people))
-    tracker, followed = PeopleTracker("best", 1), FollowedPeople()
+    tracker = PeopleTracker("best", 1)
+    followed = FollowedPeople()
     for t, image in enumerate(pictures(people, 240)):
         followed.add(t / FPS, tracker.step(image, time_s=t / FPS))
     (track,) = followed.tracks(1)
@@ -430,7 +436,8 @@ def test_pending_estimates_do_not_change_the_result(
     The small networks start early only in regions that are certain: no region is estimated twice.
     """
     people = [Person(lambda t: (200 + 3.0 * t + (jump if t >= 20 else 0), 200), BLUE)]
-    networks, strong = FakeLandmarks(people), FakeLandmarks(people)
+    networks = FakeLandmarks(people)
+    strong = FakeLandmarks(people)
     if quality == "best":
         strong = networks
     monkeypatch.setattr(
@@ -440,7 +447,8 @@ def test_pending_estimates_do_not_change_the_result(
     )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
     images = list(pictures(people, 60))
-    plain, early = PeopleTracker(quality, 1), PeopleTracker(quality, 1)
+    plain = PeopleTracker(quality, 1)
+    early = PeopleTracker(quality, 1)
     expected = [plain.step(image) for image in images]
     networks.batches.clear()
     found = [
@@ -498,7 +506,8 @@ def test_the_reference_network_repairs_swaps_of_most_of_a_clip(
 
 def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its result for the first frame arrives after the last frame."""
-    person, free = Person(lambda t: (300 + t, 200), BLUE), threading.Event()
+    person = Person(lambda t: (300 + t, 200), BLUE)
+    free = threading.Event()
 
     class SlowNetwork(FakeLandmarks):
         def estimate(self, image: np.ndarray, regions: list[Region]) -> list[PoseEstimate]:
@@ -510,7 +519,8 @@ def test_tracking_does_not_wait_for_the_reference_network(monkeypatch: pytest.Mo
         landmark_estimator, "LandmarkNetwork", lambda name, *_: networks["heavy" in name]
     )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector([person]))
-    tracker, followed = PeopleTracker("fast", 1), FollowedPeople()
+    tracker = PeopleTracker("fast", 1)
+    followed = FollowedPeople()
     for t, image in enumerate(pictures([person], 20)):
         followed.add(t / FPS, tracker.step(image))
     assert networks[True].batches == []
@@ -573,7 +583,8 @@ def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(
 @pytest.mark.parametrize("every", [1, 6], ids=["30 fps", "5 fps"])
 def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: int) -> None:
     tracker = PeopleTracker("fast", threads=2, people=4)
-    comes_s, found_s = 0.5, None
+    comes_s = 0.5
+    found_s = None
     for t, (image, places, _) in enumerate(composite(shared, ("cam1", "cam3"), crossing=False)):
         if t / 30 < comes_s:
             image[:, 700:] = 140
@@ -600,13 +611,16 @@ def test_identities_of_real_people_are_never_switched(
     """The same man twice, so that appearance does not help; occluded for a third of a second where
     the clips cross.
     """
-    tracker, followed = PeopleTracker("fast", threads=2, people=2), FollowedPeople()
-    places, hidden = [], []
+    tracker = PeopleTracker("fast", threads=2, people=2)
+    followed = FollowedPeople()
+    places = []
+    hidden = []
     for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):
         followed.add(t / 30, tracker.step(image, time_s=t / 30))
         places.append(at)
         hidden.append(is_hidden)
-    truth, visible = np.array(places), ~np.array(hidden)
+    truth = np.array(places)
+    visible = ~np.array(hidden)
     assert visible.sum() >= 37
     assert crossing == (not visible.all())
     tracks = followed.tracks(2)

@@ -14,7 +14,8 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
 from scope.solver import Body
 
-W, H = 320, 180
+W = 320
+H = 180
 
 
 def scene(seed: int, width: int = W) -> np.ndarray:
@@ -25,7 +26,8 @@ def scene(seed: int, width: int = W) -> np.ndarray:
 
 
 def cuts(frames: Sequence[np.ndarray]) -> list[float]:
-    found, cuts = SceneCuts(), []
+    found = SceneCuts()
+    cuts = []
     for t, (frame, upcoming) in enumerate(zip(frames, [*frames[1:], None], strict=True)):
         if found.is_cut(frame, upcoming):
             cuts.append(float(t))

@@ -27,7 +27,8 @@ def searches(
 ) -> list[float]:
     """Return the times of the searches, seconds after the first frame."""
     clock = FrameClock()
-    schedule, found = SearchSchedule(clock, people), []
+    schedule = SearchSchedule(clock, people)
+    found = []
     for t in range(round(seconds * fps)):
         clock.advance(start_s + t / fps)
         if schedule.is_due(IMAGE, live, lost):
@@ -69,7 +70,8 @@ def test_somebody_small_may_be_in_the_background() -> None:
 
 def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracked() -> None:
     clock = FrameClock()
-    schedule, times = SearchSchedule(clock, None), []
+    schedule = SearchSchedule(clock, None)
+    times = []
     for t in range(150):
         clock.advance(t / 30)
         assert not schedule.begin_small(IMAGE, [person(300.0)], [])
@@ -83,7 +85,8 @@ def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracke
 
 def test_the_search_beside_people_becomes_rare_until_their_number_changes() -> None:
     clock = FrameClock()
-    schedule, times = SearchSchedule(clock, 4), []
+    schedule = SearchSchedule(clock, 4)
+    times = []
     for t in range(600):
         clock.advance(t / 30)
         live = [person(300.0)] * (1 if t < 450 else 2)
@@ -102,7 +105,8 @@ def test_the_search_beside_people_becomes_rare_until_their_number_changes() -> N
 def test_after_forgetting_the_next_frame_is_searched() -> None:
     clock = FrameClock()
     clock.advance(0.0)
-    schedule, live = SearchSchedule(clock, None), [person(300.0)]
+    schedule = SearchSchedule(clock, None)
+    live = [person(300.0)]
     schedule.begin(IMAGE, live, [])
     clock.advance(1 / 30)
     assert not schedule.is_due(IMAGE, live, [])

@@ -62,8 +62,10 @@ def test_a_person_is_predicted_at_constant_velocity() -> None:
 
 def test_an_occluder_is_looked_for_where_the_person_was_and_where_they_walk_to() -> None:
     target = walker(30, 30, speed_px=24.0)
-    target.is_occluded, target.frames_lost = True, 20
-    last, now = 29 * 24.0, 49 * 24.0
+    target.is_occluded = True
+    target.frames_lost = 20
+    last = 29 * 24.0
+    now = 49 * 24.0
     assert [
         target.is_occluded_by(at(x, 0.4)) for x in (last, now, now + 0.6 * SIDE, last - 0.6 * SIDE)
     ] == [
@@ -84,9 +86,12 @@ def test_recent_confidences_cover_half_a_second(fps: int) -> None:
 
 def test_an_occluder_is_distinguished_by_confidence_and_position() -> None:
     target = walker(30, 30)
-    dim, sure, elsewhere = at(360.0, 0.4), at(360.0), at(360.0 + SIDE, 0.4)
+    dim = at(360.0, 0.4)
+    sure = at(360.0)
+    elsewhere = at(360.0 + SIDE, 0.4)
     assert not target.is_occluded_by(dim)  # lost for another reason
-    target.is_occluded, target.frames_lost = True, 3
+    target.is_occluded = True
+    target.frames_lost = 3
     assert target.is_occluded_by(dim)
     assert not target.is_occluded_by(sure)
     assert not target.is_occluded_by(elsewhere)

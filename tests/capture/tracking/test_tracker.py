@@ -159,7 +159,8 @@ def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
     assert [tracker.step(blank) for _ in range(3)] == [[]] * 3
     after = [largest(tracker, image) for image in images[3:]]
     assert None not in before + after
-    last, first = before[-1], after[0]
+    last = before[-1]
+    first = after[0]
     assert last is not None
     assert first is not None
     assert first[1].acquired

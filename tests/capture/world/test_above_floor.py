@@ -24,8 +24,10 @@ def raised(person, omega, root, visible=1.0):
     """The given motion as a track, and the result."""
     supported, _, _, _, T_world_camera, times = person
     R, t = supported.forward_kinematics(omega, root - supported.rest_joints()[0])
-    points, seen = contact_point_positions(supported, R, t), np.full((len(root), 6), visible)
-    betas, valid = np.zeros(supported.P), np.ones(len(root), bool)
+    points = contact_point_positions(supported, R, t)
+    seen = np.full((len(root), 6), visible)
+    betas = np.zeros(supported.P)
+    valid = np.ones(len(root), bool)
     placed = PlacedTrack(
         supported, betas, times, valid, omega, root, t, points, seen, np.zeros((len(root), 3))
     )
@@ -38,7 +40,8 @@ def raised(person, omega, root, visible=1.0):
 def skin_heights(person, omega, root):
     """(T, V) heights of every vertex above the floor."""
     supported, _, _, _, T_world_camera, _ = person
-    pelvis_at_rest, up = supported.rest_joints()[0], T_world_camera[2, :3]
+    pelvis_at_rest = supported.rest_joints()[0]
+    up = T_world_camera[2, :3]
     poses = [
         supported.forward_kinematics(o, r - pelvis_at_rest)
         for o, r in zip(omega, root, strict=True)
@@ -61,7 +64,8 @@ def on_the_floor(person):
     """The person's rotations, and a root with which the lowest vertex of the whole motion is on the
     floor.
     """
-    omega, root = person[1], person[2] + person[0].rest_joints()[0]
+    omega = person[1]
+    root = person[2] + person[0].rest_joints()[0]
     return omega, root - skin_heights(person, omega[:1], root[:1]).min() * person[4][2, :3]
 
 
@@ -72,7 +76,9 @@ def test_a_motion_above_the_floor_is_returned_as_it_is(step):
 
 def test_a_sinking_body_is_brought_back_to_where_it_was(step):
     omega, root = on_the_floor(step)
-    omega, up, times = np.repeat(omega[:1], len(root), axis=0), step[4][2, :3], step[5]
+    omega = np.repeat(omega[:1], len(root), axis=0)
+    up = step[4][2, :3]
+    times = step[5]
     sunk = root - 0.15 * bump(times, 0.7, 2.3)[:, None] * up
     placed, found = raised(step, omega, sunk)
     assert skin_heights(step, omega, sunk).min() < -0.14
@@ -86,7 +92,8 @@ def test_a_sinking_body_is_brought_back_to_where_it_was(step):
 def test_a_step_of_a_sinking_body_stays_smooth(step):
     """Feet are raised by different amounts; what did not sink is not moved, and nothing jerks."""
     omega, root = on_the_floor(step)
-    up, times = step[4][2, :3], step[5]
+    up = step[4][2, :3]
+    times = step[5]
     sunk = root - 0.15 * bump(times, 0.7, 2.3)[:, None] * up
     _, found = raised(step, omega, sunk)
     assert skin_heights(step, found.rotations, found.root).min() > -0.01
@@ -111,10 +118,8 @@ def test_a_foot_alone_is_raised_by_its_leg_and_the_other_stays(step):
     omega, root = on_the_floor(step)
     omega = np.repeat(omega[:1], len(times), axis=0)
     root = np.repeat(root[:1], len(times), axis=0)
-    R_camera_world, standing_foot = (
-        T_world_camera[:3, :3].T,
-        points_world(step, omega, root)[0, 2:4].mean(axis=0),
-    )
+    R_camera_world = T_world_camera[:3, :3].T
+    standing_foot = points_world(step, omega, root)[0, 2:4].mean(axis=0)
     sway = rotations.exp(0.5 * bump(times, 0.7, 2.3)[:, None] * np.array([0.0, 1.0, 0.0]))
     turn = R_camera_world @ sway @ R_camera_world.T
     pivot = transform_points(np.linalg.inv(T_world_camera), standing_foot[None])[0]
@@ -127,10 +132,8 @@ def test_a_foot_alone_is_raised_by_its_leg_and_the_other_stays(step):
     lowest = points_world(step, tilted, moved)[:, :2, 2].min()
     assert lowest < -0.03
     _, found = raised(step, tilted, moved)
-    before, after = (
-        points_world(step, tilted, moved),
-        points_world(step, found.rotations, found.root),
-    )
+    before = points_world(step, tilted, moved)
+    after = points_world(step, found.rotations, found.root)
     assert after[:, :2, 2].min() > -0.01
     assert np.abs(after[:, 2:4] - before[:, 2:4]).max() < 0.02
     assert np.abs(after[:, 2:4, 2] - before[:, 2:4, 2]).max() < 0.015

@@ -52,7 +52,8 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
         + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
     )
     joints, contact_points = place(root)
-    seen, center = np.ones((T, 6)), np.zeros((T, 3))
+    seen = np.ones((T, 6))
+    center = np.zeros((T, 3))
     every = np.ones(T, bool)
     return PlacedTrack(
         supported, np.zeros(body.P), TIMES, every, omega, root, joints, contact_points, seen, center
@@ -117,11 +118,9 @@ def test_a_body_that_moves_or_is_in_the_air_is_not_rotated():
     assert np.abs(turned_deg(turn)).max() < 1e-6
 
 
-SITS, KNEELS, BENDS = (
-    (("hip", -85), ("knee", 85)),
-    (("knee", 90), ("ankle", 50)),
-    (("hip", -20), ("knee", 40)),
-)
+SITS = (("hip", -85), ("knee", 85))
+KNEELS = (("knee", 90), ("ankle", 50))
+BENDS = (("hip", -20), ("knee", 40))
 
 
 @pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
@@ -165,7 +164,8 @@ def test_a_frame_without_contact_is_rotated_about_its_own_feet():
     """As after a cut: the angle follows from neighbouring frames, but the centre of rotation must
     not be far away.
     """
-    placed, contact = standing(20.0), FEET.copy()
+    placed = standing(20.0)
+    contact = FEET.copy()
     contact[T // 2] = 0.0
     _, pivot = balancing_rotations(placed, contact, UP)
     np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-6)

@@ -13,7 +13,8 @@ from scope.solver import load_body
 from scope.solver.rotations import exp
 
 UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
-FPS, T = 30.0, 150
+FPS = 30.0
+T = 150
 TIMES = np.arange(T) / FPS
 
 
@@ -24,7 +25,8 @@ def steps(speed, period=1.0, duty=0.6):
     soles = np.zeros((T, 4, 3))
     for foot, shift in ((0, 0.0), (1, 0.0), (2, 0.5), (3, 0.5)):
         phase = TIMES / period + shift
-        whole, share = np.floor(phase), phase % 1.0
+        whole = np.floor(phase)
+        share = phase % 1.0
         swing = np.clip((share - duty) / (1 - duty), 0, 1)
         ahead = (whole + swing - shift) * speed * period
         lift = 0.15 * np.sin(np.pi * swing)
@@ -93,7 +95,8 @@ def test_transforming_along_a_path_and_back():
     # the same point through each frame's camera and through the first frame's axes ends at the same
     # place in the world
     T_world_first = np.eye(4)
-    T_world_first[:3, :3], T_world_first[:3, 3] = exp([0.1, 0.2, 0.3]), [1, 2, 3]
+    T_world_first[:3, :3] = exp([0.1, 0.2, 0.3])
+    T_world_first[:3, 3] = [1, 2, 3]
     points = rng.standard_normal((5, 7, 3))
     frames = path.world_from_frames(T_world_first)
     local = path.points_to_frames(points)
@@ -139,7 +142,8 @@ def test_a_stance_is_the_same_in_every_camera():
 
 def test_without_smoothing_the_camera_travels_as_far(shared):
     """Where every frame is fitted alone, positions are still estimated in the same way."""
-    body, clip = load_body("scope"), shared / "data/clips/run_moving_camera.mp4"
+    body = load_body("scope")
+    clip = shared / "data/clips/run_moving_camera.mp4"
     wanted = VideoRange(end_s=1.5)
     smooth, raw = (
         capture(

@@ -13,12 +13,14 @@ UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
 
 def stands(times):
     """The body in rest pose, 4 m in front of a static camera."""
-    body, T = load_body("scope"), len(times)
+    body = load_body("scope")
+    T = len(times)
     supported = with_contact_points(body, np.zeros(body.P))
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     rotations[:, 0] = exp([np.pi, 0.0, 0.0])
     R, joints = supported.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (T, 1)))
-    contact_points, every = contact_point_positions(supported, R, joints), np.ones(T, bool)
+    contact_points = contact_point_positions(supported, R, joints)
+    every = np.ones(T, bool)
     return PlacedTrack(
         supported,
         np.zeros(body.P),

@@ -21,7 +21,8 @@ def stands_at(root: np.ndarray, T: int = 30) -> PlacedTrack:
     rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     rotations[:, 0] = exp([np.pi, 0.0, 0.0])
     R, joints = supported.forward_kinematics(rotations, np.tile(root, (T, 1)))
-    contact_points, every = contact_point_positions(supported, R, joints), np.ones(T, bool)
+    contact_points = contact_point_positions(supported, R, joints)
+    every = np.ones(T, bool)
     return PlacedTrack(
         supported,
         np.zeros(body.P),

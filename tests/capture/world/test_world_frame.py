@@ -49,8 +49,10 @@ def seen_by(body, R, t, camera_from_world):
     """The motion of part poses in the world as seen by a camera, 30 frames per second, everything
     visible.
     """
-    soled, T = with_contact_points(body, np.zeros(body.P)), len(t)
-    joints, R_camera = transform_points(camera_from_world, t), camera_from_world[:3, :3] @ R
+    soled = with_contact_points(body, np.zeros(body.P))
+    T = len(t)
+    joints = transform_points(camera_from_world, t)
+    R_camera = camera_from_world[:3, :3] @ R
     contact_points = contact_point_positions(soled, R_camera, joints)
     every = np.ones(T, bool)
     return PlacedTrack(
@@ -216,7 +218,8 @@ def test_people_lying_on_the_floor_do_not_tilt_the_world(standing):
     up = rotations.exp(np.radians([10.0, 0, 0])) @ [0, -1.0, 0]
     truth = world_from_level_camera(up, height=1.6)
     fallen = rotations.exp(np.radians([0, -85.0, 0]))
-    R[:60], t[:60] = fallen @ R[:60], t[:60] @ fallen.T
+    R[:60] = fallen @ R[:60]
+    t[:60] = t[:60] @ fallen.T
     placed = seen_by(body, R, t + np.array([0, 5.0, 0]), np.linalg.inv(truth))
     angle = np.degrees(np.arccos(up_from_standing([placed]) @ up))
     # with nothing else to go by, cameras are taken for level

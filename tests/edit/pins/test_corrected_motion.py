@@ -67,16 +67,15 @@ def test_the_file_keeps_the_corrections_and_removing_them_restores_the_motion(tm
     for restored in (with_corrections(back, BODY, ()), uncorrected(back)):
         for name, value in vars(MOTION).items():
             np.testing.assert_array_equal(getattr(restored, name), value, err_msg=name)
-    once, again = (
-        with_corrections(back, BODY, corrections[:1]),
-        with_corrections(MOTION, BODY, corrections[:1]),
-    )
+    once = with_corrections(back, BODY, corrections[:1])
+    again = with_corrections(MOTION, BODY, corrections[:1])
     np.testing.assert_array_equal(once.poses, again.poses)
 
 
 def test_joints_in_the_camera_are_those_of_the_corrected_pose():
     motion = with_corrections(MOTION, BODY, (pin(),))
-    T, at = motion.world_from_camera[45], motion.joints_cam[45, NAMES.index("right_wrist")]
+    T = motion.world_from_camera[45]
+    at = motion.joints_cam[45, NAMES.index("right_wrist")]
     pixel = motion.intrinsics @ at
     np.testing.assert_allclose(pixel[:2] / pixel[2], pin().pixel, atol=0.5)
     world = clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)[45]
@@ -125,7 +124,8 @@ def test_sides_are_exchanged_before_pins(pin_first):
 
 
 def test_sides_exchanged_at_frames_that_the_motion_lacks_are_kept_and_change_nothing():
-    half, exchange = motion_of(TRUTH.rows(slice(40)), noise=0.05), Exchange(80, 85)
+    half = motion_of(TRUTH.rows(slice(40)), noise=0.05)
+    exchange = Exchange(80, 85)
     motion = with_corrections(half, BODY, (exchange,))
     assert corrections_of(motion) == (exchange,)
     for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam"):

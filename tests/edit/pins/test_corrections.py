@@ -93,8 +93,10 @@ def test_a_new_pin_replaces_that_of_the_same_joint_and_frame():
 
 
 def test_a_second_upright_line_turns_what_the_first_has_made():
-    first, second = np.eye(4), np.eye(4)
-    first[:3, :3], second[:3, 3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]], [1, 2, 3]
+    first = np.eye(4)
+    second = np.eye(4)
+    first[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    second[:3, 3] = [1, 2, 3]
     (both,) = added((Upright.of(first),), Upright.of(second))
     np.testing.assert_array_equal(both.transform, second @ first)
 

@@ -61,14 +61,14 @@ def test_interpolated_frames_stay_so_in_every_smoothing(strength):
 @pytest.mark.parametrize("strength", STRENGTHS)
 @pytest.mark.parametrize("world", [None, [[0.0, 0.3, 0.0], [0.5, 1.0, 0.2]]])
 def test_feet_stay_on_the_floor_in_every_smoothing(strength, world):
-    motion, corrections = raised(sunk=0.2), (FeetOnFloor(),)
+    motion = raised(sunk=0.2)
+    corrections = (FeetOnFloor(),)
     if world is not None:  # an upright line that undoes a tilt
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = exp(np.array(world[0])), world[1]
-        motion, corrections = (
-            moved_motion(motion, BODY, np.linalg.inv(T)),
-            (Upright.of(T), *corrections),
-        )
+        T[:3, :3] = exp(np.array(world[0]))
+        T[:3, 3] = world[1]
+        motion = moved_motion(motion, BODY, np.linalg.inv(T))
+        corrections = (Upright.of(T), *corrections)
     before = smoothed(BODY, motion, strength)
     assert np.abs(lowest(before)).max() > 0.2
     clip = smoothed(BODY, with_corrections(motion, BODY, corrections), strength)
@@ -108,7 +108,8 @@ def test_pins_hold_on_edited_frames():
 
 
 def test_interpolations_are_applied_in_their_order():
-    first, second = Interpolation(36, 46), Interpolation(44, 50)
+    first = Interpolation(36, 46)
+    second = Interpolation(44, 50)
     motion = damaged()
     a, b = (with_corrections(motion, BODY, order) for order in ((first, second), (second, first)))
     assert np.abs(a.poses - b.poses).max() > 1e-3
@@ -150,7 +151,8 @@ def leaning(clip, truth):
 
 def test_joints_in_the_camera_are_those_of_the_edited_pose():
     motion = with_corrections(raised(), BODY, (FeetOnFloor(),))
-    R, t = motion.world_from_camera[:, :3, :3], motion.world_from_camera[:, :3, 3]
+    R = motion.world_from_camera[:, :3, :3]
+    t = motion.world_from_camera[:, :3, 3]
     pelvis = np.einsum("tij,tj->ti", R, motion.joints_cam[:, 0]) + t
     np.testing.assert_allclose(pelvis, motion.trans + BODY.rest_joints(BETAS)[0], atol=1e-5)
     np.testing.assert_allclose(np.median(lowest(smoothed(BODY, motion, 1.0))), 0.0, atol=0.03)

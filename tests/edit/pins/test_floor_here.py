@@ -129,8 +129,10 @@ def test_a_foot_that_stands_is_put_on_the_corrected_floor():
 
 def test_a_floor_and_an_upright_line_keep_each_other_in_either_order():
     turn = np.eye(4)
-    turn[:3, :3], turn[:3, 3] = exp(np.array([0.1, 0.05, 0.0])), [0.3, 0.0, 0.1]
-    upright, floor = Upright.of(turn), Floor(20, -0.25)
+    turn[:3, :3] = exp(np.array([0.1, 0.05, 0.0]))
+    turn[:3, 3] = [0.3, 0.0, 0.1]
+    upright = Upright.of(turn)
+    floor = Floor(20, -0.25)
     for first, second in ((upright, floor), (floor, upright)):
         both = added(added((), first), second)
         assert [type(c) for c in both] == [Upright, Floor]

@@ -19,7 +19,8 @@ MOTION = motion_of(walk(1.0), noise=0.02)
 def transform(seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = exp(rng.normal(size=3)), rng.normal(size=3)
+    T[:3, :3] = exp(rng.normal(size=3))
+    T[:3, 3] = rng.normal(size=3)
     return T
 
 
@@ -52,7 +53,8 @@ def test_a_clip_moves_as_its_motion_does() -> None:
 
 
 def test_there_and_back_nothing_has_changed_and_the_given_motion_never_does() -> None:
-    T, poses = transform(8), MOTION.poses.copy()
+    T = transform(8)
+    poses = MOTION.poses.copy()
     back = moved_motion(moved_motion(MOTION, BODY, T), BODY, np.linalg.inv(T))
     np.testing.assert_array_equal(MOTION.poses, poses)
     for name in ("trans", "trans_raw", "world_from_camera"):

@@ -11,7 +11,8 @@ POINT = np.array([0.2, 3.0, 0.9])
 
 def looking(pitch, height=1.0):
     """A camera at the origin that looks along y, and down by some degrees."""
-    c, s = np.cos(np.radians(pitch)), np.sin(np.radians(pitch))
+    c = np.cos(np.radians(pitch))
+    s = np.sin(np.radians(pitch))
     T = np.eye(4)
     T[:3, :3] = np.stack([[1.0, 0, 0], [0, -s, -c], [0, c, -s]], axis=1)
     T[2, 3] = height

@@ -51,7 +51,8 @@ def test_a_pin_within_reach_stays(refit: PoseRefit) -> None:
 def test_a_pin_far_away_is_met_by_the_stretched_limb(
     refit: PoseRefit, limb: tuple[str, ...], slack: float
 ) -> None:
-    origin, direction = at(limb[0]), np.array([0.6, 0.0, -0.8])
+    origin = at(limb[0])
+    direction = np.array([0.6, 0.0, -0.8])
     place = within_reach(refit, limb[-1], origin + 3.0 * direction, (AT, {}), None, slack)
     np.testing.assert_allclose(place, origin + (length(*limb) + slack) * direction, atol=1e-9)
     nearly = origin + (length(*limb) + 0.5 * slack) * direction
@@ -59,7 +60,8 @@ def test_a_pin_far_away_is_met_by_the_stretched_limb(
 
 
 def test_another_pin_of_the_limb_is_where_the_rest_of_it_turns_about(refit: PoseRefit) -> None:
-    elbow, direction = at("left_elbow") + [0.1, 0.0, 0.3], np.array([0.0, 1.0, 0.0])
+    elbow = at("left_elbow") + [0.1, 0.0, 0.3]
+    direction = np.array([0.0, 1.0, 0.0])
     place = within_reach(refit, "left_wrist", elbow + direction, (AT, {"left_elbow": elbow}), None)
     np.testing.assert_allclose(
         place, elbow + (length("left_elbow", "left_wrist") + SLACK_M) * direction, atol=1e-9

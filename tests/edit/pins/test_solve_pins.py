@@ -22,7 +22,9 @@ SHOT = Shot(
     np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]]),
 )
 JOINTS = TRUTH.joints(BODY, BETAS)
-FIRST, LAST = 30, 60  # the corrupted span
+# the corrupted span
+FIRST = 30
+LAST = 60
 ARM = [NAMES.index(f"left_{name}") for name in ("elbow", "wrist")]
 
 
@@ -84,7 +86,8 @@ def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
 
 
 def test_other_limbs_and_other_frames_stay():
-    bad, pin = corrupted(), pins((45,))[0]
+    bad = corrupted()
+    pin = pins((45,))[0]
     good = resolve(bad, BODY, BETAS, [pin], SHOT)
     changed = np.flatnonzero(
         (good.rotations != bad.rotations).any((1, 2, 3)) | (good.root != bad.root).any(1)
@@ -134,8 +137,10 @@ def standing():
 @pytest.mark.parametrize("down", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize("joint", ["pelvis", "left_hip"])
 def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint, down, height):
-    still, number = standing(), NAMES.index(joint)
-    at, soles = still.joints(BODY, BETAS), still.soles(BODY, BETAS)
+    still = standing()
+    number = NAMES.index(joint)
+    at = still.joints(BODY, BETAS)
+    soles = still.soles(BODY, BETAS)
     camera = level_camera(T)
     camera[:, 2, 3] = height
     shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
@@ -152,7 +157,8 @@ def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint,
 def test_a_pelvis_in_the_image_stays_at_its_depth_whatever_the_camera_looks_at(pitch):
     at = JOINTS[45, 0]
     camera = np.tile(np.eye(4), (T, 1, 1))
-    c, s = np.cos(np.radians(pitch)), np.sin(np.radians(pitch))
+    c = np.cos(np.radians(pitch))
+    s = np.sin(np.radians(pitch))
     camera[:, :3, :3] = np.stack([[1.0, 0, 0], [0, -s, -c], [0, c, -s]], axis=1)
     camera[:, :3, 3] = at - 3.0 * camera[0, :3, 2]
     shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)

@@ -51,7 +51,8 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
         ),
     )
     transform = upright_transform(motion, BODY, 20, line)
-    before, motion = motion, with_corrections(motion, BODY, (pin,))
+    before = motion
+    motion = with_corrections(motion, BODY, (pin,))
     fixed = with_corrections(motion, BODY, (pin, Upright.of(transform)))
     np.testing.assert_array_equal(fixed.joints_cam, motion.joints_cam)
     clips = [clip_from_motion(BODY, m, raw=False) for m in (motion, fixed)]
@@ -78,12 +79,11 @@ def test_an_upright_line_turns_every_smoothing_as_the_motion(strength):
         position=tuple(clip_from_motion(BODY, TRUTH, raw=False).joints(BODY, TRUTH.betas)[30, 15]),
     )
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = exp(np.array([0.1, 0.05, 0.0])), [0.3, 0.0, 0.1]
+    T[:3, :3] = exp(np.array([0.1, 0.05, 0.0]))
+    T[:3, 3] = [0.3, 0.0, 0.1]
     plain, turned = (with_corrections(TRUTH, BODY, c) for c in ((pin,), (pin, Upright.of(T))))
-    expected, found = (
-        moved_clip(smoothed(BODY, plain, strength), T),
-        smoothed(BODY, turned, strength),
-    )
+    expected = moved_clip(smoothed(BODY, plain, strength), T)
+    found = smoothed(BODY, turned, strength)
     np.testing.assert_allclose(found.root, expected.root, atol=1e-6)
     assert angle(found.rotations, expected.rotations).max() < 1e-5
 

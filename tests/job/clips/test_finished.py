@@ -125,7 +125,8 @@ print(json.dumps({"frames": 3, "outputs": [output], "warnings": []}))
 
 def test_a_batch_removes_the_records_without_a_search_of_its_folder(tmp_path, monkeypatch):
     """A search for each of ten thousand clips takes minutes."""
-    clips, out = tmp_path / "clips", tmp_path / "out"
+    clips = tmp_path / "clips"
+    out = tmp_path / "out"
     (clips / "below").mkdir(parents=True)
     for name in ("a.mp4", "b[1].mp4", "below/a.mp4"):
         (clips / name).write_text(name)

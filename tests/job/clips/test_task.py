@@ -15,7 +15,8 @@ def basis(**options: str | None) -> str:
 
 
 def test_files_count_by_their_content_and_threads_do_not(tmp_path: Path) -> None:
-    network, description = tmp_path / "net.onnx", tmp_path / "net.json"
+    network = tmp_path / "net.onnx"
+    description = tmp_path / "net.json"
     network.write_text("network")
     first = basis(keypoints=str(network), threads="1")
     assert basis(keypoints=str(network), threads="2") == first

@@ -36,7 +36,8 @@ def test_what_is_recorded_is_what_was_shown(folder, tmp_path, networks, body, mo
     """A busy computer drops most frames, and shows some of the other poses: they are compared with
     all that came.
     """
-    sent, keep = [], LiveProcess._keep
+    sent = []
+    keep = LiveProcess._keep
     monkeypatch.setattr(
         LiveProcess, "_keep", lambda live, line: sent.append(line) or keep(live, line)
     )
@@ -46,7 +47,8 @@ def test_what_is_recorded_is_what_was_shown(folder, tmp_path, networks, body, mo
         LiveRequest(source, reconnect_s=0.0, threads=1), folder, None, [sys.executable, "-I"]
     )
     live.record()
-    poses, result = [], []
+    poses = []
+    result = []
 
     def step():
         result.extend(m for m in live.poll() if m["event"] == "result")
@@ -95,7 +97,8 @@ def test_a_recording_begins_when_it_is_asked_for(folder, body):
 
 
 def test_a_recording_with_footage_begins_with_its_first_picture(folder, body):
-    commands, added = Commands(), []
+    commands = Commands()
+    added = []
     footage = SimpleNamespace(origin=None, add=added.append)
     recorder = _Recorder([folder / "person1.npz"], body, FakeSource(), commands, footage)
     recorder.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=None)]), (640, 480))

@@ -7,7 +7,8 @@ from scope.scope_addon.job.live.commands import RECORD, STOP, Commands
 
 @pytest.mark.parametrize("size", [1, 3, 100])
 def test_commands_arrive_in_any_pieces(size):
-    commands, sent = Commands(), b"nonsense\n" + RECORD + STOP
+    commands = Commands()
+    sent = b"nonsense\n" + RECORD + STOP
     for at in range(0, len(sent), size):
         assert not commands.stopped.is_set()
         commands.receive(sent[at : at + size])

@@ -21,8 +21,10 @@ def replayed(messages, earlier=None):
     """Return the time, what is left in truth and the estimate at 400 times of a capture, and its
     progress.
     """
-    now, rest = [0.0], list(messages)
-    progress, found = JobProgress(lambda: now[0], earlier), []
+    now = [0.0]
+    rest = list(messages)
+    progress = JobProgress(lambda: now[0], earlier)
+    found = []
     end = messages[-1][0]
     for t in np.linspace(0.0, end, 400, endpoint=False):
         while rest and rest[0][0] <= t:
@@ -65,7 +67,8 @@ def test_captures_have_the_stages_whose_shares_the_bar_shows(name):
     _, progress = replayed(MEASURED[name])
     assert progress.fraction == pytest.approx(1.0 - STAGES["writing"])
     # How long the networks take to load does not depend on the footage.
-    took, loading = progress.seconds, STAGES["starting"]
+    took = progress.seconds
+    loading = STAGES["starting"]
     end = MEASURED[name][-1][0] - took["starting"]
     for stage in list(STAGES)[1:]:
         assert abs(took.get(stage, 0.0) / end - STAGES[stage] / (1.0 - loading)) < 0.12, stage

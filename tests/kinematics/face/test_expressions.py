@@ -48,7 +48,8 @@ def test_left_is_the_persons_left_and_the_mirror_image_of_right(body):
 
 def test_the_jaw_opens_downwards_and_a_smile_lifts_the_corner_outwards(body):
     found = by_name(body)
-    jaw, smile = found["jawOpen"], found["mouthSmileLeft"]
+    jaw = found["jawOpen"]
+    smile = found["mouthSmileLeft"]
     assert jaw.offsets[np.linalg.norm(jaw.offsets, axis=1).argmax(), 1] < -0.02
     corner = smile.offsets[np.linalg.norm(smile.offsets, axis=1).argmax()]
     assert corner[0] > 0
@@ -93,7 +94,8 @@ def test_the_inside_of_the_mouth_shows_when_it_opens(body):
     opened[jaw.vertices] += jaw.offsets
     visible = []
     for vertices in (rest, opened):
-        centers, triangles = vertices[body.faces[mouth_faces_of(body)]].mean(axis=1), vertices[skin]
+        centers = vertices[body.faces[mouth_faces_of(body)]].mean(axis=1)
+        triangles = vertices[skin]
         below = (triangles.max(axis=1) < centers.min(axis=0))[:, :2].any(axis=1)
         above = (triangles.min(axis=1) > centers.max(axis=0))[:, :2].any(axis=1)
         near = triangles[~below & ~above]  # the others cover none of them, and take long

@@ -58,10 +58,12 @@ def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
         np.concatenate([body.faces[own][:, [0, 1, 2]], body.faces[own][:, [0, 2, 3]]])
     ]
     points = points + [1e-6, 0.0, 0.0]  # off the edges in the middle
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     beside = (triangles.max(axis=1) < low)[:, :2] | (triangles.min(axis=1) > high)[:, :2]
     near = triangles[~beside.any(axis=1)]
-    (left, below), (right, above) = near.min(axis=1)[:, :2].T, near.max(axis=1)[:, :2].T
+    (left, below) = near.min(axis=1)[:, :2].T
+    (right, above) = near.max(axis=1)[:, :2].T
     out = np.full(len(points), -np.inf)
     for i, point in enumerate(points):
         x, y = point[:2]
@@ -80,7 +82,9 @@ def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def test_the_body_keeps_its_vertices_faces_and_expressions(plain, body):
-    V, F, U = len(plain.v_template), len(plain.faces), len(plain.uv)
+    V = len(plain.v_template)
+    F = len(plain.faces)
+    U = len(plain.uv)
     assert len(body.v_template) > V
     for name, count in (
         ("v_template", V),
@@ -123,7 +127,9 @@ def test_teeth_and_tongue_follow_the_head_alone(plain, body):
 
 
 def test_the_jaw_takes_the_lower_teeth_and_the_tongue(plain, body):
-    rest, teeth, tongue = body.v_template, vertices_of(body, "teeth"), vertices_of(body, "tongue")
+    rest = body.v_template
+    teeth = vertices_of(body, "teeth")
+    tongue = vertices_of(body, "tongue")
     opened = moved(body, None, jawOpen=1.0) - rest
     lower = np.abs(opened[teeth]).max(axis=1) > 1e-9
     assert lower.mean() == pytest.approx(0.5, abs=0.01)

@@ -13,18 +13,22 @@ from scope.solver.rotations import exp
 
 from ...kinematics.posed_people import stepping_person
 
-LEFT, RIGHT = slice(0, 2), slice(2, 4)
+LEFT = slice(0, 2)
+RIGHT = slice(2, 4)
 
 
 @pytest.fixture(scope="module")
 def stepped():
     """Soles (T, 4, 3) in the world, true and held, and contact (T, 6)."""
     supported, omega, root, place, T_world_camera, times = stepping_person()
-    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    R = T_world_camera[:3, :3]
+    t = T_world_camera[:3, 3]
     true = place(omega, root)[2]
     error_m = 0.04 * np.sin(2 * np.pi * 1.3 * times)
     seen = root + error_m[:, None] * line_of_sight(root)
-    feet, held, contact = FootHold(supported), [], []
+    feet = FootHold(supported)
+    held = []
+    contact = []
     for k, time_s in enumerate(times):
         rays = true[k, :4, :2] / true[k, :4, 2:]
         frame = FittedFrame(omega[k], seen[k], np.ones(len(omega[k])), rays)
@@ -56,14 +60,17 @@ def taken_for_the_swinging_foot(lift_m):
     :param lift_m: of the body in each of these frames, which then does leave the floor.
     """
     supported, omega, root, place, T_world_camera, times = stepping_person()
-    R, t = T_world_camera[:3, :3], T_world_camera[:3, 3]
+    R = T_world_camera[:3, :3]
+    t = T_world_camera[:3, 3]
     true = place(omega, root)[2]
-    feet, held = FootHold(supported), []
+    feet = FootHold(supported)
+    held = []
     hip = supported.joint_names.index("right_hip")
     for k, time_s in enumerate(times[:60]):
         rays = true[k, :4, :2] / true[k, :4, 2:]
         rays[LEFT, 0] += 0.02 * max(k - 30, 0)  # 2.4 m/s at 4 m
-        rotations, raised = omega[k].copy(), 0.0
+        rotations = omega[k].copy()
+        raised = 0.0
         if 40 <= k < 44:
             rays[RIGHT, 0] += 0.02
             # the foot is 8 cm aside
@@ -145,7 +152,9 @@ def test_after_a_pause_who_stood_on_the_floor_is_not_below_it(stepped, height_m,
 def test_a_foot_that_is_held_where_the_image_does_not_show_it_is_let_go():
     supported, omega, root, place, T_world_camera, times = stepping_person()
     true = place(omega, root)[2][0, :4]
-    feet, away_m, is_held = FootHold(supported), [], True
+    feet = FootHold(supported)
+    away_m = []
+    is_held = True
     for k in range(60):
         # Fits stay where the feet are held; once nothing is held, they find the person 60 cm behind
         # that place.

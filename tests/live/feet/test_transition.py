@@ -13,7 +13,8 @@ def shown_after_change(at: int, count: int = 400) -> np.ndarray:
     """Return what is shown (count, 3) of an offset that moves at 0.5 m/s, and is 0 from a frame
     on.
     """
-    transition, shown = Transition(2, 6.0), []
+    transition = Transition(2, 6.0)
+    shown = []
     where = np.array([True, False])
     for k in range(count):
         before, now = (
@@ -42,8 +43,10 @@ def test_the_remainder_dies_away() -> None:
 
 
 def test_the_course_does_not_depend_on_the_frame_rate() -> None:
-    coarse, fine = Transition(1, 6.0), Transition(1, 6.0)
-    one, zero = np.array([[1.0, 2.0, 3.0]]), np.zeros((1, 3))
+    coarse = Transition(1, 6.0)
+    fine = Transition(1, 6.0)
+    one = np.array([[1.0, 2.0, 3.0]])
+    zero = np.zeros((1, 3))
     for each in (coarse, fine):
         each.change(np.array([True]), (0.9 * one, one), (zero, zero), 0.05)
     coarse.advance(0.1)

@@ -17,7 +17,8 @@ def pose_given(body, index, time_s, delay_s, betas=None):
     then = time_s - delay_s
     R = np.tile(np.eye(3), (body.K + 1, 1, 1))
     R[0] = rotations.exp([0.0, 0.0, 2.0 * then])
-    nothing, betas = np.zeros((body.K + 1, 3)), np.zeros(body.P) if betas is None else betas
+    nothing = np.zeros((body.K + 1, 3))
+    betas = np.zeros(body.P) if betas is None else betas
     T = world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.0)
     return LivePose(
         index,

@@ -36,7 +36,8 @@ def parsed(data):
     """Return address and arguments of every message of a packet."""
     assert len(data) % 4 == 0
     if data.startswith(b"#bundle\0"):
-        found, at = [], 16
+        found = []
+        at = 16
         assert struct.unpack_from(">Q", data, 8)[0] == 1  # immediately
         while at < len(data):
             (size,) = struct.unpack_from(">i", data, at)
@@ -67,7 +68,8 @@ def pose_of(
     R[0] = R_world_root
     joints = np.zeros((body.K + 1, 3))
     joints[0] = pelvis
-    root, nothing = np.array(pelvis), np.zeros(body.K + 1)
+    root = np.array(pelvis)
+    nothing = np.zeros(body.K + 1)
     return LivePose(
         3,
         0.5,
@@ -162,7 +164,8 @@ def test_positions_by_hand(world, unity):
 def test_a_converted_rotation_turns_converted_points():
     R = rotations.exp(np.array([0.3, -0.8, 0.5]))
     x, y, z, w = unity_quaternion(R)
-    point, mirror = np.array([0.2, 0.7, -0.4]), np.array([-1.0, 1, 1])
+    point = np.array([0.2, 0.7, -0.4])
+    mirror = np.array([-1.0, 1, 1])
     axis = np.array([x, y, z])
     p = point * mirror  # q p q* by the cross product formula, which is the same in left-handed axes
     turned = p + 2 * np.cross(axis, np.cross(axis, p) + w * p)

@@ -21,7 +21,10 @@ from scope.scope_addon.live.sources.newest_frame import NewestFrame
 from ..fake_source import FakeClock
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="devices of Linux")
-CAPTURE, METADATA, HAS_OWN_ANSWER = 1, 0x00800000, 1 << 31  # of linux/videodev2.h
+# of linux/videodev2.h
+CAPTURE = 1
+METADATA = 0x00800000
+HAS_OWN_ANSWER = 1 << 31
 
 
 def answering(of_all, of_this=0):
@@ -104,7 +107,9 @@ def opened(device, monkeypatch):
             assert name == str(device)
             self.left, self.then = lives.pop(0)
             self.isOpened = lambda: True
-            self.set, self.get, self.release = (lambda *_: True), (lambda _: 30.0), (lambda: None)
+            self.set = lambda *_: True
+            self.get = lambda _: 30.0
+            self.release = lambda: None
 
         def read(self):
             self.left -= 1
@@ -122,7 +127,9 @@ def opened(device, monkeypatch):
 
 def test_a_camera_that_is_unplugged_and_plugged_in_again_goes_on(device, opened):
     opened += [(3, device.unlink), (2, lambda: None)]
-    said, taken, clock = [], [], FakeClock()
+    said = []
+    taken = []
+    clock = FakeClock()
 
     def say(text):
         said.append(text)

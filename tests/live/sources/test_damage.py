@@ -14,7 +14,9 @@ from scope.scope_addon.live.sources.stream import DAMAGED_S
 from ..fake_source import FakeClock
 from ..stream_server import encoded, rtp_of_h264, rtsp_server, served, without
 
-GROUP, COUNT, LOST = 10, 40, 13
+GROUP = 10
+COUNT = 40
+LOST = 13
 INTACT = [*range(LOST), *range(2 * GROUP, COUNT)]
 
 
@@ -35,7 +37,8 @@ def walking(count=COUNT):
     a hundred times.
     """
     random = np.random.default_rng(1)
-    grain, pictures = random.integers(0, 60, (128, 176, 3)), []
+    grain = random.integers(0, 60, (128, 176, 3))
+    pictures = []
     for k in range(count):
         picture = grain + random.integers(0, 60, grain.shape)
         picture[20:100, 4 * k : 4 * k + 24] += 120
@@ -113,7 +116,10 @@ def cut(data, picture, packets):
     return b"".join(piece for k, piece in enumerate(pieces) if k not in lost)
 
 
-ALL, MIDDLE, LAST, FIRST = slice(None), slice(2, 4), slice(-2, None), slice(0, 2)
+ALL = slice(None)
+MIDDLE = slice(2, 4)
+LAST = slice(-2, None)
+FIRST = slice(0, 2)
 
 
 @pytest.mark.parametrize("codec", ["libx264", "libx265", "mpeg4", "mpeg2video"])

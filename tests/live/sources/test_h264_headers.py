@@ -28,16 +28,20 @@ WAYS = {
 def packets_of(way, count=300):
     """The packets of a stream, and its extradata."""
     kind, options, pixels = WAYS[way]
-    random, target = np.random.default_rng(0), io.BytesIO()
+    random = np.random.default_rng(0)
+    target = io.BytesIO()
     with av.open(target, "w", format=kind) as container:
         stream = container.add_stream(
             "libx264", rate=30, options={"preset": "ultrafast", "bf": "0"} | options
         )
-        stream.height, stream.width, stream.pix_fmt = 64, 64, pixels
+        stream.height = 64
+        stream.width = 64
+        stream.pix_fmt = pixels
         for k in range(count):
             picture = random.integers(0, 255, (64, 64, 3), np.uint8)
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            frame.time_base, frame.pts = Fraction(1, 30), k
+            frame.time_base = Fraction(1, 30)
+            frame.pts = k
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     with av.open(io.BytesIO(target.getvalue())) as container:

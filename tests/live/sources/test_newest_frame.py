@@ -11,7 +11,8 @@ from scope.scope_addon.live.sources.newest_frame import DAMAGE_SAID_S, NewestFra
 
 from ..fake_source import FakeClock, FakeSource
 
-WIDE, TALL = np.zeros((40, 60, 3), np.uint8), np.zeros((60, 40, 3), np.uint8)
+WIDE = np.zeros((40, 60, 3), np.uint8)
+TALL = np.zeros((60, 40, 3), np.uint8)
 
 
 def all_taken(reader):
@@ -22,7 +23,8 @@ def all_taken(reader):
 
 
 def test_frames_that_come_while_one_is_processed_are_dropped_and_counted():
-    given, go_on = threading.Event(), threading.Event()
+    given = threading.Event()
+    go_on = threading.Event()
 
     def before(index):
         if index == 1:  # the first frame has been given; it must be taken before the others come
@@ -42,8 +44,10 @@ def test_frames_that_come_while_one_is_processed_are_dropped_and_counted():
 
 
 def test_an_interrupted_source_is_opened_again_and_numbers_and_times_continue():
-    said, clock = [], FakeClock()
-    taken, next_one = [], threading.Semaphore(1)
+    said = []
+    clock = FakeClock()
+    taken = []
+    next_one = threading.Semaphore(1)
     source = FakeSource([50.0, 50.1], [7.0, 7.5], before=lambda _: next_one.acquire(timeout=300))
     with NewestFrame(source, clock, reconnect_s=3.0, say=said.append) as reader:
         for _ in range(4):
@@ -59,7 +63,8 @@ def test_an_interrupted_source_is_opened_again_and_numbers_and_times_continue():
 
 
 def test_an_interruption_that_lasts_is_said_once():
-    said, clock = [], FakeClock()
+    said = []
+    clock = FakeClock()
     source = FakeSource([0.0])  # and then it cannot be opened any more
     clock.stop_after = 5
     with NewestFrame(source, clock, reconnect_s=1.0, say=said.append) as reader:
@@ -90,7 +95,8 @@ def test_a_source_that_cannot_be_opened_at_first_fails_even_if_it_could_be_tried
 
 
 def test_an_error_in_a_running_stream_is_said_and_survived():
-    said, clock = [], FakeClock()
+    said = []
+    clock = FakeClock()
     source = FakeSource([0.0], error=VideoError("fake was interrupted (timed out)"))
     with NewestFrame(
         source, clock, reconnect_s=1.0, say=lambda s: (said.append(s), clock.stopped.set())
@@ -100,7 +106,8 @@ def test_an_error_in_a_running_stream_is_said_and_survived():
 
 
 def test_stopping_does_not_wait_for_a_source_that_is_stalled():
-    clock, stalled = FakeClock(), threading.Event()
+    clock = FakeClock()
+    stalled = threading.Event()
     try:
         with NewestFrame(FakeSource([0.0], before=lambda _: stalled.wait(300)), clock) as reader:
             clock.stopped.set()
@@ -122,7 +129,9 @@ def test_pictures_of_another_shape_are_given_as_they_are():
 
 
 def test_damaged_frames_are_counted_and_said_not_again_and_again():
-    said, taken, clock = [], [], FakeClock()
+    said = []
+    taken = []
+    clock = FakeClock()
     waits = {5: 0.5 * DAMAGE_SAID_S, 8: DAMAGE_SAID_S}
 
     def before(index):
@@ -145,7 +154,8 @@ def test_damaged_frames_are_counted_and_said_not_again_and_again():
 
 
 def test_a_source_that_is_frozen_is_said_once_each_time():
-    said, clock = [], FakeClock()
+    said = []
+    clock = FakeClock()
     times = np.arange(0, 26, 0.5)
     images = [
         WIDE + np.uint8(0 if t < 2 else 1 if t < 10 else 2 + t % 2 if t < 17 else 7) for t in times
@@ -163,7 +173,9 @@ def test_a_source_that_is_frozen_is_said_once_each_time():
 
 def test_a_computer_that_slept_says_so_and_shows_no_backlog():
     """The clock leaps by an hour before the third picture, as where it counts the time asleep."""
-    said, taken, clock = [], [], FakeClock()
+    said = []
+    taken = []
+    clock = FakeClock()
 
     def before(index):
         clock.time_s = 100.0 + index / 30 + 3600.0 * (index >= 2)
@@ -185,7 +197,10 @@ class Arrivals:
     """
 
     def __init__(self, clock, rate):
-        self.clock, self.rate, self.given, self.reader = clock, rate, 0, None
+        self.clock = clock
+        self.rate = rate
+        self.given = 0
+        self.reader = None
 
     def __enter__(self):
         return self
@@ -212,7 +227,8 @@ class Arrivals:
 
 def test_frames_are_given_evenly_where_not_every_one_can_be_processed():
     """Each takes 20 ms where one comes every 17; the newest ones would be 17 or 33 ms apart."""
-    clock, taken = FakeClock(), []
+    clock = FakeClock()
+    taken = []
     clock.time_s = 0.0
     arrivals = Arrivals(clock, 60)
     reader = arrivals.reader = NewestFrame(FakeSource(), clock)

@@ -11,12 +11,16 @@ def processed(rate, seconds, took_s, pace=None):
 
     :param took_s: of the frame that is taken at a time.
     """
-    pace, taken, busy_until_s, waiting = pace or Pace(), [], 0.0, None
+    pace = pace or Pace()
+    taken = []
+    busy_until_s = 0.0
+    waiting = None
     for k in range(round(rate * seconds)):
         due_s = k / rate
         while waiting is not None and busy_until_s <= due_s:
             taken.append(waiting)
-            started_s, waiting = max(busy_until_s, taken[-1] / rate), None
+            started_s = max(busy_until_s, taken[-1] / rate)
+            waiting = None
             pace.take(taken[-1] / rate)
             busy_until_s = started_s + took_s(started_s)
             pace.add_duration(busy_until_s - started_s)
@@ -54,7 +58,9 @@ def test_a_slow_machine_processes_evenly_what_is_hardly_less(rate, took_s, every
 
 def test_a_slow_machine_whose_times_vary_does_not_waver():
     """As where one network more is asked in most frames, and now and then in none for a while."""
-    pace, random, chosen = Pace(), np.random.default_rng(0), []
+    pace = Pace()
+    random = np.random.default_rng(0)
+    chosen = []
 
     def took_s(now_s):
         chosen.append(pace.every)
@@ -98,7 +104,8 @@ def test_a_source_is_not_made_slower_than_28_frames_per_second(rate, took_s):
 
 
 def test_a_machine_that_becomes_faster_processes_every_frame_again_and_does_not_waver():
-    pace, changes = Pace(), []
+    pace = Pace()
+    changes = []
     every = None
 
     def took_s(now_s):
@@ -115,7 +122,8 @@ def test_a_machine_that_becomes_faster_processes_every_frame_again_and_does_not_
 
 
 def test_a_machine_that_is_barely_fast_enough_does_not_waver():
-    pace, chosen = Pace(), []
+    pace = Pace()
+    chosen = []
     processed(
         60, 20, lambda _: chosen.append(pace.every) or 0.0145 * (1 + 0.1 * (len(chosen) % 3)), pace
     )
@@ -124,7 +132,9 @@ def test_a_machine_that_is_barely_fast_enough_does_not_waver():
 
 def test_times_that_vary_by_some_milliseconds_do_not_matter():
     """As those of a camera, whose frames are timed when they come."""
-    pace, random, due = Pace(), np.random.default_rng(0), []
+    pace = Pace()
+    random = np.random.default_rng(0)
+    due = []
     pace.every = 2
     for k in range(300):
         time_s = k / 60 + random.uniform(-0.003, 0.003)

@@ -72,7 +72,9 @@ def test_amounts_are_shares_of_the_faces_lengths_along_its_axes():
         "brow.T.L.003": {"left": {"jawOpen": 0.1}},
     }
     found = posed(bones, control_motions(ExpressionMap({}, amounts), weights(jawOpen=0.5), bones))
-    mouth, lids, eyes = 0.05, 0.012, 0.06
+    mouth = 0.05
+    lids = 0.012
+    eyes = 0.06
     np.testing.assert_allclose(
         found["lip.B"][0], (0, -0.02 - 0.05 * mouth, 1.59 - 0.25 * mouth), atol=1e-12
     )
@@ -86,7 +88,8 @@ def test_amounts_are_shares_of_the_faces_lengths_along_its_axes():
 
 def test_turns_go_down_to_the_left_and_left_side_up():
     bones = face()
-    ahead, left = np.array([0.0, -1, 0]), np.array([1.0, 0, 0])
+    ahead = np.array([0.0, -1, 0])
+    left = np.array([1.0, 0, 0])
     for channel, from_, to in (
         ("pitch", ahead, (0, 0, -1)),
         ("yaw", ahead, (1, 0, 0)),

@@ -42,7 +42,8 @@ def test_axes_are_left_up_and_forward_of_the_person(names: tuple[str, ...]) -> N
 
 def test_a_rig_that_is_scaled_and_turned_has_the_same_face() -> None:
     R = exp(np.array([0.4, -0.9, 0.3]))
-    plain, turned = measure_face(bones(NAMES[0])), measure_face(bones(NAMES[0], 100.0, R))
+    plain = measure_face(bones(NAMES[0]))
+    turned = measure_face(bones(NAMES[0], 100.0, R))
     np.testing.assert_allclose(turned.axes, R @ plain.axes, atol=1e-12)
     assert (turned.mouth, turned.eyes, turned.lids) == pytest.approx((4.0, 6.0, 1.2))
 

@@ -18,19 +18,23 @@ def animated():
     )
     channels.write("scale", np.arange(3.0), np.ones((3, 3)), "BEZIER")
     point = curves[0].keyframe_points[2]
-    point.interpolation, point.easing = "ELASTIC", "EASE_OUT"
-    point.amplitude, point.period, point.type = 0.7, 3.0, "EXTREME"
+    point.interpolation = "ELASTIC"
+    point.easing = "EASE_OUT"
+    point.amplitude = 0.7
+    point.period = 3.0
+    point.type = "EXTREME"
     point.handle_left_type = point.handle_right_type = "FREE"
-    point.handle_left, point.handle_right = (1.5, 9.0), (2.5, -9.0)
+    point.handle_left = (1.5, 9.0)
+    point.handle_right = (2.5, -9.0)
     curves[0].update()
-    curves[1].mute, curves[1].extrapolation, curves[1].color_mode = True, "LINEAR", "CUSTOM"
+    curves[1].mute = True
+    curves[1].extrapolation = "LINEAR"
+    curves[1].color_mode = "CUSTOM"
     noise = curves[2].modifiers.new("NOISE")
-    noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = (
-        0.5,
-        True,
-        2.0,
-        4.0,
-    )
+    noise.strength = 0.5
+    noise.use_restricted_range = True
+    noise.frame_start = 2.0
+    noise.frame_end = 4.0
     envelope = curves[2].modifiers.new("ENVELOPE")
     envelope.control_points.add(3.0)
     # Blender 5.2 can crash on assigning to one point
@@ -88,7 +92,8 @@ def remove_curves(obj):
 def add_curves(obj):
     action = obj.animation_data.action
     obj.keyframe_insert("rotation_euler", frame=3)
-    action.use_frame_range, action.frame_end = True, 77.0
+    action.use_frame_range = True
+    action.frame_end = 77.0
     if has_slots():
         other = bpy.data.objects.new("Other", None)
         Channels(other, action).write("location", np.arange(2.0), np.zeros((2, 3)))
@@ -97,7 +102,8 @@ def add_curves(obj):
 @pytest.mark.parametrize("change", [change_keys, change_modifiers, remove_curves, add_curves])
 def test_an_action_is_restored_in_place(animated, change):
     action = animated.animation_data.action
-    copy, before = action.copy(), content(animated)
+    copy = action.copy()
+    before = content(animated)
     change(animated)
     assert content(animated) != before
     restore_content(action, copy)

@@ -17,7 +17,8 @@ def cube() -> bpy.types.Object:
 
 
 def test_keys_drive_the_object_with_fractions_and_linear_steps(cube):
-    frames, values = np.array([1.0, 2.5, 7.25]), np.array([[0.0, 1, 2], [3, 1, 2], [-5, 1, 2]])
+    frames = np.array([1.0, 2.5, 7.25])
+    values = np.array([[0.0, 1, 2], [3, 1, 2], [-5, 1, 2]])
     actions.Channels(cube, bpy.data.actions.new("a")).write(
         "location", frames, values, group="Object Transforms"
     )
@@ -95,7 +96,8 @@ def test_cycles_come_before_the_users_own_modifiers_and_keep_them(cube):
         "location", np.arange(3.0), np.zeros((3, 3))
     )
     noise = actions.fcurves(cube)[1].modifiers.new("NOISE")
-    noise.strength, noise.phase = 0.25, 3.5
+    noise.strength = 0.25
+    noise.phase = 3.5
     for _ in range(2):
         actions.add_cycles(cube, {("location", 0)})
         first, second, third = actions.fcurves(cube)
@@ -112,7 +114,8 @@ def test_a_key_within_a_hundredth_of_a_frame_is_changed_as_where_blender_inserts
 ):
     channels = actions.Channels(cube, bpy.data.actions.new("a"))
     frames = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 4.012, 5.0, 6.0])
-    new, values = np.array([1.5, 3.0 + off, 4.0115, 5.0 + off, 5.5]), np.arange(20.0, 25.0)
+    new = np.array([1.5, 3.0 + off, 4.0115, 5.0 + off, 5.5])
+    values = np.arange(20.0, 25.0)
     curves = [channels.write(path, frames, frames, interpolation)[0] for path in ('["x"]', '["y"]')]
     actions.change_keys(curves[0], new, values)
     for frame, value in zip(new.tolist(), values.tolist(), strict=True):
@@ -148,7 +151,8 @@ def test_keys_that_are_added_are_those_that_blender_inserts(cube, interpolation)
     for curve in curves:
         for key in list(curve.keyframe_points)[::3]:
             key.handle_left_type = key.handle_right_type = "FREE"
-            key.select_control_point, key.type = True, "EXTREME"
+            key.select_control_point = True
+            key.type = "EXTREME"
     actions.change_keys(curves[0], new, np.cos(new))
     missing = dict(zip(new.tolist(), np.cos(new).tolist(), strict=True))
     for key in curves[1].keyframe_points:

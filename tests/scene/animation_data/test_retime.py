@@ -61,8 +61,10 @@ def test_strips_move_with_the_part_that_they_play(moved: bpy.types.Object, facto
     animation = moved.animation_data
     action = animation.action
     strip = animation.nla_tracks.new().strips.new("walk", 21, action)
-    strip.action_frame_start, strip.action_frame_end = 2.0, 8.0
-    strip.frame_start_raw, strip.frame_end_raw = 21.0, 27.0
+    strip.action_frame_start = 2.0
+    strip.action_frame_end = 8.0
+    strip.frame_start_raw = 21.0
+    strip.frame_end_raw = 27.0
     (strip,) = action_strips(animation)
     assert strip.action == action
     retime_strip(strip, Retiming(1.0, factor))

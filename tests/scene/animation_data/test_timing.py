@@ -73,6 +73,7 @@ def test_bad_timestamps_are_refused(stamps):
 )
 def test_frame_range_covers_the_keys(first, last, expected):
     scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 100, 200
+    scene.frame_start = 100
+    scene.frame_end = 200
     timing.set_frame_range(scene, first, last)
     assert (scene.frame_start, scene.frame_end) == expected

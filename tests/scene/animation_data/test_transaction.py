@@ -23,7 +23,9 @@ def person(body, make_motion):
 
 def everything(person):
     """Return the values that must not change."""
-    scene, rig, keys = bpy.context.scene, person.armature, person.mesh.data.shape_keys
+    scene = bpy.context.scene
+    rig = person.armature
+    keys = person.mesh.data.shape_keys
     curves = [
         (c.data_path, c.array_index, read_keys(c).tobytes())
         for c in (*fcurves(rig), *fcurves(keys))
@@ -56,7 +58,8 @@ def everything(person):
 
 def shuffle(person):
     """Make the changes of edits and retargeting, and others."""
-    scene, rig = bpy.context.scene, person.armature
+    scene = bpy.context.scene
+    rig = person.armature
     for curve in fcurves(rig)[:7]:
         rewrite_keys(curve, np.array([1.0, 2.0]), np.array([0.3, 0.4]))
     empty = bpy.data.objects.new("Root", None)
@@ -64,9 +67,14 @@ def shuffle(person):
     Channels(empty, bpy.data.actions.new("Trajectory")).write(
         "location", np.array([1.0]), np.array([[1.0, 2.0, 3.0]])
     )
-    rig.parent, rig.location = empty, (1, 2, 3)
-    rig["new"], rig["scope_start"], rig.pose.bones[3]["IK_FK"] = 1.0, 99.0, 0.5
-    scene.frame_start, scene.frame_end, scene.render.fps = 5, 6, 99
+    rig.parent = empty
+    rig.location = (1, 2, 3)
+    rig["new"] = 1.0
+    rig["scope_start"] = 99.0
+    rig.pose.bones[3]["IK_FK"] = 0.5
+    scene.frame_start = 5
+    scene.frame_end = 6
+    scene.render.fps = 99
     scene.frame_set(6)
     scene.timeline_markers.new("new", frame=3)
     rig.animation_data.action.use_fake_user = False
@@ -93,7 +101,8 @@ def test_a_failure_changes_nothing(person):
 
 
 def test_a_new_action_is_removed_by_a_rollback(person):
-    before, action = everything(person), person.armature.animation_data.action
+    before = everything(person)
+    action = person.armature.animation_data.action
     with pytest.raises(MemoryError):
         fail_after(lambda: another_action(person.armature), person.armature)
     assert everything(person) == before

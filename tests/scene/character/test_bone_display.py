@@ -39,8 +39,10 @@ def test_rings_lie_around_the_limbs(body, make_motion):
             np.array([v.co for v in key.data]) - [v.co for v in key.relative_key.data]
         )
     for name in ("left_hip", "right_knee", "left_elbow", "spine2"):
-        bone, posed = person.armature.data.bones[name], person.armature.pose.bones[name]
-        head, tail = np.array(bone.head_local), np.array(bone.tail_local)
+        bone = person.armature.data.bones[name]
+        posed = person.armature.pose.bones[name]
+        head = np.array(bone.head_local)
+        tail = np.array(bone.tail_local)
         along = (tail - head) / bone.length
         groups = person.mesh.vertex_groups[name].index
         mine = [

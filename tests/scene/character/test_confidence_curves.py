@@ -128,7 +128,8 @@ def test_the_action_is_named_and_kept(body, doubtful):
 
 def test_resampling_puts_a_key_on_every_frame_of_the_scene(body, make_motion, truth, blender):
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = 25, 1.0
+    scene.render.fps = 25
+    scene.render.fps_base = 1.0
     motion = make_motion(body, 31, rate=30.0)
     result = build_scene([motion], body, options=BuildOptions(frame_rate="resample"))
     rig = result.people[0].armature

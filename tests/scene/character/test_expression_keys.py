@@ -107,7 +107,8 @@ def primitive_of(path: Path, material: str) -> tuple[np.ndarray, dict[str, np.nd
     """
     data = path.read_bytes()
     length = struct.unpack("<I", data[12:16])[0]
-    gltf, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
+    gltf = json.loads(data[20 : 20 + length])
+    binary = data[28 + length :]
 
     def floats(index: int) -> np.ndarray:
         accessor = gltf["accessors"][index]
@@ -147,7 +148,8 @@ def test_a_glb_has_teeth_and_a_tongue_that_the_jaw_moves(whole_body, motion, tmp
     path = tmp_path / "talk.glb"
     export_motions([motion], whole_body, path)
     teeth, tongue = (primitive_of(path, material) for material in ("teeth", "tongue"))
-    at, opened = teeth[0], np.linalg.norm(teeth[1]["jawOpen"], axis=1)
+    at = teeth[0]
+    opened = np.linalg.norm(teeth[1]["jawOpen"], axis=1)
     lower = opened > 0
     assert 0.4 < lower.mean() < 0.6
     assert at[lower, 1].mean() < at[~lower, 1].mean() - 0.005
@@ -165,7 +167,8 @@ def morph_animation(path: Path) -> dict[str, np.ndarray]:
     """
     data = path.read_bytes()
     length = struct.unpack("<I", data[12:16])[0]
-    gltf, binary = json.loads(data[20 : 20 + length]), data[28 + length :]
+    gltf = json.loads(data[20 : 20 + length])
+    binary = data[28 + length :]
     (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
     (animation,) = gltf["animations"]
     (sampler,) = [

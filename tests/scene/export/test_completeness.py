@@ -17,7 +17,8 @@ def exported(request, body, make_motion, tmp_path):
 
 
 def test_only_the_whole_file_is_whole(exported):
-    is_whole, content = CHECKS[exported.suffix], exported.read_bytes()
+    is_whole = CHECKS[exported.suffix]
+    content = exported.read_bytes()
     assert is_whole(exported)
     half = len(content) // 2
     for damaged in (

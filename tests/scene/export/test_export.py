@@ -28,7 +28,8 @@ SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
 def test_joints_and_skin_survive(
     whole_body, make_motion, truth, joints_world, blender, tmp_path, suffix
 ):
-    body, rate = whole_body, 30000 / 1001
+    body = whole_body
+    rate = 30000 / 1001
     motion = make_motion(body, 12, rate=rate)
     path = tmp_path / f"walk{suffix}"
     assert export_motions([motion], body, path) == ([path], [])
@@ -78,7 +79,8 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender,
     path = tmp_path / f"walk{suffix}"
     export_motions([motion], body, path)
     first = read_back(path)
-    armature, expected = blender.only("ARMATURE"), truth(body, motion)
+    armature = blender.only("ARMATURE")
+    expected = truth(body, motion)
     for t, stamp in enumerate(stamps):
         blender.go_to(first + round(stamp * 30))
         joints = blender.joints(armature, body.joint_names)
@@ -199,7 +201,8 @@ def test_the_camera_keeps_its_field_of_view_in_a_scene_of_another_shape(
     body, make_motion, tmp_path, blender, suffix, fx, fy
 ):
     motion = make_motion(body, 2, intrinsics=np.array([[fx, 0, 320], [0, fy, 240], [0, 0, 1]]))
-    bpy.context.scene.render.resolution_x, bpy.context.scene.render.resolution_y = 1920, 1080
+    bpy.context.scene.render.resolution_x = 1920
+    bpy.context.scene.render.resolution_y = 1080
     build_scene([motion], body)
     path = tmp_path / f"walk{suffix}"
     export(path, options=ExportOptions(camera=True))
@@ -349,7 +352,8 @@ def test_several_files_at_once(body, make_motion, tmp_path):
 
 def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
     bpy.ops.mesh.primitive_cube_add()
-    scene, window = bpy.context.scene, bpy.context.window
+    scene = bpy.context.scene
+    window = bpy.context.window
     kinds = "scenes collections objects meshes armatures actions cameras".split()
     kinds += "materials shape_keys movieclips".split()
     before = {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds}

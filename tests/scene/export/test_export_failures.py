@@ -55,7 +55,8 @@ def closed_folder():
     """
     # tmp_path lies in a folder that nobody else may enter
     with tempfile.TemporaryDirectory() as name:
-        folder, is_root = Path(name), os.geteuid() == 0
+        folder = Path(name)
+        is_root = os.geteuid() == 0
         folder.chmod(0o555)
         if is_root:
             os.setresuid(NOBODY, NOBODY, 0)
@@ -90,7 +91,8 @@ def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(
 ):
     import resource
 
-    path, motion = tmp_path / f"walk{suffix}", make_motion(body, 200)
+    path = tmp_path / f"walk{suffix}"
+    motion = make_motion(body, 200)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
     try:
@@ -125,7 +127,8 @@ def test_a_failing_writer_leaves_the_old_file_and_no_other(
 class StoppedExporter(bpy.types.Operator):
     """An exporter in Python that is interrupted with Ctrl-C."""
 
-    bl_idname, bl_label = "scope_test.stopped", "Stopped"
+    bl_idname = "scope_test.stopped"
+    bl_label = "Stopped"
 
     def execute(self, context):
         raise KeyboardInterrupt

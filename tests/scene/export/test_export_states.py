@@ -47,7 +47,9 @@ def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suff
 def test_a_linked_capture_is_exported_with_its_shape_baked(
     body, make_motion, tmp_path, blender, truth, overridden
 ):
-    motion, file, path = make_motion(body, 4), tmp_path / "capture.blend", tmp_path / "walk.usdc"
+    motion = make_motion(body, 4)
+    file = tmp_path / "capture.blend"
+    path = tmp_path / "walk.usdc"
     name = build_scene([motion], body, options=BuildOptions(frame_rate="set")).collection.name
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -97,7 +99,8 @@ def test_motion_disabled_in_the_viewport_is_exported(
 ):
     motion = make_motion(body, 4)
     result = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
-    person, collection = result.people[0], result.collection
+    person = result.people[0]
+    collection = result.collection
     hide(person, collection)
 
     def state():
@@ -106,7 +109,8 @@ def test_motion_disabled_in_the_viewport_is_exported(
         ]
         return hidden, person.armature.data.pose_position, person.armature.mode
 
-    before, path = state(), tmp_path / f"walk{suffix}"
+    before = state()
+    path = tmp_path / f"walk{suffix}"
     export(path)
     assert state() == before
     first = read_back(path)
@@ -118,7 +122,8 @@ def test_motion_disabled_in_the_viewport_is_exported(
 def _to_nla(datablock, *starts):
     """Move a datablock's action to NLA strips that start at these frames."""
     animation = datablock.animation_data
-    action, slot = animation.action, getattr(animation, "action_slot", None)
+    action = animation.action
+    slot = getattr(animation, "action_slot", None)
     animation.action = None
     for start in starts:
         strip = animation.nla_tracks.new().strips.new(f"from {start}", start, action)
@@ -136,7 +141,8 @@ def test_a_capture_with_a_parent_moves_with_it_in_the_file(
     ).people[0]
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
-    stage.rotation_euler, person.armature.parent = (0.2, -0.1, 0.7), stage
+    stage.rotation_euler = (0.2, -0.1, 0.7)
+    person.armature.parent = stage
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.object.parent = stage
     for frame, x in ((0, 2.0), (3, 2.5)):
@@ -161,7 +167,8 @@ def test_a_motion_in_the_nla_is_exported_as_displayed(
     motion = make_motion(body, 5)
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     animation = _to_nla(person.armature, 40)
-    actions_before, path = set(bpy.data.actions), tmp_path / f"walk{suffix}"
+    actions_before = set(bpy.data.actions)
+    path = tmp_path / f"walk{suffix}"
     export(path)
     assert (animation.action, animation.use_nla, set(bpy.data.actions)) == (
         None,
@@ -184,7 +191,8 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
     person.camera.keyframe_insert("location", frame=1)
     layered = _to_nla(person.camera, 1)
     person.camera.keyframe_insert("location", frame=1)  # an action of its own over the strip
-    layered.action_blend_type, action = "ADD", layered.action
+    layered.action_blend_type = "ADD"
+    action = layered.action
     export(tmp_path / "walk.glb")
     assert (layered.action, layered.action_blend_type, layered.use_nla) == (action, "ADD", True)
     first = read_back(tmp_path / "walk.glb")
@@ -225,7 +233,8 @@ def test_a_capture_in_a_scene_in_centimetres_has_its_true_size(
     body, make_motion, tmp_path, blender, truth, size, suffix
 ):
     bpy.context.scene.unit_settings.scale_length = 0.01
-    motion, path = make_motion(body, 4), tmp_path / f"walk{suffix}"
+    motion = make_motion(body, 4)
+    path = tmp_path / f"walk{suffix}"
     person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     person.armature.scale = (size,) * 3  # as the warning of the build suggests
     bpy.context.view_layer.update()

@@ -22,7 +22,8 @@ def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
     states.
     """
     parser = package("io_scene_fbx.parse_fbx")
-    path, motion = tmp_path / "walk.fbx", make_motion(body, 4)
+    path = tmp_path / "walk.fbx"
+    motion = make_motion(body, 4)
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
     root, version = parser.parse(str(path))
     assert version == 7400

@@ -13,9 +13,11 @@ from ..exported import glb_json
 @pytest.mark.parametrize("rate", [12.5, 24000 / 1001, 30000 / 1001, 24.449])
 def test_glb_key_times_are_those_of_the_footage(body, make_motion, tmp_path, rate):
     """Read from the file itself, because Blender's importer has the same error as its exporter."""
-    motion, path = make_motion(body, 7, rate=rate), tmp_path / "walk.glb"
+    motion = make_motion(body, 7, rate=rate)
+    path = tmp_path / "walk.glb"
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
-    gltf, data = glb_json(path), path.read_bytes()
+    gltf = glb_json(path)
+    data = path.read_bytes()
     assert len(data) == struct.unpack("<I", data[8:12])[0]
     binary = data[28 + struct.unpack("<I", data[12:16])[0] :]
     for index in {sampler["input"] for sampler in gltf["animations"][0]["samplers"]}:

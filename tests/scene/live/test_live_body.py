@@ -45,14 +45,16 @@ def truth(body, rotations, pelvis, betas):
 def test_every_pose_and_shape_is_that_of_smpl(live, body):
     rng = np.random.default_rng(5)
     for seed in range(4):
-        betas, (rotations, pelvis) = rng.normal(size=body.P), pose(seed)
+        betas = rng.normal(size=body.P)
+        (rotations, pelvis) = pose(seed)
         created = live.show(quaternion_from_matrix(rotations), pelvis, betas)
         assert created == (seed == 0)
         np.testing.assert_allclose(shown(live), truth(body, rotations, pelvis, betas), atol=1e-4)
 
 
 def test_the_rest_pose_becomes_that_of_the_last_shape(live, body):
-    (rotations, pelvis), betas = pose(1), np.linspace(-1, 1, body.P)
+    (rotations, pelvis) = pose(1)
+    betas = np.linspace(-1, 1, body.P)
     live.show(quaternion_from_matrix(rotations), pelvis, np.zeros(body.P))
     live.show(quaternion_from_matrix(rotations), pelvis, betas)
     names = sorted(obj.name for obj in bpy.data.objects)
@@ -71,9 +73,11 @@ def test_a_body_without_its_scene_is_an_error_that_keeps_what_is_there(live, bod
     """The body is also in another scene, and its mesh was deleted, so that it has to be created
     again.
     """
-    (rotations, pelvis), betas = pose(2), np.zeros(body.P)
+    (rotations, pelvis) = pose(2)
+    betas = np.zeros(body.P)
     live.show(quaternion_from_matrix(rotations), pelvis, betas)
-    mine, other = bpy.context.scene, bpy.data.scenes.new("other")
+    mine = bpy.context.scene
+    other = bpy.data.scenes.new("other")
     other.collection.children.link(live.armature.users_collection[0])
     bpy.data.scenes.remove(mine)
     if change == "show":
@@ -90,7 +94,8 @@ def test_a_body_without_its_scene_is_an_error_that_keeps_what_is_there(live, bod
 
 def test_a_removed_body_is_created_again_and_cancelling_leaves_nothing(live, body):
     before = blocks()
-    (rotations, pelvis), betas = pose(2), np.zeros(body.P)
+    (rotations, pelvis) = pose(2)
+    betas = np.zeros(body.P)
     live.show(quaternion_from_matrix(rotations), pelvis, betas)
     after = blocks()
     bpy.data.objects.remove(live.armature)
@@ -110,7 +115,8 @@ def test_coefficients_that_blender_cannot_show_are_limited(live, body):
 
 def test_a_body_that_the_user_edits_waits_and_is_created_again_if_it_lost_bones(live, body):
     rotations, pelvis = pose(4)
-    q, betas = quaternion_from_matrix(rotations), np.zeros(body.P)
+    q = quaternion_from_matrix(rotations)
+    betas = np.zeros(body.P)
     live.show(q, pelvis, betas)
     bpy.context.view_layer.objects.active = live.armature
     bpy.ops.object.mode_set(mode="EDIT")

@@ -26,8 +26,10 @@ def test_the_pose_is_that_of_the_retargeted_frame(options):
     bone_map = guess_bone_map(rig)
     for part in ("left_hip", "right_elbow", "spine2"):  # of quaternions, Euler angles and an axis
         posed = rig.pose.bones[bones[part]]
-        posed.location, posed.scale = (0.1, 0.0, 0.05), (1.3, 1.0, 1.2)
-    live, followed = LiveRig(rig, BODY, bone_map, options), []
+        posed.location = (0.1, 0.0, 0.05)
+        posed.scale = (1.3, 1.0, 1.2)
+    live = LiveRig(rig, BODY, bone_map, options)
+    followed = []
     for frame in FRAMES:
         rotations = exp(motion.poses[frame - 1].reshape(-1, 3).astype(float))
         pelvis = BODY.rest_joints(motion.betas)[0] + motion.trans[frame - 1]
@@ -84,9 +86,11 @@ def test_a_missing_bone_is_an_error():
 
 def test_the_proportions_follow_the_shape_but_not_at_every_pose(monkeypatch):
     rig, _ = build_rig("unity")
-    live, now = LiveRig(rig, BODY, guess_bone_map(rig)), [100.0]
+    live = LiveRig(rig, BODY, guess_bone_map(rig))
+    now = [100.0]
     monkeypatch.setattr(live_rig.time, "monotonic", lambda: now[0])
-    first, tall = live._transfer_of(np.zeros(BODY.P)), np.linspace(1, 0, BODY.P)
+    first = live._transfer_of(np.zeros(BODY.P))
+    tall = np.linspace(1, 0, BODY.P)
     assert live._transfer_of(tall) is first  # not yet
     now[0] += 1.0
     second = live._transfer_of(tall)

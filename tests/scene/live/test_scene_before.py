@@ -27,8 +27,10 @@ def test_what_changed_is_restored_and_what_is_gone_is_left_out():
 
 
 def test_another_scene_is_left_alone():
-    first, other = bpy.context.scene, bpy.data.scenes.new("other")
-    before, window = SceneBefore(), bpy.context.window_manager.windows[0]
+    first = bpy.context.scene
+    other = bpy.data.scenes.new("other")
+    before = SceneBefore()
+    window = bpy.context.window_manager.windows[0]
     hidden = bpy.data.objects.new("hidden", None)
     other.collection.objects.link(hidden)
     hidden.hide_set(True, view_layer=other.view_layers[0])

@@ -124,7 +124,8 @@ def test_a_rig_that_is_scaled_and_turned_behaves_equally(rigify_face):
     values = {"jawOpen": 0.8, "mouthSmileLeft": 0.7, "eyeBlinkRight": 1.0, "eyeLookUpLeft": 1.0}
     names = [bone.name for bone in rigify_face.data.bones if bone.name.startswith("DEF-")]
     plain = moved(rigify_face, *names, **values)
-    rigify_face.scale, rigify_face.rotation_euler = (3.0, 3.0, 3.0), (0.0, 0.0, 0.7)
+    rigify_face.scale = (3.0, 3.0, 3.0)
+    rigify_face.rotation_euler = (0.0, 0.0, 0.7)
     turned = moved(rigify_face, *names, **values)
     R = np.array(rigify_face.rotation_euler.to_matrix())
     np.testing.assert_allclose(turned, 3.0 * plain @ R.T, atol=2e-6)
@@ -149,7 +150,8 @@ def test_the_bodys_keys_stay_and_an_unedited_result_is_replaced(rigify_face):
 
 def test_what_fails_changes_nothing(rigify_face, monkeypatch):
     retarget_face_bones(shown(jawOpen=1.0), rigify_face, guess_face_bones(rigify_face))
-    before, action = heads(rigify_face, 3, "lip.B", "jaw_master"), rigify_face.animation_data.action
+    before = heads(rigify_face, 3, "lip.B", "jaw_master")
+    action = rigify_face.animation_data.action
     monkeypatch.setattr(face_bones, "retire", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         retarget_face_bones(shown(eyeBlinkLeft=1.0), rigify_face, guess_face_bones(rigify_face))

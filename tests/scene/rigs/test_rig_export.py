@@ -85,14 +85,13 @@ def worst_arm(rig, bone_of, offset):
     """Return the angles between the rig's arms and the body's, degrees; the motion begins at frame
     ``offset``.
     """
-    joints, worst = truth()[[f - 1 for f in FRAMES]], 0.0
+    joints = truth()[[f - 1 for f in FRAMES]]
+    worst = 0.0
     frames = [f - 1 + offset for f in FRAMES]
     for a, b in ARMS:
         heads = seen(rig, [bone_of[a], bone_of[b]], frames)
-        ours, theirs = (
-            heads[:, 1] - heads[:, 0],
-            joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)],
-        )
+        ours = heads[:, 1] - heads[:, 0]
+        theirs = joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
         cosine = (
             (ours * theirs).sum(1) / np.linalg.norm(ours, axis=1) / np.linalg.norm(theirs, axis=1)
         )
@@ -138,7 +137,8 @@ def test_a_rig_of_a_scene_in_centimetres_has_its_true_size(tmp_path, suffix):
     rig, bones = build_rig("unreal", size=130.0)
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
-    rig.parent, stage.location = stage, (50.0, 20.0, 0.0)
+    rig.parent = stage
+    stage.location = (50.0, 20.0, 0.0)
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.object.parent = stage  # so that the parent is not exported
     retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE)
@@ -166,7 +166,10 @@ def test_two_people_have_a_rig_each(tmp_path):
 
 def test_people_of_different_heights_keep_their_places_in_proportion(tmp_path):
     """One stands along x and one along y: both pairs of hips are as far away, times one factor."""
-    source, motions, legs, wanted = rig_source(save_rig(tmp_path / "rig.glb")), [], [], []
+    source = rig_source(save_rig(tmp_path / "rig.glb"))
+    motions = []
+    legs = []
+    wanted = []
     for axis, tall in enumerate((2.0, -2.0)):
         clip = walk(1.0, speed=0.0)
         betas = np.zeros(BODY.P)
@@ -222,14 +225,18 @@ def test_fingers_that_follow_one_another_matter_only_where_fingers_are_captured(
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
     hand = rig.data.edit_bones[bone_of["left_wrist"]]
-    parent, along = hand, (hand.tail - hand.head).normalized() * 0.03
+    parent = hand
+    along = (hand.tail - hand.head).normalized() * 0.03
     for k in (1, 2, 3):
         bone = rig.data.edit_bones.new(f"mixamorig:LeftHandIndex{k}")
-        bone.head, bone.tail, bone.parent = parent.tail, parent.tail + along, parent
+        bone.head = parent.tail
+        bone.tail = parent.tail + along
+        bone.parent = parent
         parent = bone
     bpy.ops.object.mode_set(mode="OBJECT")
     constraint = rig.pose.bones["mixamorig:LeftHandIndex2"].constraints.new("COPY_ROTATION")
-    constraint.target, constraint.subtarget = rig, "mixamorig:LeftHandIndex1"
+    constraint.target = rig
+    constraint.subtarget = "mixamorig:LeftHandIndex1"
     constraint.target_space = constraint.owner_space = "LOCAL"
     formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

@@ -31,7 +31,8 @@ def rig():
     bpy.ops.object.mode_set(mode="EDIT")
     for name, head in HEADS.items():
         bone = armature.edit_bones.new(name)
-        bone.head, bone.tail = head, (head[0], head[1], head[2] + 0.2)
+        bone.head = head
+        bone.tail = (head[0], head[1], head[2] + 0.2)
     for name, parent in PARENTS.items():
         armature.edit_bones[name].parent = armature.edit_bones[parent]
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -58,7 +59,8 @@ def test_parents_come_before_their_children_and_places_are_those_at_rest(rig):
 
 def test_a_bone_that_a_constraint_makes_follow_another_is_its_child(rig):
     child_of = rig.pose.bones["prop"].constraints.new("CHILD_OF")
-    child_of.target, child_of.subtarget = rig, "spine"
+    child_of.target = rig
+    child_of.subtarget = "spine"
     child_of.inverse_matrix = (rig.matrix_world @ rig.pose.bones["spine"].matrix).inverted()
     with at_rest(rig):
         assert parents(probe(rig, PARTS))["prop"] == "spine"

@@ -21,7 +21,8 @@ def source():
 
 def direction_error(rig, bone_of, pairs, frames=FRAMES):
     """Return the largest angle between a limb of the rig and the body's, degrees."""
-    joints, worst = truth()[[f - 1 for f in frames]], 0.0
+    joints = truth()[[f - 1 for f in frames]]
+    worst = 0.0
     for a, b in pairs:
         ours = seen(rig, [bone_of[a], bone_of[b]], frames)
         ours = ours[:, 1] - ours[:, 0]
@@ -82,7 +83,8 @@ def _disabled_in_viewports(rig):
 def test_a_hidden_or_edited_rig_moves(source, hide):
     rig, bone_of = build_rig("mixamo")
     hide(rig)
-    collections, hidden = rig.users_collection, rig.hide_viewport
+    collections = rig.users_collection
+    hidden = rig.hide_viewport
     run(source, rig, feet=False)
     assert (rig.users_collection, rig.hide_viewport) == (collections, hidden)
     # it would not be seen to move otherwise
@@ -125,7 +127,8 @@ def test_a_rig_of_controls_alone_stands_on_its_lowest_bone(source):
 
 
 def test_rigify(rigify_rigs):
-    source, frames = captured(motion_of(walk(1.0))), range(1, 31, 6)
+    source = captured(motion_of(walk(1.0)))
+    frames = range(1, 31, 6)
     limbs = ("thigh", "shin", "foot", "upper_arm", "forearm", "hand")
     parts = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
     for rig, prefix in rigify_rigs:
@@ -188,7 +191,8 @@ def _solo(animation):
 def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
     rig, bone_of = build_rig("unreal")
     knee = rig.pose.bones[bone_of["left_knee"]]
-    knee.rotation_mode, knee.rotation_quaternion = "QUATERNION", (0.7, 0.7, 0, 0)
+    knee.rotation_mode = "QUATERNION"
+    knee.rotation_quaternion = (0.7, 0.7, 0, 0)
     knee.keyframe_insert("rotation_quaternion", frame=1)
     animation = rig.animation_data
     own = animation.action
@@ -202,7 +206,8 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
 
 
 def _posed(bone):
-    bone.location, bone.scale = (0.1, 0.0, 0.05), (1.3, 1.0, 1.2)
+    bone.location = (0.1, 0.0, 0.05)
+    bone.scale = (1.3, 1.0, 1.2)
 
 
 def _keyed(bone):
@@ -245,7 +250,8 @@ def test_a_failure_leaves_the_rig_unchanged(source, monkeypatch, step):
     bone = rig.pose.bones[3]
     bone["IK_FK"] = 0.25
     rig.pose.bones[0].keyframe_insert("location", frame=3)
-    before, actions = rig.animation_data.action, len(bpy.data.actions)
+    before = rig.animation_data.action
+    actions = len(bpy.data.actions)
 
     def fail(*args, **keywords):
         raise MemoryError
@@ -277,9 +283,12 @@ def test_a_pelvis_that_cannot_be_moved_is_reported(source):
     rig, bone_of = build_rig("unreal")
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
-    root, pelvis = rig.data.edit_bones.new("root"), rig.data.edit_bones[bone_of["pelvis"]]
-    root.head, root.tail = (0, 0, 0), pelvis.head
-    pelvis.parent, pelvis.use_connect = root, True
+    root = rig.data.edit_bones.new("root")
+    pelvis = rig.data.edit_bones[bone_of["pelvis"]]
+    root.head = (0, 0, 0)
+    root.tail = pelvis.head
+    pelvis.parent = root
+    pelvis.use_connect = True
     bpy.ops.object.mode_set(mode="OBJECT")
     with pytest.raises(InputError, match="'pelvis' of 'unreal' is connected to 'root'"):
         run(source, rig)
@@ -289,7 +298,8 @@ def test_a_pelvis_that_cannot_be_moved_is_reported(source):
     run(source, rig)
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
     constraint = rig.pose.bones["pelvis"].constraints.new("COPY_LOCATION")
-    constraint.target, constraint.subtarget = rig, "root"
+    constraint.target = rig
+    constraint.subtarget = "root"
     with pytest.raises(InputError, match="'pelvis' of 'unreal' does not move"):
         run(source, rig)
 
@@ -301,7 +311,8 @@ def test_bones_blocked_by_a_constraint_are_reported(source):
     bpy.context.scene.collection.objects.link(target)
     target.location = (0.2, -0.4, 0.5)  # far before where the foot ever is in this walk
     constraint = rig.pose.bones[bone_of["left_knee"]].constraints.new("IK")
-    constraint.target, constraint.chain_count = target, 2
+    constraint.target = target
+    constraint.chain_count = 2
     (warning,) = run(source, rig).warnings
     assert "'thigh_l'" in warning
     assert "cannot follow the motion: mute the constraints" in warning

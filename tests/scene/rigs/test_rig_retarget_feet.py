@@ -30,7 +30,9 @@ def points(rig, feet):
     """Return for each (foot, ball): heel and ball (T, 2, 3) in the world, and their positions at
     rest.
     """
-    heels_of_bones, rests, moved = [], [], []
+    heels_of_bones = []
+    rests = []
+    moved = []
     for foot, ball in feet:
         ankle = np.array(rig.matrix_world @ rig.data.bones[foot].head_local)
         rest_ball = np.array(rig.matrix_world @ rig.data.bones[ball].head_local)
@@ -44,7 +46,8 @@ def points(rig, feet):
     for frame in range(1, len(STANDS["left"]) + 1):
         bpy.context.scene.frame_set(frame)
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        world, bones = np.array(posed.matrix_world), posed.pose.bones
+        world = np.array(posed.matrix_world)
+        bones = posed.pose.bones
         heels = [
             world @ np.array(bones[foot].matrix) @ at
             for (foot, _), at in zip(feet, heels_of_bones, strict=True)
@@ -94,7 +97,8 @@ def test_feet_in_contact_stay_in_place(source, scheme, size):
 
 @pytest.mark.parametrize("loose", [("thigh",), ("",)], ids=["thighs", "every bone"])
 def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(loose):
-    clip, frames = walk(2.0), range(1, 60, 6)
+    clip = walk(2.0)
+    frames = range(1, 60, 6)
     clip.rotations[:, 0] = (
         exp(0.4 * np.sin(5 * clip.times)[:, None] * [0.3, 1.0, 0.5]) @ clip.rotations[:, 0]
     )

@@ -56,23 +56,25 @@ def build_hands(scheme, twist=0.6, **options):
     """
     rig, bone_of = build_rig(scheme, **options)
     to_armature = rig.matrix_world.inverted()
-    size, rng = options.get("size", 1.3), np.random.default_rng(5)
+    size = options.get("size", 1.3)
+    rng = np.random.default_rng(5)
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
-    edit, spell, found = rig.data.edit_bones, SPELL[scheme], {}
+    edit = rig.data.edit_bones
+    spell = SPELL[scheme]
+    found = {}
 
     def bone(name, parent, head, tail):
         new = edit.new(name)
-        new.head, new.tail, new.parent, new.roll = (
-            to_armature @ head,
-            to_armature @ tail,
-            parent,
-            rng.uniform(-3, 3),
-        )
+        new.head = to_armature @ head
+        new.tail = to_armature @ tail
+        new.parent = parent
+        new.roll = rng.uniform(-3, 3)
         return new
 
     for side in ("left", "right"):
-        wrist, elbow = edit[bone_of[f"{side}_wrist"]], edit[bone_of[f"{side}_elbow"]]
+        wrist = edit[bone_of[f"{side}_wrist"]]
+        elbow = edit[bone_of[f"{side}_elbow"]]
         start = rig.matrix_world @ wrist.head
         along = (start - rig.matrix_world @ elbow.head).normalized()
         down = along.cross(Vector((0, -1, 0))) * (1 if side == "left" else -1)
@@ -149,7 +151,8 @@ def check_hands(rig, bone_of):
 
         for finger in FINGERS:
             for k in (1, 2):
-                (a, A), (b, B) = rows(f"{finger}{k}"), rows(f"{finger}{k + 1}")
+                (a, A) = rows(f"{finger}{k}")
+                (b, B) = rows(f"{finger}{k + 1}")
                 assert angles(b - a, B - A).max() < 1.0, (side, finger, k)
         (w, W), (i, I), (p, P) = (rows(part) for part in ("wrist", "index1", "pinky1"))
         assert angles(np.cross(i - w, p - w), np.cross(I - W, P - W)).max() < 1.0, side
@@ -208,7 +211,8 @@ def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):
     person = build_scene(
         [motion_of(gesture(), body=HANDS)], HANDS, None, BuildOptions(start_frame=1.0)
     ).people[0]
-    rig, mesh = person.armature, person.mesh
+    rig = person.armature
+    mesh = person.mesh
     rig.animation_data_clear()
     for name in HANDS.joint_names:
         side, _, part = name.partition("_")

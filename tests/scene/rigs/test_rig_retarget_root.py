@@ -99,7 +99,8 @@ def test_a_capture_with_root_motion_on_an_object_or_in_place(source):
     np.testing.assert_allclose(seen(rig, bones)[0], before[0], atol=2e-3)
     # The pelvis stays, and the hips turn about it.
     assert np.ptp(seen(source, ["pelvis"])[:, 0, :2], axis=0).max() < 1e-3
-    hips, wanted = between_hips(rig, bone_of), between_hips(source)
+    hips = between_hips(rig, bone_of)
+    wanted = between_hips(source)
     np.testing.assert_allclose(hips[:, :2], travel * wanted[:, :2], atol=2e-3)
     move_root_motion_to_bones(source, BODY, RATE)
     run(source, rig)
@@ -123,7 +124,8 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root)
 
 def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
     rig, _ = build_rig("unreal")
-    name, actions = run(source, rig).action.name, len(bpy.data.actions)
+    name = run(source, rig).action.name
+    actions = len(bpy.data.actions)
     for root in ("object", "object", "in-place", "bone"):
         assert run(source, rig, root=root).action.name == name
     assert len(bpy.data.actions) == actions
@@ -137,9 +139,11 @@ def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
 @pytest.mark.parametrize("scale", [(1.3, 1.0, 1.0), (1.1, 0.9, 1.2), (-1.0, 1.0, 1.0)])
 def test_the_path_of_a_rig_with_three_factors_of_scale_is_the_captured_one(source, scale):
     rig, bone_of = build_rig("unreal")
-    rig.scale, rig.rotation_euler = scale, (0.0, 0.0, 0.5)
+    rig.scale = scale
+    rig.rotation_euler = (0.0, 0.0, 0.5)
     travel = run(source, rig).travel
-    path, wanted = between_hips(rig, bone_of), between_hips(source)
+    path = between_hips(rig, bone_of)
+    wanted = between_hips(source)
     np.testing.assert_allclose(
         (path - path[0])[:, :2], travel * (wanted - wanted[0])[:, :2], atol=2e-3
     )

@@ -83,10 +83,13 @@ def test_a_leg_that_is_straight_or_overstretched_does_not_turn_about_itself(rigi
         turns[:, NAMES.index(f"{side}_hip")] = 0.0
         turns[:, NAMES.index(f"{side}_knee")] = bent[:, None] * [1.0, 0.0, 0.0]
     rig = rigify_rigs[1][0]
-    source, options = captured(motion), RetargetOptions(feet=False)
+    source = captured(motion)
+    options = RetargetOptions(feet=False)
     retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, options)
     bones = [f"ORG-{bone}.{side}" for bone in ("thigh", "shin") for side in "LR"]
-    frames, axes, places = range(1, 31, 3), [], []
+    frames = range(1, 31, 3)
+    axes = []
+    places = []
     for fk in (1.0, 0.0):
         switch(rig, IK_FK=fk)
         places.append(posed(rig, frames))

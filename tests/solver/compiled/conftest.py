@@ -92,7 +92,8 @@ def _forked(server: socket.socket, code: str, folder: Path, variables: Mapping[s
     request = json.dumps([code, str(folder), dict(variables), TIMEOUT_S])
     with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
         socket.send_fds(server, [request.encode()], [stdout.fileno(), stderr.fileno()])
-        status, printed = int(server.recv(100)), []
+        status = int(server.recv(100))
+        printed = []
         for file in (stdout, stderr):
             file.seek(0)
             printed.append(file.read().decode("utf-8"))

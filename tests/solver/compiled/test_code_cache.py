@@ -147,7 +147,8 @@ def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compil
     first = code_files(folder / "cache")[0]
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
-    own, others = first.parent, (f"00000000-{ended.pid}", f"{computer()}-{os.getpid()}")
+    own = first.parent
+    others = (f"00000000-{ended.pid}", f"{computer()}-{os.getpid()}")
     for name in (f"{computer()}-{ended.pid}", *others):
         (own / f"{first.stem}{SUFFIX}.{name}-1a2b3c4d").write_bytes(first.read_bytes()[:100])
     assert run(folder, folder / "cache") == ([1] * COUNT, "")

@@ -20,8 +20,11 @@ def _all(a, d, src, s, n, results) -> None:
 @pytest.mark.parametrize("n", [0, 4, 8, 12, 40, 76])
 def test_operations_are_those_of_numpy(n: int) -> None:
     rng = np.random.default_rng(n)
-    src, before, a = rng.normal(size=300), rng.normal(size=4000), rng.normal(size=3)
-    d, s = 13, 5
+    src = rng.normal(size=300)
+    before = rng.normal(size=4000)
+    a = rng.normal(size=3)
+    d = 13
+    s = 5
     expected = before.copy()
     expected[d : d + n] = 0.0
     expected[1000 + d : 1000 + d + n] = src[s : s + n]

@@ -8,7 +8,8 @@ from scope.solver.compiled.kernel import kernel
 
 def _formula(q, state):
     """All operators, with numbers on either side."""
-    a, b = q(0), q(1)
+    a = q(0)
+    b = q(1)
     x, y = state
     return 2.0 - a * x, (x + b) / (1.0 + y * y), simd.sqrt(1.0 + a * a) - 3.0 / (2.0 + b * b)
 
@@ -23,8 +24,10 @@ def _run(table, at, state) -> None:
 
 def test_a_formula_gives_what_numpy_gives() -> None:
     rng = np.random.default_rng(2)
-    width, at = simd.WIDTH, 5
-    table, state = rng.normal(size=at + 2 * width + 3), rng.normal(size=3 * width)
+    width = simd.WIDTH
+    at = 5
+    table = rng.normal(size=at + 2 * width + 3)
+    state = rng.normal(size=3 * width)
     before = state.copy()
     given = [table[at + k * width : at + (k + 1) * width] for k in range(2)]
     expected = np.concatenate(

@@ -36,7 +36,9 @@ from scope.solver.residuals import floor, foot_contact, joint_prior, pose_prior
 
 from ..synthetic import forward, random_body, random_state
 
-K, P, M = 6, 4, 14
+K = 6
+P = 4
+M = 14
 BODY = random_body(np.random.default_rng(1), K, P, M)
 R0, T0, OMEGA, BETA = random_state(np.random.default_rng(2), K, P)
 POINTS = forward(BODY, R0, T0, OMEGA, BETA)[2]
@@ -106,7 +108,8 @@ SAME = {
 def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver(own, built_in):
     """One that numba has compiled already, and one as plain Python."""
     b = solved(SAME[built_in], Weights(**{built_in: 4e4}))
-    a, none = fitted(own, POINT_ROWS[own], 4e4), solved(SEEN)
+    a = fitted(own, POINT_ROWS[own], 4e4)
+    none = solved(SEEN)
     assert_same(a, b, 1e-9)
     assert np.abs(a.t_camera_part - none.t_camera_part).max() > 1e-3
     np.testing.assert_allclose(a.cost_by_term[own], b.cost_by_term[built_in], rtol=1e-9)
@@ -122,7 +125,9 @@ def test_a_python_residual_of_a_joint_fits_as_the_solvers_own_kernel():
 
 
 def test_a_python_residual_of_a_part_fits_as_the_solvers_own_kernel():
-    parts, R, t = np.array([0, 3]), rotations.exp(np.eye(3)[:2]), POINTS[:2]
+    parts = np.array([0, 3])
+    R = rotations.exp(np.eye(3)[:2])
+    t = POINTS[:2]
     a = fitted("slow_pose", pose_prior.pack(parts, R, t, [40.0, 9.0], [10.0, 300.0]), 3.0)
     assert_same(
         a,
@@ -134,7 +139,8 @@ def test_a_python_residual_of_a_part_fits_as_the_solvers_own_kernel():
 
 def test_the_python_residual_of_the_example_fits_as_its_kernel():
     rows = np.array([[2], [5]]), np.array([[0.3, 1.0], [-0.4, 2.0]])
-    a, b = fitted("height", rows, 1e4), fitted("slow_height", rows, 1e4)
+    a = fitted("height", rows, 1e4)
+    b = fitted("slow_height", rows, 1e4)
     assert_same(a, b, 1e-6)
     np.testing.assert_allclose(a.cost_by_term["height"], b.cost_by_term["slow_height"], rtol=1e-6)
 

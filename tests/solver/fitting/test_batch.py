@@ -87,7 +87,8 @@ def test_other_threads_run_while_the_kernels_do():
         while shared < 10 and fits < 20_000:
             before = len(ticks)
             solver.fit(m)
-            shared, fits = shared + (len(ticks) - before >= 5), fits + 1
+            shared = shared + (len(ticks) - before >= 5)
+            fits = fits + 1
     finally:
         sys.setswitchinterval(interval)
         done.set()

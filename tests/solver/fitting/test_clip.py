@@ -32,7 +32,10 @@ from scope.solver.gauss_newton.terms import make_terms
 from ..dense import jacobian, residuals, robust_factors
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
 
-K, P, M, T = 12, 6, 52, 12
+K = 12
+P = 6
+M = 52
+T = 12
 WEAK = Options(stages=[Stage(Weights(joint_prior=1e-3, shape=1e-4, joint_limits=0.0), 1e-12, 300)])
 SCALE = 1.12
 
@@ -47,7 +50,10 @@ def clip(seed, noise=0.0, scale=SCALE, frames=T):
     true = INTRINSICS.copy()
     true[0, 0] *= scale
     true[1, 1] *= scale
-    index, ones, states, measurements = np.arange(M), np.ones(M), [], []
+    index = np.arange(M)
+    ones = np.ones(M)
+    states = []
+    measurements = []
     for _ in range(frames):
         R0 = rotations.exp(0.1 * rng.standard_normal(3)) @ R0
         t0 = t0 + 0.03 * rng.standard_normal(3)
@@ -144,8 +150,10 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
     )
     joint.cost = joint._linearize(0, trial=False)
     predicted = joint._step(0, 20.0)
-    n, G = 6 + 3 * K, P + 1
-    H, g = np.zeros((frames * n + G,) * 2), np.zeros(frames * n + G)
+    n = 6 + 3 * K
+    G = P + 1
+    H = np.zeros((frames * n + G,) * 2)
+    g = np.zeros(frames * n + G)
     cost = 0.5 * 100.0 * beta @ beta
     for k, (m, s) in enumerate(zip(measurements, starts, strict=True)):
         data = {
@@ -155,10 +163,8 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
         }
         state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
         raw = residuals(body, data, focal=True)
-        sigmas, weights = (
-            [options.robust_keypoints2d, options.robust_keypoints3d],
-            [1e6 * np.ones(M), 24000.0 * np.ones(M)],
-        )
+        sigmas = [options.robust_keypoints2d, options.robust_keypoints3d]
+        weights = [1e6 * np.ones(M), 24000.0 * np.ones(M)]
         factors, part_cost = robust_factors(raw(state, np.zeros(n + G))[:2], sigmas, weights)
         cost += part_cost
 
@@ -167,7 +173,8 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
                 [(f[:, None] * r).ravel() for f, r in zip(factors, raw(moved, d), strict=False)]
             )
 
-        J, r = jacobian(body, state, stacked, extra=1), np.real(stacked(state, np.zeros(n + G)))
+        J = jacobian(body, state, stacked, extra=1)
+        r = np.real(stacked(state, np.zeros(n + G)))
         at = np.r_[k * n : (k + 1) * n, frames * n : frames * n + G]
         H[np.ix_(at, at)] += J.T @ J
         g[at] += J.T @ r
@@ -191,10 +198,12 @@ def test_carried_information_equals_what_the_frames_say_together():
     the joint one.
     """
     body, _, measurements, beta = clip(6, noise=1.0, scale=1.0)
-    priors, last = Priors(), None
+    priors = Priors()
+    last = None
     for m in measurements:
         fitted = fit(body, m, init=last, priors=priors)
-        priors, last = carry(priors, fitted, Weights().shape), fitted.state
+        priors = carry(priors, fitted, Weights().shape)
+        last = fitted.state
     joint = fit_clip(body, measurements, priors=Priors())
     single = fit(body, measurements[0], priors=Priors())
     causal_error = np.linalg.norm(fitted.state.beta - joint.beta)
@@ -253,11 +262,10 @@ def from_behind():
     turn = np.diag([1.0, -1.0, -1.0]) @ rotations.exp([0.0, np.pi - 0.3, 0.0])
     R, t = person.place(body, replace(state, R_camera_root=turn))
     index = np.array(list(body.keypoint_set("blazepose").values()))
-    points, ones = body.keypoints(R, t, state.beta)[index], np.ones(len(index))
-    image, space = (
-        Keypoints2D(index, person.project(points), ones),
-        Keypoints3D(index, points, ones),
-    )
+    points = body.keypoints(R, t, state.beta)[index]
+    ones = np.ones(len(index))
+    image = Keypoints2D(index, person.project(points), ones)
+    space = Keypoints3D(index, points, ones)
     return body, t, Measurements(person.INTRINSICS, image, space)
 
 
@@ -266,7 +274,8 @@ def from_behind():
 def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, temporal):
     body, joints, seen = from_behind()
     found = fit_clip(body, [*[Measurements()] * unseen, seen, seen, seen], temporal=temporal)
-    before, after = found.frames[: 1 if temporal else unseen], found.frames[unseen:]
+    before = found.frames[: 1 if temporal else unseen]
+    after = found.frames[unseen:]
     for f in [*before, *after]:  # those before hold the pose in which the person appears
         assert np.linalg.norm(f.t_camera_part - joints, axis=1).mean() < 0.02
     assert {f.status for f in before} == {Status.NO_MEASUREMENTS}
@@ -274,7 +283,8 @@ def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, tempora
 
 def test_a_clip_is_deterministic_and_refuses_nonsense():
     body, _, measurements, _ = clip(10, noise=1.0)
-    a, b = fit_clip(body, measurements, focal=True), fit_clip(body, measurements, focal=True)
+    a = fit_clip(body, measurements, focal=True)
+    b = fit_clip(body, measurements, focal=True)
     assert a.cost == b.cost
     np.testing.assert_array_equal(a.beta, b.beta)
     with pytest.raises(ShapeError, match="at least one frame"):

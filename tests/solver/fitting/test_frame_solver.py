@@ -38,7 +38,9 @@ from scope.solver.residuals.registry import RESIDUALS
 
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
 
-K, P, M = 23, 10, 60
+K = 23
+P = 10
+M = 60
 FREE = Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0)
 NO_PRIOR = Options(stages=[Stage(FREE, 1e-14, 200)])
 
@@ -48,7 +50,8 @@ def measured(body, state, noise=0.0, seed=0):
     rng = np.random.default_rng(seed)
     R, t, p = forward(body, *state)
     n = len(p)
-    index, ones = np.arange(n), np.ones(n)
+    index = np.arange(n)
+    ones = np.ones(n)
     return Measurements(
         INTRINSICS,
         Keypoints2D(index, project(p) + noise * rng.standard_normal((n, 2)), ones),
@@ -124,7 +127,8 @@ def test_one_kind_of_measurement_is_enough_to_start(kind):
     elif kind == "keypoints3d":
         assert np.linalg.norm(p - p_true, axis=1).max() < 0.03
     else:
-        bone, true = p - t[body.keypoint_part], p_true - t_true[body.keypoint_part]
+        bone = p - t[body.keypoint_part]
+        true = p_true - t_true[body.keypoint_part]
         cosines = (
             np.sum(bone * true, 1) / np.linalg.norm(bone, axis=1) / np.linalg.norm(true, axis=1)
         )
@@ -148,8 +152,12 @@ def test_an_outlier_moves_the_fit_less_than_without_the_robust_kernel():
 def run_iterates(body, state, m, count=5):
     tree = make_tree(body)
     table, _, _ = Options().stage_table([Stage()])
-    terms, pose, trial = make_terms(tree, m, Priors()), State(*state).pose(tree), make_pose(tree)
-    blocks, work, out = make_blocks(tree), make_workspace(tree), []
+    terms = make_terms(tree, m, Priors())
+    pose = State(*state).pose(tree)
+    trial = make_pose(tree)
+    blocks = make_blocks(tree)
+    work = make_workspace(tree)
+    out = []
     for _ in range(count):
         cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
         out.append((cost, pose.Omega[1:].copy(), pose.beta.copy(), pose.t - pose.t[0]))
@@ -163,7 +171,8 @@ def test_moving_camera_and_person_together_leaves_the_iterates_unchanged():
     body, state = scene(3)
     m = measured(body, state, noise=2.0)
     start = random_state(np.random.default_rng(9), K, P)
-    G, shift = rotations.exp([0.3, -1.0, 0.5]), np.array([2.0, -30.0, 400.0])
+    G = rotations.exp([0.3, -1.0, 0.5])
+    shift = np.array([2.0, -30.0, 400.0])
     m = replace(m, keypoints2d=None)
     m2 = replace(
         m,
@@ -196,12 +205,10 @@ def test_predicted_decrease_is_the_actual_one_near_the_solution(damping):
     start = State(
         state[0] @ rotations.exp([1e-4, -2e-4, 1e-4]), state[1] + 1e-4, state[2], state[3] + 1e-3
     )
-    pose, trial, blocks, work = (
-        start.pose(tree),
-        make_pose(tree),
-        make_blocks(tree),
-        make_workspace(tree),
-    )
+    pose = start.pose(tree)
+    trial = make_pose(tree)
+    blocks = make_blocks(tree)
+    work = make_workspace(tree)
     cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
     predicted = step(tree, pose, blocks, damping, 1 / 0.3, work)
     retract(tree, pose, work, trial)
@@ -235,7 +242,8 @@ def test_second_order_correction_reaches_the_same_minimum():
 def test_same_input_gives_the_same_bits():
     body, state = scene(7)
     m = measured(body, state, noise=2.0)
-    a, b = fit(body, m), fit(body, m)
+    a = fit(body, m)
+    b = fit(body, m)
     assert a.cost == b.cost
     np.testing.assert_array_equal(a.state.Omega, b.state.Omega)
     np.testing.assert_array_equal(a.state.beta, b.state.beta)
@@ -474,7 +482,8 @@ INDICES = {
 @pytest.mark.parametrize("name", INDICES)
 def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
     body, state = scene(10)
-    module, (outside, message) = RESIDUALS[name], INDICES[name]
+    module = RESIDUALS[name]
+    (outside, message) = INDICES[name]
     for index in outside:
         table = np.full((1, module.INTS), index), np.ones((1, module.FLOATS))
         with pytest.raises(ShapeError, match=f"{message}, but go from {index} to {index}"):
@@ -562,9 +571,11 @@ def test_wrong_states_priors_and_trees_are_refused():
 
 def test_one_solver_fits_cold_and_warm_by_turns_as_a_new_one_for_each_does():
     body, state = scene(3)
-    m, solver = measured(body, state, noise=1.0), FrameSolver(body)
+    m = measured(body, state, noise=1.0)
+    solver = FrameSolver(body)
     start = FrameSolver(body).fit(m).state
     for init in (None, start, None, start):
-        found, fresh = solver.fit(m, init), FrameSolver(body).fit(m, init)
+        found = solver.fit(m, init)
+        fresh = FrameSolver(body).fit(m, init)
         assert (found.cost, found.iterations) == (fresh.cost, fresh.iterations)
         np.testing.assert_array_equal(found.t_camera_part, fresh.t_camera_part)

@@ -42,7 +42,8 @@ def masked(m, value):
 
 def contradiction(m):
     k = m.keypoints3d
-    indices, ones = np.tile(k.indices, 2), np.ones(2 * len(k.indices))
+    indices = np.tile(k.indices, 2)
+    ones = np.ones(2 * len(k.indices))
     return replace(
         m, keypoints3d=Keypoints3D(indices, np.concatenate([k.points, 1.0 - k.points[::-1]]), ones)
     )
@@ -134,7 +135,8 @@ def test_one_bad_value_masks_its_own_measurement_and_nothing_else(bad):
     rng = np.random.default_rng(4)
     body = random_body(rng, 23, 10, 48)
     m = measured(body, random_state(rng, 23, 10, 0.4))
-    spoiled, without = masked(m, 1.0), masked(m, 1.0)
+    spoiled = masked(m, 1.0)
+    without = masked(m, 1.0)
     for name, field in (
         ("keypoints2d", "pixels"),
         ("keypoints3d", "points"),
@@ -144,7 +146,8 @@ def test_one_bad_value_masks_its_own_measurement_and_nothing_else(bad):
         broken[5, 1] = bad
         getattr(without, name).confidence[5] = 0.0
         spoiled = replace(spoiled, **{name: replace(getattr(spoiled, name), **{field: broken})})
-    a, b = fit(body, spoiled), fit(body, without)
+    a = fit(body, spoiled)
+    b = fit(body, without)
     assert a.measurements == b.measurements
     np.testing.assert_array_equal(a.t_camera_part, b.t_camera_part)
 
@@ -155,9 +158,12 @@ def test_no_value_however_large_spoils_the_frames_of_a_clip(size):
     rng = np.random.default_rng(5)
     body = random_body(rng, 23, 10, 48)
     m = measured(body, random_state(rng, 23, 10, 0.4))
-    ones, far = np.ones(1), np.array([[size, 0.0, size]])
-    image, space = np.array(m.keypoints2d.pixels), np.array(m.keypoints3d.points)
-    image[3], space[4] = size * INTRINSICS[0, 0], size
+    ones = np.ones(1)
+    far = np.array([[size, 0.0, size]])
+    image = np.array(m.keypoints2d.pixels)
+    space = np.array(m.keypoints3d.points)
+    image[3] = size * INTRINSICS[0, 0]
+    space[4] = size
     spoiled = replace(
         m,
         keypoints2d=replace(m.keypoints2d, pixels=image),

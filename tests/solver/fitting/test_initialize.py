@@ -11,7 +11,9 @@ from scope.solver.gauss_newton.terms import make_terms
 
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
 
-K, P, M = 6, 4, 21
+K = 6
+P = 4
+M = 21
 BODY = random_body(np.random.default_rng(1), K, P, M)
 TREE = make_tree(BODY)
 R0, T0, OMEGA, BETA = random_state(np.random.default_rng(2), K, P)

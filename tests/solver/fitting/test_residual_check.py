@@ -10,7 +10,9 @@ from scope.solver.residuals.accumulation import add_to_point
 
 from ..synthetic import random_body
 
-K, P, M = 5, 3, 12
+K = 5
+P = 3
+M = 12
 BODY = random_body(np.random.default_rng(1), K, P, M)
 ROWS = [[2], [4]], [[0.3, 1.0], [-0.2, 2.0]]
 
@@ -21,10 +23,12 @@ def kernel(gradient, curvature):
     def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
         cost = 0.0
         for k in range(ints.shape[0]):
-            i, w = ints[k, 0], weight * floats[k, 1]
+            i = ints[k, 0]
+            w = weight * floats[k, 1]
             r = pose.t[i, 1] - floats[k, 0]
             cost += 0.5 * w * r * r
-            W, f = curvature * w, gradient * w * r
+            W = curvature * w
+            f = gradient * w * r
             add_to_point(
                 tree,
                 pose,

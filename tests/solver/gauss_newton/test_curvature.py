@@ -77,7 +77,8 @@ def test_three_steps_teach_the_hessian_of_a_quadratic(small, accepted):
     axes they come.
     """
     rng, tree, curvature = small
-    true, known = symmetric(rng, K + 1), np.tile(2.0 * np.eye(3), (K + 1, 1, 1))
+    true = symmetric(rng, K + 1)
+    known = np.tile(2.0 * np.eye(3), (K + 1, 1, 1))
     at = rng.standard_normal((K + 1, 3))
     pose = placed(rng, tree)
     set_current(tree, pose, filled(tree, pose, known, np.einsum("iab,ib->ia", true, at)), curvature)
@@ -89,7 +90,8 @@ def test_three_steps_teach_the_hessian_of_a_quadratic(small, accepted):
         trial_blocks = filled(tree, trial, known, np.einsum("iab,ib->ia", true, at + w))
         update(tree, pose, u, trial, trial_blocks, accepted, curvature)
         if accepted:
-            pose, at = trial, at + w
+            pose = trial
+            at = at + w
             set_current(tree, pose, trial_blocks, curvature)
     np.testing.assert_allclose(curvature.S[1:], (true - known)[1:], atol=1e-8)
     reset(curvature)
@@ -128,7 +130,8 @@ def test_what_overflowed_is_not_added(small, bad):
 
 def test_residuals_that_couple_joint_and_part_teach_nothing(small):
     rng, tree, curvature = small
-    pose, trial = placed(rng, tree), placed(rng, tree)
+    pose = placed(rng, tree)
+    trial = placed(rng, tree)
     ones = np.ones((K + 1, 3))
     set_current(tree, pose, filled(tree, pose, symmetric(rng, K + 1), ones), curvature)
     blocks = filled(tree, trial, symmetric(rng, K + 1), -ones)
@@ -141,7 +144,8 @@ def noisy(body, seed):
     """A start near, and noisy measurements of, a person whose joints are drawn from the learned
     prior.
     """
-    rng, prior = np.random.default_rng(seed), load_joint_prior()
+    rng = np.random.default_rng(seed)
+    prior = load_joint_prior()
     R, t, _, beta = random_state(rng, 23, 10)
     Omega = np.array([prior.sample(name, 1, rng)[0] for name in body.joint_names[1:]])
     points = forward(body, R, t, Omega, beta)[2]
@@ -156,7 +160,8 @@ def test_the_default_stop_is_close_to_the_end(body):
     """Cost within 0.1 % and joints within 1 mm of the same start run to the end; Gauss-Newton alone
     stops short of that in one such frame of ten.
     """
-    solver, close = FrameSolver(body), []
+    solver = FrameSolver(body)
+    close = []
     end = Options(stages=(Stage(Weights(), 1e-13, 500),))
     for seed in range(80):
         start, m = noisy(body, seed)
@@ -191,7 +196,8 @@ def test_without_it_every_step_is_a_dense_gauss_newton_step():
         J, r, _ = dense_system(arrays, state, raw, sigmas, scales, priors, weights)
         d = -np.linalg.solve(J.T @ J, J.T @ r)
         R, _, _ = forward(arrays, *state)
-        R_parent, u = R[arrays.parents[1:]], d[6:27].reshape(7, 3)
+        R_parent = R[arrays.parents[1:]]
+        u = d[6:27].reshape(7, 3)
         Omega = rotations.exp(np.einsum("iba,ib->ia", R_parent, u)) @ state[2]
         state = rotations.exp(d[:3]) @ state[0], state[1] + d[3:6], Omega, state[3] + d[27:]
     plain = fit(
@@ -225,9 +231,12 @@ def test_the_information_on_the_shape_is_gauss_newtons(body):
     """What was learned serves the steps; it does not stay in what the fit reports."""
     start, m = noisy(body, 3)
     found = fit(body, m, init=start)
-    priors, tree = default_priors(body), make_tree(body)
+    priors = default_priors(body)
+    tree = make_tree(body)
     table, _, _ = Options().stage_table([Stage()])
-    pose, blocks, work = found.state.pose(tree), make_blocks(tree), make_workspace(tree)
+    pose = found.state.pose(tree)
+    blocks = make_blocks(tree)
+    work = make_workspace(tree)
     linearize(tree, make_terms(tree, m, priors), table[0], 0.0, pose, blocks, work.scratch)
     eliminate(tree, pose, blocks, MIN_DAMPING, 1.0 / 0.3, work)
     expected = work.C[:10, :10] - table[0, 0, SHAPE_PRIOR] * np.eye(10)

@@ -23,11 +23,9 @@ def assert_upper_is(C: np.ndarray, expected: np.ndarray) -> None:
 @pytest.mark.parametrize("count", [1, 6, 15])
 def test_products_of_two_arrays_and_of_one(W: int, count: int) -> None:
     rng = np.random.default_rng(W + count)
-    C0, X, Z = (
-        rng.normal(size=(W, W)),
-        rng.normal(size=(count, 3 + W)),
-        rng.normal(size=(count, 1 + W)),
-    )
+    C0 = rng.normal(size=(W, W))
+    X = rng.normal(size=(count, 3 + W))
+    Z = rng.normal(size=(count, 1 + W))
     C = C0.copy()
     add_gram(C, W, X, 3, 3 + W, Z, 1, 1 + W, count)
     assert_upper_is(C, C0 + X[:, 3:].T @ Z[:, 1:])
@@ -43,7 +41,8 @@ def test_known_zeros_are_skipped_without_changing_the_product(
     W: int, first: int, count: int
 ) -> None:
     rng = np.random.default_rng(W)
-    C0, X = rng.normal(size=(W, W)), rng.normal(size=(count, W))
+    C0 = rng.normal(size=(W, W))
+    X = rng.normal(size=(count, W))
     for j in range(count):
         X[: 3 * (j // 3), first + j] = 0.0
     C = C0.copy()
@@ -54,12 +53,11 @@ def test_known_zeros_are_skipped_without_changing_the_product(
 @pytest.mark.parametrize("width", WIDTHS)
 def test_four_rows_alone(width: int) -> None:
     rng = np.random.default_rng(width)
-    count, c_row = 7, width + 5
-    C0, X, Z = (
-        rng.normal(size=(6, c_row)),
-        rng.normal(size=(count, 4)),
-        rng.normal(size=(count, width)),
-    )
+    count = 7
+    c_row = width + 5
+    C0 = rng.normal(size=(6, c_row))
+    X = rng.normal(size=(count, 4))
+    Z = rng.normal(size=(count, width))
     C = C0.copy()
     # rows 1..4, columns 2..
     subtract_gram_rows(C, c_row + 2, c_row, X, 0, 4, Z, 0, width, count, width)

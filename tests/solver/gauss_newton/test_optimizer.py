@@ -30,7 +30,9 @@ def test_a_rejected_step_is_damped_more_and_more(trial_cost):
 
 def test_a_small_decrease_ends_in_convergence_and_damping_without_end_in_a_stall():
     assert judge_trial(10.0, 9.999, 0.001, 0.01, 2.0, 1e-3)[3] == Status.CONVERGED.value
-    damping, growth, status = 0.01, 2.0, RUNNING
+    damping = 0.01
+    growth = 2.0
+    status = RUNNING
     for _ in range(100):
         if status == RUNNING:
             _, damping, growth, status = judge_trial(10.0, 11.0, 5.0, damping, growth, 1e-3)

@@ -87,7 +87,8 @@ def problem(seed, K, P, M, focal=False):
 
 def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
     """J and r of everything, and the cost, from the definitions."""
-    K, P = len(state[2]), len(state[3])
+    K = len(state[2])
+    P = len(state[3])
     factors, cost = robust_factors(raw(state, np.zeros(6 + 3 * K + P + extra)), sigmas, scales)
 
     def stacked(moved_state, d):
@@ -117,14 +118,18 @@ def test_step_equals_dense_step(K, P, M, seed):
     )
     J_terms, r_terms, cost = dense_system(body, state, raw, sigmas, scales, priors, weights)
     for damping, coupled in product((0.0, 40.0), (False, True)):
-        J, r = J_terms, r_terms
-        pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
+        J = J_terms
+        r = r_terms
+        pose = State(*state).pose(tree)
+        blocks = make_blocks(tree)
+        work = make_workspace(tree)
         assert linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch) == pytest.approx(
             cost, rel=1e-11
         )
         if coupled:
             J_extra, r_extra = random_coupling(rng, tree, blocks, pose.t, pose.t[0])
-            J, r = np.vstack([J, J_extra]), np.concatenate([r, r_extra])
+            J = np.vstack([J, J_extra])
+            r = np.concatenate([r, r_extra])
         Lambda = damping * np.concatenate(
             [np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K), np.zeros(P)]
         )
@@ -142,7 +147,9 @@ def test_focal_length_is_one_more_column(damping):
         3, 23, 10, 40, focal=True
     )
     J, r, _ = dense_system(body, state, raw, sigmas, scales, priors, weights, extra=1)
-    pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
+    pose = State(*state).pose(tree)
+    blocks = make_blocks(tree)
+    work = make_workspace(tree)
     linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     Lambda = damping * np.concatenate(
         [np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(69), np.zeros(11)]
@@ -155,12 +162,10 @@ def test_focal_length_is_one_more_column(damping):
 
 def test_twists_of_parts_follow_from_the_step():
     _, body, state, tree, terms, stage, *_ = problem(5, 23, 10, 40)
-    pose, trial, blocks, work = (
-        State(*state).pose(tree),
-        make_pose(tree),
-        make_blocks(tree),
-        make_workspace(tree),
-    )
+    pose = State(*state).pose(tree)
+    trial = make_pose(tree)
+    blocks = make_blocks(tree)
+    work = make_workspace(tree)
     linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     step(tree, pose, blocks, 1.0, ROOT_SCALE, work)
     for array in (work.x, work.u, work.dbeta):
@@ -168,7 +173,8 @@ def test_twists_of_parts_follow_from_the_step():
     retract(tree, pose, work, trial)
     R, t, _ = forward(body, trial.R[0], trial.t[0], trial.Omega[1:], trial.beta[:10])
     for i in range(24):
-        w, nu = work.x[i, :3], work.x[i, 3:]
+        w = work.x[i, :3]
+        nu = work.x[i, 3:]
         np.testing.assert_allclose(rotations.log(R[i] @ pose.R[i].T), w, atol=1e-12)
         expected = np.cross(w, pose.t[i] - pose.t[0]) + nu + pose.D[i, :, :10] @ work.dbeta[:10]
         np.testing.assert_allclose(t[i] - pose.t[i], expected, atol=1e-12)
@@ -176,7 +182,9 @@ def test_twists_of_parts_follow_from_the_step():
 
 def test_a_rejected_step_is_solved_again_from_the_kept_blocks():
     _, _, state, tree, terms, stage, *_ = problem(6, 23, 10, 40)
-    pose, blocks, work = State(*state).pose(tree), make_blocks(tree), make_workspace(tree)
+    pose = State(*state).pose(tree)
+    blocks = make_blocks(tree)
+    work = make_workspace(tree)
     linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
     first = step(tree, pose, blocks, 5.0, ROOT_SCALE, work)
     x = work.x.copy()

@@ -114,7 +114,8 @@ def smpl_formula(
         local = np.eye(4)
         # the root has none, and its entry is not used
         parent = int(tables["kintree_table"][0, i]) if i else 0
-        local[:3, :3], local[:3, 3] = R, J[i] - (J[parent] if i else 0)
+        local[:3, :3] = R
+        local[:3, 3] = J[i] - (J[parent] if i else 0)
         chain.append(chain[parent] @ local if i else local)
     from_rest = []
     for G, joint in zip(chain, J, strict=True):

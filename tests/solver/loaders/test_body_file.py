@@ -15,7 +15,8 @@ def test_a_body_knows_its_file_unless_it_is_built_in(tmp_path):
     """A motion names the file, so that its body is found again on this machine."""
     path = tmp_path / "mine.npz"
     shutil.copy(BUILT_IN["scope"], path)
-    own, built_in = load_body(path), load_body("scope")
+    own = load_body(path)
+    built_in = load_body("scope")
     assert (own.file, built_in.file) == (str(path.resolve()), "")
     np.testing.assert_array_equal(own.v_template, built_in.v_template)
 

@@ -54,7 +54,8 @@ def as_smpl_file(body: Body) -> dict[str, np.ndarray]:
     """The default body as an SMPL-like file: a regressor that gives its joints exactly, for every
     shape.
     """
-    V, n = len(body.v_template), body.K + 1
+    V = len(body.v_template)
+    n = body.K + 1
     basis = np.column_stack([body.v_template, body.shapedirs.reshape(V, -1), np.ones(V)])
     wanted = np.column_stack([body.J_template, body.J_shapedirs.reshape(n, -1), np.ones(n)])
     weights = np.zeros((V, n))
@@ -96,7 +97,8 @@ def test_the_heel_is_on_the_sole_even_if_the_ankle_protrudes_further_back(tmp_pa
     v = tables["v_template"].copy()
     v[v[:, 1] > v[:, 1].min() + 0.06] -= [0.0, 0.0, 0.1]  # everything above the feet, backwards
     np.savez(tmp_path / "leaning.npz", **{**tables, "v_template": v})
-    plain, leaning = load_model(tmp_path / "plain.npz"), load_model(tmp_path / "leaning.npz")
+    plain = load_model(tmp_path / "plain.npz")
+    leaning = load_model(tmp_path / "leaning.npz")
     for name in ("coco/left_heel", "coco/right_heel"):
         i = own.keypoint_names.index(name)
         np.testing.assert_allclose(

@@ -51,11 +51,9 @@ def test_kinematics_and_skinning_follow_the_smpl_formula(
     assert body.name == family
     assert body.P == kept
     rng = np.random.default_rng(2)
-    betas, trans, rotations = (
-        rng.normal(size=kept),
-        rng.normal(size=3),
-        random_rotations(body.K + 1),
-    )
+    betas = rng.normal(size=kept)
+    trans = rng.normal(size=3)
+    rotations = random_rotations(body.K + 1)
     R, t = body.forward_kinematics(rotations, trans, betas)
     vertices, joints = formula(tables, betas, rotations, trans)
     np.testing.assert_allclose(t, joints, atol=1e-12)
@@ -306,7 +304,8 @@ def test_damaged_archives_never_give_a_traceback(tmp_path, tables_of):
     path = tmp_path / "body.npz"
     np.savez_compressed(path, **tables_of("smpl", vertices=90, betas=2))
     whole = path.read_bytes()
-    rng, refused = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
+    refused = 0
     for k in range(150):
         damaged = bytearray(whole)
         for position in rng.integers(0, len(whole), 4):

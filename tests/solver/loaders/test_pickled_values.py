@@ -23,7 +23,9 @@ def with_state(cls: type, **state: object) -> object:
 
 def compressed(cls: type, dense: np.ndarray, by_column: bool, **names: object) -> object:
     """The attributes of a CSC or CSR matrix, counted out entry by entry."""
-    data, indices, indptr = [], [], [0]
+    data = []
+    indices = []
+    indptr = [0]
     for line in dense.T if by_column else dense:
         for i, value in enumerate(line):
             if value:
@@ -139,7 +141,8 @@ def test_python_2_pickles(tmp_path, tables_of, stand_ins, python2, protocol):
 
 def test_a_chumpy_slice_is_the_slice(tmp_path, tables_of, stand_ins):
     tables = tables_of("smpl", betas=20)
-    ch, select = stand_ins("chumpy.ch.Ch"), stand_ins("chumpy.reordering.Select")
+    ch = stand_ins("chumpy.ch.Ch")
+    select = stand_ins("chumpy.reordering.Select")
     kept = np.arange(tables["shapedirs"].size).reshape(tables["shapedirs"].shape)[:, :, :7]
     sliced = with_state(
         select,

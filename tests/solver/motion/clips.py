@@ -27,7 +27,9 @@ from scope.solver.motion.views import View, pack_frames
 from ..dense import complex_log, moved
 from ..synthetic import INTRINSICS, forward, random_body, random_state
 
-K, P, M = 6, 3, 10
+K = 6
+P = 3
+M = 10
 FOCAL_WEIGHT = 7.0
 FLAT = Options(stages=[Stage(Weights(joint_prior=0.0, joint_limits=0.0))], curvature=False)
 PRIOR = MotionPrior(
@@ -66,7 +68,8 @@ class Clip:
     cameras: list
 
     def frames(self):
-        index, ones = np.arange(M), np.ones(M)
+        index = np.arange(M)
+        ones = np.ones(M)
         out = []
         for f in range(len(self.times)):
             views = []
@@ -95,11 +98,9 @@ class Clip:
         problem = ClipProblem(tree, views, motion, shared, settings, pool)
         poses = make_poses(tree, problem.frames)
         for f, s in enumerate(self.starts):
-            poses.R[f, 0], poses.t[f, 0], poses.Omega[f, 1:] = (
-                s.R_camera_root,
-                s.t_camera_root,
-                s.Omega,
-            )
+            poses.R[f, 0] = s.R_camera_root
+            poses.t[f, 0] = s.t_camera_root
+            poses.Omega[f, 1:] = s.Omega
         poses.beta[:P] = self.starts[0].beta
         return problem, poses, problem.make_system()
 
@@ -108,7 +109,8 @@ def noisy_clip(seed, frames=6, cameras=2):
     """Return a clip whose measurements are near the states that it starts from."""
     rng = np.random.default_rng(seed)
     body, states, times = walk(rng, frames)
-    pixels, points = [[] for _ in range(cameras)], []
+    pixels = [[] for _ in range(cameras)]
+    points = []
     for s in states:
         p = forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2]
         points.append(p + 0.02 * rng.standard_normal(p.shape))
@@ -126,9 +128,12 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
 
     From the definition; analytic, so that complex steps give its Jacobian.
     """
-    body, T = clip.body, len(clip.times)
-    n, h = 6 + 3 * K, np.diff(clip.times)
-    indices, p = np.asarray(clip.stands.indices), np.asarray(clip.stands.probability)
+    body = clip.body
+    T = len(clip.times)
+    n = 6 + 3 * K
+    h = np.diff(clip.times)
+    indices = np.asarray(clip.stands.indices)
+    p = np.asarray(clip.stands.probability)
     table = prior.packed(K)
 
     def velocity(A, B, step):
@@ -137,7 +142,8 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
     def all_of_them(d, step=moved):
         shared = d[T * n :]
         log_focal = shared[P] if focal else 0.0
-        poses, out = [], []
+        poses = []
+        out = []
         for f in range(T):
             s = clip.starts[f]
             state = (s.R_camera_root, s.t_camera_root, s.Omega, clip.starts[0].beta)
@@ -157,7 +163,9 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
             out.append((points - clip.points[f], np.full(M, 24000.0), np.full(M, 0.01)))
         for f in range(2, T):
             mean = 0.5 * (h[f - 1] + h[f - 2])
-            a, b, c = poses[f - 2], poses[f - 1], poses[f]
+            a = poses[f - 2]
+            b = poses[f - 1]
+            c = poses[f]
             rows = [
                 (velocity(b[0][0], c[0][0], h[f - 1]) - velocity(a[0][0], b[0][0], h[f - 2])) / mean
             ]

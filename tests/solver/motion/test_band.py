@@ -10,7 +10,8 @@ from scope.solver.motion.band import make_factor, solve_clip
 from ..dense import H
 from .clips import K, P, gauss_newton_residuals, kernel, noisy_clip
 
-DAMPING, ROOT_SCALE = 3.0, 1 / 0.3
+DAMPING = 3.0
+ROOT_SCALE = 1 / 0.3
 
 
 def dense_step(clip):
@@ -18,7 +19,8 @@ def dense_step(clip):
     Hessian.
     """
     residuals = gauss_newton_residuals(clip)
-    n, T = 6 + 3 * K, len(clip.times)
+    n = 6 + 3 * K
+    T = len(clip.times)
     size = T * n + P + 1
     at_rest = residuals(np.zeros(size))
     factors = [np.sqrt(w * kernel(r, sigma)[1])[:, None] for r, w, sigma in at_rest]
@@ -33,7 +35,8 @@ def dense_step(clip):
         d = np.zeros(size, complex)
         d[k] = 1j * H
         J[:, k] = np.imag(stacked(d)) / H
-    JTJ, g = J.T @ J, J.T @ np.real(stacked(np.zeros(size)))
+    JTJ = J.T @ J
+    g = J.T @ np.real(stacked(np.zeros(size)))
     damped = np.zeros(size)
     damped[: T * n] = np.tile(
         DAMPING * np.r_[np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K)], T

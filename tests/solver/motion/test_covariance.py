@@ -23,7 +23,8 @@ def test_covariance_is_that_of_the_dense_inverse():
         problem.tree, system, poses, 1.0, make_factor(system)
     )
     _, _, _, H = dense_step(clip)
-    n, T = 6 + 3 * K, len(clip.times)
+    n = 6 + 3 * K
+    T = len(clip.times)
     S = np.linalg.inv(H + MIN_DAMPING * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)]))
     np.testing.assert_allclose(
         shared, S[T * n :, T * n :], rtol=1e-6, atol=1e-9 * np.abs(shared).max()
@@ -49,7 +50,8 @@ def test_covariance_is_that_of_the_dense_inverse():
 
 def dense_matrix(system, T):
     """The symmetric matrix (T n + G, T n + G) that a system stands for."""
-    n, G = 6 + 3 * K, P + 1
+    n = 6 + 3 * K
+    G = P + 1
     A = np.zeros((T * n + G, T * n + G))
     slots = [0, *range(6, n, 3), 3]
     for f in range(T):
@@ -60,7 +62,8 @@ def dense_matrix(system, T):
                 A[(f - 1) * n + at : (f - 1) * n + at + 3, f * n + at : f * n + at + 3] = block.T
             w, _, J, columns, counts = system.contacts
             for k, m in enumerate(counts):
-                own, before = J[f, k, :, :m], J[f - 1, k, :, :m]
+                own = J[f, k, :, :m]
+                before = J[f - 1, k, :, :m]
                 A[np.ix_((f - 1) * n + columns[k, :m], f * n + columns[k, :m])] -= (
                     w[f, k] * before.T @ own
                 )
@@ -73,7 +76,8 @@ def dense_matrix(system, T):
 
 
 def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
-    T, n = 60, 6 + 3 * K
+    T = 60
+    n = 6 + 3 * K
     clip = noisy_clip(4, frames=T, cameras=1)
     stiff = replace(
         PRIOR, joints=30.0, root_rotation=30.0, root_position=500.0, robust_joints=np.inf

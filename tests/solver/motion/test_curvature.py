@@ -20,10 +20,13 @@ from scope.solver.examples import person
 
 def both_fits(seed):
     """Fits of one clip, seen in 2D with noise, with the learned curvature and without it."""
-    body, rng = load_body("scope"), np.random.default_rng(seed)
+    body = load_body("scope")
+    rng = np.random.default_rng(seed)
     index = list(body.keypoint_set("blazepose").values())
     first = person.pose(body, seed=1)
-    frames, starts, times = [], [], np.arange(6) / 30
+    frames = []
+    starts = []
+    times = np.arange(6) / 30
     for t in times:
         bent = first.Omega @ rotations.exp(2.0 * t * rng.standard_normal((1, 3)))
         state = State(first.R_camera_root, first.t_camera_root, bent, first.beta)

@@ -43,7 +43,8 @@ def smooth_walk(rng, frames, rate):
     """A body, its states in a smooth motion, and their times."""
     body, (first,), _ = walk(rng, 1, random_body(rng, K, P, MARKERS))
     times = np.arange(frames) / rate
-    swing, turn = 0.4 * rng.standard_normal((K, 3)), rng.uniform(1.0, 3.0, (K, 1))
+    swing = 0.4 * rng.standard_normal((K, 3))
+    turn = rng.uniform(1.0, 3.0, (K, 1))
     states = [
         State(
             rotations.exp([0.0, 0.4 * t, 0.1 * np.sin(t)]) @ first.R_camera_root,
@@ -74,7 +75,10 @@ def test_covariance_and_estimate_of_linear_motion_in_closed_form():
     """One point with no joints: the estimate is the linear smoother's, y -> A^-1 w y with A = w I +
     D'D w_a / h^3.
     """
-    T, h, weight, w_a = 24, 1 / 30, 24000.0, 40.0
+    T = 24
+    h = 1 / 30
+    weight = 24000.0
+    w_a = 40.0
     rng = np.random.default_rng(0)
     empty = np.zeros((1, 3, 1))
     body = RandomBody(
@@ -152,8 +156,10 @@ def test_windows_agree_with_the_whole_clip(known):
 
 def test_moved_with_its_cameras_the_motion_moves_along():
     clip = noisy_clip(5, frames=5)
-    G, g = rotations.exp(np.array([0.4, -0.8, 0.3])), np.array([1.0, -2.0, 0.5])
-    frames, elsewhere = [], []
+    G = rotations.exp(np.array([0.4, -0.8, 0.3]))
+    g = np.array([1.0, -2.0, 0.5])
+    frames = []
+    elsewhere = []
     # without 3D keypoints, which are in the first camera's axes
     for first, *others in clip.frames():
         views = [
@@ -311,9 +317,9 @@ FRAMES_REFUSED = {
         "frames[1][0] must be View, but is a Measurements",
     ),
     "a view of None": (
-        [View(None)],
+        [View(None)],  # type: ignore[arg-type]
         "measurements of frames[1][0] must be Measurements, but is None",
-    ),  # type: ignore[arg-type]
+    ),
     "scaled": (
         [View(Measurements()), View(Measurements(), 2.0 * TURNED)],
         "R_camera_world of frames[1][1] must be",

@@ -60,7 +60,8 @@ def test_exact_rays_meet_in_the_points(world: np.ndarray) -> None:
 def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(
     world: np.ndarray,
 ) -> None:
-    first, second = np.arange(8), np.arange(4, POINTS)
+    first = np.arange(8)
+    second = np.arange(4, POINTS)
     found = points_of([seen(world, 0, first), seen(world, 1, second)])
     np.testing.assert_array_equal(found.indices, np.arange(4, 8))
     twice = [seen(world, 0, first), seen(world, 0, first)]  # two cameras in one place

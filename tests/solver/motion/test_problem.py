@@ -24,14 +24,16 @@ def test_gradient_of_the_clips_whole_objective_by_finite_differences(seed, camer
     clip = noisy_clip(seed, cameras=cameras)
     problem, poses, system = clip.problem()
     cost = problem.linearize(0, poses, system)
-    n, T = 6 + 3 * K, len(clip.times)
+    n = 6 + 3 * K
+    T = len(clip.times)
     residuals = gauss_newton_residuals(clip)
 
     def objective(d):
         return cost_of(residuals(d, turned))
 
     assert cost == pytest.approx(objective(np.zeros(T * n + P + 1)), rel=1e-11)
-    expected, h = np.zeros(T * n + P + 1), 1e-5
+    expected = np.zeros(T * n + P + 1)
+    h = 1e-5
     for k in range(len(expected)):
         d = np.zeros(len(expected))
         d[k] = h

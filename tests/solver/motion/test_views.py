@@ -20,7 +20,9 @@ from scope.solver.motion.views import pack_frames, terms_of
 
 from ..synthetic import INTRINSICS, random_body
 
-K, P, M = 6, 3, 10
+K = 6
+P = 3
+M = 10
 
 
 def seen(rng, points):
@@ -45,7 +47,8 @@ def test_the_terms_of_every_view_are_those_it_has_alone():
     rng = np.random.default_rng(0)
     body = random_body(rng, K, P, M)
     body.parents[1:] = 0  # every joint hangs on the root, so that both ends of a direction do
-    tree, priors = make_tree(body), Priors(limits=None)
+    tree = make_tree(body)
+    priors = Priors(limits=None)
     sets = [np.arange(5), np.arange(5), np.array([7, 2, 9]), np.arange(5), np.array([1, 4])]
     single = [seen(rng, some) for some in sets]
     pair = [
@@ -62,7 +65,8 @@ def test_the_terms_of_every_view_are_those_it_has_alone():
     assert views.own_axes.tolist() == [True] * 5 + [False] * 2 + [True]
     assert (counts > 0).tolist() == [True] * 6 + [False]
     for v, (m, its_priors) in enumerate(flat):
-        found, expected = terms_of(views, v), make_terms(tree, m, priors)
+        found = terms_of(views, v)
+        expected = make_terms(tree, m, priors)
         np.testing.assert_array_equal(found.starts, expected.starts)
         np.testing.assert_array_equal(found.flags, expected.flags)
         np.testing.assert_array_equal(found.rest, expected.rest)

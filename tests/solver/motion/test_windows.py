@@ -20,7 +20,8 @@ def test_every_frame_is_kept_once_and_has_neighbours(
     kept = np.concatenate([np.arange(len(times))[w.kept] for w in windows])
     np.testing.assert_array_equal(kept, np.arange(len(times)))
     for w in windows:
-        frames, own = times[w.frames], times[w.kept]
+        frames = times[w.frames]
+        own = times[w.kept]
         assert frames[-1] - frames[0] <= length + 1e-9
         assert w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop
         least = 0.4 * overlap  # half of it, but for the unevenness of the frames

@@ -136,10 +136,8 @@ def test_each_point_may_have_a_plane_of_its_own():
         fit(BODY, seen(state, floor=copies), init=state).t_camera_part, one.t_camera_part
     )
     sideways = np.array([1.0, 0.0, 0.0])
-    normals, offsets = (
-        np.array([sideways, -sideways]),
-        np.array([1.0, -1.0]) * (p[FEET[:2], 0] + [0.05, 0.05]),
-    )
+    normals = np.array([sideways, -sideways])
+    offsets = np.array([1.0, -1.0]) * (p[FEET[:2], 0] + [0.05, 0.05])
     found = points(
         fit(
             BODY, seen(state, floor=Floor(FEET[:2], normals, offsets, np.zeros(2))), init=state

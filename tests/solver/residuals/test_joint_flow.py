@@ -102,7 +102,8 @@ def test_vector_kernel_agrees_with_numpy_joint_by_joint_also_at_half_turns():
             a = flows[i - 1, jf.BOUND] - log_det
             half = 0.5 * (a + np.sqrt(a * a + 1.0))
             g = J.T @ z - h * half / np.sqrt(a * a + 1.0) * gradient
-            w, R = 1.3 * weights[i - 1], pose.R[tree.parents[i]]
+            w = 1.3 * weights[i - 1]
+            R = pose.R[tree.parents[i]]
             expected += w * (0.5 * z @ z + h * half)
             np.testing.assert_allclose(
                 blocks.H_u[i, :, 6], w * R @ g, rtol=1e-6, atol=1e-9, err_msg=str(i)

@@ -17,14 +17,17 @@ BENT = {"knee": [0.0, 0.0, -1.0], "elbow": [0.0, 0.0, 1.0]}
 
 def cost(name, rotation_vector):
     axis, lower, upper, swing_limit = HINGES[name]
-    Omega, origin, identity = rotations.exp(rotation_vector), np.zeros(3), np.eye(3)
+    Omega = rotations.exp(rotation_vector)
+    origin = np.zeros(3)
+    identity = np.eye(3)
     part = Part(Omega, origin, np.zeros((3, 0)), Omega, identity, origin, np.zeros(0))
     return float(np.sum(evaluate(part, np.array(axis), lower, upper, swing_limit, 1.0, 1.0).r ** 2))
 
 
 @pytest.mark.parametrize("name", HINGES)
 def test_knees_bend_backwards_and_elbows_forwards(name):
-    axis, limb = np.array(HINGES[name][0]), name.split("_")[1]
+    axis = np.array(HINGES[name][0])
+    limb = name.split("_")[1]
     rest = np.array(REST.get(name, REST.get(limb)))
     np.testing.assert_allclose(rotations.exp(np.pi / 2 * axis) @ rest, BENT[limb], atol=1e-12)
 

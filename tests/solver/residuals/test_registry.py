@@ -122,7 +122,8 @@ def test_kernels_made_in_a_loop_have_names_of_their_own():
     """Machine code from several processes is linked by these names."""
     from scope.solver.residuals import registry
 
-    names, chain = [], [registry.accumulate_tables]
+    names = []
+    chain = [registry.accumulate_tables]
     while chain:
         function = chain.pop().py_func
         names.append(function.__qualname__)

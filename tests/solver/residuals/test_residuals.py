@@ -34,7 +34,8 @@ from ..synthetic import INTRINSICS, random_body, random_flow, random_state
 
 P = 6
 AXIS = np.array([0.6, 0.0, 0.8])
-CONTOUR, NORMAL = np.array([0.3, -0.2]), np.array([0.6, -0.8])
+CONTOUR = np.array([0.3, -0.2])
+NORMAL = np.array([0.6, -0.8])
 
 
 def random_part(rng, scale=1.0):
@@ -58,7 +59,8 @@ def moved(part, x, u, dbeta):
     """The part moved by a twist about its origin of twists, with its joint and the shape, by their
     definition.
     """
-    w, nu = x[:3], x[3:]
+    w = x[:3]
+    nu = x[3:]
     E = rotations.exp(w)
     return Part(
         E @ part.R,
@@ -87,10 +89,8 @@ def check_derivatives(evaluate, part, atol=2e-7, h=1e-6):
     return found
 
 
-V_BAR, V = (
-    0.2 * np.random.default_rng(8).standard_normal(3),
-    0.05 * np.random.default_rng(9).standard_normal((3, P)),
-)
+V_BAR = 0.2 * np.random.default_rng(8).standard_normal(3)
+V = 0.05 * np.random.default_rng(9).standard_normal((3, P))
 L = np.random.default_rng(10).standard_normal((P, P))
 HAT = rotations.exp([0.2, -0.5, 0.3])
 FLOW = random_flow(np.random.default_rng(11), HAT)
@@ -154,7 +154,8 @@ def test_derivatives_behind_the_camera():
 @pytest.mark.parametrize("name", CASES)
 def test_weight_is_linear_in_the_cost(name):
     part = random_part(np.random.default_rng(1))
-    one, four = CASES[name](part, 1.0), CASES[name](part, 4.0)
+    one = CASES[name](part, 1.0)
+    four = CASES[name](part, 4.0)
     for a, b in zip(one, four, strict=True):
         np.testing.assert_allclose(b, 2.0 * a, rtol=1e-14)
 
@@ -224,9 +225,11 @@ def check_blocks(tree, blocks, cost, i, found):
 )
 def test_table_kernels_accumulate_their_residual(name, seed):
     rng, body, tree, pose = chain(seed)
-    i, w = 3, 1.9
+    i = 3
+    w = 1.9
     k = int(np.flatnonzero(body.keypoint_part == i)[0])
-    v_bar, shape = body.v_bar[k], body.V[k]
+    v_bar = body.v_bar[k]
+    shape = body.V[k]
     part = part_of(tree, pose, i)
     if name == "pose_prior":
         tables = pose_prior.pack([i], HAT[None], np.array([[0.1, 0.1, 2.5]]), [2.0], [3.0])
@@ -241,7 +244,9 @@ def test_table_kernels_accumulate_their_residual(name, seed):
         name = "joint_flow"
     elif name.startswith("foot_contact"):
         if name.endswith("joint"):
-            k, v_bar, shape = 10 + i, np.zeros(3), np.zeros((3, P))
+            k = 10 + i
+            v_bar = np.zeros(3)
+            shape = np.zeros((3, P))
         tables = foot_contact.pack([k], np.array([[0.1, 0.2, 3.1]]), [2.0])
         found = foot_contact.evaluate(part, v_bar, shape, np.array([0.1, 0.2, 3.1]), 2.0 * w)
         name = "foot_contact"
@@ -251,10 +256,8 @@ def test_table_kernels_accumulate_their_residual(name, seed):
         found = floor.evaluate(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
         name = "floor"
     elif name.startswith("outline"):
-        delta, normal = (
-            np.array([0.02, -0.01, 0.03]),
-            NORMAL * (-1.0 if name.endswith("inside") else 1.0),
-        )
+        delta = np.array([0.02, -0.01, 0.03])
+        normal = NORMAL * (-1.0 if name.endswith("inside") else 1.0)
         found = outline.evaluate(part, v_bar + delta, shape, CONTOUR, normal, 1.0)
         inside = bool(found.r[0] < 0)
         never = [[np.inf], [np.inf]]
@@ -363,22 +366,27 @@ def test_triggs_correction_is_the_second_derivative_along_the_residual(way):
     """With 4 (s/sigma) k below the clamp, W = dp-Hessian of the kernel with linearized r."""
     rng = np.random.default_rng(0)
     p = np.array([0.3, -0.2, 3.0])
-    inv_sigma, w = 3.0, 2.0
+    inv_sigma = 3.0
+    w = 2.0
     if way == "image":
         uv = (0.15, 0.1)
         out = keypoint2d.term(*p, *uv, 1.0, w, inv_sigma, 0.99)
-        W, G = out[1:7], np.array([[1, 0, -p[0] / p[2]], [0, 1, -p[1] / p[2]]]) / p[2]
+        W = out[1:7]
+        G = np.array([[1, 0, -p[0] / p[2]], [0, 1, -p[1] / p[2]]]) / p[2]
         r = p[:2] / p[2] - uv
     elif way == "space":
         m = p + 0.1 * rng.standard_normal(3)
         _, scale, kappa, *f = keypoint3d.term(*p, *m, w, inv_sigma, 0.99)
         full = scale * np.eye(3) - kappa * np.outer(f, f)
-        W, G, r = full[np.triu_indices(3)], np.eye(3), p - m
+        W = full[np.triu_indices(3)]
+        G = np.eye(3)
+        r = p - m
     else:
         n = np.array([0.2, -0.1, 1.0]) / np.linalg.norm([0.2, -0.1, 1.0])
         W = orientation_field.term(*p, *n, w, inv_sigma, 0.99)[1:7]
         unit = p / np.linalg.norm(p)
-        G, r = (np.eye(3) - np.outer(unit, unit)) / np.linalg.norm(p), unit - n
+        G = (np.eye(3) - np.outer(unit, unit)) / np.linalg.norm(p)
+        r = unit - n
     s = r @ r
     k = 1 / (1 + s * inv_sigma)
     expected = w * k**2 * (G.T @ G - 4 * inv_sigma * k * np.outer(G.T @ r, G.T @ r))

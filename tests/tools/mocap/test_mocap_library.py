@@ -24,7 +24,8 @@ PARTS = {
 
 @pytest.fixture(scope="module")
 def texts(shared):
-    folder, found = shared / "data" / "mocap", {}
+    folder = shared / "data" / "mocap"
+    found = {}
     for archive, (last, most) in PARTS.items():
         files = beginning(folder / f"{archive}.tar.xz", last)
         found[archive] = {name: text for name, text in files.items() if len(text) < most}
@@ -102,7 +103,8 @@ def test_feet_are_near_the_ground(takes):
 
 def test_walkers_walk_forwards_at_walking_pace_with_left_on_the_left(takes):
     walkers = [t for t in takes if "walking" in t.name or t.name in ("02_01", "walk", "long_walk1")]
-    speeds, forwards = [], []
+    speeds = []
+    forwards = []
     for take in walkers:
         pelvis = take.joint("pelvis")
         step = round(take.fps / 5)

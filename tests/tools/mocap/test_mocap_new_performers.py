@@ -57,14 +57,14 @@ def standing(
         "head_end": [0.0, 1.7, 0.0],
     }
     for side, x in (("left", 0.1), ("right", -0.1)):
-        knee, elbow = np.radians(knee_deg), np.radians(elbow_deg)
-        joints[f"{side}_hip"], joints[f"{side}_knee"] = [x, 0.95, 0.0], [x, 0.53, 0.0]
+        knee = np.radians(knee_deg)
+        elbow = np.radians(elbow_deg)
+        joints[f"{side}_hip"] = [x, 0.95, 0.0]
+        joints[f"{side}_knee"] = [x, 0.53, 0.0]
         ankle = joints[f"{side}_ankle"] = [x, 0.53 - 0.43 * np.cos(knee), -0.43 * np.sin(knee)]
         joints[f"{side}_foot_end"] = np.add(ankle, [0.0, -0.06, 0.15])
-        joints[f"{side}_collar"], joints[f"{side}_shoulder"] = (
-            [0.5 * x, 1.45, 0.0],
-            [1.8 * x, 1.43, 0.0],
-        )
+        joints[f"{side}_collar"] = [0.5 * x, 1.45, 0.0]
+        joints[f"{side}_shoulder"] = [1.8 * x, 1.43, 0.0]
         joints[f"{side}_elbow"] = [1.8 * x, 1.15, 0.0]
         joints[f"{side}_wrist"] = [1.8 * x, 1.15 - 0.25 * np.cos(elbow), 0.25 * np.sin(elbow)]
     R = exp(np.array([0.0, np.radians(turn_deg), 0.0]))
@@ -126,12 +126,11 @@ def test_the_body_stands_as_the_joints_do(body):
     assert fitted.valid.all()
     assert np.nanmax(fitted.error) < 0.03
     at = fitted.t[0]
-    ankle, knee = at[body.joint_names.index("left_ankle")], at[body.joint_names.index("left_knee")]
+    ankle = at[body.joint_names.index("left_ankle")]
+    knee = at[body.joint_names.index("left_knee")]
     assert knee[2] - ankle[2] == pytest.approx(0.43 * np.sin(np.radians(30)), abs=0.03)
-    wrist, elbow = (
-        at[body.joint_names.index("right_wrist")],
-        at[body.joint_names.index("right_elbow")],
-    )
+    wrist = at[body.joint_names.index("right_wrist")]
+    elbow = at[body.joint_names.index("right_elbow")]
     assert wrist[2] - elbow[2] == pytest.approx(0.25 * np.sin(np.radians(60)), abs=0.04)
 
 
@@ -176,7 +175,8 @@ def made_markers() -> dict[str, np.ndarray]:
 def test_joint_centres_lie_inside_the_markers():
     joints, head = markers.joint_centres(made_markers())
     np.testing.assert_allclose(head[0], [0.0, 0.0, 0.28], atol=1e-9)
-    left, right = joints["left_hip"][0], joints["right_hip"][0]
+    left = joints["left_hip"][0]
+    right = joints["right_hip"][0]
     assert np.linalg.norm(left - right) == pytest.approx(2 * (0.33 * 0.26 + 0.0073), abs=1e-9)
     assert 0.88 < left[1] < 0.93  # below the markers on the iliac spines
     for side, sign in (("left", 1.0), ("right", -1.0)):

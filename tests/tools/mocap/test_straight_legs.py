@@ -8,7 +8,8 @@ import pytest
 from scope.tools.mocap.straight_legs import MOST_M, flexion, knee_flexions, straightened
 from scope.tools.mocap.take import Take
 
-THIGH, SHANK = 0.42, 0.41
+THIGH = 0.42
+SHANK = 0.41
 NAMES = ("pelvis", *(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle")))
 
 
@@ -38,7 +39,8 @@ def legs(take):
 
 def test_flexion_has_the_sign_of_the_side_to_which_a_knee_bends():
     left = np.array([[1.0, 0.0, 0.0]])
-    hip, ankle = np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 0.0]])
+    hip = np.array([[0.0, 1.0, 0.0]])
+    ankle = np.array([[0.0, 0.0, 0.0]])
     assert flexion(hip, np.array([[0.0, 0.5, 0.1]]), ankle, left) == pytest.approx(
         2 * np.degrees(np.arctan(0.2))
     )

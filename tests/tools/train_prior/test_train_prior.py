@@ -48,7 +48,9 @@ def prior():
 
 def test_export_evaluates_to_what_torch_computed():
     row = dict(np.load(FIXTURE))
-    states, z, log_likelihood = row.pop("states"), row.pop("z"), row.pop("log_likelihood")
+    states = row.pop("states")
+    z = row.pop("z")
+    log_likelihood = row.pop("log_likelihood")
     parameters = flat(row, states)
     np.testing.assert_allclose(jf.transform(parameters, states)[0], z, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(
@@ -191,10 +193,12 @@ def test_samples_of_the_prior_look_like_the_data(prior, samples):
     for model in MODELS:
         joint = model if model in TRUNK else f"left_{model}"
         s = samples[model]
-        data, weights = s.rotations[s.is_training], balanced(s.group[s.is_training], 0.7)
+        data = s.rotations[s.is_training]
+        weights = balanced(s.group[s.is_training], 0.7)
         drawn = prior.sample(joint, 4000, rng)
         M = mean_rotation(data, weights)
-        x, y = rotations.log(M.T @ data), rotations.log(M.T @ drawn)
+        x = rotations.log(M.T @ data)
+        y = rotations.log(M.T @ drawn)
         C = np.einsum("n,ni,nj->ij", weights, x, x)
         spread, axes = np.linalg.eigh(C)
         found = np.diag(axes.T @ (y.T @ y / len(y)) @ axes)

@@ -120,7 +120,9 @@ def test_blender_does_not_wait_for_a_worker_that_is_ending(
 def test_several_people_are_built_and_distinguished(fake_worker, footage):
     fake_worker("assert request['people'] == 3\nfinish(2)")
     scene = bpy.context.scene
-    scene.scope.footage, scene.scope.people, scene.scope.people_count = str(footage), "COUNT", 3
+    scene.scope.footage = str(footage)
+    scene.scope.people = "COUNT"
+    scene.scope.people_count = 3
     bpy.ops.scope.capture()
     assert scene.scope.result.people == 2
     assert [w.text[:8] for w in scene.scope.result.warnings[1:]] == ["Person 1", "Person 2"]
@@ -131,7 +133,8 @@ def test_the_height_of_a_child_requests_the_body_of_all_ages(fake_worker, footag
     fake_worker(
         "assert request['body'] == 'scope_child', request\nsend('error', message='so it was')"
     )
-    bpy.context.scene.scope.footage, bpy.context.scene.scope.height_cm = str(footage), 110
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.context.scene.scope.height_cm = 110
     with pytest.raises(RuntimeError, match="So it was"):
         bpy.ops.scope.capture()
 
@@ -141,7 +144,8 @@ def test_hands_request_the_body_with_fingers(fake_worker, footage):
         "assert request['hands'] == 'on' and request['body'] == 'scope_h'\nsend('error', "
         "message='so it was')"
     )
-    bpy.context.scene.scope.footage, bpy.context.scene.scope.hands = str(footage), "ON"
+    bpy.context.scene.scope.footage = str(footage)
+    bpy.context.scene.scope.hands = "ON"
     with pytest.raises(RuntimeError, match="So it was"):
         bpy.ops.scope.capture()
 
@@ -179,7 +183,8 @@ def test_the_operator_builds_what_the_interface_builds(fake_worker, footage, sta
     operators = next(o for o in captures()[0].objects if o.type == "ARMATURE")
     options = BuildOptions(frame_rate="set", start_frame=1.0)
     interfaces = build_scene([standing], load_body("scope"), footage, options).people[0].armature
-    ours, theirs = fcurves(operators), fcurves(interfaces)
+    ours = fcurves(operators)
+    theirs = fcurves(interfaces)
     assert [(c.data_path, c.array_index) for c in ours] == [
         (c.data_path, c.array_index) for c in theirs
     ]
@@ -334,7 +339,8 @@ def test_the_automatic_frame_rate_respects_other_animation(fake_worker, footage,
 def test_real_worker_on_a_picture(footage):
     """It runs in Blender's Python, isolated, with only the folders that it is given."""
     scene = bpy.context.scene
-    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
+    scene.scope.footage = str(footage)
+    scene.scope.quality = "FAST"
     assert bpy.ops.scope.capture() == {"FINISHED"}
     assert scene.scope.result.people == 1
     from scope.scope_addon.capture.options import CaptureOptions
@@ -350,13 +356,14 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, 
     import cv2
 
     height, width = cv2.imread(str(footage)).shape[:2]
-    K, dist = (
-        [[700.0, 0, width / 2 + 3], [0, 720.0, height / 2], [0, 0, 1]],
-        [-0.05, 0.01, 0.002, 0.0, 0.0],
-    )
-    lens, scene = tmp_path / "lens.json", bpy.context.scene
-    scene.scope.footage, scene.scope.quality = str(footage), "FAST"
-    scene.scope.lens, scene.scope.calibration_file = "FILE", str(lens)
+    K = [[700.0, 0, width / 2 + 3], [0, 720.0, height / 2], [0, 0, 1]]
+    dist = [-0.05, 0.01, 0.002, 0.0, 0.0]
+    lens = tmp_path / "lens.json"
+    scene = bpy.context.scene
+    scene.scope.footage = str(footage)
+    scene.scope.quality = "FAST"
+    scene.scope.lens = "FILE"
+    scene.scope.calibration_file = str(lens)
     guard = tmp_path / "guard.py"
     guard.write_text(
         "import runpy, sys\n"
@@ -404,7 +411,9 @@ def test_footage_whose_name_is_not_utf8(fake_worker, footage, tmp_path):
 def test_a_kept_frame_rate_that_differs_is_reported(fake_worker, footage, policy, warns):
     fake_worker("finish()")
     scene = bpy.context.scene
-    scene.render.fps, scene.scope.frame_rate, scene.scope.footage = 20, policy, str(footage)
+    scene.render.fps = 20
+    scene.scope.frame_rate = policy
+    scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     texts = [warning.text for warning in scene.scope.result.warnings]
     assert any("keeps its 20 frames/s, the footage has 25" in text for text in texts) is warns

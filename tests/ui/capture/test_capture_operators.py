@@ -64,7 +64,8 @@ def test_an_unexpected_error_ends_the_capture():
 
 
 def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
-    drawn, now = [], [100.0]
+    drawn = []
+    now = [100.0]
     monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
     monkeypatch.setattr(capture_operators, "time", SimpleNamespace(monotonic=lambda: now[0]))
     lines = ["Finding the person"]
@@ -134,7 +135,8 @@ def test_the_sample_exists():
 def test_escape_cancels_only_over_the_panel(fake_worker, footage, x, y, window, cancels):
     fake_worker("time.sleep(600)")
     bpy.context.scene.scope.footage = str(footage)
-    state.job, state.started = CaptureJob(bpy.context.scene), time.monotonic()
+    state.job = CaptureJob(bpy.context.scene)
+    state.started = time.monotonic()
     operator = SimpleNamespace(
         job_state=state, ask_to_cancel=partial(SCOPE_OT_capture.ask_to_cancel, None)
     )
@@ -150,7 +152,8 @@ class Drawn:
     """A layout that notes what is drawn."""
 
     def __init__(self):
-        self.texts, self.operators = [], []
+        self.texts = []
+        self.operators = []
 
     def column(self):
         return self
@@ -166,11 +169,13 @@ class Drawn:
 
 @pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
 def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
-    state.job, state.started = SimpleNamespace(cancelled=False, close=lambda: None), 100.0
+    state.job = SimpleNamespace(cancelled=False, close=lambda: None)
+    state.started = 100.0
     monkeypatch.setattr(
         capture_operators, "time", SimpleNamespace(monotonic=lambda: 100.0 + seconds)
     )
-    questions, drawn = [], Drawn()
+    questions = []
+    drawn = Drawn()
     monkeypatch.setattr(capture_operators, "ask_to_stop", lambda: questions.append(True))
     monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
     operator = SimpleNamespace(

@@ -66,13 +66,15 @@ def test_the_height_is_in_centimetres_and_optional(footage):
     scene = bpy.context.scene
     scene.scope.footage = str(footage)
     assert capture_job.capture_request(scene).values["heights_m"] == ()
-    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 0.01
+    scene.unit_settings.system = "METRIC"
+    scene.unit_settings.scale_length = 0.01
     scene.scope.height_cm = 182.0
     assert capture_job.capture_request(scene).values["heights_m"] == pytest.approx((1.82,))
 
 
 def test_each_scene_has_its_own_settings():
-    first, second = bpy.context.scene, bpy.data.scenes.new("second")
+    first = bpy.context.scene
+    second = bpy.data.scenes.new("second")
     first.scope.quality = "FAST"
     assert second.scope.quality == "BEST"
 
@@ -117,10 +119,8 @@ def test_a_motion_file_contains_the_captured_motion_and_the_edits_that_it_keeps(
     fake_worker, footage, tmp_path
 ):
     captured(fake_worker, footage)
-    armature, cached = (
-        bpy.data.objects["person"],
-        next((cache().root / "captures").rglob("person1.npz")),
-    )
+    armature = bpy.data.objects["person"]
+    cached = next((cache().root / "captures").rglob("person1.npz"))
     kept = Motion.load(cached)
     bpy.context.view_layer.objects.active = armature
     bpy.ops.scope.refloor()
@@ -302,7 +302,9 @@ def test_the_part_of_the_video_is_sent_to_the_worker(fake_worker, footage):
     fake_worker("assert (float(request['start']), float(request['end'])) == (1.5, 3.0)\nfinish()")
     settings = bpy.context.scene.scope
     settings.footage = str(footage)
-    settings.use_range, settings.range_start, settings.range_end = True, 1.5, 3.0
+    settings.use_range = True
+    settings.range_start = 1.5
+    settings.range_end = 3.0
     assert bpy.ops.scope.capture() == {"FINISHED"}
     settings.range_end = 1.0
     with pytest.raises(RuntimeError, match="ends before it starts"):

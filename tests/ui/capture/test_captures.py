@@ -110,7 +110,8 @@ def test_renaming_breaks_nothing(two):
     select("person")
     collection = bpy.data.collections["person"]
     # the collections are sorted by name
-    collection.name, bpy.data.objects["person"].name = "zzz", "hero"
+    collection.name = "zzz"
+    bpy.data.objects["person"].name = "hero"
     bpy.data.collections["other"].name = "person"
     assert shown() == ("zzz", 1, "First")
     assert [obj.name for obj in people_of(collection)] == ["hero"]

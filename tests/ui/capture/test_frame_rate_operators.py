@@ -43,7 +43,8 @@ def built(start=START, **changes):
 def scene():
     """A scene of 20 frames per second with an animated cube of the user's."""
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = 20, 1.0
+    scene.render.fps = 20
+    scene.render.fps_base = 1.0
     bpy.ops.mesh.primitive_cube_add()
     cube = bpy.context.object
     for frame in (3, 40):
@@ -55,7 +56,8 @@ def scene():
 
 def at_times(armature, names, start=START):
     """Return where bones are at times of the footage, (T, B, 3)."""
-    scene, out = bpy.context.scene, []
+    scene = bpy.context.scene
+    out = []
     for time in TIMES:
         frame = start + time * scene.render.fps / scene.render.fps_base
         scene.frame_set(int(frame), subframe=frame - int(frame))
@@ -103,7 +105,8 @@ def test_a_rate_that_an_importer_has_changed_is_noticed_and_restored(scene):
 
 def test_a_frame_range_of_the_users_stays(scene):
     built()
-    scene.frame_start, scene.frame_end = 1, 250
+    scene.frame_start = 1
+    scene.frame_end = 250
     bpy.ops.scope.match_frame_rate()
     assert (scene.frame_start, scene.frame_end) == (1, 250)
 
@@ -141,7 +144,8 @@ def test_nla_strips_and_their_actions_move(scene):
 def test_a_loop_stays_closed_and_the_scene_plays_it(scene):
     person = built()
     bpy.ops.scope.loop(start=12, end=50)
-    first, last = scene.frame_start, scene.frame_end
+    first = scene.frame_start
+    last = scene.frame_end
     bpy.ops.scope.match_frame_rate()
     frames = read_keys(fcurves(person)[0])[:, 0]
     assert abs(scene.frame_start - frames[0]) < 1
@@ -167,7 +171,8 @@ def test_a_retargeted_rig_moves_along_and_its_own_action_stays(scene):
 
 
 def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
-    first, second = built(), built(start=101.0)
+    first = built()
+    second = built(start=101.0)
     rig, bones = build_rig("mixamo")
     scene.scope_retarget.rig = rig
     bpy.context.view_layer.objects.active = first
@@ -210,7 +215,8 @@ def test_review_frames_and_corrections_name_the_moved_frames(scene):
 
 
 def test_two_captures_keep_their_starts_and_speeds(scene):
-    first, second = built(), built(start=101.0)
+    first = built()
+    second = built(start=101.0)
     before = at_times(first, NAMES), at_times(second, NAMES, 101.0)
     bpy.ops.scope.match_frame_rate()
     np.testing.assert_allclose(at_times(first, NAMES), before[0], atol=1e-4)

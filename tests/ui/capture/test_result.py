@@ -68,15 +68,14 @@ def test_figures_are_wrapped_to_the_width_of_the_sidebar(body):
     motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
     motion.joint_sigma_m[:] = 0.041
     result = build_scene([motion], body)
-    shown, drawn = result.collection.scope_result, []
+    shown = result.collection.scope_result
+    drawn = []
     heights = [{"height_m": 1.7, "height_sigma_m": 0.1}] * 4
     show_result(shown, "", {"camera": "estimated, 52 degrees", "per_person": heights}, result)
     layout = SimpleNamespace(label=lambda text="", icon="NONE": drawn.append(text))
     layout.column = lambda align=False: layout
-    region, preferences = (
-        SimpleNamespace(width=260),
-        SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
-    )
+    region = SimpleNamespace(width=260)
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
     capture_panel._draw_figures(
         SimpleNamespace(region=region, preferences=preferences), layout, shown
     )

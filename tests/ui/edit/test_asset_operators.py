@@ -49,7 +49,8 @@ def test_the_action_becomes_an_asset_with_picture_tags_and_details(rig):
 
 
 def test_the_picture_is_of_the_first_frame_that_needs_no_review(rig):
-    action, pictures = rig.animation_data.action, {}
+    action = rig.animation_data.action
+    pictures = {}
     for frame in (1, 11, 20):  # the footage's frame 10 is at the scene's frame 11
         bpy.context.scene.frame_set(frame)
         bpy.ops.scope.mark_asset(current_pose=True)
@@ -99,7 +100,8 @@ def test_a_catalog_of_the_file_is_assigned_and_an_unknown_one_changes_nothing(ri
 
 def test_the_picture_and_details_are_saved_with_the_file(rig, tmp_path):
     bpy.ops.scope.mark_asset(author="Ada")
-    before, name = picture(rig.animation_data.action), rig.animation_data.action.name
+    before = picture(rig.animation_data.action)
+    name = rig.animation_data.action.name
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walk.blend"))
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(tmp_path / "walk.blend"), assets_only=True) as (found, wanted):

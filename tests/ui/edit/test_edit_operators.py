@@ -27,7 +27,8 @@ def rig(tmp_path):
     armature = captured(motion)
     path = tmp_path / "person1.npz"
     motion.save(path)
-    armature["scope_motion"], armature["scope_body_file"] = str(path), "scope"
+    armature["scope_motion"] = str(path)
+    armature["scope_body_file"] = "scope"
     return armature
 
 
@@ -70,7 +71,8 @@ def test_a_scene_of_the_users_own_body_knows_its_file(tmp_path, monkeypatch):
 
 
 def test_smoothing_from_raw_and_back(rig):
-    before, action = seen(rig), rig.animation_data.action
+    before = seen(rig)
+    action = rig.animation_data.action
     bpy.ops.scope.smooth(strength=0.0)
     raw = seen(rig)
     assert np.abs(raw - before).max() > 0.02
@@ -85,7 +87,8 @@ def test_smoothing_from_raw_and_back(rig):
 
 def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
     scene = bpy.context.scene
-    scene.render.fps, scene.render.fps_base = 24, 1.0
+    scene.render.fps = 24
+    scene.render.fps_base = 1.0
     motion = motion_of(walk(SECONDS), noise=0.05)
     rig = (
         build_scene([motion], BODY, None, BuildOptions(frame_rate="resample", start_frame=1.0))
@@ -93,7 +96,8 @@ def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
         .armature
     )
     motion.save(tmp_path / "person1.npz")
-    rig["scope_motion"], rig["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    rig["scope_motion"] = str(tmp_path / "person1.npz")
+    rig["scope_body_file"] = "scope"
     before = read_clip(rig, BODY, 24.0)[1]
     np.testing.assert_array_equal(before, np.arange(1, len(before) + 1))
     bpy.ops.scope.smooth(strength=2.0)
@@ -168,7 +172,8 @@ def test_the_floor_is_the_same_with_root_motion_on_an_object_or_removed(rig, mod
 
 @pytest.mark.parametrize("heading", [True, False])
 def test_root_motion_looks_the_same_and_comes_back(rig, heading):
-    before, clip = seen(rig), keys(rig)[0]
+    before = seen(rig)
+    clip = keys(rig)[0]
     bpy.ops.scope.root_motion(mode="OBJECT", heading=heading)
     empty = root_object(rig)
     np.testing.assert_allclose(seen(rig), before, atol=2e-4)
@@ -188,11 +193,9 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
 def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
-    rig.location, rig.rotation_euler, rig.scale = (
-        (1.0, 2.0, 0.5),
-        (tilt, -0.4 * tilt, 0.8),
-        (1.2,) * 3,
-    )
+    rig.location = (1.0, 2.0, 0.5)
+    rig.rotation_euler = (tilt, -0.4 * tilt, 0.8)
+    rig.scale = (1.2,) * 3
     rig.rotation_mode = "XYZ"
     before = seen(rig)
     for mode in ("OBJECT", "OBJECT", "IN_PLACE", "OBJECT", "BONES"):
@@ -205,14 +208,14 @@ def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
 
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
 def test_a_moved_armature_is_in_place_again_when_root_motion_returns_to_the_bones(rig, mode):
-    rig.rotation_mode, rig.location, rig.rotation_euler, rig.scale = (
-        "XYZ",
-        (1.0, 2.0, 0.5),
-        (0.3, 0, 0.8),
-        (1.2,) * 3,
-    )
+    rig.rotation_mode = "XYZ"
+    rig.location = (1.0, 2.0, 0.5)
+    rig.rotation_euler = (0.3, 0, 0.8)
+    rig.scale = (1.2,) * 3
     bpy.ops.scope.smooth()
-    before, place, clip = seen(rig), np.array(rig.matrix_world), keys(rig)[0]
+    before = seen(rig)
+    place = np.array(rig.matrix_world)
+    clip = keys(rig)[0]
     operators = bpy.ops.scope.smooth, lambda: bpy.ops.scope.root_motion(mode="BONES")
     for back in operators:
         bpy.ops.scope.root_motion(mode=mode)
@@ -228,7 +231,8 @@ def stage():
     """An animated object that is also moved, rotated, tilted and scaled."""
     obj = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(obj)
-    obj.rotation_euler, obj.scale = (0.2, -0.1, 0.7), (1.5,) * 3
+    obj.rotation_euler = (0.2, -0.1, 0.7)
+    obj.scale = (1.5,) * 3
     for frame, x in ((1, 2.0), (90, 5.0)):
         obj.location = (x, -1.0, 0.3)
         obj.keyframe_insert("location", frame=frame)
@@ -236,12 +240,10 @@ def stage():
 
 
 def test_root_motion_keeps_the_armatures_parent(rig, stage):
-    rig.parent, rig.location, rig.rotation_euler, rig.rotation_mode = (
-        stage,
-        (0.4, 0, 0),
-        (0, 0, 0.5),
-        "XYZ",
-    )
+    rig.parent = stage
+    rig.location = (0.4, 0, 0)
+    rig.rotation_euler = (0, 0, 0.5)
+    rig.rotation_mode = "XYZ"
     rig.matrix_parent_inverse = Matrix.Translation((0, 0.2, 0)) @ Matrix.Scale(0.8, 4)
     before = seen(rig)
     for mode in ("OBJECT", "OBJECT", "IN_PLACE", "BONES", "OBJECT", "BONES"):
@@ -265,7 +267,9 @@ def test_root_motion_of_an_armature_parented_to_a_bone(rig, stage):
     crane.data.edit_bones.new("hook").tail = (0.3, 0.0, 0.9)
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.objects.active = rig
-    rig.parent, rig.parent_type, rig.parent_bone = crane, "BONE", "hook"
+    rig.parent = crane
+    rig.parent_type = "BONE"
+    rig.parent_bone = "hook"
     before = seen(rig)
     for mode in ("OBJECT", "BONES"):
         bpy.ops.scope.root_motion(mode=mode)
@@ -275,7 +279,9 @@ def test_root_motion_of_an_armature_parented_to_a_bone(rig, stage):
 
 def test_a_failed_edit_restores_keys_and_root(rig, monkeypatch):
     bpy.ops.scope.root_motion(mode="OBJECT")
-    before, empty, action = seen(rig), root_object(rig), rig.animation_data.action.name
+    before = seen(rig)
+    empty = root_object(rig)
+    action = rig.animation_data.action.name
     blocks = (len(bpy.data.objects), len(bpy.data.actions))
 
     def fail(*args, **keywords):
@@ -300,10 +306,8 @@ def test_each_cycle_of_a_loop_continues_from_the_previous_one(rig):
     length = scene.frame_end + 1 - scene.frame_start
     assert length in (30, 60)  # a period is one second
     first = scene.frame_start
-    once, next_time = (
-        seen(rig, [first, first + 10]),
-        seen(rig, [first + length, first + length + 10]),
-    )
+    once = seen(rig, [first, first + 10])
+    next_time = seen(rig, [first + length, first + length + 10])
     gone = next_time[:, 0] - once[:, 0]
     np.testing.assert_allclose(gone[:, 1], -1.2 * length / RATE, atol=0.02)
     np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
@@ -320,7 +324,8 @@ def test_smoothing_a_loop_restores_the_whole_motion(rig):
 
 def test_smoothing_a_loop_restores_the_frame_range(rig):
     scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 2, 120
+    scene.frame_start = 2
+    scene.frame_end = 120
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     cycle = scene.frame_start, scene.frame_end
     # again, within the first one
@@ -363,7 +368,8 @@ def test_a_motion_file_without_the_armature_is_an_error(rig, tmp_path):
 
 @pytest.mark.parametrize("degrees", [0.3, 2.0])
 def test_reduced_keys_stay_within_the_chosen_error(rig, degrees):
-    before, dense = seen(rig, range(1, 91)), keys(rig)[0]
+    before = seen(rig, range(1, 91))
+    dense = keys(rig)[0]
     count = sum(len(c.keyframe_points) for c in _curves(rig))
     bpy.ops.scope.reduce_keys(degrees=degrees, millimetres=3.0)
     after = sum(len(c.keyframe_points) for c in _curves(rig))
@@ -392,10 +398,12 @@ def test_edits_need_a_captured_armature_and_find_the_only_one():
 
 @pytest.mark.parametrize("overridden", [False, True])
 def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overridden):
-    name, file = rig.users_collection[0].name, tmp_path / "capture.blend"
+    name = rig.users_collection[0].name
+    file = tmp_path / "capture.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene, layer = bpy.context.scene, bpy.context.view_layer
+    scene = bpy.context.scene
+    layer = bpy.context.view_layer
     scene.render.fps = int(RATE)
     with bpy.data.libraries.load(str(file), link=True) as (_, here):
         here.collections = [name]
@@ -457,7 +465,8 @@ def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, edit, chang
 
 def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
     animation = rig.animation_data
-    action, slot = animation.action, getattr(animation, "action_slot", None)
+    action = animation.action
+    slot = getattr(animation, "action_slot", None)
     animation.action = None
     track = animation.nla_tracks.new()
     strip = track.strips.new("walk", 1, action)
@@ -467,7 +476,8 @@ def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
         RuntimeError, match="NLA strip 'walk', not by an action of its own alone: enter Tweak Mode"
     ):
         bpy.ops.scope.refloor()
-    animation.nla_tracks.active, strip.select = track, True
+    animation.nla_tracks.active = track
+    strip.select = True
     animation.use_tweak_mode = True
     assert bpy.ops.scope.refloor() == {"FINISHED"}
 
@@ -475,10 +485,8 @@ def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
 def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
     before = seen(rig)
     bpy.ops.scope.push_to_nla()
-    rig.animation_data.action, rig.animation_data.action_blend_type = (
-        bpy.data.actions.new("fix"),
-        "ADD",
-    )
+    rig.animation_data.action = bpy.data.actions.new("fix")
+    rig.animation_data.action_blend_type = "ADD"
     elbow = rig.pose.bones["left_elbow"]
     elbow.rotation_quaternion = (0.9, 0.4, 0.0, 0.0)
     elbow.keyframe_insert("rotation_quaternion", frame=1)

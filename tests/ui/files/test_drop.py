@@ -21,7 +21,8 @@ def test_dropped_files_become_the_footage(footage):
 
 
 def test_dropped_motions_are_imported(tmp_path):
-    motion, path = motion_of(walk(1.0)), tmp_path / "walk_poses.npz"
+    motion = motion_of(walk(1.0))
+    path = tmp_path / "walk_poses.npz"
     np.savez(
         path,
         poses=motion.poses,

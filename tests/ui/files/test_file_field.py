@@ -34,7 +34,8 @@ class Row:
     """A layout that notes the fields and the buttons that are drawn."""
 
     def __init__(self):
-        self.fields, self.buttons = [], []
+        self.fields = []
+        self.buttons = []
 
     def row(self, align):
         return self
@@ -113,7 +114,8 @@ def test_without_preferences_no_file_is_chosen_for_them():
 
 
 def test_the_button_beside_a_field_chooses_the_file_of_that_field(preferences):
-    scene, row = bpy.context.scene, Row()
+    scene = bpy.context.scene
+    row = Row()
     for settings, path in (
         (scene.scope, "body_file"),
         (scene.scope_live, "file"),
@@ -134,7 +136,8 @@ def test_a_chosen_file_is_stored_as_the_user_prefers(saved, fake_worker, is_rela
     bpy.context.preferences.filepaths.use_relative_paths = is_relative
     (saved / "clips").mkdir()
     (saved / "clips" / "a.mp4").touch()
-    chosen, settings = {"filepath": str(saved / "clips" / "a.mp4")}, bpy.context.scene.scope
+    chosen = {"filepath": str(saved / "clips" / "a.mp4")}
+    settings = bpy.context.scene.scope
     for owner, setting in SETTINGS:
         bpy.ops.scope.choose_file(owner=owner, setting=setting, **chosen)
         assert getattr(getattr(bpy.context.scene, owner), setting) == stored.format(folder=saved)

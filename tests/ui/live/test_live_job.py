@@ -39,7 +39,8 @@ def live(tmp_path, monkeypatch, standing):
     )
     (tmp_path / "walk.mp4").touch()
     settings = bpy.context.scene.scope_live
-    settings.source, settings.file = "FILE", str(tmp_path / "walk.mp4")
+    settings.source = "FILE"
+    settings.file = str(tmp_path / "walk.mp4")
 
     def start(body):
         # one each: a process may not have read its own yet
@@ -210,7 +211,8 @@ def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch)
     kept = tmp_path / "take.mp4"
     monkeypatch.setattr(live_job, "kept_footage", lambda scene: kept)
     settings = bpy.context.scene.scope_live
-    settings.source, settings.keep_footage = "CAMERA", True
+    settings.source = "CAMERA"
+    settings.keep_footage = True
     job = live(f'pose(1); receive(); receive(); assert request["keep_footage"] == {str(kept)!r}; '
                f'shutil.copy({str(SAMPLE)!r}, request["keep_footage"]); finish()')  # fmt: skip
     until(job, lambda: job.has_body)
@@ -225,7 +227,8 @@ def test_cancelling_leaves_nothing_of_the_footage(live, tmp_path, monkeypatch):
     (tmp_path / "takes").mkdir()
     monkeypatch.setattr(live_job, "kept_footage", lambda scene: tmp_path / "takes" / "take.mp4")
     settings = bpy.context.scene.scope_live
-    settings.source, settings.keep_footage = "CAMERA", True
+    settings.source = "CAMERA"
+    settings.keep_footage = True
     root = str(Path(live_job.__file__).resolve().parents[4])
     job = live(f"""
         sys.path.insert(0, {root!r})
@@ -307,11 +310,13 @@ def test_a_recording_that_was_asked_for_too_late_leaves_the_last_pose(live):
 def test_a_recording_whose_retargeting_fails_is_kept(live, monkeypatch):
     rig, _ = build_rig("mixamo")
     scene = bpy.context.scene
-    scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
+    scene.scope_live.with_rig = True
+    scene.scope_retarget.rig = rig
     job = live("pose(1); receive(); receive(); finish()")
     until(job, lambda: job.has_body)
     job.record()
-    scene.scope_retarget.pairs.add().bone, scene.scope_retarget.pairs[0].part = "gone", "pelvis"
+    scene.scope_retarget.pairs.add().bone = "gone"
+    scene.scope_retarget.pairs[0].part = "pelvis"
     job.stop()
     to_end(job)
     assert scene.scope.capture is not None
@@ -319,8 +324,10 @@ def test_a_recording_whose_retargeting_fails_is_kept(live, monkeypatch):
 
 
 def test_a_stream_ends_when_online_access_does(live, monkeypatch):
-    settings, system = bpy.context.scene.scope_live, bpy.context.preferences.system
-    settings.source, settings.stream = "STREAM", "rtsp://camera/stream"
+    settings = bpy.context.scene.scope_live
+    system = bpy.context.preferences.system
+    settings.source = "STREAM"
+    settings.stream = "rtsp://camera/stream"
     system.use_online_access = True
     jobs = [
         live("pose(1); receive()"),
@@ -342,8 +349,10 @@ def test_cancelling_leaves_the_scene_as_it_was(live, recording):
     rig, _ = build_rig("mixamo")
     bpy.context.view_layer.objects.active = bpy.data.objects["Armature"]
     scene = bpy.context.scene
-    scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
-    before, posed = inventory(), [bone.matrix_basis.copy() for bone in rig.pose.bones]
+    scene.scope_live.with_rig = True
+    scene.scope_retarget.rig = rig
+    before = inventory()
+    posed = [bone.matrix_basis.copy() for bone in rig.pose.bones]
     job = live("pose(1); receive(); receive()")
     until(job, lambda: job.has_body)
     assert [bone.matrix_basis for bone in rig.pose.bones] != posed
@@ -362,7 +371,8 @@ def test_cancelling_leaves_the_scene_as_it_was(live, recording):
 def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
     rig, _ = build_rig("mixamo")
     scene = bpy.context.scene
-    scene.scope_live.with_rig, scene.scope_retarget.rig = True, rig
+    scene.scope_live.with_rig = True
+    scene.scope_retarget.rig = rig
     job = live('pose(1); assert receive() == "record"; assert receive() == "stop"; finish()')
     until(job, lambda: job.has_body)
     job.record()
@@ -463,14 +473,17 @@ def test_a_source_that_is_none_is_an_error(source, value, says):
 
 def test_a_missing_video_is_an_error():
     settings = bpy.context.scene.scope_live
-    settings.source, settings.file = "FILE", "/nowhere/walk.mp4"
+    settings.source = "FILE"
+    settings.file = "/nowhere/walk.mp4"
     with pytest.raises(VideoError, match="does not exist"):
         live_request(bpy.context.scene)
 
 
 def test_a_stream_needs_online_access_and_gets_its_login(monkeypatch):
-    settings, system = bpy.context.scene.scope_live, bpy.context.preferences.system
-    settings.source, settings.stream = "STREAM", "rtsp://me:secret@camera/stream"
+    settings = bpy.context.scene.scope_live
+    system = bpy.context.preferences.system
+    settings.source = "STREAM"
+    settings.stream = "rtsp://me:secret@camera/stream"
     assert settings.stream == "rtsp://camera/stream"
     system.use_online_access = False
     with pytest.raises(OfflineError, match="Allow Online Access"):
@@ -485,7 +498,9 @@ def test_the_capture_has_the_options_of_the_panel():
     scene = bpy.context.scene
     scene.scope_live.camera = "0: USB Camera: front (MJPG 1920×1080)"
     scene.scope_live.quality = "BALANCED"
-    scene.scope.height_cm, scene.scope.lens, scene.scope.focal_mm = 181, "FOCAL", 28
+    scene.scope.height_cm = 181
+    scene.scope.lens = "FOCAL"
+    scene.scope.focal_mm = 28
     request = live_request(scene)
     assert request.source == "0"
     assert not request.online

@@ -17,7 +17,10 @@ class FakeJob:
     """A running live capture."""
 
     def __init__(self):
-        self.done, self.recording, self.finishing, self.has_body = [], False, False, True
+        self.done = []
+        self.recording = False
+        self.finishing = False
+        self.has_body = True
 
     countdown_s = 0
 

@@ -17,7 +17,8 @@ from ...scene import made_rigs
 from ...scene.made_rigs import captured
 
 FRAME = 46  # of the scene; the footage's frame 45, as the capture starts at frame 1
-WRIST, ANKLE = NAMES.index("left_wrist"), NAMES.index("right_ankle")
+WRIST = NAMES.index("left_wrist")
+ANKLE = NAMES.index("right_ankle")
 
 
 @pytest.fixture
@@ -25,10 +26,12 @@ def rig(tmp_path):
     """A captured walk, with its motion file."""
     armature = captured(motion := motion_of(walk(3.0), noise=0.05))
     motion.save(tmp_path / "person1.npz")
-    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    armature["scope_motion"] = str(tmp_path / "person1.npz")
+    armature["scope_body_file"] = "scope"
     scene = bpy.context.scene
     scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
-    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    scene.render.resolution_x = 640
+    scene.render.resolution_y = 480
     scene.frame_set(FRAME)
     return armature
 
@@ -47,7 +50,8 @@ def in_image(place):
 
 
 def test_a_pin_in_space_is_met_and_other_keys_stay(rig):
-    before, old = seen(rig)[0], keys(rig)
+    before = seen(rig)[0]
+    old = keys(rig)
     target = before[WRIST] + [0.1, 0.05, 0.15]
     bpy.ops.scope.add_pin(joint="left_wrist", location=target)
     assert np.linalg.norm(seen(rig)[0, WRIST] - target) < 0.01
@@ -163,7 +167,8 @@ ALL_KINDS = ("pin", "sides", "foot")
 )
 def test_without_corrections_keys_and_motion_are_again_the_same_to_the_bit(rig, order, edit):
     EDITS[edit]()
-    before, motion = keys(rig), stored_motion_of(rig)
+    before = keys(rig)
+    motion = stored_motion_of(rig)
     wrist = seen(rig)[0, WRIST]
     for name in order:
         CORRECTIONS[name](wrist)
@@ -263,7 +268,8 @@ def test_a_pin_on_edited_keys_is_met_where_it_was_placed(rig):
 
 
 def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
-    left, right = NAMES.index("left_knee"), NAMES.index("right_knee")
+    left = NAMES.index("left_knee")
+    right = NAMES.index("right_knee")
     before = seen(rig, [40, 46, 70])
     bpy.ops.scope.exchange_sides(start=40, end=52)
     after = seen(rig, [40, 46, 70])
@@ -326,7 +332,8 @@ def test_a_span_outside_of_the_motion_is_refused(rig):
 
 
 def test_a_failure_changes_nothing(rig, monkeypatch):
-    before, path = keys(rig), rig["scope_motion"]
+    before = keys(rig)
+    path = rig["scope_motion"]
     for arguments, message in (
         ({"joint": "left_paw"}, "no joint 'left_paw'"),
         *(({"joint": "head", "frame": frame}, outside(frame)) for frame in (500, 92, 0, -3)),

@@ -15,7 +15,8 @@ from ...scene.made_rigs import captured
 FRAME = 46  # of the scene; the capture starts at frame 1
 STANDS = (40, 47)  # the left foot swings in these frames
 EXCHANGED = (12, 18)
-WRIST, ANKLE = NAMES.index("left_wrist"), NAMES.index("left_ankle")
+WRIST = NAMES.index("left_wrist")
+ANKLE = NAMES.index("left_ankle")
 FRAMES = (*range(EXCHANGED[0], EXCHANGED[1] + 1), *range(STANDS[0], STANDS[1] + 1))
 SUFFIXES = {"GLB": "glb", "FBX": "fbx", "BVH": "bvh"}
 
@@ -25,7 +26,8 @@ def rig(tmp_path):
     """A captured walk, with its motion file."""
     armature = captured(motion := motion_of(walk(3.0)))
     motion.save(tmp_path / "person1.npz")
-    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    armature["scope_motion"] = str(tmp_path / "person1.npz")
+    armature["scope_body_file"] = "scope"
     return armature
 
 
@@ -55,13 +57,15 @@ def check(places, before, target):
     """Check joints (T, K+1, 3) of `FRAMES` against what was corrected, and that it was wrong
     before.
     """
-    at, span = FRAMES.index(FRAME), slice(len(FRAMES) - (STANDS[1] - STANDS[0] + 1), None)
+    at = FRAMES.index(FRAME)
+    span = slice(len(FRAMES) - (STANDS[1] - STANDS[0] + 1), None)
     assert np.linalg.norm(places[at, WRIST] - target) < 0.01
     assert np.linalg.norm(before[at, WRIST] - target) > 0.1
     assert np.ptp(places[span, ANKLE], axis=0).max() < 0.005
     assert np.ptp(before[span, ANKLE], axis=0).max() > 0.05
     middle = slice(2, EXCHANGED[1] - EXCHANGED[0] - 1)
-    ours, theirs = directions(places, "left")[middle], directions(before, "right")[middle]
+    ours = directions(places, "left")[middle]
+    theirs = directions(before, "right")[middle]
     # A left thigh turned like a right one: the body's knees lie 5 mm outside the line from hip to
     # ankle.
     assert np.abs(ours - theirs).max() < 0.03
@@ -74,7 +78,8 @@ def test_the_rig_that_the_motion_is_retargeted_to_is_corrected(rig):
     own = made_rigs.renamed(rig, dict(zip(NAMES, names, strict=True)))
     settings = bpy.context.scene.scope_retarget
     # the bones, without what keeps feet of other rigs on the floor
-    settings.rig, settings.feet = own, False
+    settings.rig = own
+    settings.feet = False
     bpy.ops.scope.guess_bones()
     bpy.context.view_layer.objects.active = rig
     bpy.ops.scope.retarget()

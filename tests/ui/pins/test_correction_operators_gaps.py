@@ -33,11 +33,9 @@ def pinned(motion, frame):
 def test_a_pin_in_frames_in_which_the_person_was_not_seen_is_met():
     motion = motion_of(walk(3.0))
     hidden = np.arange(len(motion.valid))[30:60]
-    motion.valid[hidden], motion.joint_confidence[hidden], motion.residual_px[hidden] = (
-        False,
-        0.0,
-        np.nan,
-    )
+    motion.valid[hidden] = False
+    motion.joint_confidence[hidden] = 0.0
+    motion.residual_px[hidden] = np.nan
     armature, target, before = pinned(motion, 46)
     after = made_rigs.seen(armature, NAMES, FRAMES)
     assert np.linalg.norm(after[45, NAMES.index("left_wrist")] - target) < 0.01

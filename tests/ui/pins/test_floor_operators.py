@@ -14,7 +14,8 @@ from ...edit.walking import BODY, NAMES, motion_of, walk
 from ...scene import made_rigs
 from ...scene.made_rigs import captured, captured_together
 
-FRAME, FRAMES = 20, (5, 20, 50)
+FRAME = 20
+FRAMES = (5, 20, 50)
 RAISED = 0.25  # metres, of the captured world
 
 
@@ -26,7 +27,8 @@ def rig(tmp_path):
     motion = moved_motion(motion_of(walk(2.0), noise=0.02), BODY, T)
     armature = captured(motion)
     motion.save(tmp_path / "person1.npz")
-    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    armature["scope_motion"] = str(tmp_path / "person1.npz")
+    armature["scope_body_file"] = "scope"
     scene = bpy.context.scene
     scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
     scene.frame_set(FRAME)

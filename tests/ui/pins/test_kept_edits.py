@@ -74,7 +74,9 @@ def is_swapped(rig):
     """
     left, right = seen(rig, SWAPPED)[1:-1, KNEES].transpose(1, 0, 2)
     truth = walk(3.0).joints(BODY, BETAS)[SWAPPED[1] - 1 : SWAPPED[-1] - 1, KNEES]
-    ours, theirs = (left - right)[:, 1], (truth[:, 0] - truth[:, 1])[:, 1]  # along the walk
+    # along the walk
+    ours = (left - right)[:, 1]
+    theirs = (truth[:, 0] - truth[:, 1])[:, 1]
     return ours @ theirs / (theirs @ theirs) < -0.5
 
 
@@ -142,7 +144,8 @@ def test_edits_are_kept_together_and_with_pins(rig):
 def test_taken_back_the_keys_are_again_the_same_to_the_bit(rig, name, smoothing):
     if smoothing is not None:
         bpy.ops.scope.smooth(strength=smoothing)
-    before, motion = keys(rig), stored_motion_of(rig)
+    before = keys(rig)
+    motion = stored_motion_of(rig)
     EDITS[name][0]()
     if smoothing is not None:
         bpy.ops.scope.smooth(strength=1.0)
@@ -306,7 +309,8 @@ def test_a_floor_after_feet_on_the_floor_moves_them_and_snapping_again_puts_them
     scene = bpy.context.scene
     camera = next(o for o in scene.objects if o.type == "CAMERA")
     high = max(range(10, 80), key=lambda frame: lowest(rig)[frame - 1])
-    height, z = lowest(rig)[high - 1], camera.matrix_world.translation.z
+    height = lowest(rig)[high - 1]
+    z = camera.matrix_world.translation.z
     assert height > 0.005
     scene.frame_set(high)
     bpy.ops.scope.floor_here()

@@ -18,7 +18,9 @@ from ...scene import made_rigs
 from ...scene.exported import read_back
 from ...scene.made_rigs import captured
 
-BAD, EXCHANGED = slice(40, 45), slice(62, 71)  # rows
+# rows
+BAD = slice(40, 45)
+EXCHANGED = slice(62, 71)
 FRAMES = range(5, 86, 2)  # of the scene; the capture starts at frame 1
 SUFFIXES = {"GLB": "glb", "FBX": "fbx", "BVH": "bvh"}
 

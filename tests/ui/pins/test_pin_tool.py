@@ -23,7 +23,8 @@ class Tool:
     """
 
     def __init__(self, armature):
-        self.reported, self.status = [], []
+        self.reported = []
+        self.status = []
         self._session = SimpleNamespace(
             armature=armature.name,
             dragged="",
@@ -42,7 +43,8 @@ class Tool:
             bpy_extras.view3d_utils, "location_3d_to_region_2d", lambda *_: Vector((0.0, 0.0))
         )
         monkeypatch.setattr(bpy_extras.view3d_utils, "region_2d_to_location_3d", lambda *_: place)
-        self._session.dragged, self._session.mouse = "left_wrist", (50.0, 0.0)
+        self._session.dragged = "left_wrist"
+        self._session.mouse = (50.0, 0.0)
         workspace = SimpleNamespace(status_text_set=self.status.append)
         context = SimpleNamespace(
             scene=bpy.context.scene,

@@ -39,17 +39,20 @@ def rig(tmp_path, request):
     tilted = moved_motion(motion, BODY, tilt)
     armature = captured(tilted)
     tilted.save(tmp_path / "person1.npz")
-    armature["scope_motion"], armature["scope_body_file"] = str(tmp_path / "person1.npz"), "scope"
+    armature["scope_motion"] = str(tmp_path / "person1.npz")
+    armature["scope_body_file"] = "scope"
     scene = bpy.context.scene
     scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
-    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    scene.render.resolution_x = 640
+    scene.render.resolution_y = 480
     scene.frame_set(20)
     return armature, line
 
 
 def in_image(rig):
     """(frames, joints, 2) where the scene's camera sees the joints."""
-    scene, found = bpy.context.scene, []
+    scene = bpy.context.scene
+    found = []
     for frame in FRAMES:
         places = made_rigs.seen(rig, NAMES, [frame])[0]
         found.append(
@@ -135,7 +138,8 @@ def test_without_the_line_everything_is_the_same_to_the_bit(rig, removed):
 def test_a_pin_moves_with_the_line_and_back(rig):
     armature, line = rig
     pin(armature)
-    alone, seen = everything(armature), in_image(armature)
+    alone = everything(armature)
+    seen = in_image(armature)
     bpy.context.scene.frame_set(20)
     bpy.ops.scope.set_upright(start=line[0], end=line[1])
     np.testing.assert_allclose(in_image(armature), seen, atol=2e-3)
@@ -202,7 +206,8 @@ def leaning(tmp_path):
     scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
     for obj in (armature, scene.camera):
         obj.matrix_world = place @ obj.matrix_world
-    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    scene.render.resolution_x = 640
+    scene.render.resolution_y = 480
     scene.frame_set(20)
     view = place.to_3x3() @ Vector((1.0, 0.0, 0.0))
     post = [place @ Vector(tilt[:3, :3] @ np.array(point)) for point in POST]
@@ -217,7 +222,8 @@ def lean_of_camera():
 
 def test_a_line_from_the_side_turns_person_and_camera_until_it_is_removed(leaning):
     armature, line = leaning
-    before, seen = everything(armature), in_image(armature)
+    before = everything(armature)
+    seen = in_image(armature)
     assert lean_of_camera() > 7
     bpy.context.scene.frame_set(20)
     bpy.ops.scope.set_upright_in_view(**line)
@@ -245,7 +251,8 @@ def test_a_line_in_a_view_from_above_is_refused(leaning):
 
 def test_a_refused_line_changes_nothing(rig):
     armature, _ = rig
-    before, path = in_image(armature), armature["scope_motion"]
+    before = in_image(armature)
+    path = armature["scope_motion"]
     bpy.context.scene.frame_set(20)
     with pytest.raises(RuntimeError, match="from upright"):
         bpy.ops.scope.set_upright(start=(10, 10), end=(200, 12))

@@ -98,7 +98,9 @@ def test_a_rig_without_a_known_face_keeps_its_face(settings):
 
 def test_where_a_mesh_has_known_shape_keys_they_show_the_face(settings):
     face_mesh(["viseme_aa", "blinkLeft"], settings.rig)
-    rig, settings.face, settings.rig = settings.rig, None, None
+    rig = settings.rig
+    settings.face = None
+    settings.rig = None
     settings.rig = rig
     assert settings.face is None
     bpy.ops.scope.retarget()

@@ -92,10 +92,8 @@ def test_a_mesh_that_was_deleted_from_the_scene_is_not_animated(settings):
 
 def test_choosing_another_mesh_replaces_the_list(settings):
     bpy.ops.scope.guess_expressions()
-    first, other = (
-        settings.face,
-        face_mesh(["jawOpen", "mouthPucker", "mouthFunnel", "cheekPuff", "noseSneerLeft"]),
-    )
+    first = settings.face
+    other = face_mesh(["jawOpen", "mouthPucker", "mouthFunnel", "cheekPuff", "noseSneerLeft"])
     settings.face_pairs[0].factor = 0.25  # edited by hand
     for chosen in (None, first):
         settings.face = chosen
@@ -109,7 +107,8 @@ def test_choosing_another_mesh_replaces_the_list(settings):
 def test_guessing_without_known_names_leaves_the_list_as_it_is(settings):
     settings.face = face_mesh(["Key 1"])
     pair = settings.face_pairs.add()
-    pair.key, pair.expression = "Key 1", "jawOpen"
+    pair.key = "Key 1"
+    pair.expression = "jawOpen"
     with pytest.raises(RuntimeError, match="has a name of ARKit, Oculus or VRM"):
         bpy.ops.scope.guess_expressions()
     assert settings.face_pairs[0].key == "Key 1"

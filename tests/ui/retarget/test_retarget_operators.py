@@ -71,7 +71,8 @@ def two_people_who_meet():
     """Return the armatures of two people who come towards each other, and their rigs of different
     sizes and kinds.
     """
-    apart, clips = ([1.4, 0.3, 0.0], [0.0, 0.0, 0.0]), (walk(2.0), walk(2.0, speed=0.8))
+    apart = ([1.4, 0.3, 0.0], [0.0, 0.0, 0.0])
+    clips = (walk(2.0), walk(2.0, speed=0.8))
     for clip, place in zip(clips, apart, strict=True):
         clip.root += place
     clips[0].root[:, 0] -= np.linspace(0.0, 1.0, len(clips[0]))
@@ -91,7 +92,8 @@ def two_people_who_meet():
 def test_rigs_of_two_people_meet_where_these_met_with_one_travel_scale(travel, root):
     people, rigs = two_people_who_meet()
     settings = bpy.context.scene.scope_retarget
-    settings.travel, settings.root = travel, root
+    settings.travel = travel
+    settings.root = root
     for person, rig in zip(people, rigs, strict=True):
         bpy.context.view_layer.objects.active = person
         settings.rig = rig
@@ -203,7 +205,8 @@ def test_a_rig_without_bones_empties_the_bone_list(rig):
 
 
 def test_the_captured_body_is_hidden_side_by_side_or_overlapping(rig):
-    settings, scene = bpy.context.scene.scope_retarget, bpy.context.scene
+    settings = bpy.context.scene.scope_retarget
+    scene = bpy.context.scene
     source = next(obj for obj in scene.objects if "scope_source" in obj)
     body = next(obj for obj in source.children if obj.type == "MESH")
     bpy.ops.scope.retarget()
@@ -254,11 +257,9 @@ def test_retargeting_again_after_an_edit_updates_the_rig(rig, tmp_path):
     motion_of(walk(2.0), noise=0.1).save(tmp_path / "person1.npz")
     source["scope_motion"] = str(tmp_path / "person1.npz")
     bpy.ops.scope.retarget()
-    before, count, name = (
-        seen(rig, ["upperarm_l", "hand_l"]),
-        len(bpy.data.actions),
-        rig.animation_data.action.name,
-    )
+    before = seen(rig, ["upperarm_l", "hand_l"])
+    count = len(bpy.data.actions)
+    name = rig.animation_data.action.name
     bpy.ops.scope.smooth(strength=0.0)
     bpy.ops.scope.retarget()
     assert np.abs(seen(rig, ["upperarm_l", "hand_l"]) - before).max() > 0.02
@@ -283,7 +284,8 @@ def test_a_renamed_take_still_replaces_its_action(rig):
 
 @pytest.mark.parametrize("suffix", ["glb", "fbx"])
 def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
-    scene, layer = bpy.context.scene, bpy.context.view_layer
+    scene = bpy.context.scene
+    layer = bpy.context.view_layer
     active = layer.objects.active
     bpy.ops.mesh.primitive_plane_add(location=(1.0, 2.0, 0.5))
     stage = bpy.context.object
@@ -314,7 +316,8 @@ def test_with_several_people_the_panels_ask_for_a_selection(rig):
         captured(motion_of(walk(2.0))),
     ]
     people[1]["scope_body_file"] = "scope"
-    panels, layer = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit), bpy.context.view_layer
+    panels = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit)
+    layer = bpy.context.view_layer
     layer.objects.active = rig
     assert all(panel.poll(bpy.context) for panel in panels)
     with pytest.raises(RuntimeError, match="Several people are captured: select the armature"):
@@ -378,7 +381,8 @@ def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path,
     skin.modifiers.new("rig", "ARMATURE").object = rig
     skin.vertex_groups.new(name="pelvis").add([0, 1, 2], 1.0, "REPLACE")
     bpy.ops.scope.retarget()
-    there, before = seen(rig, ["pelvis"])[:, 0], sorted(c.name for c in bpy.data.collections)
+    there = seen(rig, ["pelvis"])[:, 0]
+    before = sorted(c.name for c in bpy.data.collections)
     path = tmp_path / f"hero.{kind}"
     assert bpy.ops.scope.export(filepath=str(path), format=kind.upper(), which="RIG") == {
         "FINISHED"

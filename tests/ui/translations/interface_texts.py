@@ -18,7 +18,9 @@ from scope.scope_addon.ui.pins.pin_tool import HANDLES
 from scope.scope_addon.ui.translations import CONTEXT
 
 ROOT = Path(scope.__file__).resolve().parent / "scope_addon"
-OPERATOR, DEFAULT = "Operator", "*"  # Blender's contexts
+# Blender's contexts
+OPERATOR = "Operator"
+DEFAULT = "*"
 # The same in every language: names of products, formats and axes.
 UNTRANSLATED = {
     "Scope",

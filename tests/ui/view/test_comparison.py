@@ -18,7 +18,8 @@ def test_the_side_view_is_level_and_looks_across_the_cameras_view(heading, tilt)
     side = np.array(comparison._side_rotation(camera))
     np.testing.assert_allclose(side @ side.T, np.eye(3), atol=1e-6)
     assert np.linalg.det(side) == pytest.approx(1.0)
-    looks, up = -side[:, 2], side[:, 1]
+    looks = -side[:, 2]
+    up = side[:, 1]
     np.testing.assert_allclose(up, [0, 0, 1], atol=1e-6)
     forward = -np.array(camera.col[2])[:3]
     assert abs(looks @ forward) < 1e-6
@@ -41,7 +42,8 @@ def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     window = bpy.context.window_manager.windows[0]
     area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
-    overlay, collection = area.spaces.active.overlay, bpy.data.collections.new("capture")
+    overlay = area.spaces.active.overlay
+    collection = bpy.data.collections.new("capture")
     bpy.context.scene.collection.children.link(collection)
     for shown in (True, False):
         overlay.show_bones = shown
@@ -54,10 +56,8 @@ def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
 
 def capture_with_camera(name):
     """Return a capture's collection with a camera, linked to the scene, and the camera."""
-    collection, camera = (
-        bpy.data.collections.new(name),
-        bpy.data.objects.new(name, bpy.data.cameras.new(name)),
-    )
+    collection = bpy.data.collections.new(name)
+    camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
     collection["scope_capture"] = 1
     collection.objects.link(camera)
     bpy.context.scene.collection.children.link(collection)
@@ -66,7 +66,8 @@ def capture_with_camera(name):
 
 def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(monkeypatch):
     bpy.ops.wm.read_homefile(use_factory_startup=True)
-    window, scene = bpy.context.window_manager.windows[0], bpy.context.scene
+    window = bpy.context.window_manager.windows[0]
+    scene = bpy.context.scene
     area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
     space = area.spaces.active
     earlier, scene.camera = capture_with_camera("earlier")
@@ -77,7 +78,8 @@ def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(m
     comparison.end_others(scene, earlier)
     assert space.local_view  # it is the shown capture itself
     scene.scope.capture, _ = capture_with_camera("new")
-    side, closed = next(each for each in window.screen.areas if each.type == "OUTLINER"), []
+    side = next(each for each in window.screen.areas if each.type == "OUTLINER")
+    closed = []
     monkeypatch.setattr(comparison, "side_area", lambda screen: side)
     monkeypatch.setattr(comparison, "_close_later", closed.append)
     with bpy.context.temp_override(window=window, area=area):
@@ -88,7 +90,8 @@ def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(m
     assert closed == [side]
     own = bpy.data.objects.new("own", bpy.data.cameras.new("own"))
     scene.collection.objects.link(own)
-    space.camera, space.region_3d.view_perspective = own, "CAMERA"
+    space.camera = own
+    space.region_3d.view_perspective = "CAMERA"
     with bpy.context.temp_override(window=window, area=area):
         show_new_capture(bpy.context)
     assert space.region_3d.view_perspective == "CAMERA"

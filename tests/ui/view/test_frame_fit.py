@@ -49,7 +49,8 @@ def frame_of(area, size):
     """Return left, right, bottom and top of the frame in the region, for a sensor that is fitted
     automatically.
     """
-    view, region = area.spaces.active.region_3d, area.regions[0]
+    view = area.spaces.active.region_3d
+    region = area.regions[0]
     scale = ((math.sqrt(2) + view.view_camera_zoom / 50) / math.sqrt(2)) ** 2
     longer = scale * HALF_AT_ZOOM_0[1] / HALF_AT_ZOOM_0[0] * max(region.width, region.height)
     width, height = (longer * side / max(size) for side in size)

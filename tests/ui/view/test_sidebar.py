@@ -12,7 +12,8 @@ class Region:
     type = "UI"
 
     def __init__(self, drawn):
-        self.drawn, self.tab = drawn, "Item"
+        self.drawn = drawn
+        self.tab = "Item"
 
     @property
     def active_panel_category(self):
@@ -31,7 +32,8 @@ def area(kind="VIEW_3D", size=(800, 600), drawn=True):
     found = SimpleNamespace(
         type=kind, width=size[0], height=size[1], spaces=spaces, regions=regions
     )
-    found.as_pointer, found.tag_redraw = lambda: id(found), lambda: None
+    found.as_pointer = lambda: id(found)
+    found.tag_redraw = lambda: None
     return found
 
 
@@ -41,7 +43,9 @@ def context(areas, active=None):
 
 
 def test_the_tab_opens_in_the_largest_viewport_of_a_menu():
-    menu, small, large = area("TOPBAR", (2000, 2000)), area(size=(100, 100)), area()
+    menu = area("TOPBAR", (2000, 2000))
+    small = area(size=(100, 100))
+    large = area()
     sidebar.show_tab(context([menu, small, large], menu))
     assert [each.spaces.active.show_region_ui for each in (menu, small, large)] == [
         False,
@@ -52,7 +56,8 @@ def test_the_tab_opens_in_the_largest_viewport_of_a_menu():
 
 
 def test_the_tab_opens_in_the_viewport_that_a_file_is_dropped_in():
-    small, large = area(size=(100, 100)), area()
+    small = area(size=(100, 100))
+    large = area()
     sidebar.show_tab(context([small, large], small))
     assert [each.spaces.active.show_region_ui for each in (small, large)] == [True, False]
 
@@ -66,7 +71,9 @@ def test_without_a_viewport_or_before_the_first_drawing_nothing_fails():
 
 
 def test_what_a_menu_at_the_top_imports_is_framed_in_the_largest_viewport():
-    menu, small, large = area("TOPBAR", (2000, 2000)), area(size=(100, 100)), area()
+    menu = area("TOPBAR", (2000, 2000))
+    small = area(size=(100, 100))
+    large = area()
     assert sidebar.viewport_of(context([menu, small, large], menu)) is large
     assert sidebar.viewport_of(context([menu, small, large], small)) is small
     assert sidebar.viewport_of(context([menu], menu)) is None

@@ -18,7 +18,8 @@ def empty():
 
 
 def test_the_default_cube_is_hidden(empty):
-    startup, own = cube(), cube("Box")
+    startup = cube()
+    own = cube("Box")
     hide_startup_cube(bpy.context)
     assert startup.hide_get()
     assert not own.hide_get()

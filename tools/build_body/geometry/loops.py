@@ -77,7 +77,9 @@ class QuadLoops:
         candidates = np.flatnonzero(
             (np.abs(height) < 0.03) & (np.linalg.norm(offset, axis=1) < radius)
         )
-        best, best_cost, done = None, np.inf, set()
+        best = None
+        best_cost = np.inf
+        done = set()
         for v in candidates.tolist():
             for other in self.neighbours(v):
                 if (v, other) in done or abs(height[v] - height[other]) > 0.02:
@@ -99,7 +101,8 @@ class QuadLoops:
                     and np.linalg.norm(ring, axis=1).max() < radius
                     and cost < best_cost - 1e-9
                 ):
-                    best, best_cost = loop, cost
+                    best = loop
+                    best_cost = cost
         if best is None:
             raise ValueError(f"no closed edge loop within {radius} m of {np.round(point, 3)}")
         return best
@@ -107,7 +110,8 @@ class QuadLoops:
     def beyond(self, loop: list[int], seed: int) -> NDArray[np.bool_]:
         """Return (F,) bool: the faces reached from face ``seed`` without crossing ``loop``."""
         border = {frozenset(edge) for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
-        reached, queue = np.zeros(len(self.quads), bool), [seed]
+        reached = np.zeros(len(self.quads), bool)
+        queue = [seed]
         reached[seed] = True
         while queue:
             quad = self.quads[queue.pop()]

@@ -43,7 +43,8 @@ def face_materials(
     mirrored = mirror_faces(mesh)
 
     def between(start: str, end: str, fraction: float) -> NDArray[np.float64]:
-        a, b = J[skeleton.index(start)], J[skeleton.index(end)]
+        a = J[skeleton.index(start)]
+        b = J[skeleton.index(end)]
         return a + fraction * (b - a)
 
     def beyond(

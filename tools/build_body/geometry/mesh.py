@@ -15,7 +15,9 @@ from .diffusion import bump, diffuse, perineum
 from .visibility import seen_from_outside
 
 NIPPLE_RINGS = (range(1794, 1810), range(8466, 8482))  # vertex loops around what is smoothed away
-PERINEUM_RADIUS, PERINEUM_ROUNDS = 0.08, 6  # metres, times
+# metres, times
+PERINEUM_RADIUS = 0.08
+PERINEUM_ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ def keep_visible(source: SourceMesh, vertices: NDArray[np.float64]) -> Mesh:
     skin, eyes = body_and_eyes(source)
     neck = vertices[source.cubes["neck"], 1].mean()
     in_head = skin & (vertices[source.faces][:, :, 1].min(axis=1) > neck)
-    head, hidden_by = source.faces[in_head], source.faces[eyes]
+    head = source.faces[in_head]
+    hidden_by = source.faces[eyes]
     seen = (
         seen_from_outside(vertices, split_quads(head), split_quads(hidden_by))
         .reshape(2, -1)
@@ -58,7 +61,8 @@ def keep_visible(source: SourceMesh, vertices: NDArray[np.float64]) -> Mesh:
     keep = (skin & ~in_head) | eyes
     keep[in_head] = touched[head].any(axis=1)
 
-    faces, uv_faces = source.faces[keep], source.uv_faces[keep]
+    faces = source.faces[keep]
+    uv_faces = source.uv_faces[keep]
     kept, faces = np.unique(faces, return_inverse=True)
     used_uv, uv_faces = np.unique(uv_faces, return_inverse=True)
     mirror = np.searchsorted(kept, source.mirror[kept])

@@ -31,7 +31,8 @@ MATERIALS = {  # linear RGBA
     "tongue": (0.42, 0.14, 0.13, 1.0),
 }
 TEETH, GUMS, TONGUE = range(3)
-COLUMNS, ROWS = 17, 4
+COLUMNS = 17
+ROWS = 4
 # rows of a strip: where the gum ends, half a crown, the edge, the inner side
 GUM, CROWN, EDGE, INNER = range(4)
 # Widths of incisors, canine, premolars and two molars, mm, as commonly quoted from Wheeler's Dental
@@ -41,7 +42,9 @@ WIDTHS_MM = {
     "lower": (5.0, 5.5, 7.0, 7.0, 7.0, 11.0, 10.5),
 }
 ACROSS = (0.0, 0.2, 0.8)  # where a tooth has vertices; 0 is also the end of the one before
-BETWEEN, BESIDE = 0.16, 0.03  # how far inwards between two teeth, and at 0.2 and 0.8
+# how far inwards between two teeth, and at 0.2 and 0.8
+BETWEEN = 0.16
+BESIDE = 0.03
 # row r of the middle of a tooth, what is added between two teeth, whether it lies further inwards
 # there
 PROFILE = (
@@ -87,7 +90,9 @@ def build_mouth(wheel: Path, grown: ShapedMesh) -> dict[str, NDArray[Any]]:
     J, posed_J, _ = rest_joints(grown, skeleton)
     head = skeleton.index("head")  # which is not turned on the way to the T-pose
     basis = np.einsum("vn,pnx->pvx", W, grown.basis) + (posed_J - J)[:, head, None]
-    starts, moved, moves = [0], [], []
+    starts = [0]
+    moved = []
+    moves = []
     with zipfile.ZipFile(wheel) as archive:
         for name in EXPRESSIONS:
             indices, offsets = parse_target(archive.read(f"{FOLDER}{name}.target"))
@@ -125,11 +130,10 @@ def _row_of_teeth(source: SourceMesh, jaw: str) -> Part:
     columns = [
         (a + t * (b - a), t) for a, b in zip(ends[:-1], ends[1:], strict=True) for t in ACROSS
     ] + [(ends[-1], 0.0)]
-    across, width = len(PROFILE), len(columns)
-    weights, coordinates = (
-        np.zeros((width, across, len(source.vertices))),
-        np.zeros((width, across, 2)),
-    )
+    across = len(PROFILE)
+    width = len(columns)
+    weights = np.zeros((width, across, len(source.vertices)))
+    coordinates = np.zeros((width, across, 2))
     for i, (at, t) in enumerate(columns):
         s = _along(float(np.interp(at, length, np.arange(COLUMNS))))
         for j, (row, lower, recessed) in enumerate(PROFILE):
@@ -167,7 +171,8 @@ def _grid(
     side.
     """
     chosen = source.face_group == group
-    quads, uv_quads = source.faces[chosen], source.uv_faces[chosen]
+    quads = source.faces[chosen]
+    uv_quads = source.uv_faces[chosen]
     place: dict[int, NDArray[np.intp]] = dict(
         zip(quads[0].tolist(), np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), strict=True)
     )

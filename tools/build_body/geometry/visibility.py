@@ -31,7 +31,8 @@ def seen_from_outside(
         projected = corners @ frame.T
         projected[:, :, :2] = (projected[:, :, :2] - projected[:, :, :2].min(axis=(0, 1))) / PIXEL
         width, height = (int(size) + 2 for size in projected[:, :, :2].max(axis=(0, 1)))
-        depth, owner = np.full((height, width), -np.inf), np.full((height, width), -1)
+        depth = np.full((height, width), -np.inf)
+        owner = np.full((height, width), -1)
         _draw(projected, depth, owner)
         seen[owner[owner >= 0]] = True
     return seen[: len(triangles)]
@@ -40,7 +41,8 @@ def seen_from_outside(
 def _sphere(count: int) -> NDArray[np.float64]:
     """Return directions spread evenly over the sphere (the golden spiral)."""
     i = np.arange(count) + 0.5
-    height, turn = 1.0 - 2.0 * i / count, i * np.pi * (3.0 - np.sqrt(5.0))
+    height = 1.0 - 2.0 * i / count
+    turn = i * np.pi * (3.0 - np.sqrt(5.0))
     ring = np.sqrt(1.0 - height**2)
     return np.stack([ring * np.cos(turn), height, ring * np.sin(turn)], axis=1)
 
@@ -52,9 +54,15 @@ def _draw(corners, depth, owner):
     """
     for t in range(len(corners)):
         # unpacked rows compile slowly
-        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
-        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
-        cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
+        ax = corners[t, 0, 0]
+        ay = corners[t, 0, 1]
+        az = corners[t, 0, 2]
+        bx = corners[t, 1, 0]
+        by = corners[t, 1, 1]
+        bz = corners[t, 1, 2]
+        cx = corners[t, 2, 0]
+        cy = corners[t, 2, 1]
+        cz = corners[t, 2, 2]
         twice_area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         if twice_area == 0.0:
             continue

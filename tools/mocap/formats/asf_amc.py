@@ -83,7 +83,8 @@ class Skeleton:
         """
         R = np.empty_like(M)
         ends = np.empty(M.shape[:-1])
-        R[:, 0], ends[:, 0] = M[:, 0], root
+        R[:, 0] = M[:, 0]
+        ends[:, 0] = root
         for b in range(1, len(self.bones)):
             p = self.parents[b]
             R[:, b] = R[:, p] @ M[:, b]

@@ -39,8 +39,10 @@ def joint_positions(
     """
     try:
         head, motion = text.split("MOTION", 1)
-        joints, words = _hierarchy(head), motion.split()
-        count, seconds = int(words[1]), float(words[4])
+        joints = _hierarchy(head)
+        words = motion.split()
+        count = int(words[1])
+        seconds = float(words[4])
         values = np.array(words[5:], float).reshape(
             -1, sum(len(joint.channels) for joint in joints)
         )
@@ -81,12 +83,11 @@ def _positions(joints: list[_Joint], values: NDArray[np.float64]) -> dict[str, N
     # R (T, 3, 3), position (T, 3)
     poses: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
     for joint in joints:
-        offset, turned = (
-            np.tile(joint.offset, (len(values), 1)),
-            np.broadcast_to(np.eye(3), (len(values), 3, 3)),
-        )
+        offset = np.tile(joint.offset, (len(values), 1))
+        turned = np.broadcast_to(np.eye(3), (len(values), 3, 3))
         for channel in joint.channels:
-            axis, value = AXES[channel[0]], values[:, column]
+            axis = AXES[channel[0]]
+            value = values[:, column]
             column += 1
             if channel.endswith("position"):
                 offset[:, axis] = value

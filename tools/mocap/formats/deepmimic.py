@@ -52,7 +52,8 @@ def parse_character(text: str, name: str = "character") -> Character:
     """
     try:
         data = json.loads(text)
-        joints, bodies = data["Skeleton"]["Joints"], {b["Name"]: b for b in data["BodyDefs"]}
+        joints = data["Skeleton"]["Joints"]
+        bodies = {b["Name"]: b for b in data["BodyDefs"]}
         names = tuple(j["Name"] for j in joints)
         tips = {}
         for tip, joint, half in (
@@ -100,7 +101,8 @@ def forward_kinematics(
     """Return R (T, J, 3, 3) and t (T, J, 3), joint to world, DeepMimic's axes, of frames (T,
     44).
     """
-    T, J = len(frames), len(character.names)
+    T = len(frames)
+    J = len(character.names)
     R = np.empty((T, J, 3, 3))
     t = np.empty((T, J, 3))
     column = 4

@@ -104,7 +104,8 @@ class _Bwdif:
     def _ready(self) -> Iterator[av.VideoFrame]:
         while self._waiting and (frame := self._pull()) is not None:
             given = self._waiting.popleft()
-            frame.pts, frame.time_base = given.pts, given.time_base
+            frame.pts = given.pts
+            frame.time_base = given.time_base
             if self._not_shown:
                 self._not_shown -= 1
             else:

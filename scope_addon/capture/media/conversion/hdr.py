@@ -32,7 +32,9 @@ PEAK = 1000.0  # cd/m² from which on everything is white
 SDR_GAMMA = 2.4  # of the screen (ITU-R BT.1886)
 HLG_GAMMA = 1.2  # system gamma of HLG for a screen of `PEAK` (ITU-R BT.2100)
 # Code points of ITU-T H.273, which FFmpeg uses.
-_PQ, _HLG = 16, 18  # transfer characteristics
+# transfer characteristics
+_PQ = 16
+_HLG = 18
 # matrix coefficients; others are taken for BT.2020's
 _YUV_MATRICES = {1: "ITU709", 5: "ITU601", 6: "ITU601"}
 _LUMINANCE = np.array([0.2627, 0.6780, 0.0593])  # of the primaries of BT.2020
@@ -95,12 +97,18 @@ def hlg_light(code: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the scene's light, 0 to 1, for HLG codes (...) from 0 to 1: the inverse OETF of ITU-R
     BT.2100.
     """
-    a, b, c = 0.17883277, 0.28466892, 0.55991073
+    a = 0.17883277
+    b = 0.28466892
+    c = 0.55991073
     return np.where(code <= 0.5, code**2 / 3, (np.exp((code - c) / a) + b) / 12)
 
 
 # constants of PQ
-_M1, _M2, _C1, _C2, _C3 = 2610 / 16384, 2523 / 32, 3424 / 4096, 2413 / 128, 2392 / 128
+_M1 = 2610 / 16384
+_M2 = 2523 / 32
+_C1 = 3424 / 4096
+_C2 = 2413 / 128
+_C3 = 2392 / 128
 
 
 def pq_light(code: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -127,7 +135,8 @@ def compress(light: NDArray[np.float64]) -> NDArray[np.float64]:
     spline, which arrives level at the new maximum.
     """
     peak = pq_code(np.array(PEAK))
-    share, largest = np.minimum(pq_code(light) / peak, 1.0), pq_code(np.array(WHITE)) / peak
+    share = np.minimum(pq_code(light) / peak, 1.0)
+    largest = pq_code(np.array(WHITE)) / peak
     knee = 1.5 * largest - 0.5
     t = (share - knee) / (1 - knee)
     spline = (

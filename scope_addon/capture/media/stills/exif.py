@@ -13,10 +13,15 @@ from dataclasses import dataclass
 
 PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
 TIFF = (b"II*\0", b"MM\0*")  # one of these does; a TIFF of more than 4 GB would begin otherwise
-_WIDTH, _HEIGHT, _BITS = 0x0100, 0x0101, 0x0102  # tag numbers of TIFF 6.0
+# tag numbers of TIFF 6.0
+_WIDTH = 0x0100
+_HEIGHT = 0x0101
+_BITS = 0x0102
 _DEEPEST = 64  # bits of one channel
 # tag numbers of the EXIF 2.3 standard
-_ORIENTATION, _EXIF_DIRECTORY, _FOCAL_35MM = 0x0112, 0x8769, 0xA405
+_ORIENTATION = 0x0112
+_EXIF_DIRECTORY = 0x8769
+_FOCAL_35MM = 0xA405
 _INTEGER = {3: "H", 4: "I"}  # TIFF field types SHORT and LONG
 
 
@@ -132,7 +137,8 @@ def _parse(tiff: bytes) -> Exif:
     tags = _directory(tiff, struct.unpack_from(endian + "I", tiff, 4)[0], endian)
     if _EXIF_DIRECTORY in tags:
         tags |= _directory(tiff, tags[_EXIF_DIRECTORY], endian)
-    orientation, focal = tags.get(_ORIENTATION, 1), tags.get(_FOCAL_35MM, 0)
+    orientation = tags.get(_ORIENTATION, 1)
+    focal = tags.get(_FOCAL_35MM, 0)
     return Exif(orientation if 1 <= orientation <= 8 else 1, float(focal) if focal > 0 else None)
 
 

@@ -135,7 +135,8 @@ class _MetaBox:
         if item.kind != b"grid":
             raise ValueError(f"items of type {item.kind!r} are not supported")
         grid = self._content(item)
-        rows, columns = grid[2] + 1, grid[3] + 1
+        rows = grid[2] + 1
+        columns = grid[3] + 1
         width, height = struct.unpack_from(">II" if grid[1] & 1 else ">HH", grid, 4)
         if not 0 < width * height <= MAX_PIXELS or rows * columns > MAX_TILES:
             raise ValueError("the grid is empty or too large")
@@ -151,7 +152,8 @@ class _MetaBox:
                 return
             size, name, header = *struct.unpack_from(">I4s", self._data, start), 8
             if size == 1:
-                size, header = struct.unpack_from(">Q", self._data, start + 8)[0], 16
+                size = struct.unpack_from(">Q", self._data, start + 8)[0]
+                header = 16
             size = size or end - start  # 0: up to the end
             if size < header or start + size > end:
                 raise ValueError("a box does not fit into its parent")
@@ -171,7 +173,8 @@ class _MetaBox:
     def _read_locations(self, read: _Reader) -> None:
         sizes = read.integer(2)
         offset, length, base, index = (sizes >> shift & 15 for shift in (12, 8, 4, 0))
-        is_wide, extents = read.version == 2, 0
+        is_wide = read.version == 2
+        extents = 0
         for _ in range(read.integer(4 if is_wide else 2)):
             item = self._items.setdefault(read.integer(4 if is_wide else 2), _Item())
             item.is_in_idat = bool(read.version and read.integer(2) & 15 == 1)
@@ -236,7 +239,9 @@ class _Reader:
     """
 
     def __init__(self, data: bytes, start: int, end: int, is_full: bool = True) -> None:
-        self._data, self.at, self._end = data, start, end
+        self._data = data
+        self.at = start
+        self._end = end
         self.version = self.integer(1) if is_full else 0
         self.flags = self.integer(3) if is_full else 0
 

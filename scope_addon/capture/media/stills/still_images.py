@@ -27,7 +27,8 @@ from .heif import assemble, read_layout
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
-_OPENEXR, _GIF = b"v/1\x01", b"GIF8"
+_OPENEXR = b"v/1\x01"
+_GIF = b"GIF8"
 _READ = (PNG, *TIFF, b"\xff\xd8\xff", b"BM")  # how files begin that OpenCV is given; and WebP
 # of a file: as many as its image may take, with four channels of 16 bits
 _MAX_BYTES = 8 * MAX_PIXELS
@@ -169,5 +170,6 @@ def _upright(image: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:
     """Undo an EXIF orientation (1..8)."""
     if orientation in (5, 6, 7, 8):
         image = image.transpose(1, 0, 2)
-    vertical, horizontal = orientation in (3, 4, 7, 8), orientation in (2, 3, 6, 7)
+    vertical = orientation in (3, 4, 7, 8)
+    horizontal = orientation in (2, 3, 6, 7)
     return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])

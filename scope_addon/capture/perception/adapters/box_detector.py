@@ -57,7 +57,8 @@ class BoxFormat(NamedTuple):
 
 def _corners_of(centers_and_sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Convert (N, 4) centre x, y, width, height to left, top, right, bottom."""
-    center, half = centers_and_sizes[:, :2], centers_and_sizes[:, 2:4] / 2
+    center = centers_and_sizes[:, :2]
+    half = centers_and_sizes[:, 2:4] / 2
     return np.concatenate([center - half, center + half], axis=1)
 
 
@@ -92,7 +93,8 @@ def _is_yolox(graph: Graph) -> bool:
 
 def _yolox(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
     rows = finite(outputs[0])[0]
-    box, decoded = rows[:, :4], description.decoded
+    box = rows[:, :4]
+    decoded = description.decoded
     if decoded is None:  # boxes in pixels spread over the whole input, others over a few units
         decoded = bool(np.abs(finite(graph.trial_outputs[0][0, :, 0])).mean() > graph.width / 8)
     if not decoded:

@@ -79,7 +79,8 @@ class Graph:
         self.path = path
         self._session = open_session(path, threads, execution, NetworkProcess)
         inputs = self._session.get_inputs()
-        names, shapes = [i.name for i in inputs], [i.shape for i in inputs]
+        names = [i.name for i in inputs]
+        shapes = [i.shape for i in inputs]
         self.names = [output.name for output in self._session.get_outputs()]
         if len(inputs) != 1:
             raise ModelFileError(
@@ -147,7 +148,8 @@ class Graph:
                         f"{list(description.input_size)}, but "
                         f"{self.path.name} takes images of {width} x {height}; correct it"
                     )
-            width, height = new_width, new_height
+            width = new_width
+            height = new_height
         if not (isinstance(width, int) and isinstance(height, int)):
             raise ModelFileError(
                 f"{self.path} takes images of any size; put its training size in "
@@ -244,7 +246,8 @@ def _fields(data: memoryview) -> Iterator[tuple[int, memoryview | int]]:
     at = 0
     while at < len(data):
         tag, at = _varint(data, at)
-        number, wire = tag >> 3, tag & 7
+        number = tag >> 3
+        wire = tag & 7
         if number == 0:
             raise ValueError("a field has no number")
         if wire == 2:

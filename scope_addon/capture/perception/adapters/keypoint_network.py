@@ -88,7 +88,8 @@ def _heatmap(outputs: Outputs, graph: Graph, description: Description) -> Keypoi
     refined: NDArray[np.float64] = np.array(
         [refine(h, x, y) for h, (x, y) in zip(heatmaps, cells.tolist(), strict=True)]
     )
-    size, grid = np.array([graph.width, graph.height]), np.array([columns, rows])
+    size = np.array([graph.width, graph.height])
+    grid = np.array([columns, rows])
     pixels_per_cell: NDArray[np.float64] = (
         (size - 1) / (grid - 1) if description.udp else size / grid
     )
@@ -100,7 +101,8 @@ def _by_quarter(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float
     rows, columns = heat.shape
     if not (0 < x < columns - 1 and 0 < y < rows - 1):
         return x, y
-    right, down = heat[y, x + 1] - heat[y, x - 1], heat[y + 1, x] - heat[y - 1, x]
+    right = heat[y, x + 1] - heat[y, x - 1]
+    down = heat[y + 1, x] - heat[y - 1, x]
     return x + 0.25 * float(np.sign(right)), y + 0.25 * float(np.sign(down))
 
 
@@ -110,12 +112,14 @@ def _by_taylor(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float]
     if not (1 < x < columns - 2 and 1 < y < rows - 2) or heat[y, x] <= 0:
         return x, y
     reach = _BLUR // 2 + 2  # the support of the blur in the 5 x 5 cells that are used
-    left, top = max(0, x - reach), max(0, y - reach)
+    left = max(0, x - reach)
+    top = max(0, y - reach)
     part = heat[top : y + reach + 1, left : x + reach + 1]
     # zero padding: there is no heat beyond the heatmap
     blurred = cv2.GaussianBlur(part, (_BLUR, _BLUR), 0, borderType=cv2.BORDER_CONSTANT)
     h = np.log(np.maximum(blurred, _MIN_HEAT))
-    x0, y0 = x - left, y - top
+    x0 = x - left
+    y0 = y - top
     gradient = np.array([h[y0, x0 + 1] - h[y0, x0 - 1], h[y0 + 1, x0] - h[y0 - 1, x0]]) / 2
     xx = (h[y0, x0 + 2] - 2 * h[y0, x0] + h[y0, x0 - 2]) / 4
     yy = (h[y0 + 2, x0] - 2 * h[y0, x0] + h[y0 - 2, x0]) / 4

@@ -96,14 +96,14 @@ class KeypointSet:
         :param scores: (count,) 0..1.
         :return: (33, 2) pixels and (33,) confidence.
         """
-        ours, confidence = np.zeros((len(KEYPOINT_NAMES), 2)), np.zeros(len(KEYPOINT_NAMES))
+        ours = np.zeros((len(KEYPOINT_NAMES), 2))
+        confidence = np.zeros(len(KEYPOINT_NAMES))
         for k, name in enumerate(KEYPOINT_NAMES):
             if name in self.mixture:
-                indices, weights = (
-                    list(self.mixture[name]),
-                    np.array(list(self.mixture[name].values())),
-                )
-                ours[k], confidence[k] = weights @ points[indices], scores[indices].min()
+                indices = list(self.mixture[name])
+                weights = np.array(list(self.mixture[name].values()))
+                ours[k] = weights @ points[indices]
+                confidence[k] = scores[indices].min()
         at = {name: ours[k] for k, name in enumerate(KEYPOINT_NAMES)}
         for k, name in enumerate(KEYPOINT_NAMES):
             if name not in self.mixture:

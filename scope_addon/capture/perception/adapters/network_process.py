@@ -31,7 +31,8 @@ OPENING_S = {"tensorrt": 1800.0}  # TensorRT compiles the network
 DEFAULT_OPENING_S = 120.0
 RUN_S = 60.0
 # of memory; onnxruntime copies weights while it rearranges them
-BASE_BYTES, WEIGHT_COPIES = 4 << 30, 4
+BASE_BYTES = 4 << 30
+WEIGHT_COPIES = 4
 _FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0)
 
 
@@ -48,7 +49,8 @@ class NetworkProcess:
         :raises RuntimeError: onnxruntime cannot open it, or its process crashed.
         :raises SetupError: the process cannot be started.
         """
-        self._path, self._lock = path, threading.Lock()
+        self._path = path
+        self._lock = threading.Lock()
         self._limit_bytes = BASE_BYTES + WEIGHT_COPIES * _bytes_of_weights(path)
         self._limit_s = OPENING_S.get(provider, DEFAULT_OPENING_S)
         self._process = _start()

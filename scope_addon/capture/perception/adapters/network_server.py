@@ -106,7 +106,8 @@ def _with_arrays(text: bytes, stream: IO[bytes], largest_arrays: int) -> dict[st
         raise ValueError("a message is no object")
     arrays = []
     for described in message["arrays"]:
-        dtype, shape = np.dtype(described["dtype"]), [int(n) for n in described["shape"]]
+        dtype = np.dtype(described["dtype"])
+        shape = [int(n) for n in described["shape"]]
         number = 1
         for n in shape:
             number *= n
@@ -245,7 +246,8 @@ def main() -> None:
 
     :raises ValueError: a message of the parent is damaged.
     """
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    requests = os.fdopen(os.dup(0), "rb")
+    answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever libraries print
     server = Server()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):

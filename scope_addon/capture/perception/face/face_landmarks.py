@@ -31,7 +31,9 @@ _EYES = [KEYPOINT_NAMES.index(f"{side}_eye") for side in ("left", "right")]
 _EARS = [KEYPOINT_NAMES.index(f"{side}_ear") for side in ("left", "right")]
 _MOUTH = [KEYPOINT_NAMES.index(f"mouth_{side}") for side in ("left", "right")]
 # Distances on an adult's face: each gives a scale, the largest of which is the least foreshortened.
-_EYES_M, _EYES_TO_MOUTH_M, _EARS_M = 0.063, 0.068, 0.150
+_EYES_M = 0.063
+_EYES_TO_MOUTH_M = 0.068
+_EARS_M = 0.150
 # longer side of the box of the landmarks, which reaches from the hairline to the chin
 FACE_M = 0.185
 _MIDDLE = 0.3  # of the face, from the eyes towards the mouth, in their distance
@@ -112,7 +114,8 @@ class FaceNetwork:
 
 def pixels_per_metre(keypoints_px: NDArray[np.float64]) -> float:
     """Estimate the image scale at the head from the body's keypoints (33, 2)."""
-    eyes, mouth = keypoints_px[_EYES], keypoints_px[_MOUTH].mean(axis=0)
+    eyes = keypoints_px[_EYES]
+    mouth = keypoints_px[_MOUTH].mean(axis=0)
     return max(
         float(np.linalg.norm(eyes[0] - eyes[1])) / _EYES_M,
         float(np.linalg.norm(mouth - eyes.mean(axis=0))) / _EYES_TO_MOUTH_M,
@@ -126,7 +129,8 @@ def region_from_body(keypoints_px: NDArray[np.float64]) -> Region:
     Up is from the mouth to the eyes, and across the line of the eyes, each as far as it is not
     foreshortened.
     """
-    eyes, mouth = keypoints_px[_EYES], keypoints_px[_MOUTH].mean(axis=0)
+    eyes = keypoints_px[_EYES]
+    mouth = keypoints_px[_MOUTH].mean(axis=0)
     middle = eyes.mean(axis=0)
     # from the right eye to the left one, to the right in an image of a front view
     dx, dy = eyes[0] - eyes[1]
@@ -226,13 +230,16 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
 
 def _brightness(image: NDArray[np.uint8], x: float, y: float, half: float) -> float:
     """Return the median of green in a square around a point; NaN outside the image."""
-    left, top = math.floor(x - half), math.floor(y - half)
-    right, bottom = math.ceil(x + half) + 1, math.ceil(y + half) + 1
+    left = math.floor(x - half)
+    top = math.floor(y - half)
+    right = math.ceil(x + half) + 1
+    bottom = math.ceil(y + half) + 1
     height, width = image.shape[:2]
     if top >= height or left >= width or bottom <= 0 or right <= 0:
         return math.nan
     part = image[max(top, 0) : bottom, max(left, 0) : right, 1]
-    low, high = (part.size - 1) // 2, part.size // 2
+    low = (part.size - 1) // 2
+    high = part.size // 2
     ordered = np.partition(part, (low, high), axis=None)
     return (int(ordered[low]) + int(ordered[high])) / 2
 

@@ -36,7 +36,9 @@ RECORD = _LIGHT + 1  # numbers in a row
 _FACE_PX = (16.0, 64.0)
 _FACING = (0.2, 0.6)  # cosine of the angle between the face's direction and the one to the camera
 _SCALE = 1.5  # side of a region over the face's
-_FOREHEAD, _CHIN = 10, 152  # landmarks
+# landmarks
+_FOREHEAD = 10
+_CHIN = 152
 # Inner corner, outer corner and iris of the left and of the right eye.
 _EYES = ((362, 263, 473), (133, 33, 468))
 _RADIUS = 0.4  # of the eyeball, 12 mm, over the distance of the eye's corners, 30 mm
@@ -60,10 +62,13 @@ def record(
     size = estimate.next_region.side_px / _SCALE
     facing = -float(head_axes(estimate.landmarks)[2, 2])
     confidence = estimate.presence * _ramp(size, *_FACE_PX) * _ramp(facing, *_FACING)
-    row[0], row[1] = max(confidence, 1e-3), size
+    row[0] = max(confidence, 1e-3)
+    row[1] = size
     if weights is not None:
-        row[_WEIGHTS], row[_GAZE] = weights, gaze(estimate.landmarks).ravel()
-    row[_POINTS], row[_LIGHT] = estimate.landmarks[_KEPT].ravel(), estimate.eye_light
+        row[_WEIGHTS] = weights
+        row[_GAZE] = gaze(estimate.landmarks).ravel()
+    row[_POINTS] = estimate.landmarks[_KEPT].ravel()
+    row[_LIGHT] = estimate.eye_light
     return row
 
 
@@ -119,7 +124,8 @@ def with_expression(
 ) -> NDArray[np.floating[Any]]:
     """Return rows (T, RECORD) with other weights (T, 52) and directions of the eyes (T, 2, 3)."""
     out = rows.copy()
-    out[:, _WEIGHTS], out[:, _GAZE] = weights, directions.reshape(len(rows), -1)
+    out[:, _WEIGHTS] = weights
+    out[:, _GAZE] = directions.reshape(len(rows), -1)
     return out
 
 

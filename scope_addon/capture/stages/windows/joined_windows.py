@@ -70,7 +70,8 @@ class JoinedWindows:
         if len(record) == record.first:
             return
         self.warnings += [text for text in record.warnings if text not in self.warnings]
-        first, base = record.first, len(self._frames)
+        first = record.first
+        base = len(self._frames)
         shift = self._frames[base - first] - int(record.indices[0]) if 0 < first <= base else 0
         self._frames += (record.indices[first:] + shift).tolist()
         self.timestamps += record.timestamps[first:].tolist()
@@ -87,7 +88,8 @@ class JoinedWindows:
             elif own.rows:
                 numbers[number] = len(self._people)
                 self._people.append(own)
-        self._numbers, self._last = numbers, record
+        self._numbers = numbers
+        self._last = record
 
     def tracks(self, most: int) -> list[Track]:
         """Return the tracks of at most ``most`` people; see `build_tracks`."""
@@ -131,7 +133,8 @@ class JoinedWindows:
         frames before.
         """
         assert self._last is not None
-        joined, last = self._people[place], self._last.tracklets[number]
+        joined = self._people[place]
+        last = self._last.tracklets[number]
         behind = len(joined.rows) - len([row for row in last.rows if row >= self._last.first])
         skipped = len([row for row in last.rows if row < self._last.first])
         for k, value in faded(last, tracklet, self._last.anchor, overlap).items():

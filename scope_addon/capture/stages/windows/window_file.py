@@ -88,7 +88,8 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
     :raises OSError: it cannot be written.
     """
     path = folder / window_name(record.window.number)
-    window, background = record.window, record.background
+    window = record.window
+    background = record.background
     segments = [edge.segments for edge in background.edge_frames]
     text = json.dumps({"execution": record.execution, "warnings": list(record.warnings)}).encode()
     arrays = {
@@ -196,7 +197,8 @@ def _check(arrays: Arrays) -> None:
     _require(
         lengths["H"] in (0, lengths["R"]) and lengths["F"] in (0, lengths["R"]), "hands and faces"
     )
-    frames, (first, anchor) = lengths["N"], arrays["rows"].tolist()
+    frames = lengths["N"]
+    (first, anchor) = arrays["rows"].tolist()
     _require(0 <= first <= frames and first <= anchor <= frames, "rows")
     for name, column in (
         ("cut_rows", ...),
@@ -329,7 +331,8 @@ class KeptWindows:
         self, unfinished: Path | None, options: CaptureOptions, size: tuple[int, int]
     ) -> None:
         self._folder = None if unfinished is None else unfinished / f"windows-{_digest(options)}"
-        self._size, self._bytes = size, 0
+        self._size = size
+        self._bytes = 0
 
     def load(self, window: Window) -> WindowRecord | None:
         """Return what was observed in a window; None if that is not known."""

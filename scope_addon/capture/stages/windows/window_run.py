@@ -41,9 +41,14 @@ class WindowRun:
         pool: ThreadPoolExecutor,
         clock: StageClock,
     ) -> None:
-        self.window, self._following = window, following
-        self._trackers, self._masks, self._cuts = trackers, masks, SceneCuts()
-        self.background, self._pool, self._clock = background, pool, clock
+        self.window = window
+        self._following = following
+        self._trackers = trackers
+        self._masks = masks
+        self._cuts = SceneCuts()
+        self.background = background
+        self._pool = pool
+        self._clock = clock
         self._exposure = AutoExposure()
         # in the brightness that the networks are given
         self._upcoming_lit: NDArray[np.uint8] | None = None
@@ -51,7 +56,8 @@ class WindowRun:
         self._indices: list[int] = []
         self._times: list[float] = []
         self._checksums: list[int] = []
-        self._first, self._anchor = 0, -1
+        self._first = 0
+        self._anchor = -1
         self._tracklets: dict[int, Tracklet] = {}
         self._anchor_regions: dict[int, Region] = {}
         self._cut_rows: list[int] = []
@@ -71,7 +77,8 @@ class WindowRun:
             self._upcoming_lit = (
                 None if upcoming is None else self._exposure.brighten(upcoming.image_rgb)
             )
-        time_s, row = frame.timestamp_s, len(self._times)
+        time_s = frame.timestamp_s
+        row = len(self._times)
         is_own = self.window.has_begun(time_s)
         with self._clock.stage("networks"):
             is_cut = self._cuts.is_cut(

@@ -68,10 +68,14 @@ class WindowedClip:
         pool: ThreadPoolExecutor,
         unfinished: Path | None = None,
     ) -> None:
-        self._video, self._windows, self._options, self._clock = video, windows, options, clock
+        self._video = video
+        self._windows = windows
+        self._options = options
+        self._clock = clock
         self._kept = KeptEstimates(unfinished)
         self._kept_windows = KeptWindows(unfinished, options, (video.width, video.height))
-        self._camera, self._pool = given_camera(video, options), pool
+        self._camera = given_camera(video, options)
+        self._pool = pool
         self._execution = Execution(options.provider)
         self._threads = network_threads(options.threads, self._execution)
         self._trackers: Trackers | None = None
@@ -136,8 +140,10 @@ class WindowedClip:
         """Observe all windows in one pass, from the first on that an earlier capture has not
         finished.
         """
-        known, is_single = self._join_kept(), len(self._windows) == 1
-        done, expected = len(self._joined), self._video.expected_frames
+        known = self._join_kept()
+        is_single = len(self._windows) == 1
+        done = len(self._joined)
+        expected = self._video.expected_frames
         listeners.progress(FINDING, done, max(expected, done))
         if known == len(self._windows):
             return
@@ -202,7 +208,8 @@ class WindowedClip:
         others then.
         """
         for exact in (False, True):
-            run, pairs = self._begin(window), frame_pairs(self._frames(window, exact), self._clock)
+            run = self._begin(window)
+            pairs = frame_pairs(self._frames(window, exact), self._clock)
             if not window.number:
                 break
             pairs = _up_to_begin(run, pairs)
@@ -303,7 +310,9 @@ class WindowedClip:
 
     def _footage(self, background: BackgroundEstimators) -> Footage:
         """Return what is known of the joined windows apart from the people."""
-        joined, camera, size = self._joined, self._camera, (self._video.width, self._video.height)
+        joined = self._joined
+        camera = self._camera
+        size = (self._video.width, self._video.height)
         execution = self._execution.describe(self._threads) if self._trackers else joined.execution
         warnings = self._execution.warnings + self._video.warnings
         warnings += [text for text in joined.warnings if text not in warnings]
@@ -363,7 +372,8 @@ def run_windows(
         while current is not None and current.window.has_ended(frame.timestamp_s):
             if following is None and left:
                 following = begin(left.popleft())
-            current, following = seam(current, following), None
+            current = seam(current, following)
+            following = None
         if current is None:
             return
         if following is None and left and left[0].warms_up(frame.timestamp_s):

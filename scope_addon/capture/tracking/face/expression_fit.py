@@ -41,15 +41,19 @@ from ...perception.face.face_record import (
 )
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
-MIN_S, MIN_FRAMES = 2.0, 10  # of a face, from which a person's face at rest is known
+# of a face, from which a person's face at rest is known
+MIN_S = 2.0
+MIN_FRAMES = 10
 SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
 # size of a face below which errors grow, with the area's inverse; most growth of λ
-SURE_PX, MAX_NOISE = 64.0, 8.0
+SURE_PX = 64.0
+MAX_NOISE = 8.0
 # w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
 LARGEST_GAZE = 2.0
 _TIME_TOLERANCE_S = 0.005  # of their sum
-_ROUNDS, _SWEEPS = 4, 30
+_ROUNDS = 4
+_SWEEPS = 30
 _STILL = 1e-6  # change of the weights in a sweep after which no other follows
 _TURN_RIDGE = 0.03  # on G, in squared radians
 _BLOCK = 2048  # frames that are solved at once: they fit into a processor's cache
@@ -152,7 +156,9 @@ def fit_units(
     x = points - response.mean - view_terms(turns) @ response.view
     views = turns - turns[sure].mean(axis=0)
     ridge = _TURN_RIDGE * sure.sum() * np.eye(3)
-    normal, w, ratio = E @ response.projection.T, np.zeros((len(x), len(E))), 1.0
+    normal = E @ response.projection.T
+    w = np.zeros((len(x), len(E)))
+    ratio = 1.0
     for _ in range(_ROUNDS):
         rest = x[sure] - w[sure] @ E
         constant = np.median(rest, axis=0)
@@ -192,8 +198,10 @@ def _descend(
     :param target: (T, U) g.
     """
     # a unit's numbers lie together
-    weights, g = np.ascontiguousarray(w.T), np.ascontiguousarray(target.T)
-    before, diagonal = np.empty_like(weights), np.diag(normal).tolist()
+    weights = np.ascontiguousarray(w.T)
+    g = np.ascontiguousarray(target.T)
+    before = np.empty_like(weights)
+    diagonal = np.diag(normal).tolist()
     for _ in range(_SWEEPS):
         before[:] = weights
         for u, most in enumerate(largest.tolist()):

@@ -52,7 +52,8 @@ def expression_motion(
     open_eyes = eyes_seen[:, None] & (weights[:, _BLINKS] < CLOSED)
     eyes = released(weights[:, _EYES], eyes_seen, times, np.zeros(len(_EYES)))
     weights = released(weights, seen, times, np.zeros(len(EXPRESSIONS)))
-    weights[:, _EYES], sure = eyes, np.where(eyes_seen, confidence, SURE_OF_MOUTH * confidence)
+    weights[:, _EYES] = eyes
+    sure = np.where(eyes_seen, confidence, SURE_OF_MOUTH * confidence)
     if smoothing and len(rows) > 2:
         noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE), 1.0)
         weights = np.clip(calmed(weights, times, NOISE * noise[:, None]), 0.0, 1.0)
@@ -133,12 +134,14 @@ def released(
     :param times: (T,) seconds.
     :param rest: (n,).
     """
-    T, out = len(values), np.tile(rest, (len(values), 1)).astype(float)
+    T = len(values)
+    out = np.tile(rest, (len(values), 1)).astype(float)
     rows = np.flatnonzero(seen)
     if not len(rows):
         return out
     place = np.searchsorted(rows, np.arange(T), side="right")
-    last, following = rows[np.maximum(place - 1, 0)], rows[np.minimum(place, len(rows) - 1)]
+    last = rows[np.maximum(place - 1, 0)]
+    following = rows[np.minimum(place, len(rows) - 1)]
     since = np.where(place > 0, times - times[last], np.inf)
     until = np.where(place < len(rows), times[following] - times, np.inf)
     shares = [0.5 * (1 + np.cos(np.pi * np.minimum(t / RELEASE_S, 1.0))) for t in (since, until)]

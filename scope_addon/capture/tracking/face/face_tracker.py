@@ -31,7 +31,9 @@ from ..frame_clock import PATIENCE_S, is_search_due
 PRESENCE_THRESHOLD = 0.5
 # between the face and where the body's head predicts it, in sides of the predicted region
 MAX_DISTANCE = 0.35
-MIN_SIZE, MAX_SIZE = 0.5, 1.6  # side of the face's region over that of the predicted one
+# side of the face's region over that of the predicted one
+MIN_SIZE = 0.5
+MAX_SIZE = 1.6
 SMALLEST_REGION_PX = 24.0
 # Least cosine of the angle to the camera, by the body, of a head on which a lost face is looked
 # for. Of heads that look farther away, the network imagines the half that nobody sees, or a face at
@@ -87,13 +89,15 @@ class FaceTracker:
         :param image_rgb: (H, W, 3).
         :param observations: tracklet number and observation of each person.
         """
-        before, self._faces = self._faces, {}
+        before = self._faces
+        self._faces = {}
         found = []
         for number, person in observations:
             head = person.keypoints_px[list(HEAD)].mean(axis=0)
             face = before.get(number) or _Face(None, head, time_s, time_s - PATIENCE_S)
             estimate = self._find(image_rgb, face, person, head, time_s)
-            face.region, face.head_px = (estimate.next_region if estimate else None), head
+            face.region = estimate.next_region if estimate else None
+            face.head_px = head
             if estimate:
                 face.seen_s = time_s
                 estimate = replace(estimate, eye_light=eye_light(image_rgb, estimate.landmarks))

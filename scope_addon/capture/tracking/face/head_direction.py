@@ -32,7 +32,8 @@ _HEAD_FROM_REFERENCE = np.radians([5.3, -0.4, 0.7])
 _Y_DOWN = np.diag([1.0, -1.0, -1.0])
 # Cosine of the angle between face and ears from which a face counts for nothing, and to which it
 # counts in full: at the back of a head, the network may see a face that looks the other way.
-_CONTRADICTED, _AGREED = np.cos(np.radians(60.0)), np.cos(np.radians(30.0))
+_CONTRADICTED = np.cos(np.radians(60.0))
+_AGREED = np.cos(np.radians(30.0))
 
 
 def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.float64]:
@@ -43,7 +44,8 @@ def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.f
     :raises ModelFileError: the response of the landmarks, which has the reference face, is missing
         or damaged.
     """
-    directions, seen = np.zeros((len(face), 3)), face[:, 0] > 0
+    directions = np.zeros((len(face), 3))
+    seen = face[:, 0] > 0
     if not seen.any():
         return directions
     response = load_response()

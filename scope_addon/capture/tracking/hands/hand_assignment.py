@@ -18,7 +18,8 @@ WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's
 UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
 # The same of a hand of a sure side, with this presence, within the forearm's reach, that was this
 # one a frame ago: it has not left its place because the body's wrist is elsewhere.
-FOLLOWED_DISTANCE, FOLLOWED_PRESENCE = 2.0, 0.8
+FOLLOWED_DISTANCE = 2.0
+FOLLOWED_PRESENCE = 0.8
 SURE_WRIST = 0.5
 MAX_SIZE = 2.0  # of the hand, in the hand lengths of the body
 # mean distance of the keypoints, in sizes of the hand, below which two hands are one
@@ -32,7 +33,8 @@ DISAGREEMENT_THRESHOLD = 0.3
 CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
 MIN_SIDE_PROBABILITY = 0.15  # of the right side
 # distances of the body's two wrists from a hand of the wrong side, in hand lengths
-SAME_WRIST, OTHER_WRIST = 0.3, 1.0
+SAME_WRIST = 0.3
+OTHER_WRIST = 1.0
 FOLLOWED_WRIST = 0.5  # the first of them for a hand that was this one in the frame before or after
 # Where forearms cross, the body's wrists are exchanged or both at one hand. A hand of a sure side
 # then goes by its own.
@@ -59,7 +61,8 @@ TENTATIVE = Least(0.2, 0.2)  # of one that may be believed later, see `tentative
 # the same of a hand that is followed back from where it was found again
 FOLLOWED_BACK = Least(0.2, 0.2, 0.42)
 # The same of hands in a second look, which finds small ones in the skin of a forearm.
-SECOND, SECOND_TENTATIVE = Least(0.6, np.inf, 0.42), Least(0.2, np.inf, 0.42)
+SECOND = Least(0.6, np.inf, 0.42)
+SECOND_TENTATIVE = Least(0.2, np.inf, 0.42)
 
 
 def assigned(
@@ -89,7 +92,8 @@ def assigned(
     """
     sure = person.keypoints_confidence[WRISTS[side]] >= SURE_WRIST
     length = HAND_LENGTH_M * scale
-    wrists, elbow = person.keypoints_px[WRISTS], person.keypoints_px[ELBOWS[side]]
+    wrists = person.keypoints_px[WRISTS]
+    elbow = person.keypoints_px[ELBOWS[side]]
     distance, other = (np.linalg.norm(estimate.keypoints_px[0] - wrists, axis=1) / length)[
         [side, 1 - side]
     ]

@@ -28,7 +28,8 @@ from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_s
 FAR_MOTION = 0.35
 KEPT_REACH = 2.0  # of the part of a frame that is kept around the wrist, in hand lengths
 # keypoints of a hand: bases and middle joints of the fingers
-_KNUCKLES, _MIDDLES = [5, 9, 13, 17], [6, 10, 14, 18]
+_KNUCKLES = [5, 9, 13, 17]
+_MIDDLES = [6, 10, 14, 18]
 _ALONG = (1 / 3, 2 / 3)  # places on the palm, from the wrist to the knuckles
 _DARK = 8.0  # added to colours, which say little below it
 MAX_SHADE = 0.7  # change of a channel's logarithm that light can make from one frame to another
@@ -50,7 +51,8 @@ class Found(NamedTuple):
         hand is negative.
         """
         out = np.empty((HAND_POINTS, 6))
-        out[:, :2], out[:, 3:] = self.estimate.keypoints_px, self.estimate.world_landmarks
+        out[:, :2] = self.estimate.keypoints_px
+        out[:, 3:] = self.estimate.world_landmarks
         out[:, 2] = self.estimate.presence if self.is_sure else -self.estimate.presence
         return np.where(np.isfinite(out), out, 0.0).astype(np.float32)
 
@@ -85,7 +87,8 @@ class Sight:
         """
         reach = KEPT_REACH * self.hand_px
         height, width = self.image_rgb.shape[:2]
-        (x0, y0), (x1, y1) = np.floor(self.wrist_px - reach), np.ceil(self.wrist_px + reach)
+        (x0, y0) = np.floor(self.wrist_px - reach)
+        (x1, y1) = np.ceil(self.wrist_px + reach)
         x0, x1 = (int(np.clip(x, 0, width)) for x in (x0, x1))
         y0, y1 = (int(np.clip(y, 0, height)) for y in (y0, y1))
         return replace(self, image_rgb=self.image_rgb[y0:y1, x0:x1].copy(), offset_px=(x0, y0))
@@ -161,7 +164,8 @@ def palm_color(
     :param image_rgb: (H, W, 3) uint8.
     :param keypoints_px: (21, 2) of the hand.
     """
-    wrist, knuckles = keypoints_px[0], keypoints_px[_KNUCKLES]
+    wrist = keypoints_px[0]
+    knuckles = keypoints_px[_KNUCKLES]
     places = [
         knuckles,
         keypoints_px[_MIDDLES],
@@ -180,7 +184,8 @@ def is_like(color: NDArray[np.float64] | None, before: NDArray[np.float64] | Non
     """
     if color is None or before is None:
         return True
-    a, b = color + _DARK, before + _DARK
+    a = color + _DARK
+    b = before + _DARK
     shade = float(np.abs(np.log(a / b)).max())
     tint = float(np.abs(a / a.sum() - b / b.sum()).max())
     return shade <= MAX_SHADE or tint <= MAX_TINT

@@ -48,7 +48,9 @@ AGAIN_PRESENCE = 0.03  # the same where a hand is looked for that was found in t
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
 # side of the square in which a palm is searched, in sides of the predicted region
 SEARCH_SCALE = 2.3
-CLOSER_SCALE, SMALLER_SCALE = 1.5, 0.7  # of the square and the region of a second look, likewise
+# of the square and the region of a second look, likewise
+CLOSER_SCALE = 1.5
+SMALLER_SCALE = 0.7
 UNSURE_SCORE = 0.2  # of a palm in a second look
 MAX_PALMS = 2
 # Frames that are kept of a hand, a third of a second at 30 frames/s: each is a copy of its
@@ -116,7 +118,9 @@ class HandTracker:
     def restarted(self) -> HandTracker:
         """Return a tracker with the same networks that has seen nothing."""
         tracker = copy.copy(self)
-        tracker._hands, tracker._missed, tracker._time_s = {}, {}, 0.0
+        tracker._hands = {}
+        tracker._missed = {}
+        tracker._time_s = 0.0
         return tracker
 
     def step(
@@ -164,12 +168,15 @@ class HandTracker:
                 # Another one was found there: look beside all of them, which this one may touch.
                 others = [other for other in kept.values() if other is not None]
                 beside = self._search(replace(sight, others=others), look_again=False)
-                found[key], kept[key] = beside, beside and beside.estimate
+                found[key] = beside
+                kept[key] = beside and beside.estimate
         for key, hand in found.items():
             state = self._hands[key]
-            state.found, state.wrist_px = hand, sights[key].wrist_px
+            state.found = hand
+            state.wrist_px = sights[key].wrist_px
             if hand is not None and hand.is_sure:
-                state.seen_s, state.color = now, hand.color
+                state.seen_s = now
+                state.color = hand.color
         nothing = np.zeros((HAND_POINTS, 6), np.float32)
         rows = {
             n: np.array(
@@ -177,7 +184,8 @@ class HandTracker:
             )
             for n, _ in observations
         }
-        before, self._missed = self._missed, {}
+        before = self._missed
+        self._missed = {}
         for key, sight in sights.items():
             hand = found[key]
             missed = [m for m in before.get(key, []) if now - m.time_s <= SUPPORT_S + 0.005]
@@ -215,7 +223,8 @@ class HandTracker:
             for other in elsewhere:
                 if other.time_s == each.time_s:
                     other.sight.others.append(found.estimate)
-            hand, sight = found, each.sight
+            hand = found
+            sight = each.sight
 
     def _found_back(self, sight: Sight, later: Found, later_sight: Sight) -> Found | None:
         """Look for a hand in the frame before one in which it was found, there and around the

@@ -53,17 +53,20 @@ def _reached(
     """Return (T,) which tentative hands (T, 21, 6) follow a sure one without interruption."""
     out = np.zeros(len(own), bool)
     # the hand that was believed last, and when the network was sure of it last
-    last, since = -1, -np.inf
+    last = -1
+    since = -np.inf
     for k in np.flatnonzero(own[:, 0, _CONFIDENCE]):
         if sure[k]:
-            last, since = k, times[k]
+            last = k
+            since = times[k]
         elif (
             last >= 0
             and times[k] - since <= SUPPORT_S + _TOLERANCE_S
             and times[k] - times[last] <= LONGEST_STEP_S + _TOLERANCE_S
             and _continues(own[last], own[k])
         ):
-            out[k], last = True, k
+            out[k] = True
+            last = k
     return out
 
 

@@ -34,7 +34,8 @@ class LandmarkEstimator:
     """Runs the landmark network, and keeps pending estimates in the targets."""
 
     def __init__(self, networks: TrackingNetworks) -> None:
-        self._landmarks, self._early = networks.landmarks, networks.begins_early
+        self._landmarks = networks.landmarks
+        self._early = networks.begins_early
         self._prefetches = networks.prefetches
         self._with_masks = self._upcoming_with_masks = False
 
@@ -43,7 +44,8 @@ class LandmarkEstimator:
 
         :param upcoming_with_masks: whether the people of the frame after it need masks.
         """
-        self._with_masks, self._upcoming_with_masks = self._upcoming_with_masks, upcoming_with_masks
+        self._with_masks = self._upcoming_with_masks
+        self._upcoming_with_masks = upcoming_with_masks
 
     def estimate(
         self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], sure: bool = True
@@ -190,7 +192,8 @@ def open_networks(
         if detector
         else PersonDetector(threads, execution)
     )
-    name, largest = landmark_network_name(quality), landmark_network_name("best")
+    name = landmark_network_name(quality)
+    largest = landmark_network_name("best")
     reference: LandmarkNetwork | None = None
     if keypoints:
         own = KeypointNetwork(keypoints, threads, execution)

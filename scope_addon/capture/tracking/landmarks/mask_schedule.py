@@ -32,8 +32,10 @@ class MaskSchedule:
     """
 
     def __init__(self, network: LandmarkNetwork | None, frames: int) -> None:
-        self._network, self._stride = network, max(MIN_STRIDE, frames // MASKS)
-        self._frames, self._masks = 0, 0
+        self._network = network
+        self._stride = max(MIN_STRIDE, frames // MASKS)
+        self._frames = 0
+        self._masks = 0
 
     @property
     def upcoming_is_due(self) -> bool:
@@ -46,7 +48,8 @@ class MaskSchedule:
         self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]]
     ) -> list[tuple[int, Observation]]:
         """Return the observations of the next frame (H, W, 3) with masks, if they are due."""
-        found, due = list(observations), self._frames % self._stride == 0
+        found = list(observations)
+        due = self._frames % self._stride == 0
         self._frames += bool(found)
         if self._network is None or not found or not due:
             return [(number, o if o.mask is None else replace(o, mask=None)) for number, o in found]

@@ -23,14 +23,17 @@ DISAGREEMENT_THRESHOLD = 0.25
 UNSURE_SPREAD_THRESHOLD = 0.47
 UNSURE_DISAGREEMENT_THRESHOLD = 0.18
 # keypoints above this confidence; a person who has left shows fewer
-MIN_CONFIDENT, CONFIDENT = 4, 0.3
+MIN_CONFIDENT = 4
+CONFIDENT = 0.3
 SMALLEST_SIDE_PX = 24.0
 LARGEST_SIDE = 6.0  # in longer sides of the image
 # mean distance of the keypoints, in sides of the region, below which two bodies are one
 SAME_BODY = 0.1
 # How far a predicted region may be from the one that the frame before gives: centre and size in
 # sides, rotation in radians. The networks were trained on regions with larger errors.
-SAME_CENTER, SAME_SIDE, SAME_ROTATION = 0.08, 0.12, 0.15
+SAME_CENTER = 0.08
+SAME_SIDE = 0.12
+SAME_ROTATION = 0.15
 
 
 def is_plausible(estimate: PoseEstimate, sure: bool = True) -> bool:

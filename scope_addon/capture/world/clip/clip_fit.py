@@ -39,7 +39,10 @@ OVERLAP = 4_800
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
 _Progress = Callable[[str, int, int], None]
 # of the standard deviations, see `joint_sigma`
-ALONG, ACROSS, _RATE_HZ, _EXPONENT = 15.5, 11.5, 60.0, 0.3
+ALONG = 15.5
+ACROSS = 11.5
+_RATE_HZ = 60.0
+_EXPONENT = 0.3
 _MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
@@ -77,14 +80,14 @@ class _Clip:
         progress: _Progress,
         ablation: Ablation,
     ) -> None:
-        self._prepared, self._path, self._progress, self._limb_search = (
-            prepared,
-            path,
-            progress,
-            ablation.limb_search,
-        )
-        self._start, first = start, path.to_first(start)
-        self._rotations, self._root = first.rotations.copy(), first.t_camera_root.copy()
+        self._prepared = prepared
+        self._path = path
+        self._progress = progress
+        self._limb_search = ablation.limb_search
+        self._start = start
+        first = path.to_first(start)
+        self._rotations = first.rotations.copy()
+        self._root = first.t_camera_root.copy()
         self._surface = (
             BodySurface(prepared.body, np.asarray(start.betas, float))
             if ablation.body_surface
@@ -98,11 +101,9 @@ class _Clip:
         to this one's.
         """
         self._progress("solving the clip", int(self._done.sum()), len(self._done))
-        body, times, every = (
-            self._prepared.body,
-            self._prepared.track.times[frames],
-            slice(0, len(frames)),
-        )
+        body = self._prepared.body
+        times = self._prepared.track.times[frames]
+        every = slice(0, len(frames))
         quadratic, robust = motion_priors(body, times)
         window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
         found = window.fit(every, [self._state(k) for k in frames], quadratic)
@@ -139,7 +140,8 @@ class _Clip:
         root[:both] = (
             self._root[frames[:both]] * (1 - share[:, None]) + root[:both] * share[:, None]
         )
-        self._rotations[frames], self._root[frames] = rotations, root
+        self._rotations[frames] = rotations
+        self._root[frames] = root
         self._sigma[frames] = self._blended_sigma(frames, found, share)
         self._done[frames] = True
 
@@ -154,7 +156,8 @@ class _Clip:
         joints = found.t_world_part - self._path.center[frames, None]
         times = self._prepared.track.times[frames]
         sigma = joint_sigma(found.joint_covariance[:, 0], found.covariance_from_root, joints, times)
-        earlier, w = self._sigma[frames[: len(share)]], share[:, None, None]
+        earlier = self._sigma[frames[: len(share)]]
+        w = share[:, None, None]
         sigma[: len(share)] = (1.0 - w) * earlier + w * sigma[: len(share)]
         return sigma
 

@@ -37,7 +37,9 @@ from ...fitting.prepared_track import PreparedTrack
 from ...fitting.weights import CLIP_STEPS, ROBUST, clip_stages
 from ..camera_path import CameraPath
 
-MIN_PROBABILITY, SPREAD_M = 0.5, 0.02  # of a rest; see `resting_places`
+# of a rest; see `resting_places`
+MIN_PROBABILITY = 0.5
+SPREAD_M = 0.02
 ENTERS_M = 0.01  # depth from which on an arm counts as inside the body
 # of a point inside the body, against one of a sole under the floor that is surely in contact
 _INSIDE_WEIGHT = 1.0
@@ -87,7 +89,9 @@ class ClipWindow:
 
         :param steps: the most iterations; fewer than by default where the motion is not kept.
         """
-        prepared, frames, stands = self.prepared, self.frames[rows], None
+        prepared = self.prepared
+        frames = self.frames[rows]
+        stands = None
         if prepared.stance is not None:
             stands = StandingPoints(prepared.contact_point_indices, prepared.stance.resting[frames])
         return fit_motion(
@@ -117,7 +121,9 @@ class ClipWindow:
 
     def with_resting_places(self, found: MotionFit) -> ClipWindow:
         """Add to the measurements where soles and palms rest in a motion."""
-        prepared, path, frames = self.prepared, self.path, self.frames
+        prepared = self.prepared
+        path = self.path
+        frames = self.frames
         if prepared.stance is None:
             return self
         points = contact_point_positions(prepared.body, found.R_world_part, found.t_world_part)
@@ -135,7 +141,8 @@ class ClipWindow:
 
         :return: and whether they enter it by more than `ENTERS_M` there.
         """
-        path, planes = self.path, surface.planes(found.R_world_part, found.t_world_part)
+        path = self.path
+        planes = surface.planes(found.R_world_part, found.t_world_part)
         offset = planes.offset - np.einsum("tci,ti->tc", planes.normal, path.center[self.frames])
         normal_cam = planes.normal @ path.R_first_camera[self.frames]
         measured = [
@@ -162,7 +169,9 @@ class ClipWindow:
         return replace(ROBUST, stages=clip_stages(self.prepared.weights, steps))
 
     def _views(self, rows: slice) -> Sequence[Measurements] | Sequence[Sequence[View]]:
-        measured, frames, path = self.measured[rows], self.frames[rows], self.path
+        measured = self.measured[rows]
+        frames = self.frames[rows]
+        path = self.path
         if path.is_static:
             return measured
         R = np.swapaxes(path.R_first_camera[frames], 1, 2)
@@ -183,13 +192,16 @@ def resting_places(
     :param points: (T, C, 3) in axes that do not move, metres.
     :param resting: (T, C) probability that each point rests.
     """
-    places, probability = np.zeros(points.shape), np.zeros(resting.shape)
+    places = np.zeros(points.shape)
+    probability = np.zeros(resting.shape)
     for c in range(resting.shape[1]):
         for first, end in runs(resting[:, c] > MIN_PROBABILITY):
-            rest, p = points[first:end, c], resting[first:end, c]
+            rest = points[first:end, c]
+            p = resting[first:end, c]
             place = p @ rest / p.sum()
             if np.linalg.norm(rest - place, axis=1).max() < SPREAD_M:
-                places[first:end, c], probability[first:end, c] = place, p
+                places[first:end, c] = place
+                probability[first:end, c] = p
     return places, probability
 
 
@@ -208,7 +220,8 @@ def with_planes(
     count = len(indices)
     if not count:
         return floor
-    free, inside = np.zeros(count), np.full(count, _INSIDE_WEIGHT)
+    free = np.zeros(count)
+    inside = np.full(count, _INSIDE_WEIGHT)
     if floor is None:
         return Floor(indices, normal, offset, free, below=inside)
     soles = len(np.asarray(floor.indices))

@@ -21,10 +21,13 @@ from .....solver import Body, MotionFit, MotionPrior, State
 from ....kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
 from .clip_window import ClipWindow
 
-SHALLOW_M, DEEP_M = 0.03, 0.1  # a bone is mirrored while it is deeper, if it gets so deep
+# a bone is mirrored while it is deeper, if it gets so deep
+SHALLOW_M = 0.03
+DEEP_M = 0.1
 _MIN_CHANGE_M = 0.1  # by which a limb that has a minimum of its own differs
 # that the mirrored limb may add to frames alone, in the mean and to one
-_MAX_COST, _MAX_COST_OF_ONE = 5.0, 30.0
+_MAX_COST = 5.0
+_MAX_COST_OF_ONE = 30.0
 _MIN_GAIN = 10.0  # of cost, over the frames that are fitted together
 _LONGEST_S = 2.0  # of a bone on one side; longer trials cost much, and none has found a better pose
 _SAMPLES = 5  # further frames of a run that are tried alone
@@ -109,7 +112,8 @@ def _may_be_better(
     added: list[float] = []
     ends = list(limb[1:])
     for row in rows:
-        now, then = window.fit_alone(row, states[row]), window.fit_alone(row, other[row])
+        now = window.fit_alone(row, states[row])
+        then = window.fit_alone(row, other[row])
         change: NDArray[Any] = np.linalg.norm(
             then.t_camera_part[ends] - now.t_camera_part[ends], axis=1
         )
@@ -130,6 +134,10 @@ def _better(
     then = window.fit(around, other[around], prior, steps=_STEPS)
     if not now.cost - then.cost > _MIN_GAIN:
         return motion
-    states, R, joints = list(motion.states), motion.R.copy(), motion.joints.copy()
-    states[around], R[around], joints[around] = then.states, then.R_world_part, then.t_world_part
+    states = list(motion.states)
+    R = motion.R.copy()
+    joints = motion.joints.copy()
+    states[around] = then.states
+    R[around] = then.R_world_part
+    joints[around] = then.t_world_part
     return _Motion(states, R, joints)

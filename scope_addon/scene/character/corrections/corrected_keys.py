@@ -40,7 +40,8 @@ from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_value
 _SAME_FRAME = 2e-3
 _WHOLE = 1e-3  # frames; timestamps are rounded
 _SAME_S = 1e-4  # keys' frames are single precision
-_MISSED_PX, _MISSED_M = 1.0, 0.005
+_MISSED_PX = 1.0
+_MISSED_M = 0.005
 
 
 def rewrite_changed_keys(
@@ -66,7 +67,8 @@ def rewrite_changed_keys(
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
-    start, (before, after) = start_frame(armature), motions
+    start = start_frame(armature)
+    (before, after) = motions
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
     on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
@@ -87,9 +89,11 @@ def rewrite_changed_keys(
     for row in restored:
         again |= np.abs(frames - (start + known.times[row] * rate)) < _SAME_FRAME
     exact = again if was is not None else again | ~differ(free, old)
-    old.rotations[exact], old.root[exact] = free.rotations[exact], free.root[exact]
+    old.rotations[exact] = free.rotations[exact]
+    old.root[exact] = free.root[exact]
     rows = frames.astype(np.float32)
-    values, moves = keyed_values(armature, body, rows), _moves(again, was, now)
+    values = keyed_values(armature, body, rows)
+    moves = _moves(again, was, now)
     edits = KeyEdits(
         corrections_of(after), after.betas, shot_of(after, _start(armature, rate)), added, exact
     )
@@ -98,7 +102,8 @@ def rewrite_changed_keys(
             armature, body, (_moved_rows(clip, moves)[0], old), frames, edits
         )
         write_keys(armature, body, begun, frames, differ(begun, clip))
-        clip, moves = begun, np.tile(np.eye(4), (len(frames), 1, 1))
+        clip = begun
+        moves = np.tile(np.eye(4), (len(frames), 1, 1))
     _write_change(armature, body, clip, frames, (old, new), moves)
     if isinstance(added, Pin):
         _meet_pin(armature, body, rate, after, added)
@@ -291,7 +296,8 @@ def _write_change(
     """
     old, new = change
     which = differ(old, new)
-    changed, inverse = clip.copy(), np.swapaxes(old.rotations[which], -1, -2)
+    changed = clip.copy()
+    inverse = np.swapaxes(old.rotations[which], -1, -2)
     shift = (inverse[:, 0] @ (new.root - old.root)[which, :, None])[..., 0]
     changed.root[which] += (clip.rotations[which, 0] @ shift[..., None])[..., 0]
     changed.rotations[which] = clip.rotations[which] @ inverse @ new.rotations[which]
@@ -305,7 +311,8 @@ def _moved_rows(clip: Clip, moves: NDArray[np.float64]) -> tuple[Clip, NDArray[n
     """Move each row in the world by its rigid transform (T, 4, 4); also return which rows (T,) that
     moves.
     """
-    out, moved = clip.copy(), (moves != np.eye(4)).any(axis=(1, 2))
+    out = clip.copy()
+    moved = (moves != np.eye(4)).any(axis=(1, 2))
     out.rotations[moved, 0] = moves[moved, :3, :3] @ out.rotations[moved, 0]
     out.root[moved] = (moves[moved, :3, :3] @ out.root[moved, :, None])[..., 0] + moves[
         moved, :3, 3

@@ -126,5 +126,6 @@ def floored(
 def _replaced(clip: Clip, rows: NDArray[np.bool_], part: Clip) -> Clip:
     """Return a clip with other values in some rows."""
     out = clip.copy()
-    out.rotations[rows], out.root[rows] = part.rotations, part.root
+    out.rotations[rows] = part.rotations
+    out.root[rows] = part.root
     return out

@@ -92,7 +92,8 @@ def restore(
     same = (now == known.written) | (np.isnan(now) & np.isnan(known.written))
     rows = np.flatnonzero(same.all(axis=1) & ~np.isnan(now).all(axis=1))
     for column, curve in enumerate(channel_curves(armature, body)):
-        values, keys = known.before[rows, column], curve.keyframe_points
+        values = known.before[rows, column]
+        keys = curve.keyframe_points
         there = ~np.isnan(now[rows, column])
         coordinates = read_keys(curve)
         at = np.clip(
@@ -125,7 +126,8 @@ def write_both(
     for clip in clips:
         write_clip(armature, body, clip, frames)
         values.append(keyed_values(armature, body, frames.astype(np.float32)))
-    start, rows = start_frame(armature), differ(free, corrected)
+    start = start_frame(armature)
+    rows = differ(free, corrected)
     return changed_rows(frames.astype(np.float32), rows, (values[0], values[1]), start, rate)
 
 

@@ -55,7 +55,8 @@ def test_with_smpl_and_a_regressor_joints_are_those_of_the_mesh(tmp_path, table)
     (clip,) = clips(tmp_path, models)
     assert clip.protocols == ("3dpw-mesh",)
     female = clip.truth().people[1]
-    tables, frame = make_tables("smpl", seed=1), 4
+    tables = make_tables("smpl", seed=1)
+    frame = 4
     rotations = exp(table["poses"][1][frame].reshape(24, 3))
     vertices, _ = smpl_formula(tables, table["betas"][1], rotations, table["trans"][1][frame])
     T = table["cam_poses"][frame]

@@ -12,7 +12,10 @@ import numpy as np
 from ....required import package
 
 av = package("av")
-PQ, HLG, BT709 = 16, 18, 1  # transfer characteristics of ITU-T H.273
+# transfer characteristics of ITU-T H.273
+PQ = 16
+HLG = 18
+BT709 = 1
 BT2020 = 9  # primaries, and matrix of YUV
 
 
@@ -34,12 +37,10 @@ def coded_frame(
         rows = np.zeros((plane.height, plane.line_size // kind().itemsize), kind)
         rows[:, : plane.width] = np.rint(values * 2 ** (bits - 8))
         plane.update(rows.tobytes())
-    frame.color_trc, frame.color_primaries, frame.colorspace, frame.color_range = (
-        transfer,
-        primaries,
-        matrix,
-        1,
-    )
+    frame.color_trc = transfer
+    frame.color_primaries = primaries
+    frame.colorspace = matrix
+    frame.color_range = 1
     return frame
 
 
@@ -52,13 +53,19 @@ def write_frames(
         stream = container.add_stream(
             codec, rate=rate, options={k.replace("_", "-"): v for k, v in options.items()}
         )
-        stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, pixels
-        context, first = stream.codec_context, frames[0]
+        stream.width = frames[0].width
+        stream.height = frames[0].height
+        stream.pix_fmt = pixels
+        context = stream.codec_context
+        first = frames[0]
         context.thread_count = 1
-        context.color_trc, context.color_primaries = first.color_trc, first.color_primaries
-        context.colorspace, context.color_range = first.colorspace, first.color_range
+        context.color_trc = first.color_trc
+        context.color_primaries = first.color_primaries
+        context.colorspace = first.colorspace
+        context.color_range = first.color_range
         for k, frame in enumerate(frames):
-            frame.pts, frame.time_base = k, Fraction(1, rate)
+            frame.pts = k
+            frame.time_base = Fraction(1, rate)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     return path
@@ -85,7 +92,8 @@ def marked(frames: list, order: str) -> list:
     graph.link_nodes(buffer, graph.add("setfield", order), graph.add("buffersink")).configure()
     result = []
     for k, frame in enumerate(frames):
-        frame.pts, frame.time_base = k, Fraction(1, 25)
+        frame.pts = k
+        frame.time_base = Fraction(1, 25)
         graph.vpush(frame)
         result.append(graph.vpull())
     return result

@@ -19,7 +19,8 @@ from scope.scope_addon.capture.media.video_range import VideoRange
 from ....required import need_encoder
 from .made_frames import BT2020, HLG, av, coded_frame, marked, with_fields
 
-HEIGHT, WIDTH = 48, 96
+HEIGHT = 48
+WIDTH = 96
 
 
 def moving_bar(k: int) -> np.ndarray:
@@ -98,10 +99,8 @@ def test_the_frame_before_makes_a_late_begin_the_same() -> None:
 
 
 def test_a_change_of_size_or_format_loses_no_frame() -> None:
-    large, small = (
-        with_fields([moving_bar(k) for k in range(6)]),
-        with_fields([moving_bar(k)[:32] for k in range(6)]),
-    )
+    large = with_fields([moving_bar(k) for k in range(6)])
+    small = with_fields([moving_bar(k)[:32] for k in range(6)])
     other = with_fields([moving_bar(k) for k in range(6)], pixels="yuv422p")
     frames = [*large, *small, *other]
     shown = list(deinterlaced(frames))
@@ -122,7 +121,8 @@ def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int
         """The graph, one method of which fails from a certain call on."""
 
         def __init__(self) -> None:
-            self.graph, self.calls = graph(), 0
+            self.graph = graph()
+            self.calls = 0
 
         def __getattr__(self, name: str):
             if name == broken:
@@ -135,7 +135,8 @@ def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int
             self.graph.link_nodes(*nodes)
             return self
 
-    woven, graph = with_fields([moving_bar(k) for k in range(14)]), av.filter.Graph
+    woven = with_fields([moving_bar(k) for k in range(14)])
+    graph = av.filter.Graph
     monkeypatch.setattr(av.filter, "Graph", Failing)
     shown = list(deinterlaced(woven))
     assert times(shown) == times(woven)
@@ -162,9 +163,12 @@ def write(
         stream = container.add_stream(
             codec, rate=rate, options={"flags": flags, "threads": "1", **options}
         )
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, pixels
+        stream.width = WIDTH
+        stream.height = HEIGHT
+        stream.pix_fmt = pixels
         for k, frame in enumerate(frames):
-            frame.pts, frame.time_base = k, 1 / stream.codec_context.framerate
+            frame.pts = k
+            frame.time_base = 1 / stream.codec_context.framerate
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     return path
@@ -252,7 +256,9 @@ def test_fields_that_are_frames_of_their_own_stay_as_they_are(tmp_path: Path) ->
     with av.open(str(path), "w") as container:
         options = {"x265-params": "log-level=none:interlace=tff"}
         stream = container.add_stream("libx265", rate=50, options=options)
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        stream.width = WIDTH
+        stream.height = HEIGHT
+        stream.pix_fmt = "yuv420p"
         for k in range(6):
             frame = av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24").reformat(
                 format="yuv420p"

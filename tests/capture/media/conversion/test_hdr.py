@@ -107,7 +107,9 @@ def test_colours_come_back(transfer: int) -> None:
     assert np.abs(error[-1]).max() < 40, error.round()
 
 
-D65, DCI = (0.3127, 0.3290), (0.314, 0.351)  # whites
+# whites
+D65 = (0.3127, 0.3290)
+DCI = (0.314, 0.351)
 SDR_PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))  # chromaticities of BT.709
 P3_PRIMARIES = ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060))
 
@@ -154,7 +156,8 @@ def test_other_frames_are_sdr(transfer: int) -> None:
 @pytest.mark.parametrize("matrix", [0, 2, 3, 5, 8, 10, 14, 15, 200])
 @pytest.mark.parametrize("primaries", [0, BT709, 11, 12, 200])
 def test_damaged_tags_leave_greys_alone(matrix: int, primaries: int) -> None:
-    frame, right = grey(0.5, HLG, matrix=matrix, primaries=primaries), converted(grey(0.5, HLG))
+    frame = grey(0.5, HLG, matrix=matrix, primaries=primaries)
+    right = converted(grey(0.5, HLG))
     np.testing.assert_allclose(converted(frame).astype(int), right.astype(int), atol=1)
 
 

@@ -27,7 +27,8 @@ def exif_block(orientation: int, focal_35mm: int | None = None, endian: str = "<
 
 
 def jpeg_with_exif(image: np.ndarray, tiff: bytes) -> bytes:
-    data, segment = encode(".jpg", image), b"Exif\0\0" + tiff
+    data = encode(".jpg", image)
+    segment = b"Exif\0\0" + tiff
     return data[:2] + b"\xff\xe1" + struct.pack(">H", len(segment) + 2) + segment + data[2:]
 
 

@@ -21,7 +21,8 @@ from scope.scope_addon.errors import VideoError
 
 from ...heif_files import heic
 
-W, H = 150, 100
+W = 150
+H = 100
 
 
 def slopes(width: int = W, height: int = H) -> np.ndarray:
@@ -110,13 +111,16 @@ def test_tiles_of_different_sizes_are_refused() -> None:
 
 
 def test_damaged_files_raise_only_video_errors(tmp_path: Path) -> None:
-    whole, path = heic(slopes(64, 48), 32), tmp_path / "a.heic"
+    whole = heic(slopes(64, 48), 32)
+    path = tmp_path / "a.heic"
     for size in (30, 100, 300, len(whole) // 2, len(whole) - 40):
         path.write_bytes(whole[:size])
         with pytest.raises(VideoError, match=r"a\.heic"):
             open_video(path)
-    whole, rng = heic(slopes(64, 48), 32, focal_mm=26), np.random.default_rng(0)
-    boxes, refused = whole.index(b"mdat"), 0
+    whole = heic(slopes(64, 48), 32, focal_mm=26)
+    rng = np.random.default_rng(0)
+    boxes = whole.index(b"mdat")
+    refused = 0
     for _ in range(150):
         broken = bytearray(whole)
         for at in rng.integers(24, boxes, 3):

@@ -17,7 +17,8 @@ from scope.scope_addon.errors import VideoError
 
 from ....required import need_encoder, package
 
-W, H = 64, 48
+W = 64
+H = 48
 GREY = np.full((H, W, 3), 90, np.uint8)
 
 
@@ -34,11 +35,9 @@ def avif(path: Path, image_rgb: np.ndarray) -> Path:
     need_encoder("libsvtav1")
     with av.open(str(path), "w", format="avif") as container:
         stream = container.add_stream("libsvtav1", rate=1)
-        stream.width, stream.height, stream.pix_fmt = (
-            image_rgb.shape[1],
-            image_rgb.shape[0],
-            "yuv420p",
-        )
+        stream.width = image_rgb.shape[1]
+        stream.height = image_rgb.shape[0]
+        stream.pix_fmt = "yuv420p"
         for packet in [
             *stream.encode(av.VideoFrame.from_ndarray(image_rgb, "rgb24")),
             *stream.encode(),
@@ -118,7 +117,8 @@ def test_a_range_of_a_single_picture_gives_a_warning(
 @pytest.mark.parametrize("name", ["a.webp", "a.png"])
 def test_an_animation_gives_a_warning(tmp_path: Path, name: str) -> None:
     animation = cv2.Animation()
-    animation.frames, animation.durations = [GREY, GREY + 30, GREY + 60], [100, 100, 100]
+    animation.frames = [GREY, GREY + 30, GREY + 60]
+    animation.durations = [100, 100, 100]
     assert cv2.imwriteanimation(str(tmp_path / name), animation)
     with open_video(tmp_path / name) as video:
         (frame,) = video

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector, cells
 
-WIDTH, HEIGHT = 160, 96  # of the networks
+# of the networks
+WIDTH = 160
+HEIGHT = 96
 # 251 / 96 is more than 333 / 160: as high as the network's picture
 IMAGE = np.zeros((251, 333, 3), np.uint8)
 SCALE = HEIGHT / 251

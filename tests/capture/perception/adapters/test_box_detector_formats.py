@@ -68,10 +68,12 @@ def test_yolov8(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("order", [("boxes", "confs"), ("confs", "boxes")])
 def test_yolov4(tmp_path: Path, order: tuple[str, str]) -> None:
-    boxes, scores = np.zeros((1, 40, 1, 4), np.float32), np.zeros((1, 40, 80), np.float32)
+    boxes = np.zeros((1, 40, 1, 4), np.float32)
+    scores = np.zeros((1, 40, 80), np.float32)
     boxes[0, 5, 0] = PERSON / [333, 251, 333, 251]
     scores[0, 5, 0] = 0.9
-    boxes[0, 6, 0], scores[0, 6, 2] = [0.1, 0.1, 0.2, 0.2], 0.99
+    boxes[0, 6, 0] = [0.1, 0.1, 0.2, 0.2]
+    scores[0, 6, 2] = 0.99
     outputs = {"boxes": boxes, "confs": scores}
     path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {name: outputs[name] for name in order})
     assert_finds_the_person(path, "yolov4")

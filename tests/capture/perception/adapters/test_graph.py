@@ -22,7 +22,8 @@ from scope.scope_addon.capture.perception.adapters.graph import (
 )
 from scope.solver.errors import ModelFileError
 
-WIDTH, HEIGHT = 32, 16
+WIDTH = 32
+HEIGHT = 16
 PICTURE = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH, 3)).astype(np.uint8)
 
 

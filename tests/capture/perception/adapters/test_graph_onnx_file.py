@@ -74,7 +74,8 @@ def boxes_and_scores(path: Path) -> Path:
     path.with_suffix(".json").write_text(
         '{"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"}'
     )
-    boxes, label = np.array([[[4, 4, 28, 28, 0.9]]], np.float32), np.zeros((1, 1), np.int64)
+    boxes = np.array([[[4, 4, 28, 28, 0.9]]], np.float32)
+    label = np.zeros((1, 1), np.int64)
     return fixed(path, 32, 32, {"dets": boxes, "labels": label})
 
 
@@ -87,7 +88,8 @@ def test_every_truncation_and_some_flipped_bytes(
 ) -> None:
     path = make(tmp_path / "m.onnx")
     opens(path, threads=1)
-    whole, harmed = path.read_bytes(), 0
+    whole = path.read_bytes()
+    harmed = 0
     for size in range(0, len(whole), len(whole) // 16):
         path.write_bytes(whole[:size])
         refused(opens, path)
@@ -109,11 +111,14 @@ def with_external_data(path: Path, location: str, inside: str = "initializer") -
     weight.data_location = TensorProto.EXTERNAL
     for key, value in {"location": location, "offset": "0", "length": "4352"}.items():
         entry = weight.external_data.add()
-        entry.key, entry.value = key, value
+        entry.key = key
+        entry.value = value
     if inside == "initializer":
-        node, weights = helper.make_node("Identity", ["w"], ["simcc_x"]), [weight]
+        node = helper.make_node("Identity", ["w"], ["simcc_x"])
+        weights = [weight]
     else:
-        node, weights = helper.make_node("Constant", [], ["simcc_x"], value=weight), []
+        node = helper.make_node("Constant", [], ["simcc_x"], value=weight)
+        weights = []
     info = helper.make_tensor_value_info("simcc_x", TensorProto.FLOAT, [1, 17, 64])
     graph = helper.make_graph([node], "ours", [picture_input(32, 32)], [info], weights)
     path.write_bytes(

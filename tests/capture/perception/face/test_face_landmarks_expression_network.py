@@ -32,7 +32,8 @@ def test_closing_one_eye_is_a_blink_of_that_eye(face, weights_of, side):
     closed = estimate.landmarks.copy()
     upper, lower = LIDS[side]
     closed[list(upper)] = closed[list(lower)]
-    before, after = weights_of(estimate.landmarks), weights_of(closed)
+    before = weights_of(estimate.landmarks)
+    after = weights_of(closed)
     rise = {eye: (after - before)[EXPRESSIONS.index(f"eyeBlink{eye}")] for eye in LIDS}
     other = "Left" if side == "Right" else "Right"
     assert rise[side] > 0.2

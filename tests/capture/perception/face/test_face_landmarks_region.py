@@ -41,7 +41,8 @@ def test_the_body_predicts_a_face_whichever_way_up_it_is(angle):
 
 
 def test_a_head_in_profile_keeps_its_size():
-    frontal, profile = keypoints(500.0, 0.0), keypoints(500.0, 0.0)
+    frontal = keypoints(500.0, 0.0)
+    profile = keypoints(500.0, 0.0)
     profile[:11, 0] = 300  # turned by 90°, eyes and ears fall together
     assert region_from_body(profile).side_px == pytest.approx(
         region_from_body(frontal).side_px, rel=0.02
@@ -52,7 +53,8 @@ def test_the_landmarks_box_fills_two_thirds_along_the_line_of_the_eyes():
     points = np.random.default_rng(1).uniform(-1, 1, (FACE_POINTS, 2)) * [30, 40]
     points[[33, 263]] = [[-20, -10], [20, -10]]
     points[:2] = [[-30, -40], [30, 40]]
-    c, s = np.cos(0.5), np.sin(0.5)
+    c = np.cos(0.5)
+    s = np.sin(0.5)
     region = region_from_landmarks(points @ np.array([[c, s], [-s, c]]) + [100, 50])
     assert region.center_px == pytest.approx((100, 50))
     assert region.side_px == pytest.approx(1.5 * 80)

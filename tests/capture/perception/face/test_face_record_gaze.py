@@ -19,7 +19,8 @@ def landmarks(direction: np.ndarray, turn: tuple[float, float, float]) -> np.nda
     points = np.zeros((478, 3))
     for number, point in CORNERS.items():
         points[number] = point
-    points[10], points[152] = (0, 0.08, 0), (0, -0.11, 0)
+    points[10] = (0, 0.08, 0)
+    points[152] = (0, -0.11, 0)
     for iris, x in ((473, 0.031), (468, -0.031)):
         points[iris] = np.array([x, 0, 0]) + 0.012 * direction
     return 2000 * points @ (R_CAMERA_FRONTAL @ exp(np.array(turn))).T + [400, 300, 0]

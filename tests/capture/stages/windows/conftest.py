@@ -32,8 +32,12 @@ from scope.solver import load_body
 
 from ...fake_people import FakeDetector, FakeLandmarks, Person, pictures
 
-RED, BLUE = (220, 30, 30), (30, 30, 220)
-FPS, FRAMES, WINDOW_S = 30, 210, 2.0  # three windows: frames 0 to 59, 60 to 119, and the rest
+RED = (220, 30, 30)
+BLUE = (30, 30, 220)
+# three windows: frames 0 to 59, 60 to 119, and the rest
+FPS = 30
+FRAMES = 210
+WINDOW_S = 2.0
 SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
 # Present when the second window's trackers begin, and so large that they would not care about the
 # other one.

@@ -18,7 +18,10 @@ from scope.scope_addon.capture.stages.windows.plan import Window
 from scope.scope_addon.capture.stages.windows.window_record import WindowRecord
 from scope.scope_addon.capture.tracking.track import Tracklet
 
-SIDE, OVERLAP, BEFORE = 200.0, 12, 30  # pixels; frames
+# pixels; frames
+SIDE = 200.0
+OVERLAP = 12
+BEFORE = 30
 
 
 def tracklet(rows: range, x: float, side: float = SIDE, speed: float = 0.0) -> Tracklet:
@@ -32,7 +35,8 @@ def record(count: int, first: int, anchor: int, tracklets: dict[int, Tracklet]) 
     background = BackgroundRecord(
         times, np.tile(np.eye(3), (count, 1, 1)), np.ones(count, bool), []
     )
-    frames, sums = np.arange(count), np.zeros(count, np.uint32)
+    frames = np.arange(count)
+    sums = np.zeros(count, np.uint32)
     return WindowRecord(
         Window(1, 0.0, 0.0, 1.0), frames, times, sums, first, anchor, tracklets, {}, [], background
     )
@@ -72,7 +76,8 @@ def test_how_near_is_measured_by_the_smaller_region(
     """Keypoints lie 1.41 times as far apart as their coordinates: 0.15 of 200 pixels are 21 in
     each.
     """
-    before, after = tracklet(range(BEFORE), 100.0, sides[0]), tracklet(range(40), x, sides[1])
+    before = tracklet(range(BEFORE), 100.0, sides[0])
+    after = tracklet(range(40), x, sides[1])
     assert same_people(*windows({3: before}, {0: after})) == ({0: 3} if is_same else {})
 
 
@@ -95,17 +100,16 @@ def test_windows_that_do_not_share_their_frames_share_nobody() -> None:
     before, after = windows({3: tracklet(range(BEFORE), 100.0)}, {0: tracklet(range(40), 100.0)})
     before.anchor += 1
     assert same_people(before, after) == {}
-    before.anchor, after.first = BEFORE, 0
+    before.anchor = BEFORE
+    after.first = 0
     assert same_people(before, after) == {}
     assert not missed_people(before, after)
 
 
 def test_somebody_is_missed_who_was_followed_throughout_the_shared_frames() -> None:
     nobody: dict[int, Tracklet] = {}
-    throughout, newcomer = (
-        tracklet(range(BEFORE), 100.0),
-        tracklet(range(BEFORE - OVERLAP + 1, BEFORE), 100.0),
-    )
+    throughout = tracklet(range(BEFORE), 100.0)
+    newcomer = tracklet(range(BEFORE - OVERLAP + 1, BEFORE), 100.0)
     interrupted = tracklet(range(BEFORE), 100.0)
     del (
         interrupted.rows[-5],
@@ -121,14 +125,16 @@ def test_somebody_is_missed_who_was_followed_throughout_the_shared_frames() -> N
 
 
 def test_distances_are_of_shared_frames() -> None:
-    earlier, later = tracklet(range(10, 20), 0.0), tracklet(range(5), 30.0, 100.0)
+    earlier = tracklet(range(10, 20), 0.0)
+    later = tracklet(range(5), 30.0, 100.0)
     assert distance(earlier, later, 12, (0, 5)) == pytest.approx(30 * np.sqrt(2) / 100)
     assert distance(earlier, later, 20, (0, 5)) == np.inf
     assert distance(earlier, later, 12, (5, 9)) == np.inf
 
 
 def test_keypoints_go_over_evenly() -> None:
-    earlier, later = tracklet(range(BEFORE), 100.0), tracklet(range(40), 104.0)
+    earlier = tracklet(range(BEFORE), 100.0)
+    later = tracklet(range(40), 104.0)
     values = faded(earlier, later, BEFORE - OVERLAP, OVERLAP)
     assert sorted(values) == list(range(BEFORE - OVERLAP, BEFORE))
     rising = [float(values[k][0, 0]) for k in sorted(values)]

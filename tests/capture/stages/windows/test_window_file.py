@@ -24,7 +24,8 @@ from scope.scope_addon.capture.stages.windows.window_file import load_window, sa
 from scope.scope_addon.capture.stages.windows.window_record import WindowRecord, known_reference
 from scope.scope_addon.capture.tracking.track import Tracklet
 
-SIZE, FRAMES = (640, 480), 12
+SIZE = (640, 480)
+FRAMES = 12
 WINDOW = Window(3, 7.5, 8.0, 12.0)
 
 
@@ -59,7 +60,8 @@ def record(seed: int = 0) -> WindowRecord:
             list(rng.random((n, RECORD), np.float32)),
         )
     sums = rng.integers(0, 2**32, FRAMES, np.uint32)
-    cuts, indices = [4], np.arange(FRAMES) + 30
+    cuts = [4]
+    indices = np.arange(FRAMES) + 30
     return WindowRecord(
         WINDOW, indices, times, sums, 2, 9, people, {0: region}, cuts, background, "CPU", ("dark",)
     )
@@ -143,7 +145,8 @@ def test_an_array_that_is_missing_or_holds_objects_makes_a_file_worthless(
 
 def test_damaged_bytes_never_raise(tmp_path: Path) -> None:
     path = save_window(tmp_path, record(), SIZE)
-    whole, rng = path.read_bytes(), np.random.default_rng(1)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(1)
     for _ in range(60):
         data = bytearray(whole)
         for at in rng.integers(0, len(data), 8):
@@ -157,7 +160,8 @@ def test_a_full_disk_is_an_error_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A half-written zip file printed a traceback when it was destroyed."""
-    resource, unraisable = pytest.importorskip("resource"), list[object]()
+    resource = pytest.importorskip("resource")
+    unraisable = list[object]()
     monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))

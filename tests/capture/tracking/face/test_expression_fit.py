@@ -26,8 +26,10 @@ from scope.tools.render_faces.sequences import INDEX, FaceClip
 from scope.tools.render_faces.shaded import ShadedStage
 from scope.tools.render_faces.truth import SIZE, camera_vertices, focal_px
 
-T, FPS = 90, 30
-JAW, BLINKS = INDEX["jawOpen"], [INDEX["eyeBlinkLeft"], INDEX["eyeBlinkRight"]]
+T = 90
+FPS = 30
+JAW = INDEX["jawOpen"]
+BLINKS = [INDEX["eyeBlinkLeft"], INDEX["eyeBlinkRight"]]
 REGION = Region((0.0, 0.0), 1.0, 0.0)
 TIMES = np.arange(T) / FPS
 
@@ -48,7 +50,8 @@ def modelled(weights: np.ndarray, noise: float, size: float = 120.0) -> np.ndarr
     """Rows of a person whose landmarks are as the model says, with another face at rest, who turns
     his head.
     """
-    response, rng = load_response(), np.random.default_rng(3)
+    response = load_response()
+    rng = np.random.default_rng(3)
     share = response.units / response.units.sum(axis=1, keepdims=True)
     turns = np.stack([0.05 * np.sin(TIMES), 0.2 * np.sin(2 * TIMES), 0 * TIMES], axis=1)
     own = 0.03 * rng.standard_normal(response.mean.shape)
@@ -124,13 +127,17 @@ def test_a_rendered_face_that_the_network_sees(tmp_path):
     """The default body, which nothing was calibrated on, turned by 20°, through the real landmark
     network.
     """
-    body, rng, truth = load_body("scope"), np.random.default_rng(8), talk(66)
+    body = load_body("scope")
+    rng = np.random.default_rng(8)
+    truth = talk(66)
     R = np.diag([1.0, -1.0, -1.0]) @ exp(np.radians([0, 20.0, 0]))
     times = np.arange(66) / FPS
     clip = FaceClip(
         truth, np.tile(R, (66, 1, 1)), np.full(66, 0.8), np.zeros(66, int), times, np.zeros((66, 3))
     )
-    stage, network, rows = ShadedStage(body), FaceNetwork(1), []
+    stage = ShadedStage(body)
+    network = FaceNetwork(1)
+    rows = []
     stage.dress(draw_look(body, rng), rng)
     region = Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0)
     for t in range(66):

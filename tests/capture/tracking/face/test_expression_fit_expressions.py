@@ -26,7 +26,9 @@ def clip(frames):
     """Two and a half seconds of a real face: the network's estimates, and a track's rows of
     them.
     """
-    network, region, estimates = FaceNetwork(1), Region((256.0, 118.0), 200.0, 0.0), []
+    network = FaceNetwork(1)
+    region = Region((256.0, 118.0), 200.0, 0.0)
+    estimates = []
     for image in frames("clips/squats_5fps", stop=13):
         estimates.append(network.estimate(image, region))
         region = estimates[-1].next_region
@@ -37,7 +39,8 @@ def clip(frames):
 def test_a_face_that_was_seen_briefly_gets_the_networks_weights_and_the_gaze_of_its_irises(
     clip, seen
 ):
-    estimates, rows = clip[0][:seen], clip[1][: seen + 1]
+    estimates = clip[0][:seen]
+    rows = clip[1][: seen + 1]
     out = with_expressions(rows, np.arange(seen + 1) / FPS)
     _, _, weights, directions, _ = parts(out)
     assert not out[0].any()

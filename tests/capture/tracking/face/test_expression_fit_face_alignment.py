@@ -10,7 +10,8 @@ from scope.solver.rotations import exp
 
 Y_UP = np.array([1.0, -1.0, -1.0])
 RNG = np.random.default_rng(0)
-FACE, SHARES = RNG.standard_normal((40, 3)), RNG.dirichlet(np.ones(40))
+FACE = RNG.standard_normal((40, 3))
+SHARES = RNG.dirichlet(np.ones(40))
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 0.1), (-0.2, 0.5, 1.5)])

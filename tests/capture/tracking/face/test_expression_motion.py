@@ -9,7 +9,8 @@ from scope.scope_addon.capture.perception.face.face_record import RECORD
 from scope.scope_addon.capture.tracking.face.expression_motion import RELEASE_S, expression_motion
 from scope.solver.names import EXPRESSIONS
 
-JAW, BLINK = EXPRESSIONS.index("jawOpen"), EXPRESSIONS.index("eyeBlinkLeft")
+JAW = EXPRESSIONS.index("jawOpen")
+BLINK = EXPRESSIONS.index("eyeBlinkLeft")
 T = 120
 TIMES = np.arange(T) / 30
 LIGHT = RECORD - 1
@@ -18,7 +19,8 @@ GAZE = slice(2 + len(EXPRESSIONS), 8 + len(EXPRESSIONS))
 
 def seen_face(size: float = 100.0) -> np.ndarray:
     rows = np.zeros((T, RECORD))
-    rows[:, 0], rows[:, 1] = 0.9, size
+    rows[:, 0] = 0.9
+    rows[:, 1] = size
     rows[:, GAZE] = [0, 0, 1, 0, 0, 1]
     rows[:, LIGHT] = 1.0
     return rows
@@ -56,7 +58,8 @@ def test_a_face_that_is_lost_goes_to_rest(smoothing):
     rows[:, GAZE] = [0.6, 0, 0.8, 0.6, 0, 0.8]
     rows[40:90] = 0.0
     face = expression_motion(rows, TIMES, smoothing)
-    jaw, gaze = face["expressions"][:, JAW], face["gaze"]
+    jaw = face["expressions"][:, JAW]
+    gaze = face["gaze"]
     assert (face["expression_confidence"][40:90] == 0).all()
     assert jaw[65] == pytest.approx(0, abs=0.05)
     np.testing.assert_allclose(jaw[[30, 100]], 0.8, atol=0.05)
@@ -122,7 +125,8 @@ def test_behind_dark_glasses_eyes_go_to_rest_and_the_mouth_goes_on(smoothing):
     rows[[20, 40], LIGHT] = 1.2  # a reflection in two frames
     rows[100, LIGHT] = 0.1  # a shadow that passes
     face = expression_motion(rows, TIMES, smoothing)
-    weights, sure = face["expressions"], face["expression_confidence"]
+    weights = face["expressions"]
+    sure = face["expression_confidence"]
     assert weights[:40, BLINK].max() < 0.02
     np.testing.assert_allclose(face["gaze"][:40], [[[0, 0, 1]] * 2] * 40, atol=0.05)
     np.testing.assert_allclose(weights[:, JAW], 0.5, atol=1e-3)

@@ -47,7 +47,8 @@ def person(x: float, y: float, scale: float = 500.0, yaw: float | None = None) -
     points[[0, 7, 8]] = (0, 0.03), (0.07, 0.01), (-0.07, 0.01)
     world = np.zeros((33, 3))
     if yaw is not None:
-        c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
+        c = np.cos(np.radians(yaw))
+        s = np.sin(np.radians(yaw))
         world[:, :2] = points
         world = world @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
     points = scale * points + [x, y]
@@ -58,7 +59,9 @@ class FakeNetwork:
     """Sees the faces (x, y, size) whose middle is inside the inner half of a region."""
 
     def __init__(self, *_):
-        self.faces, self.calls, self.presence = [], 0, 0.01
+        self.faces = []
+        self.calls = 0
+        self.presence = 0.01
 
     def estimate(self, _image, region):
         self.calls += 1
@@ -153,7 +156,8 @@ def test_a_head_too_small_is_not_looked_at(tracker):
 
 
 def test_a_real_face_is_captured_and_moves_little_but_the_head(shared):
-    clip, body = shared / "data" / "clips" / "squats_5fps.mp4", load_body("scope")
+    clip = shared / "data" / "clips" / "squats_5fps.mp4"
+    body = load_body("scope")
     without, found = (
         capture(
             clip, body, CaptureOptions(quality="fast", wanted=VideoRange(end_s=2.0), face=face)

@@ -21,7 +21,8 @@ from scope.tools.render_faces.looks import draw_look
 from scope.tools.render_faces.shaded import ShadedStage
 from scope.tools.render_faces.truth import MIDDLE, SIZE, focal_px
 
-FRONTAL, DISTANCE_M = np.diag([1.0, -1.0, -1.0]), 0.8
+FRONTAL = np.diag([1.0, -1.0, -1.0])
+DISTANCE_M = 0.8
 
 
 def camera_of(focal: float) -> Camera:
@@ -35,8 +36,12 @@ def seen(tmp_path_factory):
     """What the network sees of the default body's face, turned by degrees about the head's axes, in
     the middle.
     """
-    body, path = load_body("scope"), tmp_path_factory.mktemp("faces") / "face.png"
-    stage, network, rng, kept = ShadedStage(body), FaceNetwork(1), np.random.default_rng(8), {}
+    body = load_body("scope")
+    path = tmp_path_factory.mktemp("faces") / "face.png"
+    stage = ShadedStage(body)
+    network = FaceNetwork(1)
+    rng = np.random.default_rng(8)
+    kept = {}
     stage.dress(draw_look(body, rng), rng)
 
     def estimate(turn_deg) -> FaceEstimate:
@@ -64,7 +69,8 @@ def test_the_direction_across_a_rendered_head(seen, turn_deg):
 
 def test_a_face_that_looks_frontal_at_the_edge_of_the_image_is_turned(seen):
     """It looks along the line of sight, 30° beside the camera's axis."""
-    estimate, focal = seen((0, 0, 0)), 300.0
+    estimate = seen((0, 0, 0))
+    focal = 300.0
     places = (0.0, focal * np.tan(np.radians(30.0)))
     rows = [
         record(replace(estimate, landmarks=estimate.landmarks + [x, 0, 0]), None) for x in places
@@ -104,7 +110,8 @@ def test_the_presence_of_a_small_face_is_that_of_a_large_one(seen):
 
 
 def test_frames_without_a_face_have_no_direction():
-    face, ears = np.zeros((2, RECORD)), np.tile([0.15, 0, 0], (2, 1))
+    face = np.zeros((2, RECORD))
+    ears = np.tile([0.15, 0, 0], (2, 1))
     across = across_head(face, choose_camera(SIZE, SIZE))
     assert not across.any()
     assert not certainty(face, across, ears).any()

@@ -48,8 +48,10 @@ def hand(
 
 
 def person(sure: float = 1.0, right_wrist_px: tuple[float, float] = WRIST_PX[1]) -> Observation:
-    points, confidence = np.zeros((33, 2)), np.ones(33)
-    points[WRISTS[0]], points[WRISTS[1]] = WRIST_PX[0], right_wrist_px
+    points = np.zeros((33, 2))
+    confidence = np.ones(33)
+    points[WRISTS[0]] = WRIST_PX[0]
+    points[WRISTS[1]] = right_wrist_px
     confidence[WRISTS] = sure
     return Observation(
         points, confidence, np.zeros((33, 3)), 1.0, Region((500.0, 500.0), 900.0, 0.0), False
@@ -118,7 +120,9 @@ def test_a_hand_of_the_wrong_side_at_this_wrist_alone_is_mirrored_in_depth() -> 
 
 
 def test_a_hand_that_was_found_twice_goes_to_the_nearest_wrist() -> None:
-    left, right, again = hand(0), hand(1), hand(1, away=0.1, left=0.5)
+    left = hand(0)
+    right = hand(1)
+    again = hand(1, away=0.1, left=0.5)
     people = {4: person(), 7: person()}
     found = without_duplicates({(4, 0): left, (4, 1): again, (7, 1): right, (7, 0): None}, people)
     assert found == {(4, 0): left, (4, 1): None, (7, 1): right, (7, 0): None}

@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 from scope.scope_addon.capture.tracking.hands.hand_sight import is_like, palm_color
 
-SKIN, TROUSERS = np.array([134.0, 104, 79]), np.array([26.0, 40, 45])
+SKIN = np.array([134.0, 104, 79])
+TROUSERS = np.array([26.0, 40, 45])
 HAND = np.array([[0.0, 0.0], *([x, y] for x in (-8, -4, 0, 4, 8) for y in (-10, -13, -16, -20))])
 
 

@@ -63,7 +63,8 @@ class FakeHands:
     """Sees only the hand whose centre is nearest to the region's, if it is inside."""
 
     def __init__(self, hands):
-        self.hands, self.calls = hands, 0
+        self.hands = hands
+        self.calls = 0
 
     def estimate(self, _image, region):
         self.calls += 1
@@ -79,7 +80,8 @@ class FakeHands:
 
 class FakePalms:
     def __init__(self, hands):
-        self.hands, self.calls = hands, 0
+        self.hands = hands
+        self.calls = 0
 
     def detect(self, _image, where, threshold):
         self.calls += 1
@@ -111,12 +113,14 @@ def seen(tracker, observation):
 
 
 def test_each_hand_goes_to_its_own_side_and_then_needs_one_call_per_frame(follow):
-    left, right = hand_at((300, 500)), hand_at((700, 500), left=0.05)
+    left = hand_at((300, 500))
+    right = hand_at((700, 500), left=0.05)
     tracker = follow([left, right])
     (_, found), *_ = tracker.step(IMAGE, [(0, person())])
     assert np.array_equal(found.hands[0, :, :2], left.keypoints_px.astype(np.float32))
     assert np.array_equal(found.hands[1, :, :2], right.keypoints_px.astype(np.float32))
-    palms, calls = tracker._palms.calls, tracker._network.calls
+    palms = tracker._palms.calls
+    calls = tracker._network.calls
     assert seen(tracker, person()).all()
     assert tracker._palms.calls == palms
     assert tracker._network.calls == calls + 2
@@ -228,7 +232,8 @@ def test_a_second_look_finds_a_hand_by_an_unsure_palm_but_only_at_the_bodys_wris
 
     hands = [hand_at((300 + away * LENGTH, 500), presence=0.7)]
     tracker = follow(hands)
-    tracker._network, tracker._palms = InPalms(hands), UnsurePalms(hands)
+    tracker._network = InPalms(hands)
+    tracker._palms = UnsurePalms(hands)
     assert seen(tracker, person())[0] == is_seen
 
 
@@ -252,7 +257,8 @@ def test_hands_of_sure_sides_are_not_exchanged_where_the_bodys_wrists_are(
     follow, left, are_sides_sure
 ):
     """Forearms cross: the body's elbows are right, but each of its wrists is at the other hand."""
-    at_right, at_left = (500, 500), (500 + 1.2 * LENGTH, 500)
+    at_right = (500, 500)
+    at_left = (500 + 1.2 * LENGTH, 500)
     tracker = follow([hand_at(at_left, left=left), hand_at(at_right, left=1 - left)])
     crossed = person(left_wrist=at_right, right_wrist=at_left)
     for _ in range(3):
@@ -264,7 +270,8 @@ def test_hands_of_sure_sides_are_not_exchanged_where_the_bodys_wrists_are(
 
 def test_a_hand_beyond_the_forearms_reach_is_not_that_arms(follow):
     """The left elbow is three hands away: the left hand there is somebody else's."""
-    here, there = (500, 500), (500 + 1.8 * LENGTH, 500)
+    here = (500, 500)
+    there = (500 + 1.8 * LENGTH, 500)
     tracker = follow([hand_at(there, left=0.97)])
     person_ = person(left_wrist=here, right_wrist=there)
     elbow = KEYPOINT_NAMES.index("left_elbow")
@@ -274,7 +281,8 @@ def test_a_hand_beyond_the_forearms_reach_is_not_that_arms(follow):
 
 def test_a_hand_found_twice_goes_to_its_sure_side(follow):
     """What the other side's wrist is nearer to has the pixels of this hand and an unsure side."""
-    right, blurred = hand_at((500, 500), left=0.03), hand_at((500 - 0.2 * LENGTH, 500), left=0.6)
+    right = hand_at((500, 500), left=0.03)
+    blurred = hand_at((500 - 0.2 * LENGTH, 500), left=0.6)
     wrists = person(left_wrist=(500 - 0.2 * LENGTH, 500), right_wrist=(500 + 0.4 * LENGTH, 500))
     found = {(0, 0): blurred, (0, 1): right}
     kept = without_duplicates(found, {0: wrists})
@@ -314,10 +322,8 @@ def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides(
     """A hand behind the other one, which the network imagines where that one is, has an unsure
     side.
     """
-    left, right = (
-        hand_at((300, 500), left=certainty),
-        hand_at((300 + 0.25 * LENGTH, 500), left=0.02),
-    )
+    left = hand_at((300, 500), left=certainty)
+    right = hand_at((300 + 0.25 * LENGTH, 500), left=0.02)
     tracker = follow([left, right])
     wrists = person(left_wrist=(300, 500), right_wrist=(300 + 0.5 * LENGTH, 500))
     for _ in range(3):
@@ -388,9 +394,12 @@ def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which
     follow,
 ):
     """For a third of a second, and in the arrays that were given out for these frames."""
-    hands, people, first = [], FollowedPeople(), None
+    hands = []
+    people = FollowedPeople()
+    first = None
     tracker = follow(hands)
-    tracker._network, image = InFrame(hands), numbered_pixels()
+    tracker._network = InFrame(hands)
+    image = numbered_pixels()
     for k in range(25):
         if k == 20:
             hands.append(hand_at((300, 500)))
@@ -409,7 +418,8 @@ def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which
 def test_a_hand_is_not_followed_back_onto_one_that_is_another(follow):
     """The left hand comes out from behind the right one, at which it would be seen before."""
     hands = [hand_at((300, 500), left=0.5)]
-    tracker, found = follow(hands), []
+    tracker = follow(hands)
+    found = []
     tracker._network = InFrame(hands)
     for k in range(4):
         if k == 3:
@@ -424,8 +434,10 @@ def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
     """They measure some 25 pixels. In the first second they hang down edge-on, afterwards they are
     raised.
     """
-    people, hands = PeopleTracker("fast", 1), HandTracker(1)
-    found, apart = [], []
+    people = PeopleTracker("fast", 1)
+    hands = HandTracker(1)
+    found = []
+    apart = []
     for image in frames("clips/gesture_square", stop=72):
         for _, o in hands.step(image, people.step(image)):
             found.append(o.hands[:, 0, 2] > 0)

@@ -23,7 +23,8 @@ def hand(presence, turned_deg=0.0, size=40.0, wrist=(200.0, 300.0)):
     )
     out = np.zeros((21, 6))
     out[:, :2] = size * points @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) + wrist
-    out[:, 2], out[:, 3:5] = presence, points
+    out[:, 2] = presence
+    out[:, 3:5] = points
     return out
 
 

@@ -64,7 +64,9 @@ def test_masks_spread_over_a_long_clip_whether_or_not_its_length_is_known(expect
 
 @pytest.mark.parametrize("expected", [3000, 40, 0])
 def test_the_frame_before_knows_which_one_is_due(expected: int) -> None:
-    masks, due, told = schedule(expected), [], []
+    masks = schedule(expected)
+    due = []
+    told = []
     for k in range(600):
         told += [k + 1] if masks.upcoming_is_due else []
         due += [k] if masks.add(IMAGE, [(0, seen())])[0][1].mask is not None else []
@@ -97,7 +99,8 @@ def test_nobody_has_no_mask_and_does_not_use_up_a_turn() -> None:
 
 
 def test_a_track_keeps_masks_with_their_rows() -> None:
-    masks, tracklet = schedule(40), Tracklet()
+    masks = schedule(40)
+    tracklet = Tracklet()
     for row in range(20):
         tracklet.add(row, masks.add(IMAGE, [(0, seen())])[0][1])
     track = make_track(range(20), [row / 30 for row in range(20)], [tracklet])

@@ -38,7 +38,8 @@ def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_i
     where it is wrong.
     """
     track, true = person()
-    wrong, sigma = track.world_landmarks.copy(), np.full((FRAMES, JOINTS), 0.1)
+    wrong = track.world_landmarks.copy()
+    sigma = np.full((FRAMES, JOINTS), 0.1)
     span = slice(6, 6 + flipped)
     mirrored = 2 * wrong[:, HIPS[1], None, 2] - wrong[:, LEG, 2]
     wrong[span, LEG, 2] = mirrored[span]
@@ -81,7 +82,8 @@ def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
 def test_a_limb_that_nothing_shows_has_larger_deviations_than_its_twin():
     track, true = person()
     sigma = np.full((FRAMES, JOINTS), 0.1)
-    track.confidence[12:, ARM], sigma[12:, ARM] = 0.0, 10.0
+    track.confidence[12:, ARM] = 0.0
+    sigma[12:, ARM] = 10.0
     found = fit(prepare(track, sigma_m=sigma), true).joint_sigma_m
     left, right = (found[:, BODY.joint_names.index(f"{side}_wrist")] for side in ("left", "right"))
     assert (left[18:] > 2.0 * right[18:]).all()
@@ -146,7 +148,8 @@ def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
     path = CameraPath(
         exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01])
     )
-    (still, true), (moved, _) = person(), person(path=path)
+    (still, true) = person()
+    (moved, _) = person(path=path)
     static = fit(prepare(still), true)
     start = path.to_frames(true)
     assert np.abs(start.t_camera_root - true.t_camera_root).max() > 0.2
@@ -191,7 +194,9 @@ def test_windows_cover_all_frames_and_overlap():
 def test_longer_gaps_separate_what_is_fitted_together():
     times = np.arange(60) / FPS
     valid = np.ones(60, bool)
-    valid[10:14], valid[30:50] = False, False  # 0.17 s and 0.7 s
+    # 0.17 s and 0.7 s
+    valid[10:14] = False
+    valid[30:50] = False
     first, second = clip_fit.runs(valid, times)
     assert first.tolist() == [*range(10), *range(14, 30)]
     assert second.tolist() == [*range(50, 60)]
@@ -251,7 +256,8 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
     track.confidence[:, ARM] = 0.0
     points = keypoints(start.rotations, start.t_camera_root)
     inside = points - points[:, HIPS].mean(axis=1, keepdims=True)
-    up, nothing = np.tile([0.0, -1.0, 0.0], (FRAMES, 1)), np.zeros((FRAMES, 6))
+    up = np.tile([0.0, -1.0, 0.0], (FRAMES, 1))
+    nothing = np.zeros((FRAMES, 6))
     stance = Stance(
         true.t_camera_root,
         np.tile(np.eye(3), (FRAMES, 1, 1)),

@@ -20,7 +20,8 @@ def test_deviations_are_those_along_each_joints_own_line_of_sight():
     rng = np.random.default_rng(0)
     joints = rng.normal(0.0, 1.0, (5, 4, 3)) + [0.0, 0.0, 4.0]
     sights = joints / np.linalg.norm(joints, axis=-1, keepdims=True)
-    pelvis, others = _covariances(sights, 0.03, 0.01), _covariances(sights, 0.006, 0.002)
+    pelvis = _covariances(sights, 0.03, 0.01)
+    others = _covariances(sights, 0.006, 0.002)
     sigma = joint_sigma(pelvis[:, 0], others, joints, np.arange(5) / 60.0)
     np.testing.assert_allclose(sigma[:, 0], np.tile([0.03 * ALONG, 0.01 * ACROSS], (5, 1)))
     np.testing.assert_allclose(sigma[:, 1:], np.tile([0.006 * ALONG, 0.002 * ACROSS], (5, 3, 1)))
@@ -38,10 +39,8 @@ def test_the_same_covariance_says_less_of_more_frames(first, second, ratio):
 
 
 def test_a_single_frame_is_as_one_of_few():
-    joints, covariance = (
-        np.tile([0.0, 0.0, 3.0], (2, 2, 1)),
-        np.tile(1e-5 * np.eye(3), (2, 2, 1, 1)),
-    )
+    joints = np.tile([0.0, 0.0, 3.0], (2, 2, 1))
+    covariance = np.tile(1e-5 * np.eye(3), (2, 2, 1, 1))
     one = joint_sigma(covariance[:1, 0], covariance[:1], joints[:1], np.zeros(1))
     np.testing.assert_allclose(
         one, joint_sigma(covariance[:, 0], covariance, joints, np.array([0.0, 0.1]))[:1]

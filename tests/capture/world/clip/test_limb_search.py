@@ -12,7 +12,8 @@ from scope.solver.rotations import exp
 
 from .waving_person import BODY, HIPS, JOINTS, LEG, fit, joints, person, prepare
 
-FRAMES, SPAN = 64, slice(12, 52)
+FRAMES = 64
+SPAN = slice(12, 52)
 
 
 @pytest.mark.parametrize("moving", [False, True])
@@ -24,7 +25,8 @@ def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was(moving: bool) ->
     turns = exp(np.array([[0.0, angle, 0.0] for angle in (angles if moving else 0.0 * angles)]))
     path = CameraPath(turns, np.linspace([0.0, 0.0, 0.0], [0.4, 0.0, 0.0], FRAMES) * moving)
     track, true = person(FRAMES, path)
-    unsure, sigma = track.world_landmarks.copy(), np.full((FRAMES, JOINTS), 0.1)
+    unsure = track.world_landmarks.copy()
+    sigma = np.full((FRAMES, JOINTS), 0.1)
     unsure[SPAN, LEG, 2] = unsure[SPAN, HIPS[1], None, 2]
     sigma[SPAN, LEG] = 0.8
     start = replace(true, rotations=true.rotations.copy())

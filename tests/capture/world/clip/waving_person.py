@@ -19,8 +19,10 @@ from scope.scope_addon.capture.world.clip.clip_fit import fit_clip
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
-FPS, FRAMES = 30.0, 24
-BODY, CAMERA = load_body("scope"), choose_camera(1080, 1920)
+FPS = 30.0
+FRAMES = 24
+BODY = load_body("scope")
+CAMERA = choose_camera(1080, 1920)
 JOINTS = len(KEYPOINT_NAMES)
 HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
 ARM = [

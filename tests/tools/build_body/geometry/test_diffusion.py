@@ -33,8 +33,10 @@ def test_weights_stay_a_partition() -> None:
 
 def test_what_is_mirrored_stays_so() -> None:
     rng = np.random.default_rng(3)
-    values, strength = rng.normal(size=(9, 9)), rng.uniform(0, 1, (9, 9))
-    values, strength = values + values[:, ::-1], strength + strength[:, ::-1]
+    values = rng.normal(size=(9, 9))
+    strength = rng.uniform(0, 1, (9, 9))
+    values = values + values[:, ::-1]
+    strength = strength + strength[:, ::-1]
     found = diffuse(LINKS, values.reshape(81, 1), strength.ravel() / 2, 20).reshape(9, 9)
     np.testing.assert_allclose(found, found[:, ::-1], atol=1e-14)
 

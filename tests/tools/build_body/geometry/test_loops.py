@@ -9,7 +9,8 @@ from scope.tools.build_body.geometry.loops import QuadLoops
 
 from .quad_meshes import cube, grid, tube
 
-AROUND, RINGS = 10, 7
+AROUND = 10
+RINGS = 7
 VERTICES, QUADS = tube(AROUND, RINGS)
 
 
@@ -30,7 +31,8 @@ def test_a_path_that_meets_a_border_or_a_pole_is_no_loop() -> None:
 @pytest.mark.parametrize("height", [1.2, 2.9, 4.4])
 def test_the_loop_nearest_to_a_plane(height: float) -> None:
     scaled = 0.02 * VERTICES  # rings two centimetres apart
-    point, up = np.array([0.0, 0.0, 0.02 * height]), np.array([0.0, 0.0, 1.0])
+    point = np.array([0.0, 0.0, 0.02 * height])
+    up = np.array([0.0, 0.0, 1.0])
     loop = QuadLoops(QUADS).nearest(scaled, point, up, radius=0.1)
     assert sorted(loop) == [round(height) * AROUND + k for k in range(AROUND)]
     with pytest.raises(ValueError, match="no closed edge loop"):

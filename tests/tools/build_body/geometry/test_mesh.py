@@ -27,7 +27,8 @@ def test_areas_of_vertices_add_up_to_the_surface() -> None:
 def test_triangles_wind_as_their_quads() -> None:
     vertices, quads = cube()
     a, b, c = vertices[split_quads(quads)].transpose(1, 0, 2)
-    normals, centres = np.cross(b - a, c - a), (a + b + c) / 3
+    normals = np.cross(b - a, c - a)
+    centres = (a + b + c) / 3
     assert (np.einsum("ti,ti->t", normals, centres) > 0).all()
 
 

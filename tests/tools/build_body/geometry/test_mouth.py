@@ -111,7 +111,8 @@ def mouth_offset(grown, kept):
 
 def test_the_tongue_is_that_of_the_source(grown, mouth):
     _, kept = mouth
-    tongue, vertices = part_of_mouth(kept, "tongue"), np.unique(source_faces(grown, "tongue"))
+    tongue = part_of_mouth(kept, "tongue")
+    vertices = np.unique(source_faces(grown, "tongue"))
     at = kept["v_template"][tongue] - mouth_offset(grown, kept)
     np.testing.assert_allclose(at, grown.basis[0, vertices], atol=1e-5)
     for name in EXPRESSIONS:
@@ -124,7 +125,8 @@ def test_the_tongue_is_that_of_the_source(grown, mouth):
 @pytest.mark.parametrize("jaw", ["upper", "lower"])
 def test_teeth_are_symmetric_and_face_outwards(mouth, jaw):
     _, kept = mouth
-    V, faces = kept["v_template"].astype(float), kept["faces"]
+    V = kept["v_template"].astype(float)
+    faces = kept["faces"]
     of_jaw = np.linalg.norm(mouth_move(kept, "jawOpen"), axis=1)[faces].min(axis=1) < 1e-9
     chosen = (of_jaw if jaw == "upper" else ~of_jaw) & (kept["face_material"] < 2)
     used = np.unique(faces[chosen])
@@ -132,7 +134,8 @@ def test_teeth_are_symmetric_and_face_outwards(mouth, jaw):
     assert max(np.linalg.norm(V[used] - point, axis=1).min() for point in mirrored) < 1e-4
     crown = chosen & (kept["face_material"] == list(kept["material_names"]).index("teeth"))
     a, b, c, d = (V[faces[crown, k]] for k in range(4))
-    normal, middle = np.cross(c - a, d - b), (a + b + c + d) / 4
+    normal = np.cross(c - a, d - b)
+    middle = (a + b + c + d) / 4
     outer = middle[:, 2] > np.median(middle[:, 2])  # the front teeth
     away = middle[outer] - [0.0, V[used, 1].mean(), V[used, 2].min()]
     lip = normal[outer] * [1, 0, 1]

@@ -23,7 +23,8 @@ def test_the_outside_of_a_cube_is_seen_and_a_cube_in_it_is_not() -> None:
 
 def test_the_inside_of_a_box_is_seen_through_its_open_top_alone() -> None:
     is_lid = np.isclose(VERTICES[BOX][:, :, 2], SIDE_M / 2).all(axis=1)
-    walls, lid = BOX[~is_lid], BOX[is_lid]
+    walls = BOX[~is_lid]
+    lid = BOX[is_lid]
     inside = walls[:, ::-1]  # their fronts face inwards
     assert seen_from_outside(VERTICES, inside, NONE).all()
     larger = np.concatenate([VERTICES, 1.2 * VERTICES])
