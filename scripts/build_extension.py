@@ -369,7 +369,8 @@ def check(archive: Path, target: Target) -> None:
         "assets/sample/sample.mp4",
     ]
     wanted += [f"assets/{folder}/LICENSE.md" for folder in ("body", "lifter", "sample")]
-    wanted += ["LICENSE", "THIRD_PARTY.md", "scope_addon/ui/__init__.py", BILL, *GUIDE]
+    wanted += ["LICENSE", "THIRD_PARTY.md", BILL, *GUIDE]
+    wanted += ["scope_addon/ui/__init__.py", "scope_addon/ui/translations.txt"]
     static = [
         path.relative_to(ROOT).as_posix()
         for path in (ROOT / "scope_addon" / "report" / "static").iterdir()

@@ -36,6 +36,7 @@ DATA = {
     "scope/scope_addon/report/static/style.css",
     "scope/scope_addon/report/static/viewer.js",
     "scope/scope_addon/report/static/webgl.js",
+    "scope/scope_addon/ui/translations.txt",
 }
 CAPTURE_MODULES = ("cv2", "onnxruntime", "av", "bpy")
 

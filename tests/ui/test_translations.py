@@ -8,42 +8,88 @@ does that.
 
 from __future__ import annotations
 
+import re
+import string
+from pathlib import Path
+
 import bpy
 import pytest
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.ui import reporting
-from scope.scope_addon.ui.translations import CONTEXT, LANGUAGES
+from scope.scope_addon.ui import translations as translations_module
+from scope.scope_addon.ui.translations import (
+    BLENDER_CODES,
+    CONTEXT,
+    ENGLISH,
+    blender_translations,
+    read_table,
+)
 
-from .interface_texts import CORRECTIONS, OPERATOR, ROOT, interface_texts, texts_without_lookup
-from .tables import assert_end_as_the_english_texts, assert_have_the_same_placeholders
+from .interface_texts import (
+    CORRECTIONS,
+    OPERATOR,
+    ROOT,
+    interface_texts,
+    stage_texts,
+    texts_without_lookup,
+)
 
-MODULES = {module.__name__.rpartition(".")[2]: module for module in LANGUAGES.values()}
-every_language = pytest.mark.parametrize("language", MODULES.values(), ids=MODULES)
+TABLE = read_table()
+ENTRIES = [*TABLE.operators, *TABLE.texts]
+every_language = pytest.mark.parametrize("language", BLENDER_CODES)
 
 
-@every_language
-def test_every_text_is_translated(language):
-    assert {text for context, text in interface_texts() if context != OPERATOR} - set(
-        language.TEXTS
-    ) == set()
+def test_every_entry_has_a_text_in_every_language():
+    columns = [ENGLISH, *BLENDER_CODES]
+    assert [entry for entry in ENTRIES if list(entry) != columns] == []
+    assert [entry for entry in ENTRIES if not all(entry.values())] == []
 
 
-@every_language
-def test_no_translation_is_left_over(language):
-    assert (
-        set(language.TEXTS) - {text for context, text in interface_texts() if context != OPERATOR}
-        == set()
-    )
+def test_the_table_has_exactly_the_texts_of_the_interface():
+    labels = {text for context, text in interface_texts() if context == OPERATOR}
+    texts = {text for context, text in interface_texts() if context != OPERATOR}
+    assert {entry[ENGLISH] for entry in TABLE.operators} == labels
+    assert {entry[ENGLISH] for entry in TABLE.texts} == texts
+
+
+def test_no_text_stands_in_the_table_twice():
+    assert len(TABLE.texts) == len({entry[ENGLISH] for entry in TABLE.texts})
+    assert len(TABLE.operators) == len({entry[ENGLISH] for entry in TABLE.operators})
+
+
+def test_the_table_is_at_most_100_columns_wide():
+    content = Path(translations_module.__file__).with_suffix(".txt").read_text(encoding="utf-8")
+    wide = [line for line in content.splitlines() if len(line) > 100 or line != line.rstrip()]
+    assert wide == []
 
 
 @every_language
 def test_placeholders_are_the_same(language):
-    assert_have_the_same_placeholders(language.TEXTS)
+    for entry in ENTRIES:
+        assert _placeholders(entry[language]) == _placeholders(entry[ENGLISH]), entry[ENGLISH]
 
 
 @every_language
 def test_translations_end_as_the_english_texts_do(language):
-    assert_end_as_the_english_texts(language.TEXTS)
+    """Blender's labels and tooltips have no full stop at their end, and no spaces around."""
+    for entry in ENTRIES:
+        text = entry[ENGLISH]
+        translation = entry[language]
+        assert translation == translation.strip(), text
+        assert not translation.endswith((".", "。")) or text.endswith("."), text
+        assert translation.endswith(("?", "？")) == text.endswith("?"), text
+
+
+@every_language
+def test_a_text_of_the_progress_says_the_same_values_in_every_language(language):
+    values = {"stage": "<stage>", "done": 12, "total": 34, "rate": 5.67, "time": "<time>"}
+    progress = [entry for entry in TABLE.texts if entry[ENGLISH] in stage_texts()]
+    assert len(progress) == len(stage_texts())
+    for entry in progress:
+        said = entry[language].format(**values)
+        for name, value in values.items():
+            shown = f"{value:.1f}" if name == "rate" else str(value)
+            assert (shown in said) == (shown in entry[ENGLISH].format(**values)), said
 
 
 def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
@@ -56,27 +102,28 @@ def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
     assert ("*", "Capture finished") in texts  # report
 
 
-@pytest.mark.parametrize(
-    "language", [MODULES[code] for code in ("de", "es", "fr")], ids=("de", "es", "fr")
-)
+@pytest.mark.parametrize("language", ["de", "es", "fr"])
 def test_labels_fit_into_a_sidebar_of_the_usual_width(language):
     """Characters that fit, counted on screen: a checkbox of the options has room for 20, a listed
     correction for 18.
     """
+    texts = {entry[ENGLISH]: entry[language] for entry in TABLE.texts}
     options = {
         each.blender.label or each.name
         for each in options_at(Place.PANEL)
         if each.value_type is bool
     }
-    for text in options & set(language.TEXTS):
-        assert len(language.TEXTS[text]) <= 20, text
+    for text in options & set(texts):
+        assert len(texts[text]) <= 20, text
     for text in CORRECTIONS - {"Interpolated"}:
-        assert len(language.TEXTS[text]) <= 18, text
+        assert len(texts[text]) <= 18, text
 
 
-def test_languages_that_share_a_code_are_those_of_blender():
-    assert set(LANGUAGES) == {"de", "fr", "es", "ja", "zh_HANS", "zh_CN"}
-    assert LANGUAGES["zh_HANS"] is LANGUAGES["zh_CN"]
+def test_blender_is_given_every_language_under_each_of_its_codes():
+    given = blender_translations()
+    assert set(given) == {"de", "fr", "es", "ja", "zh_HANS", "zh_CN"}
+    assert given["de"]["Operator", "Match Frame Rate"] == "Bildrate angleichen"
+    assert given["zh_CN"]["*", "Camera"] == given["zh_HANS"][CONTEXT, "Camera"] == "摄像机"
 
 
 def test_a_text_has_its_values_filled_in():
@@ -106,3 +153,11 @@ def test_a_composed_text_that_is_not_looked_up_is_found(tmp_path):
 def test_buttons_in_a_row_have_our_short_words_in_place_of_blenders():
     settings = bpy.types.Scene.bl_rna.properties["scope_retarget"].fixed_type
     assert settings.properties["captured"].translation_context == CONTEXT
+
+
+def _placeholders(text: str) -> list[str]:
+    """Names and formats in braces, and printf's, each as often as it occurs."""
+    fields = [
+        f"{name}:{spec}" for _, name, spec, _ in string.Formatter().parse(text) if name is not None
+    ]
+    return sorted(fields + re.findall(r"%(?:\d+\$)?[sdif]", text))

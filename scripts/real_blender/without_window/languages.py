@@ -13,7 +13,7 @@ import sys
 import bpy
 from bpy.app.translations import contexts, pgettext_iface, pgettext_tip
 
-# Blender's code, and the module with our translations.
+# Blender's code of each language of our table.
 LANGUAGES = {"de_DE": "de", "fr_FR": "fr", "es": "es", "ja_JP": "ja", "zh_HANS": "zh"}
 
 
@@ -35,14 +35,13 @@ translations = next(
 view = bpy.context.preferences.view
 english = shown()
 view.use_translate_interface = view.use_translate_tooltips = True
-for code, module in LANGUAGES.items():
+table = translations.read_table()
+for code, language in LANGUAGES.items():
     assert code in bpy.app.translations.locales, (code, bpy.app.translations.locales)
     view.language = code
-    texts = getattr(translations, module).TEXTS
-    expected = (
-        getattr(translations, module).OPERATORS[english[0]],
-        *(texts[text] for text in english[1:]),
-    )
+    labels = {entry["en"]: entry[language] for entry in table.operators}
+    texts = {entry["en"]: entry[language] for entry in table.texts}
+    expected = (labels[english[0]], *(texts[text] for text in english[1:]))
     assert shown() == expected, (shown(), expected)
     translations.unregister()
     assert shown() == english, shown()
