@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 
 
 class SCOPE_OT_import_motion(ReportingOperator):
-    """Import captured motions of Scope, AMASS or other tools that use SMPL's joints, as animated
-    bodies
-    """
+    """Import captured motions of Scope"""
 
+    bl_description = (
+        "Import captured motions of Scope, AMASS or other tools that use SMPL's joints, as "
+        "animated bodies"
+    )
     bl_idname = "scope.import_motion"
     bl_label = "Import Motion"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
@@ -120,7 +122,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
 
 def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
-    """Build one motion and store it and its result with the scene."""
+    """Build one motion and store it and its result with the scene"""
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
     from .capture.frame_rate_operators import rate_warnings
@@ -153,12 +155,12 @@ def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 
 def attach() -> None:
-    """Add the operator to File > Import."""
+    """Add the operator to File > Import"""
     bpy.types.TOPBAR_MT_file_import.append(_draw_menu)
 
 
 def detach() -> None:
-    """Remove the operator from File > Import."""
+    """Remove the operator from File > Import"""
     bpy.types.TOPBAR_MT_file_import.remove(_draw_menu)
 
 

@@ -33,7 +33,7 @@ _measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and time o
 
 @with_options(Place.PREFERENCES)
 class SCOPE_AP_preferences(bpy.types.AddonPreferences):
-    """Preferences of Scope."""
+    """Preferences of Scope"""
 
     bl_idname = PACKAGE
 
@@ -81,10 +81,12 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
 
 
 class SCOPE_OT_clear_cache(bpy.types.Operator):
-    """Remove captured motion from the cache. Existing scenes and the compiled solver are not
-    affected
-    """
+    """Remove captured motion from the cache"""
 
+    bl_description = (
+        "Remove captured motion from the cache. Existing scenes and the compiled solver are not "
+        "affected"
+    )
     bl_idname = "scope.clear_cache"
     bl_label = "Clear Cache"
 
@@ -126,7 +128,7 @@ def preferences() -> SCOPE_AP_preferences | None:
 
 
 def cache() -> Cache:
-    """Return the cache: in the folder of the preferences, or else in the user folder."""
+    """Return the cache: in the folder of the preferences, or else in the user folder"""
     from ..job.cache import Cache
 
     chosen = preferences()

@@ -99,8 +99,10 @@ def test_every_operator_and_setting_has_a_tooltip():
     for module in ui._MODULES:
         for cls in module.CLASSES:
             if issubclass(cls, bpy.types.Operator):
-                assert len(cls.__doc__) > 10, cls
-                assert not cls.__doc__.endswith("."), cls  # Blender adds the full stop
+                tooltip = getattr(cls, "bl_description", cls.__doc__)
+                assert len(tooltip) > 10, cls
+                assert not tooltip.endswith("."), cls  # Blender adds the full stop
+                assert "\n" not in tooltip, cls
                 assert cls.bl_idname.startswith("scope.")
     shown = [bpy.context.scene.scope.bl_rna, ui.preferences.SCOPE_AP_preferences.bl_rna]
     for rna in shown:

@@ -262,9 +262,7 @@ def read_whole_keys(curve: bpy.types.FCurve) -> dict[str, NDArray[Any]]:
 
 
 def write_whole_keys(curve: bpy.types.FCurve, whole: dict[str, NDArray[Any]]) -> None:
-    """Replace the keys of a curve by those with these properties, in the order of their frames, (T,
-    n) each.
-    """
+    """Replace the keys of a curve by those with these properties (T, n), in their frames' order."""
     keys = curve.keyframe_points
     keys.clear()
     keys.add(len(whole["co"]))

@@ -42,7 +42,7 @@ def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list
 
 
 def differs(scene: bpy.types.Scene) -> bool:
-    """Return whether the shown capture's footage has another frame rate than the scene."""
+    """Return whether the shown capture's footage has another frame rate than the scene"""
     rate = scene.scope.result.footage_rate
     return bool(rate > 0 and abs(rate - scene.render.fps / scene.render.fps_base) > _SAME)
 
@@ -61,10 +61,12 @@ def keyed_for(scene: bpy.types.Scene) -> float:
 
 
 class SCOPE_OT_match_frame_rate(ReportingOperator):
-    """Set the scene to the motion's frame rate. Captures keep their speed, other animation keeps
-    its frames
-    """
+    """Set the scene to the motion's frame rate"""
 
+    bl_description = (
+        "Set the scene to the motion's frame rate. Captures keep their speed, other animation "
+        "keeps its frames"
+    )
     bl_idname = "scope.match_frame_rate"
     bl_label = "Match Frame Rate"
 
@@ -128,7 +130,7 @@ def _library(block: bpy.types.ID) -> bpy.types.Library | None:
 
 
 def _exact(rate: float) -> float:
-    """Return the rate that Blender will store, which single precision has rounded."""
+    """Return the rate that Blender will store, which single precision has rounded"""
     from ...scene.animation_data.timing import blender_rate
 
     fps, base = blender_rate(rate)
@@ -136,7 +138,7 @@ def _exact(rate: float) -> float:
 
 
 def _motion(person: bpy.types.Object) -> Motion | None:
-    """Return the person's motion; None if it is lost, without which keys can be moved too."""
+    """Return the person's motion; None if it is lost, without which keys can be moved too"""
     from ....solver.errors import ScopeError
 
     try:
@@ -148,7 +150,7 @@ def _motion(person: bpy.types.Object) -> Motion | None:
 def _update_results(
     scene: bpy.types.Scene, rate: float, keyed: dict[bpy.types.Object, float], warnings: list[str]
 ) -> None:
-    """Move the frames that results name, and replace the warnings about the frame rate."""
+    """Move the frames that results name, and replace the warnings about the frame rate"""
     from ...scene.datablock_names import holds
     from ...scene.match_rate import retimed_spans
 

@@ -19,7 +19,7 @@ def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 class ActionOperator(ReportingOperator):
-    """An operator on the action of an armature with captured motion. Not registered."""
+    """An operator on the action of an armature with captured motion. Not registered"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -46,10 +46,12 @@ class ActionOperator(ReportingOperator):
 
 
 class SCOPE_OT_push_to_nla(ActionOperator):
-    """Move the motion to a new track of the Nonlinear Animation editor, where takes are mixed and
-    repeated
-    """
+    """Move the motion to a new track of the Nonlinear Animation editor"""
 
+    bl_description = (
+        "Move the motion to a new track of the Nonlinear Animation editor, where takes are mixed "
+        "and repeated"
+    )
     bl_idname = "scope.push_to_nla"
     bl_label = "Push to NLA"
 

@@ -23,10 +23,12 @@ def _offered_catalogs(
 
 
 class SCOPE_OT_mark_asset(ActionOperator):
-    """Mark the captured motion as an asset with a preview image of its pose, for other files' Asset
-    Browser
-    """
+    """Mark the captured motion as an asset with a preview image of its pose"""
 
+    bl_description = (
+        "Mark the captured motion as an asset with a preview image of its pose, for other files' "
+        "Asset Browser"
+    )
     bl_idname = "scope.mark_asset"
     bl_label = "Mark as Asset"
 
@@ -112,7 +114,7 @@ def _captured(armature: bpy.types.Object) -> bpy.types.Object:
 
 
 def _described(context: bpy.types.Context, armature: bpy.types.Object) -> str:
-    """Return the description of an asset that the user has given none."""
+    """Return the description of an asset that the user has given none"""
     from ...scene.animation_data.stored_values import stored_text
 
     first, last = armature.animation_data.action.frame_range

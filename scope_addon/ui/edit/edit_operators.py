@@ -22,10 +22,12 @@ if TYPE_CHECKING:
 
 
 class SCOPE_OT_smooth(EditOperator):
-    """Smooth the captured motion again, more or less strongly. Keeps corrections, discards other
-    changes
-    """
+    """Smooth the captured motion again"""
 
+    bl_description = (
+        "Smooth the captured motion again, more or less strongly. Keeps corrections, discards "
+        "other changes"
+    )
     bl_idname = "scope.smooth"
     bl_label = "Smooth Motion"
 

@@ -17,7 +17,7 @@ from .live_state import state, stop_job
 
 
 def end_live() -> None:
-    """End a running live capture: the extension is being disabled, or a test begins."""
+    """End a running live capture: the extension is being disabled, or a test begins"""
     stop_job()
     camera_formats.end()
     state.cameras.clear()
@@ -127,7 +127,7 @@ class SCOPE_OT_live(JobOperator):
 
 
 class _RunningOperator(bpy.types.Operator):
-    """An operator on the running live capture. Not registered."""
+    """An operator on the running live capture. Not registered"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -162,10 +162,12 @@ class SCOPE_OT_record_live(_RunningOperator):
 
 
 class SCOPE_OT_stop_live(_RunningOperator):
-    """Stop the live capture. What was recorded is written as keyframes; otherwise the last pose
-    stays
-    """
+    """Stop the live capture"""
 
+    bl_description = (
+        "Stop the live capture. What was recorded is written as keyframes; otherwise the last pose "
+        "stays"
+    )
     bl_idname = "scope.stop_live"
     bl_label = "Stop"
 
@@ -196,7 +198,7 @@ class SCOPE_OT_cancel_live(bpy.types.Operator):
 
 
 def play_scene(context: bpy.types.Context) -> None:
-    """Play the scene's animation from the frame at which a recording begins, if that is wanted."""
+    """Play the scene's animation from the frame at which a recording begins, if that is wanted"""
     scene = context.scene
     if (
         scene.scope_live.with_scene
@@ -220,7 +222,7 @@ def stop_scene(context: bpy.types.Context) -> None:
 
 
 def redraw_viewports() -> None:
-    """Redraw the main region of every viewport."""
+    """Redraw the main region of every viewport"""
     for _, area in viewports():
         for region in area.regions:
             if region.type == "WINDOW":

@@ -20,10 +20,12 @@ _SAME_M = 0.002
 
 
 class SCOPE_OT_floor_here(CorrectionOperator):
-    """In this frame, a foot rests on the floor: move the capture and its camera up or down until it
-    does
-    """
+    """Let a foot rest on the floor in this frame"""
 
+    bl_description = (
+        "In this frame, a foot rests on the floor: move the capture and its camera up or down "
+        "until it does"
+    )
     bl_idname = "scope.floor_here"
     bl_label = "Floor Here"
 

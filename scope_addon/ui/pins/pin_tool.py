@@ -41,7 +41,7 @@ _HELP = (
 
 
 class _Session:
-    """What the tool draws; Blender's objects are looked up by name, because undo replaces them."""
+    """What the tool draws; Blender's objects are looked up by name, because undo replaces them"""
 
     def __init__(self, armature: str, area: int) -> None:
         """Begin with no handle under the mouse.
@@ -78,7 +78,7 @@ _running: _Session | None = None
 
 
 def is_running() -> bool:
-    """Return whether the handles are shown."""
+    """Return whether the handles are shown"""
     return _running is not None
 
 
@@ -91,10 +91,12 @@ def detach() -> None:
 
 
 class SCOPE_OT_pin_limb(bpy.types.Operator):
-    """Drag handles on the body to where the joints are in this frame; the motion around is solved
-    again
-    """
+    """Drag handles on the body to where the joints are in this frame"""
 
+    bl_description = (
+        "Drag handles on the body to where the joints are in this frame; the motion around is "
+        "solved again"
+    )
     bl_idname = "scope.pin_limb"
     bl_label = "Pin Limbs"
 
@@ -204,7 +206,7 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
 
 
 def _redraw() -> None:
-    """Redraw the viewports with the handles, and the panel with the tool's button."""
+    """Redraw the viewports with the handles, and the panel with the tool's button"""
     for _, area in viewports():
         area.tag_redraw()
     redraw_sidebars()
@@ -224,14 +226,14 @@ def _move_to_viewport(session: _Session, window: bpy.types.Window, at: tuple[int
 
 
 def _joint_positions(session: _Session) -> dict[str, Vector]:
-    """Return the handles' positions in the scene."""
+    """Return the handles' positions in the scene"""
     armature = bpy.data.objects.get(session.armature)
     bones = armature.pose.bones if armature is not None and armature.pose is not None else {}
     return {name: armature.matrix_world @ bones[name].head for name in HANDLES if name in bones}
 
 
 def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) -> str:
-    """Return the handle under the mouse, or an empty name."""
+    """Return the handle under the mouse, or an empty name"""
     from bpy_extras.view3d_utils import location_3d_to_region_2d
 
     best = _NEAR * bpy.context.preferences.system.ui_scale
@@ -245,7 +247,7 @@ def _nearest(session: _Session, area: bpy.types.Area, region: bpy.types.Region) 
 
 
 def _draw(session: _Session) -> None:
-    """Draw the handles and this frame's pins."""
+    """Draw the handles and this frame's pins"""
     import blf
     import gpu
     from bpy_extras.view3d_utils import location_3d_to_region_2d

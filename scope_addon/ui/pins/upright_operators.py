@@ -60,10 +60,12 @@ class SCOPE_OT_set_upright(CorrectionOperator):
 
 
 class SCOPE_OT_set_upright_in_view(CorrectionOperator):
-    """Turn the capture and its camera so that a line in an orthographic view from a side is
-    upright
-    """
+    """Turn capture and camera so that a line in an orthographic view is upright"""
 
+    bl_description = (
+        "Turn the capture and its camera so that a line in an orthographic view from a side is "
+        "upright"
+    )
     bl_idname = "scope.set_upright_in_view"
     bl_label = "Set Upright in View"
 
@@ -112,10 +114,12 @@ class _Line:
 
 
 class SCOPE_OT_upright_line(bpy.types.Operator):
-    """Draw a line along something upright, in the footage or a side view; it rotates the capture
-    and its camera
-    """
+    """Draw a line along something upright"""
 
+    bl_description = (
+        "Draw a line along something upright, in the footage or a side view; it rotates the "
+        "capture and its camera"
+    )
     bl_idname = "scope.upright_line"
     bl_label = "Upright Line"
 

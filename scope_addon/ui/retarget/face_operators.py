@@ -22,7 +22,7 @@ from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_vi
 
 
 class _FaceOperator(ReportingOperator):
-    """An operator on the chosen face. Not registered."""
+    """An operator on the chosen face. Not registered"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -37,10 +37,12 @@ class _FaceOperator(ReportingOperator):
 
 
 class SCOPE_OT_guess_expressions(_FaceOperator):
-    """Assign the face's shape keys, named as by ARKit, Oculus or VRM, or the controls of a known
-    rig to expressions
-    """
+    """Assign the face's shape keys"""
 
+    bl_description = (
+        "Assign the face's shape keys, named as by ARKit, Oculus or VRM, or the controls of a "
+        "known rig to expressions"
+    )
     bl_idname = "scope.guess_expressions"
     bl_label = "Guess Expressions"
 
@@ -71,10 +73,12 @@ class SCOPE_OT_guess_expressions(_FaceOperator):
 
 
 class SCOPE_OT_retarget_face(_FaceOperator):
-    """Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new
-    action
-    """
+    """Transfer the captured expressions to the mesh's shape keys or the rig's face"""
 
+    bl_description = (
+        "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new "
+        "action"
+    )
     bl_idname = "scope.retarget_face"
     bl_label = "Retarget Face"
 

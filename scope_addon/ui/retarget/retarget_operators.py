@@ -24,7 +24,7 @@ _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front 
 
 
 class _RigOperator(ReportingOperator):
-    """An operator on the chosen rig. Not registered."""
+    """An operator on the chosen rig. Not registered"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -58,10 +58,12 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
 
 class SCOPE_OT_retarget(_RigOperator):
-    """Transfer the captured motion to your rig, as a new action. One of the same capture is
-    replaced if unchanged
-    """
+    """Transfer the captured motion to your rig"""
 
+    bl_description = (
+        "Transfer the captured motion to your rig, as a new action. One of the same capture is "
+        "replaced if unchanged"
+    )
     bl_idname = "scope.retarget"
     bl_label = "Retarget"
 
