@@ -61,7 +61,7 @@ def _digest(content: bytes) -> str:
 
 def main() -> int:
     """Record or compare, and print what differs."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("what", choices=("record", "compare"))
     parser.add_argument("file", type=Path)
     parser.add_argument("captures", nargs="*", help=f"of {', '.join(CAPTURES)}; default: all")
