@@ -104,9 +104,6 @@ def register() -> None:
     try:
         for module in _MODULES:
             for cls in module.CLASSES:
-                if issubclass(cls, bpy.types.Operator):
-                    # The tooltip is the docstring, in one line.
-                    cls.bl_description = " ".join(cls.__doc__.split())
                 bpy.utils.register_class(cls)
                 registered.append(cls)
         capture_properties.attach()
