@@ -2,38 +2,52 @@
 """`./scripts/bench ablation`: what each part of the pipeline brings, on Pose2Sim, rendered people
 and IoU with masks.
 
-Every clip is observed once, and solved again for each row from the same observations, so that what
-a part contributes to the camera's estimate is not in its row. The renders and the development
-scenes count as far as they have been made. IoU is of the captured body and the masks that the
-capture itself asks for, one in six frames or 16 for longer clips; the clips for it are the four
-cameras and those of `outline`. Scenes and other clips of less than four masks have none of the
-outline.
+Every clip is observed once, and solved again for each row from the same observations, with a part
+of the product replaced from here; so what a part contributes to the camera's estimate is not in its
+row. The renders and the development scenes count as far as they have been made. IoU is of the
+captured body and the masks that the capture itself asks for, one in six frames or 16 for longer
+clips; the clips for it are the four cameras and those of `outline`. Scenes and other clips of less
+than four masks have none of the outline.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
+from ..scope_addon.capture.fitting import prepared_track
+from ..scope_addon.capture.fitting.frame_measurements import DEPTH_SIGMA_M, Measurer
+from ..scope_addon.capture.fitting.prepared_track import Stance
+from ..scope_addon.capture.fitting.stature import FIXED, with_population
+from ..scope_addon.capture.fitting.weights import WEIGHTS
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.options import CaptureOptions
 from ..scope_addon.capture.overlay.overlay_video import camera_vertices
+from ..scope_addon.capture.perception.lifter import Lifted, default_lifter, windows_around
 from ..scope_addon.capture.perception.observation import PersonMask
 from ..scope_addon.capture.pipeline import shot_of
+from ..scope_addon.capture.stages import repair as repair_module
+from ..scope_addon.capture.stages import solve as solve_module
 from ..scope_addon.capture.stages.clock import StageClock
 from ..scope_addon.capture.stages.footage import Listeners
 from ..scope_addon.capture.stages.observe import observe
 from ..scope_addon.capture.stages.repair import repair
 from ..scope_addon.capture.stages.solve import solve
 from ..scope_addon.capture.tracking.track import Track
+from ..scope_addon.capture.world import stance as stance_module
 from ..scope_addon.capture.world.assemble import Shot
+from ..scope_addon.capture.world.clip import clip_fit
+from ..scope_addon.capture.world.clip.clip_window import ClipWindow
+from ..scope_addon.capture.world.placement import PlacedTrack
 from ..scope_addon.errors import NoPersonError
 from ..scope_addon.motion import Motion
 from ..solver import Body, load_body
@@ -46,26 +60,97 @@ from .scenes.accuracy import score_people
 from .scenes.scene import DEVELOPMENT, FOLDER
 from .scenes.statistics import mean_over_people
 
+# An attribute of a module or class of the product, and what stands there instead.
+Replacement = tuple[ModuleType | type, str, Any]
+
+
+def _weights(**changed: Any) -> tuple[Replacement, ...]:
+    """Return the replacement of the solver's weights by ones of which some differ."""
+    return ((prepared_track, "WEIGHTS", replace(WEIGHTS, **changed)),)
+
+
+def landmarks_as_lifted(
+    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]]
+) -> Lifted:
+    """Return the landmark network's world landmarks in place of the lifting network's points."""
+    sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
+    return Lifted(track.world_landmarks, sigma, sigma)
+
+
+def _lift_without_landmarks(
+    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]]
+) -> Lifted:
+    """Return the points of the lifting network, which is given the keypoints in the image alone."""
+    windows = windows_around(track.times, track.seen)
+    return default_lifter().lift(measurer.rays(pixels), track.confidence, None, windows)
+
+
+def _upright(
+    placed: PlacedTrack, *_: Any
+) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    """Return rotations (T, 3, 3) that leave a body as it is, and the points (T, 3) about which."""
+    frames = len(placed.root)
+    return np.broadcast_to(np.eye(3), (frames, 3, 3)), np.zeros((frames, 3))
+
+
+def _stance_without(field: str) -> Replacement:
+    """Return the replacement of the stance by one in which an array of it is zero everywhere."""
+
+    def stance_on_ground(*given: Any) -> Stance:
+        stance = stance_module.stance_on_ground(*given)
+        return replace(stance, **{field: np.zeros_like(getattr(stance, field))})
+
+    return solve_module, "stance_on_ground", stance_on_ground
+
+
+def _as_given(first: Any, *_: Any) -> Any:
+    return first
+
+
+WITHOUT_OFFSETS: Replacement = (prepared_track, "with_keypoint_offsets", _as_given)
+LANDMARKS_AS_LIFTED: Replacement = (prepared_track, "lift", landmarks_as_lifted)
 ALL_PARTS = "all parts"
 ROWS: dict[str, dict[str, Any]] = {
     ALL_PARTS: {},
-    "without the outline": {"ablation": Ablation(outline=False)},
-    "without a shape: the mean body": {"ablation": Ablation(shape=False)},
-    "without the stature's own prior": {"ablation": Ablation(stature=False)},
-    "without keypoint offsets": {"ablation": Ablation(keypoint_offsets=False)},
-    "without the lifting network": {"ablation": Ablation(lifter=False)},
-    "lifting network without world landmarks": {"ablation": Ablation(world_landmarks=False)},
-    "without 3D keypoints": {"ablation": Ablation(keypoints3d=False)},
-    "without the orientation field": {"ablation": Ablation(orientation_field=False)},
-    "without the joint prior": {"ablation": Ablation(joint_prior=False)},
-    "without the search for mirrored limbs": {"ablation": Ablation(limb_search=False)},
-    "without the body's own surface": {"ablation": Ablation(body_surface=False)},
-    "without left-right repair": {"ablation": Ablation(left_right=False)},
-    "without keypoint-jump repair": {"ablation": Ablation(keypoint_jumps=False)},
-    "without the stance": {"ablation": Ablation(stance=False)},
-    "without balance in it": {"ablation": Ablation(balance=False)},
-    "without the floor in it": {"ablation": Ablation(floor=False)},
-    "without contact": {"ablation": Ablation(contact=False)},
+    "without the outline": {"outline": False},
+    "without a shape: the mean body": {"replacements": _weights(shape=FIXED)},
+    "without the stature's own prior": {
+        "replacements": ((prepared_track, "with_unknown_stature", with_population),)
+    },
+    "without keypoint offsets": {"replacements": (WITHOUT_OFFSETS,)},
+    "without the lifting network": {"replacements": (LANDMARKS_AS_LIFTED,)},
+    "lifting network without world landmarks": {
+        "replacements": ((prepared_track, "lift", _lift_without_landmarks),)
+    },
+    "without 3D keypoints": {"replacements": _weights(keypoints3d=0.0)},
+    "without the orientation field": {"replacements": _weights(orientation_field=0.0)},
+    "without the joint prior": {"replacements": _weights(joint_prior=0.0)},
+    "without the search for mirrored limbs": {
+        "replacements": ((clip_fit, "search_limbs", lambda *_: None),)
+    },
+    "without the body's own surface": {
+        "replacements": ((ClipWindow, "with_body_surface", lambda window, *_: (window, False)),)
+    },
+    "without left-right repair": {
+        "replacements": (
+            (repair_module, "repair_left_right", _as_given),
+            (repair_module, "repair_limb_swaps", _as_given),
+        )
+    },
+    "without keypoint-jump repair": {
+        "replacements": ((repair_module, "repair_keypoint_jumps", _as_given),)
+    },
+    "without the stance": {
+        "replacements": ((solve_module, "ground_all", lambda shot, *given: given),)
+    },
+    "without balance in it": {"replacements": ((stance_module, "balancing_rotations", _upright),)},
+    "without the floor in it": {"replacements": (_stance_without("contact"),)},
+    "without contact": {
+        "replacements": (
+            _stance_without("resting"),
+            (solve_module, "raise_feet", _as_given),
+        )
+    },
     "without smoothing: every frame alone": {"smoothing": False},
 }
 QUICK_ROWS = 3
@@ -84,13 +169,35 @@ class Observed:
     tracks: tuple[Track, ...]
     timestamps: NDArray[np.float64]  # (T,) seconds
 
-    def solve(self, ablation: Ablation = NO_ABLATION, smoothing: bool = True) -> list[Motion]:
-        """Solve the clip without some parts; most prominent person first."""
-        shot = replace(self.shot, ablation=ablation, smoothing=smoothing and self.shot.smoothing)
-        given = (track if ablation.outline else replace(track, masks=()) for track in self.tracks)
-        repaired = (repair(track, shot.camera, ablation) for track in given)
-        motions = solve(shot, repaired, lambda *_: None).motions
+    def solve(
+        self,
+        replacements: Sequence[Replacement] = (),
+        outline: bool = True,
+        smoothing: bool = True,
+    ) -> list[Motion]:
+        """Solve the clip with some parts replaced; most prominent person first.
+
+        :param outline: False: the people's masks are left out.
+        :param smoothing: False: every frame is fitted alone.
+        """
+        shot = replace(self.shot, smoothing=smoothing and self.shot.smoothing)
+        given = self.tracks if outline else [replace(track, masks=()) for track in self.tracks]
+        with replaced(replacements):
+            repaired = (repair(track, shot.camera) for track in given)
+            motions = solve(shot, repaired, lambda *_: None).motions
         return [replace(motion, timestamps=self.timestamps) for motion in motions]
+
+
+@contextmanager
+def replaced(replacements: Sequence[Replacement]) -> Iterator[None]:
+    """Let other things stand in some places of the product within the context.
+
+    :raises AttributeError: the product has no such place.
+    """
+    with ExitStack() as stack:
+        for owner, name, value in replacements:
+            stack.enter_context(mock.patch.object(owner, name, value))
+        yield
 
 
 def observe_clip(

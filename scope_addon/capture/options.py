@@ -16,7 +16,6 @@ from ..options import OPTIONS, Place, option, options_at
 from ..options.capture import ALL, LARGEST, OFF
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
-from .fitting.ablation import NO_ABLATION, Ablation
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
 from .media.video_range import FootageRange, VideoRange, parse_range
@@ -58,7 +57,6 @@ class CaptureOptions:
     # the user's own networks, ONNX files; see `adapters`
     detector: Path | None = _DEFAULT["detector"]
     keypoints: Path | None = _DEFAULT["keypoints"]
-    ablation: Ablation = NO_ABLATION  # for experiments
     # of which clips at least twice as long are observed one after another
     window_s: float = WINDOW_S
 
@@ -89,11 +87,6 @@ def check_options(body: Body, options: CaptureOptions) -> None:
     most_people(options.people)
     landmark_network_name(options.quality)
     Execution(options.provider)
-    if options.keypoints and not options.ablation.lifter:
-        raise UsageError(
-            "the lifter cannot be left out with a keypoint file: such a network does "
-            "not estimate depth"
-        )
     if problem := option("hands").type_error(options.hands):
         raise UsageError(f"hands {problem}")
     if options.hands != OFF:

@@ -62,9 +62,7 @@ def capture(
         )
     return_freed_memory()  # of the networks
     with clock.stage("solver"):
-        repaired = (
-            repair(tracks.pop(0), footage.camera, options.ablation) for _ in range(len(tracks))
-        )
+        repaired = (repair(tracks.pop(0), footage.camera) for _ in range(len(tracks)))
         solved = solve(
             shot_of(video, body, options, footage), repaired, progress, options.heights_m
         )
@@ -93,6 +91,5 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         (video.width, video.height),
         display_text(Path(video.path).name),
         options.smoothing and frames > 1,
-        options.ablation,
         options.uneven_ground,
     )

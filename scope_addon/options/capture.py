@@ -324,11 +324,4 @@ CAPTURE_OPTIONS = (
         "horizontal floor",
         argument=Argument(help="feet rest at any height, as on stairs or slopes, not on one floor"),
     ),
-    Option(
-        "ablation",
-        object,
-        None,
-        Place.CAPTURE,
-        "parts of the pipeline to leave out; only experiments set it",
-    ),
 )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of the real clips, read by plain OpenCV and not by the code under test."""
+"""Frames of the real clips, read by plain OpenCV and not by the code under test; exact lifting."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scope.benchmarks.ablation import LANDMARKS_AS_LIFTED, replaced
 
 Frames = Callable[..., Iterator[np.ndarray]]
 
@@ -36,6 +37,13 @@ def frames(shared: Path) -> Frames:
             index += 1
 
     return read
+
+
+@pytest.fixture(scope="module")
+def exact_lifting() -> Iterator[None]:
+    """World landmarks, which are exact in made tracks, replace the lifting network's points."""
+    with replaced([LANDMARKS_AS_LIFTED]):
+        yield
 
 
 @pytest.fixture(scope="session")

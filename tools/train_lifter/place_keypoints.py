@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.fitting.ablation import Ablation
+from ...benchmarks.ablation import WITHOUT_OFFSETS, replaced
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from ...scope_addon.capture.pipeline import capture
@@ -74,12 +74,10 @@ def main() -> None:
     parser.add_argument("clips", type=Path, help="folder of the clips")
     folder: Path = parser.parse_args().clips
     body = load_body("scope")
-    ablation = Ablation(keypoint_offsets=False)
     everybody = []
     for clip in CLIPS:
-        found = capture(
-            folder / f"{clip}.mp4", body, CaptureOptions(people="all", ablation=ablation)
-        )
+        with replaced([WITHOUT_OFFSETS]):
+            found = capture(folder / f"{clip}.mp4", body, CaptureOptions(people="all"))
         everybody += [
             normal_equations(body, m) for m in found.motions if m.valid.sum() >= MIN_FRAMES
         ]

@@ -38,7 +38,6 @@ from ..camera.line_segments import Segments
 from ..camera.manhattan import Edges
 from ..perception.observation import Observation
 from ..tracking.track import single_frame_track
-from .ablation import NO_ABLATION, Ablation
 from .prepared_track import prepare_track
 from .stature import with_population
 from .track_fit import fit_single_frame
@@ -130,9 +129,8 @@ def _moments(log_ratio: NDArray[np.float64], log_p: NDArray[np.float64]) -> tupl
 class FocalFits:
     """Fits single observations of a clip, in the calling thread."""
 
-    def __init__(self, body: Body, ablation: Ablation = NO_ABLATION) -> None:
+    def __init__(self, body: Body) -> None:
         self._body = body
-        self._ablation = ablation
         self._next_s = -np.inf
         self._gap_s = FIRST_GAP_S
 
@@ -160,7 +158,7 @@ class FocalFits:
             candidate = replace(
                 camera, intrinsics=pinhole(2 * K[0, 2], 2 * K[1, 2], ratio * K[0, 0])
             )
-            prepared = prepare_track(self._body, track, candidate, self._ablation)
+            prepared = prepare_track(self._body, track, candidate)
             keypoints2d = prepared.weights.keypoints2d * ratio**2
             weights = replace(prepared.weights, keypoints2d=keypoints2d, shape=SHAPE_WEIGHT)
             priors = with_population(prepared.priors, self._body)

@@ -21,7 +21,6 @@ from ..perception.lifter import HIPS
 from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.track import single_frame_track
-from .ablation import NO_ABLATION, Ablation
 from .prepared_track import prepare_track
 from .track_fit import fit_single_frame
 from .weights import ROBUST
@@ -41,16 +40,9 @@ class LivePose:
 class LiveBody:
     """Fits one body to single observations, in the calling thread."""
 
-    def __init__(
-        self,
-        body: Body,
-        camera: Camera,
-        ablation: Ablation = NO_ABLATION,
-        height_m: float | None = None,
-    ) -> None:
+    def __init__(self, body: Body, camera: Camera, height_m: float | None = None) -> None:
         self._body = body
         self._camera = camera
-        self._ablation = ablation
         self._height_m = height_m
         self.is_ready = False  # whether everything is loaded, so that a fit takes some milliseconds
 
@@ -65,7 +57,7 @@ class LiveBody:
     def _load_motion(self, observation: Observation, state: State) -> None:
         """Load what the fit of a whole clip needs besides."""
         track = single_frame_track(observation)
-        prepared = prepare_track(self._body, track, self._camera, self._ablation, self._height_m)
+        prepared = prepare_track(self._body, track, self._camera, self._height_m)
         measured = prepared.measure_all(0)
         frames: list[Measurements | list[View]] = [
             measured,
@@ -98,9 +90,7 @@ class LiveBody:
         track = single_frame_track(observation)
         if not track.seen[0]:
             return None
-        found = fit_single_frame(
-            prepare_track(self._body, track, self._camera, self._ablation, self._height_m)
-        )
+        found = fit_single_frame(prepare_track(self._body, track, self._camera, self._height_m))
         return None if found is None else found.state
 
 

@@ -19,11 +19,10 @@ from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter, windows_around
 from ..tracking.face.head_direction import across_head, certainty
 from ..tracking.track import Track
-from .ablation import NO_ABLATION, Ablation
-from .frame_measurements import DEPTH_SIGMA_M, EARS, Measurer
+from .frame_measurements import EARS, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits, without_fingers
 from .keypoint_offsets import with_keypoint_offsets
-from .stature import with_population, with_stature, with_unknown_stature
+from .stature import with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights
 
 SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that fixes the shape once it is known
@@ -156,7 +155,6 @@ def prepare_track(
     body: Body,
     track: Track,
     camera: Camera,
-    ablation: Ablation = NO_ABLATION,
     height_m: float | None = None,
     fingers: bool = True,
 ) -> PreparedTrack:
@@ -167,24 +165,22 @@ def prepare_track(
     :raises UsageError: the track has hands that are to be fitted, but the body has no finger
         joints.
     """
-    # only BlazePose estimates depth, and the offsets are BlazePose's
-    if ablation.keypoint_offsets and track.has_depth:
+    # Only BlazePose estimates depth, and the offsets are BlazePose's.
+    if track.has_depth:
         body = with_keypoint_offsets(body)
     whole_body = body
     if not fingers:
         body = without_fingers(body)
     measurer = Measurer(body, camera.intrinsics)
     pixels = camera.undistort(track.keypoints_px)
-    lifted = _lift(measurer, track, pixels, ablation)
+    lifted = lift(measurer, track, pixels)
     if height_m is not None and height_m < CHILD_BELOW_M:  # the lifting network knows adults alone
         lifted = lifted.scaled(height_m / body.stature())
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
     if height_m is not None:
         priors = with_stature(priors, body, height_m)
     else:
-        priors = (with_unknown_stature if ablation.stature else with_population)(priors, body)
-    weights = ablation.weights(WEIGHTS)
-    is_given = height_m is not None
+        priors = with_unknown_stature(priors, body)
     prepared = PreparedTrack(
         body,
         whole_body,
@@ -193,9 +189,9 @@ def prepare_track(
         pixels,
         lifted,
         priors,
-        weights,
+        WEIGHTS,
         camera=camera,
-        is_stature_given=is_given,
+        is_stature_given=height_m is not None,
     )
     if track.face is not None:
         across = across_head(track.face, camera)
@@ -212,14 +208,14 @@ def prepare_track(
     )
 
 
-def _lift(
-    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], ablation: Ablation
-) -> Lifted:
-    if not ablation.lifter:
-        sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
-        return Lifted(track.world_landmarks, sigma, sigma)
+def lift(measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]]) -> Lifted:
+    """Lift the keypoints of a track by the lifting network, with the landmark network's estimate of
+    depth where it has one.
+
+    :param pixels: (T, J, 2) keypoints without lens distortion.
+    """
     rays = measurer.rays(pixels)
     windows = windows_around(track.times, track.seen)
-    if not (ablation.world_landmarks and track.has_depth):
+    if not track.has_depth:
         return default_lifter().lift(rays, track.confidence, None, windows)
     return default_lifter().lift_mixture(rays, track.confidence, track.world_landmarks, windows)

@@ -42,8 +42,8 @@ def observe(
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
     """
     camera = given_camera(video, options)
-    live = LiveBody(body, camera, options.ablation, next(iter(options.heights_m), None))
-    fits = FocalFits(body, options.ablation)
+    live = LiveBody(body, camera, next(iter(options.heights_m), None))
+    fits = FocalFits(body)
     plan = plan_windows(video, options.window_s)
     with (
         BackgroundEstimators(camera, video.width, video.height, live, fits) as background,

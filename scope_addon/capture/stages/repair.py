@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..camera.intrinsics import Camera
-from ..fitting.ablation import Ablation
 from ..perception.hand_landmarks import HAND_LENGTH_M, SIDES, pixels_per_metre
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..tracking.hands.tentative_hands import confirmed
@@ -32,17 +31,16 @@ _BODY = np.array(
 _HAND = np.array([0, 17, 5, 2])
 
 
-def repair(track: Track, camera: Camera, ablation: Ablation) -> Track:
+def repair(track: Track, camera: Camera) -> Track:
     """Undo left-right swaps and limb swaps, replace keypoint jumps, keep tentative hands that
     others support.
 
     Wrists go to hands that contradict them.
     """
-    if ablation.left_right:
-        track = repair_limb_swaps(repair_left_right(track, camera))
+    track = repair_limb_swaps(repair_left_right(track, camera))
     if track.hands is not None:
         track = wrists_at_hands(replace(track, hands=confirmed(track.hands, track.times)))
-    return repair_keypoint_jumps(track) if ablation.keypoint_jumps else track
+    return repair_keypoint_jumps(track)
 
 
 def wrists_at_hands(track: Track) -> Track:

@@ -68,7 +68,7 @@ def solve(
     shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
     iterations = fits[0].iterations
     known = [(each.track, each.whole_body) for each in prepared]
-    if shot.ablation.stance and not shot.is_still:
+    if not shot.is_still:
         prepared, fits = ground_all(shot, prepared, fits)
     return_freed_memory()
     people = []
@@ -115,7 +115,7 @@ def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> 
     for k, track in enumerate(tracks):
         height_m = heights_m[k] if k < len(heights_m) else None
         fingers = track.hands is not None and bool((track.hands[:, :, 0, 2] > 0).any())
-        each = prepare_track(shot.body, track, shot.camera, shot.ablation, height_m, fingers)
+        each = prepare_track(shot.body, track, shot.camera, height_m, fingers)
         lifted = to_single_precision(each.lifted)
         out.append(to_single_precision(replace(each, track=track.without_depth(), lifted=lifted)))
     return out
@@ -147,7 +147,7 @@ def resize_people(
     clip's first places.
     """
     prepared, fits, count = list(prepared), list(fits), len(prepared)
-    if not 0 < len(heights_m) < count or not shot.ablation.stance or shot.uneven_ground:
+    if not 0 < len(heights_m) < count or shot.uneven_ground:
         return prepared, fits
     placed = place_each(shot, prepared, fits)
     up = find_world(placed, shot.lines).up
@@ -190,11 +190,7 @@ def ground_all(
     grounded = []
     starts = []
     for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
-        stance = stance_on_ground(placed[k], world.floor_from_camera(k), shot.ablation.balance)
-        if not shot.ablation.floor:
-            stance = replace(stance, contact=np.zeros_like(stance.contact))
-        if not shot.ablation.contact:
-            stance = replace(stance, resting=np.zeros_like(stance.resting))
+        stance = stance_on_ground(placed[k], world.floor_from_camera(k))
         measured, start = ground(each, fit, shot.path.stance_to_frames(stance))
         grounded.append(measured)
         starts.append(to_single_precision(start))
@@ -212,9 +208,7 @@ def refine(
     if shot.is_still:
         start = start.with_fingers_at_rest(prepared)
         return start, start
-    finished = (
-        fit_clip(prepared, start, shot.path, progress, shot.ablation) if shot.smoothing else start
-    )
+    finished = fit_clip(prepared, start, shot.path, progress) if shot.smoothing else start
     del start
     return_freed_memory()
     raw = to_single_precision(fit_each_frame(prepared, finished, progress))
@@ -232,6 +226,6 @@ def finish(
     the motion.
     """
     contact = placed.contact(world.up)
-    if shot.ablation.contact and not shot.uneven_ground and (shot.smoothing or shot.is_still):
+    if not shot.uneven_ground and (shot.smoothing or shot.is_still):
         placed = raise_feet(placed, contact, world.floor_from_camera(number))
     return assemble_motion(shot, person, placed, contact, world.T_world_camera)

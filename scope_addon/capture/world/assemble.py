@@ -17,7 +17,6 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..camera.intrinsics import Camera
 from ..camera.line_segments import Lines
-from ..fitting.ablation import NO_ABLATION, Ablation
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..tracking.face.expression_fit import with_expressions
@@ -188,7 +187,6 @@ class Shot:
     image_size: tuple[int, int]  # width and height, pixels
     source: str  # name of the footage
     smoothing: bool = True  # False: every frame is fitted alone
-    ablation: Ablation = NO_ABLATION
     uneven_ground: bool = False  # True: feet rest at any height
 
     @property

@@ -26,16 +26,14 @@ DEPTH_RATE_SIGMA_M_S = 0.3  # σ_r, rate of change of this error
 SLIDE_SIGMA_M_S = 0.1  # σ_s, horizontal speed of a foot in contact
 
 
-def stance_on_ground(
-    placed: PlacedTrack, T_floor_camera: NDArray[np.float64], balanced: bool
-) -> Stance:
+def stance_on_ground(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> Stance:
     """Estimate the distance and lean of a body, in the first frame's camera axes.
 
-    On uneven ground, the distance follows from feet at rest alone, and no foot is pulled to the
+    The lean puts the zero moment point between the contact points (`balance`). On uneven ground,
+    the distance follows from feet at rest alone, and no foot is pulled to the
     floor.
 
     :param T_floor_camera: (4, 4) camera to world, with this person's floor at z = 0.
-    :param balanced: whether the zero moment point has to lie between the contact points.
     """
     root = placed.root
     up = T_floor_camera[2, :3]
@@ -50,10 +48,8 @@ def stance_on_ground(
         one_floor,
     )
     shift = shift_m[:, None] * line_of_sight(root - placed.center)
-    turn = np.broadcast_to(np.eye(3), (len(root), 3, 3))
-    if balanced:
-        turn, pivot = balancing_rotations(placed, contact, up)
-        root = pivot + np.einsum("tij,tj->ti", turn, root - pivot)
+    turn, pivot = balancing_rotations(placed, contact, up)
+    root = pivot + np.einsum("tij,tj->ti", turn, root - pivot)
     height = (placed.contact_points + shift[:, None]) @ up + T_floor_camera[2, 3]
     on_floor = contact * floor_probability(height) if one_floor else np.zeros_like(contact)
     T_frames = np.broadcast_to(T_floor_camera, (len(root), 4, 4))

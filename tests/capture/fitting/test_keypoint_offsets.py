@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
+from scope.benchmarks.ablation import WITHOUT_OFFSETS, replaced
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.frame_measurements import Measurer
 from scope.scope_addon.capture.fitting.keypoint_offsets import offset, with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import prepare_track
@@ -155,12 +155,10 @@ def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_f
     video = shared / "data" / "pose2sim" / "cam3.mp4"
     wanted = VideoRange(end_s=0.6)
     left_over = []
-    for which, ablation in (
-        (body, Ablation(keypoint_offsets=False)),
-        (with_keypoint_offsets(body), Ablation()),
-    ):
-        (motion,) = capture(
-            video, body, CaptureOptions(quality="balanced", ablation=ablation, wanted=wanted)
-        ).motions
+    for which, replacements in ((body, [WITHOUT_OFFSETS]), (with_keypoint_offsets(body), [])):
+        with replaced(replacements):
+            (motion,) = capture(
+                video, body, CaptureOptions(quality="balanced", wanted=wanted)
+            ).motions
         left_over.append(left_over_px(which, motion))
     assert left_over[1] < 0.9 * left_over[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scope.benchmarks.ablation import LANDMARKS_AS_LIFTED, WITHOUT_OFFSETS, replaced
 from scope.benchmarks.scenes.garments import (
     COAT_M,
     SKIRT_M,
@@ -19,7 +20,6 @@ from scope.benchmarks.scenes.garments import (
 )
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.fitting import outline
-from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.outline import fit_shape_to_outline, usable_masks
 from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.tracking.track import Track
@@ -51,8 +51,8 @@ def added_by(
     if key not in seen:
         seen[key] = seen_in(body, betas, garment_of(body, betas, name, times) if name else None)
     camera = Camera(K, np.zeros(5), "test")
-    exact = Ablation(lifter=False, keypoint_offsets=False)
-    prepared = prepare_track(body, seen[key], camera, exact)
+    with replaced([LANDMARKS_AS_LIFTED, WITHOUT_OFFSETS]):
+        prepared = prepare_track(body, seen[key], camera)
     found = fit_shape_to_outline(prepared, usable_masks(prepared), None).beta
     girth = np.subtract(girths_m(body, found), girths_m(body, betas)).max()
     return float(girth), mass_kg(body, found) - mass_kg(body, betas)

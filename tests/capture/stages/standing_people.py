@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""People who stand, and may step up or down, as exact keypoints and world landmarks of a
-network.
+"""People who stand, and may step up or down, as exact keypoints and world landmarks of a network;
+for tests with `exact_lifting`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from fractions import Fraction
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.camera.line_segments import Lines
-from scope.scope_addon.capture.fitting.ablation import Ablation
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
@@ -82,6 +81,5 @@ def seen(track: Track, uneven_ground: bool = False) -> Shot:
         Fraction(int(RATE)),
         (1280, 720),
         "made",
-        ablation=Ablation(lifter=False),
         uneven_ground=uneven_ground,
     )

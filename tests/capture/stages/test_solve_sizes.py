@@ -13,6 +13,7 @@ from scope.solver import default_priors
 
 from .standing_people import BODY, seen, steps
 
+pytestmark = pytest.mark.usefixtures("exact_lifting")
 TALL_M = 1.95
 SHORT_M = 1.5
 

@@ -16,6 +16,7 @@ from scope.scope_addon.motion import Motion
 
 from .standing_people import BODY, RATE, STAYS_S, seen, steps
 
+pytestmark = pytest.mark.usefixtures("exact_lifting")
 STEP_M = 0.2  # a height at which a foot is taken to be on the floor, unless the ground is uneven
 
 

@@ -14,6 +14,7 @@ from scope.solver.loaders.body_file import load_body
 
 from .standing_people import seen, steps
 
+pytestmark = pytest.mark.usefixtures("exact_lifting")
 FINGERS = 30
 
 

@@ -289,8 +289,7 @@ class WindowedClip:
         own = Trackers(
             people.restarted(regions), hands and hands.restarted(), faces and faces.restarted()
         )
-        network = people.mask_network if self._options.ablation.outline else None
-        masks = MaskSchedule(network, self._video.expected_frames)
+        masks = MaskSchedule(people.mask_network, self._video.expected_frames)
         following = (
             self._windows[window.number + 1] if window.number + 1 < len(self._windows) else None
         )

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from .....solver import MotionFit, State
 from .....solver.rotations import exp, log
 from ....kinematics.body_surface import BodySurface
-from ...fitting.ablation import NO_ABLATION, Ablation
 from ...fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
 from ...fitting.prepared_track import PreparedTrack
 from ...fitting.weights import motion_priors
@@ -51,7 +50,6 @@ def fit_clip(
     start: FittedTrack,
     path: CameraPath,
     progress: _Progress,
-    ablation: Ablation = NO_ABLATION,
 ) -> FittedTrack:
     """Fit all frames of a track together, between longer gaps.
 
@@ -60,7 +58,7 @@ def fit_clip(
         cancel.
     :return: the states in each frame's camera; those of invalid frames are as given.
     """
-    clip = _Clip(prepared, start, path, progress, ablation)
+    clip = _Clip(prepared, start, path, progress)
     for run in runs(start.valid, prepared.track.times):
         for window in windows(
             len(run), _frames_of(prepared, WINDOW_UNKNOWNS), _frames_of(prepared, OVERLAP)
@@ -78,21 +76,15 @@ class _Clip:
         start: FittedTrack,
         path: CameraPath,
         progress: _Progress,
-        ablation: Ablation,
     ) -> None:
         self._prepared = prepared
         self._path = path
         self._progress = progress
-        self._limb_search = ablation.limb_search
         self._start = start
         first = path.to_first(start)
         self._rotations = first.rotations.copy()
         self._root = first.t_camera_root.copy()
-        self._surface = (
-            BodySurface(prepared.body, np.asarray(start.betas, float))
-            if ablation.body_surface
-            else None
-        )
+        self._surface = BodySurface(prepared.body, np.asarray(start.betas, float))
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
@@ -107,12 +99,10 @@ class _Clip:
         quadratic, robust = motion_priors(body, times)
         window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
         found = window.fit(every, [self._state(k) for k in frames], quadratic)
-        better = search_limbs(body, window, found, quadratic) if self._limb_search else None
+        better = search_limbs(body, window, found, quadratic)
         if better is not None:
             found = window.fit(every, better, quadratic)
         resting = window.with_resting_places(found)
-        if self._surface is None:
-            return self._keep(frames, resting.fit(every, found.states, robust, covariance=True))
         outside, entered = resting.with_body_surface(found, self._surface)
         if entered:  # what comes out of one part may enter the next
             found = outside.fit(every, found.states, robust)

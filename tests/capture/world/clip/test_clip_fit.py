@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting.ablation import Ablation
+from scope.benchmarks.ablation import ROWS, replaced
 from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
 from scope.scope_addon.capture.world.camera_path import CameraPath
@@ -267,7 +267,8 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
         nothing,
     )
     prepared = prepare(track, inside).with_stance(stance, true.betas)
-    found = fit(prepared, start, ablation=Ablation(body_surface=not left_out))
+    with replaced(ROWS["without the body's own surface"]["replacements"] if left_out else ()):
+        found = fit(prepared, start)
     surface = BodySurface(with_arm_points(BODY), np.zeros(BODY.P))
     R, t = BODY.forward_kinematics(
         found.rotations, found.t_camera_root - BODY.rest_joints()[0], np.zeros(BODY.P)

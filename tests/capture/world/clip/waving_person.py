@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.fitting.ablation import NO_ABLATION, Ablation
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, prepare_track
@@ -82,15 +81,8 @@ def prepare(
     return replace(prepare_track(BODY, track, CAMERA), lifted=Lifted(points, sigma, sigma))
 
 
-def fit(
-    prepared: PreparedTrack,
-    start: FittedTrack,
-    path: CameraPath | None = None,
-    ablation: Ablation = NO_ABLATION,
-) -> FittedTrack:
-    return fit_clip(
-        prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None, ablation
-    )
+def fit(prepared: PreparedTrack, start: FittedTrack, path: CameraPath | None = None) -> FittedTrack:
+    return fit_clip(prepared, start, path or CameraPath.static(len(start.valid)), lambda *_: None)
 
 
 def joints(fitted: FittedTrack) -> np.ndarray:
