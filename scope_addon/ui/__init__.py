@@ -8,6 +8,9 @@ are loaded at the first use, so that Blender starts as fast as without them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import ExitStack
+
 import bpy
 
 from . import (
@@ -100,27 +103,15 @@ _MODULES = (
 
 def register() -> None:
     """Register everything with Blender; if that fails, nothing stays registered."""
-    registered = []
-    try:
+    with ExitStack() as undo:
         for module in _MODULES:
             for cls in module.CLASSES:
                 bpy.utils.register_class(cls)
-                registered.append(cls)
-        capture_properties.attach()
-        retarget_properties.attach()
-        live_properties.attach()
-        command.register()
-        correction_panel.attach()
-        view_after_undo.attach()
-        import_operators.attach()
-        menus.attach()
-        keymap.attach()
-        warm_up.attach()
-        translations.register()
-    except Exception:
-        for cls in reversed(registered):
-            bpy.utils.unregister_class(cls)
-        raise
+                undo.callback(bpy.utils.unregister_class, cls)
+        for attach, detach in _attachments():
+            attach()
+            undo.callback(detach)
+        undo.pop_all()
 
 
 def unregister() -> None:
@@ -129,17 +120,25 @@ def unregister() -> None:
     live_operators.end_live()
     pin_tool.detach()
     compiled_solver.detach()
-    translations.unregister()
-    warm_up.detach()
-    keymap.detach()
-    menus.detach()
-    import_operators.detach()
-    view_after_undo.detach()
-    correction_panel.detach()
-    command.unregister()
-    live_properties.detach()
-    retarget_properties.detach()
-    capture_properties.detach()
+    for _, detach in reversed(_attachments()):
+        detach()
     for module in reversed(_MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)
+
+
+def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
+    """Return what attaches things other than classes to Blender, and what detaches them."""
+    return [
+        (capture_properties.attach, capture_properties.detach),
+        (retarget_properties.attach, retarget_properties.detach),
+        (live_properties.attach, live_properties.detach),
+        (command.register, command.unregister),
+        (correction_panel.attach, correction_panel.detach),
+        (view_after_undo.attach, view_after_undo.detach),
+        (import_operators.attach, import_operators.detach),
+        (menus.attach, menus.detach),
+        (keymap.attach, keymap.detach),
+        (warm_up.attach, warm_up.detach),
+        (translations.register, translations.unregister),
+    ]

@@ -81,15 +81,25 @@ def test_enabling_loads_no_heavy_library_and_collects_no_garbage():
 
 
 def test_a_failing_registration_leaves_nothing(unregistered, monkeypatch):
-    from scope.scope_addon.ui import command
+    from scope.scope_addon.ui import translations
 
     def refuse():
         raise RuntimeError("refused")
 
+    def drawn():
+        menus = (bpy.types.VIEW3D_MT_pose, bpy.types.TOPBAR_MT_file_import)
+        return [len(menu._dyn_ui_initialize()) for menu in menus]
+
+    handlers = len(bpy.app.handlers.undo_pre)
+    entries = drawn()
     with monkeypatch.context() as patch:
-        patch.setattr(command, "register", refuse)
+        patch.setattr(translations, "register", refuse)
         with pytest.raises(RuntimeError, match="refused"):
             scope.register()
+    assert not hasattr(bpy.types.Scene, "scope")
+    assert not hasattr(bpy.types.Collection, "scope_result")
+    assert len(bpy.app.handlers.undo_pre) == handlers
+    assert drawn() == entries
     assert ours() == []
 
 

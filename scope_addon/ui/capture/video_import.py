@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..files.file_field import FootageBrowser, stored_path
+from ..live.live_state import state as live_state
 from ..reporting import rpt_, tip_
 from ..view.sidebar import show_tab
 from .capture_operators import state
@@ -24,7 +25,7 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that no capture is running."""
-        if state.job is not None:
+        if state.job is not None or live_state.job is not None:
             cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
             return False
         return True

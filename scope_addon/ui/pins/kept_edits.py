@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edits of keys that the motion keeps like corrections: interpolated frames, swapped sides, feet on
-the floor.
+"""Edits of keys that the motion keeps like corrections: interpolated frames, feet on the floor.
 
 Where the motion is lost, as in old .blend files without their cache, they edit the keys only.
 """
@@ -16,7 +15,7 @@ from ..captured_person import betas_of, captured_armature, motion_of
 from ..edit.edit_base import edit_clip
 from ..reporting import tip_
 from .corrected_person import CorrectionOperator, change_corrections
-from .correction_operators import CorrectSpanOperator, ExchangeOperator, floor_warning
+from .correction_operators import CorrectSpanOperator, floor_warning
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,21 +63,6 @@ class SCOPE_OT_interpolate_span(KeptSpanOperator):
         from ...edit.spans import interpolate
 
         return lambda clip, _: interpolate(clip, self.start / rate, self.end / rate)
-
-
-class SCOPE_OT_swap_sides(ExchangeOperator, KeptSpanOperator):
-    """Swap the left and right limbs within a span of frames"""
-
-    bl_idname = "scope.swap_sides"
-    bl_label = "Swap Left and Right"
-
-    def change(self, body: Body, rate: float) -> Callable[[Clip, NDArray[np.float64]], Clip]:
-        """Return the swap of keys."""
-        from ...edit.spans import swap_sides
-
-        return lambda clip, _: swap_sides(
-            clip, body, self.start / rate, self.end / rate, self.limbs
-        )
 
 
 class SCOPE_OT_refloor(CorrectionOperator):
@@ -152,4 +136,4 @@ def _has_motion(armature: bpy.types.Object) -> bool:
     return True
 
 
-CLASSES = (SCOPE_OT_interpolate_span, SCOPE_OT_swap_sides, SCOPE_OT_refloor)
+CLASSES = (SCOPE_OT_interpolate_span, SCOPE_OT_refloor)

@@ -186,7 +186,7 @@ class Steps(FileSteps):
         place = [chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(0.2, 1.5)]
         values: dict[str, dict[str, object]] = {
             **dict.fromkeys(
-                ("interpolate_span", "swap_sides", "exchange_sides", "foot_stands"), span
+                ("interpolate_span", "exchange_sides", "foot_stands"), span
             ),
             **dict.fromkeys(("choose_footage", "import_video"), {"filepath": self.footage}),
             "import_motion": {

@@ -480,7 +480,7 @@ def kept_edits(first: int, frame: int) -> Iterator[float]:
     frames = (first + 8, frame - 2, frame, frame + 2, frame + 10)
     captured_there = places(frames)
     use(bpy.ops.scope.interpolate_span, start=frame - 4, end=frame + 4)
-    use(bpy.ops.scope.swap_sides, start=first + 5, end=first + 12, limbs="legs")
+    use(bpy.ops.scope.exchange_sides, start=first + 5, end=first + 12, limbs="legs")
     began = time.monotonic()
     use(bpy.ops.scope.refloor)
     report["feet_to_floor_s"] = round(time.monotonic() - began, 2)

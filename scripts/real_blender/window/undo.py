@@ -142,7 +142,6 @@ def edits() -> dict[str, Callable[[], object]]:
         "smooth": lambda: use(scope.smooth, strength=2.5),
         "raw": lambda: use(scope.smooth, strength=0.0),
         "bridge frames": lambda: use(scope.interpolate_span, start=10, end=16),
-        "swap sides": lambda: use(scope.swap_sides, start=10, end=16),
         "feet to floor": lambda: use(scope.refloor, level=True),
         "in place": lambda: use(scope.root_motion, mode="IN_PLACE"),
         "loop": lambda: use(scope.loop, start=1, end=60),

@@ -114,7 +114,7 @@ def test_smoothing_without_the_captured_motion_is_an_error(rig):
 
 def test_interpolating_and_swapping_a_span(rig):
     before = keys(rig)[0]
-    bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
+    bpy.ops.scope.exchange_sides(start=20, end=30, limbs="legs")
     swapped = keys(rig)[0]
     assert turned(swapped.rotations[19:30], before.rotations[19:30]) > 10
     # smoothing has mixed the sides at the ends of the span, so it is smoothed again there
@@ -123,7 +123,7 @@ def test_interpolating_and_swapping_a_span(rig):
         turned(np.delete(swapped.rotations, around, 0), np.delete(before.rotations, around, 0))
         < 0.01
     )
-    bpy.ops.scope.swap_sides(start=20, end=30, limbs="legs")
+    bpy.ops.scope.exchange_sides(start=20, end=30, limbs="legs")
     assert turned(keys(rig)[0].rotations, before.rotations) < 0.05
     bpy.ops.scope.interpolate_span(start=40, end=44)
     assert 0.1 < turned(keys(rig)[0].rotations, before.rotations) < 8

@@ -315,7 +315,7 @@ def test_a_span_is_corrected_as_far_as_there_is_a_motion(rig, start, end):
 
 
 @pytest.mark.parametrize(
-    "operator", ["foot_stands", "exchange_sides", "interpolate_span", "swap_sides", "loop"]
+    "operator", ["foot_stands", "exchange_sides", "interpolate_span", "loop"]
 )
 def test_a_span_the_wrong_way_round_is_said_with_the_frames_of_the_scene(rig, operator):
     with pytest.raises(

@@ -41,7 +41,7 @@ def rig():
     armature = captured(motion := motion_of(wrong_walk()))
     set_motion_of(armature, motion)
     assert off(made_rigs.seen(armature, NAMES, FRAMES)) > 0.3
-    bpy.ops.scope.swap_sides(start=EXCHANGED.start + 1, end=EXCHANGED.stop, limbs="legs")
+    bpy.ops.scope.exchange_sides(start=EXCHANGED.start + 1, end=EXCHANGED.stop, limbs="legs")
     bpy.ops.scope.interpolate_span(start=39, end=47)
     bpy.ops.scope.refloor()
     for strength in (0.0, 1.0):
