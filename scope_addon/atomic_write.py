@@ -35,7 +35,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
     ends.
 
     If the block is left by an exception, the temporary file is removed and ``path`` is unchanged.
-    If ``path`` is a link, its target is written and the link stays.
+    A power cut within the block leaves the earlier file; after it, the new one is on the disk. If
+    ``path`` is a link, its target is written and the link stays.
 
     :return: context manager that gives the temporary file's path. The block may replace the file,
         which is empty at first, but has to leave a file of that name.
@@ -55,11 +56,46 @@ def atomic_path(path: Path) -> Iterator[Path]:
         mode = stat.S_IMODE(os.fstat(handle).st_mode)
         os.close(handle)
         yield temporary
+        sync(temporary)
         os.chmod(temporary, mode)  # a library may have replaced the file by one of its own
-        os.replace(temporary, target)
+        replace_durably(temporary, target)
     finally:
         _remove_with_drafts(temporary)
         _temporary_files.discard(temporary)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file's content is on the disk; otherwise its name may get there before it.
+
+    :raises OSError: the disk refuses the content, which some only say now.
+    """
+    # Windows syncs only what is open for writing.
+    handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def replace_durably(source: Path, target: Path) -> None:
+    """Rename a file whose content is on the disk, and wait until its new name is there too.
+
+    :raises OSError: the file cannot be renamed.
+    """
+    os.replace(source, target)
+    _sync_folder(target.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until a folder's names are on the disk, where the system can: Windows opens no folder,
+    and some network file systems refuse.
+    """
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool = False) -> None:

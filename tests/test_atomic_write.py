@@ -5,6 +5,7 @@ replaced.
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import subprocess
@@ -249,3 +250,45 @@ def test_an_archive_that_the_disk_refuses_is_one_error(tmp_path, monkeypatch, ca
     assert path.read_bytes() == b"earlier"
     assert os.listdir(tmp_path) == ["walk.npz"]
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs the names of open files")
+def test_content_and_name_are_on_the_disk_before_success_is_said(tmp_path, monkeypatch):
+    """A power cut after a rename that was not preceded by a sync leaves an empty file."""
+    done = []
+    real_sync = os.fsync
+    real_replace = os.replace
+
+    def fsync(handle):
+        name = os.path.basename(os.readlink(f"/proc/self/fd/{handle}"))
+        size = os.fstat(handle).st_size if name.startswith(".walk.scope-") else None
+        done.append(("sync", name, size))
+        real_sync(handle)
+
+    def replace(source, target):
+        done.append(("rename", os.path.basename(source), os.path.basename(target)))
+        real_replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "replace", replace)
+    write(tmp_path / "walk.txt", "whole")
+    temporary = done[0][1]
+    assert done == [
+        ("sync", temporary, 5),
+        ("rename", temporary, "walk.txt"),
+        ("sync", tmp_path.name, None),
+    ]
+
+
+def test_a_disk_that_refuses_at_the_sync_leaves_the_earlier_file(tmp_path, monkeypatch):
+    path = tmp_path / "walk.txt"
+    path.write_text("earlier")
+
+    def fsync(handle):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with pytest.raises(OSError, match="Input/output error"):
+        write(path)
+    assert path.read_text() == "earlier"
+    assert os.listdir(tmp_path) == ["walk.txt"]

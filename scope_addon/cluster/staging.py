@@ -9,7 +9,6 @@ can therefore not publish anything, because only this machine renames results.
 from __future__ import annotations
 
 import errno
-import os
 import secrets
 import shutil
 import time
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.processes import has_ended, owner
-from ..atomic_write import atomic_path, reason, resolve_link
+from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError
 from ..job.clips.task import file_hash
 
@@ -93,7 +92,8 @@ class Staging:
 def _rename(staged: Path, final: Path) -> None:
     final.parent.mkdir(parents=True, exist_ok=True)
     try:
-        os.replace(staged, resolve_link(final))
+        # The worker, which wrote the file, has synced its content.
+        replace_durably(staged, resolve_link(final))
     except OSError as error:
         if error.errno != errno.EXDEV:
             raise
