@@ -19,8 +19,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from ..solver.processes import is_abandoned, owner
 from .errors import OutputError
+from .processes import is_abandoned, owner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -2,9 +2,9 @@
 """The solver's machine code for a platform and a Python, to be shipped in an extension.
 
 It is made by the staged extension itself, with its own wheels in the Python of that Blender, for
-the processor that `solver/compiled/code_folders.py` names; so it can be made on a computer of that
-platform alone, by building there. It is kept in build/kernels/PLATFORM/PYTHON: a copy of that
-folder serves another computer, if the sources are the same. Where there is none, the extension
+the processor that `scope_addon/machine_code/code_folders.py` names; so it can be made on a computer
+of that platform alone, by building there. It is kept in build/kernels/PLATFORM/PYTHON: a copy of
+that folder serves another computer, if the sources are the same. Where there is none, the extension
 works as well, and compiles the solver once on the user's computer.
 """
 
@@ -183,7 +183,7 @@ def _numpy_wheel(python: str) -> Path:
 def _digest(staging: Path, wheels: list[Path]) -> str:
     """Return a digest of what decides the machine code: the sources and the compiler."""
     digest = hashlib.sha256("\n".join(sorted(w.name for w in wheels)).encode())
-    for folder in ("solver", "scope_addon/capture/overlay"):
+    for folder in ("solver", "scope_addon/machine_code", "scope_addon/capture/overlay"):
         for path in sorted((staging / folder).rglob("*.py")):
             digest.update(path.relative_to(staging).as_posix().encode() + b"\n" + path.read_bytes())
     return digest.hexdigest()

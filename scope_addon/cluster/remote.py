@@ -17,10 +17,10 @@ from typing import Any
 import fsspec
 
 from ...solver.errors import InputError, ScopeError
-from ...solver.processes import has_ended, owner
 from ..errors import OutputError, UsageError
 from ..footage import is_url
 from ..job.batch import REPORT_NAME
+from ..processes import has_ended, owner
 from .staging import ATTEMPTS, TOKEN
 
 

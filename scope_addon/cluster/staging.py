@@ -15,10 +15,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ...solver.processes import has_ended, owner
 from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError
 from ..job.clips.task import file_hash
+from ..processes import has_ended, owner
 
 ATTEMPTS = ".scope-attempts"
 TOKEN = "token"  # file by which a worker shows that it sees the same folder

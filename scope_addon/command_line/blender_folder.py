@@ -17,8 +17,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ...solver.processes import is_abandoned, owner
 from ..job.private_folder import is_private
+from ..processes import is_abandoned, owner
 
 _START = "scope-blender-"
 # by which Blender finds the system's temporary folder, on Windows the others

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 REPORT = "report.json"
-# a folder of solver/compiled/code_folders.py, less its program
+# a folder of scope_addon/machine_code/code_folders.py, less its program
 _VERSION = re.compile(r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}")
 _JOB = "job-"  # begins the name of a job's folder, before its owner
 
@@ -68,7 +68,7 @@ class Cache:
         """
         import tempfile
 
-        from ...solver.processes import owner
+        from ..processes import owner
 
         jobs = self.root / "jobs"
         try:
@@ -170,7 +170,7 @@ def _remove_abandoned(jobs: Path) -> None:
     """Remove the folders of jobs whose Blender does not run any more."""
     import shutil
 
-    from ...solver.processes import is_abandoned
+    from ..processes import is_abandoned
 
     for folder in _by_time(jobs):
         with suppress(OSError):  # another process has removed it

@@ -12,7 +12,6 @@ import gc
 
 import numpy as np
 
-from ...solver.compiled.code_cache import compiled_kernels
 from ...solver.loaders.body_file import ASSETS, load_body
 from ..capture.media.video_range import VideoRange
 from ..capture.options import CaptureOptions
@@ -21,6 +20,7 @@ from ..capture.pipeline import capture
 from ..capture.stages.clock import Progress
 from ..edit.pins.corrected_motion import with_corrections
 from ..edit.pins.corrections import Pin
+from ..machine_code.code_cache import compiled_kernels
 from .preview import load_rasterizer
 
 ROOT = ASSETS.parent

@@ -33,7 +33,7 @@ def load() -> None:
         load_package(ROOT)
         _loaded.append(NAME)
     for name in [OWN_NAME, *([NAME] if is_ours() else [])]:
-        import_module(f"{name}.solver.compiled.code_folders").keep_in(cache().kernels)
+        import_module(f"{name}.scope_addon.machine_code.code_folders").keep_in(cache().kernels)
     if is_ours():
         import_module(f"{NAME}.solver")
 

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How every kernel of the solver is compiled, and how its machine code is kept."""
 
+import hashlib
 import logging
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from numba import njit
 
-from .code_cache import CodeCache
-from .pipeline import KernelCompiler
+from ..code_keeper import CodeKeeper, use_keeper
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is
 # not, because the optimizer must recognise them. The GIL is released, so that frames can be solved
@@ -18,10 +19,7 @@ _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"reassoc", "contract", "arcp", "nsz"},
     "no_cfunc_wrapper": True,  # no C code calls a kernel; to compile an entry for it takes long
-    "pipeline_class": KernelCompiler,
 }
-
-
 _LOG = logging.getLogger(__name__)
 
 
@@ -34,12 +32,12 @@ def kernel(function: Callable[..., Any]) -> Any:
     Kernels are inlined into their callers in other files, so that a change of any file of the
     solver makes all of their code stale. Where no folder can be written to, nothing is kept.
     """
-    return _compiled(function, _nrt=False)
+    return cached(_compiled(function, _nrt=False))
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that creates arrays; otherwise as `kernel`."""
-    return _compiled(function, _nrt=True)
+    return cached(_compiled(function, _nrt=True))
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
@@ -48,8 +46,7 @@ def inlined_kernel(function: Callable[..., Any]) -> Any:
 
     For functions made in a loop, which numba's cache cannot tell apart. Python cannot call it.
     """
-    options = dict(_OPTIONS, _nrt=False, no_cpython_wrapper=True)
-    return njit(**options)(function)
+    return _compiled(function, _nrt=False, no_cpython_wrapper=True)
 
 
 def expanded_kernel(function: Callable[..., Any]) -> Any:
@@ -58,8 +55,7 @@ def expanded_kernel(function: Callable[..., Any]) -> Any:
     For pieces of a hot loop that pass many numbers to each other: a call might pass them through
     memory.
     """
-    options = dict(_OPTIONS, _nrt=False, inline="always")
-    return njit(**options)(function)
+    return _compiled(function, _nrt=False, inline="always")
 
 
 def cached(compiled: Any) -> Any:
@@ -67,28 +63,75 @@ def cached(compiled: Any) -> Any:
 
     A change of any source in its folder, or of the solver, makes it stale.
     """
-    if hasattr(compiled, "_cache"):  # not where numba is configured not to compile at all
-        compiled._cache = CodeCache(compiled.py_func)
+    if hasattr(compiled, "enable_caching"):  # not where numba is configured not to compile at all
+        _kept.append(compiled)
+        _keeper.keep(compiled)
     return compiled
 
 
-def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-    return cached(njit(**_OPTIONS, **options)(function))
-
-
-def is_compiled(dispatcher: Any) -> bool:
+def is_compiled(compiled: Any) -> bool:
     """Whether a kernel's machine code is in memory or, as it seems, on disk."""
-    return bool(dispatcher.signatures) or dispatcher._cache.has_code()
+    return bool(compiled.signatures) or _keeper.has_code(compiled)
 
 
-_announced: set[Any] = set()
-
-
-def announce_compilation(dispatcher: Any) -> None:
+def announce_compilation(compiled: Any) -> None:
     """Log why the coming call takes long; warnings go to stderr unless logging is configured.
 
     Once in a process: further threads that come meanwhile wait for the same machine code.
     """
-    if not is_compiled(dispatcher) and dispatcher not in _announced:
-        _announced.add(dispatcher)
+    if not is_compiled(compiled) and compiled not in _announced:
+        _announced.add(compiled)
         _LOG.warning("Compiling the solver for this machine, once: a minute or two.")
+
+
+class NumbaCache:
+    """Numba's own cache, which besides a kernel's own file heeds all others of the solver."""
+
+    def __init__(self) -> None:
+        digest = hashlib.sha256()
+        for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+            digest.update(path.read_bytes())
+        self._sources = digest.hexdigest()
+
+    def prepare(self, kernel: Any) -> None:
+        """Leave a kernel as it is."""
+
+    def keep(self, kernel: Any) -> None:
+        """Switch the cache on, if there is a folder for it."""
+        try:
+            kernel.enable_caching()
+        except RuntimeError:  # no folder can be written to
+            return
+        # A kernel contains copies of kernels in other files, whose changes numba would not notice.
+        index = kernel._cache._cache_file
+        index._source_stamp = (index._source_stamp, self._sources)
+
+    def has_code(self, kernel: Any) -> bool:
+        """Whether the cache has code of any signature."""
+        index = getattr(kernel._cache, "_cache_file", None)
+        return index is not None and bool(index._load_index())
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    compiled = njit(**_OPTIONS, **options)(function)
+    if hasattr(compiled, "enable_caching"):
+        _prepared.append(compiled)
+        _keeper.prepare(compiled)
+    return compiled
+
+
+def _use(keeper: CodeKeeper) -> None:
+    """Let a keeper take care of all kernels."""
+    global _keeper
+    _keeper = keeper
+    for compiled in _prepared:
+        keeper.prepare(compiled)
+    for compiled in _kept:
+        keeper.keep(compiled)
+
+
+_announced: set[Any] = set()
+_prepared: list[Any] = []  # the kernels of this process
+_kept: list[Any] = []  # those whose machine code is kept on disk
+_keeper: CodeKeeper = NumbaCache()
+use_keeper(_use)

@@ -11,7 +11,7 @@ import sys
 import pytest
 from scope.scope_addon.cluster.staging import TOKEN, Staging
 from scope.scope_addon.errors import OutputError
-from scope.solver.processes import computer
+from scope.scope_addon.processes import computer
 
 
 @pytest.fixture

@@ -18,8 +18,8 @@ from scope.scope_addon.motion import Motion
 from scope.solver.errors import ScopeError
 from scope.solver.loaders.body_file import load_body
 
+from ..machine_code.small_package import make_package
 from ..made_motion import made_motion
-from ..solver.compiled.small_package import make_package
 from .system_calls import FULL, KILL, NO_MEMORY
 
 ACTIONS = (KILL, FULL, NO_MEMORY)

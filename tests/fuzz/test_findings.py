@@ -2,7 +2,7 @@
 """What once broke under attack, F1 to F15 and three more, each as its finder saw it: from outside.
 
 Details are tested beside the modules, and all of F1, damaged machine code and no place for it, in
-``tests/solver/compiled/test_code_cache.py``. Where a finding was a crash, much memory or the
+``tests/machine_code/test_code_cache.py``. Where a finding was a crash, much memory or the
 shell's, a process of its own is started, so that it would fail alone.
 """
 
@@ -31,8 +31,8 @@ from scope.scope_addon.cli import SAMPLE, main
 
 from ..capture.media.made_video import patch_track_header, write_video
 from ..capture.perception.adapters.made_networks import huge, looping
+from ..machine_code.small_package import LONG_CALLEE, make_package
 from ..retarget.made_files import array, fbx, glb
-from ..solver.compiled.small_package import LONG_CALLEE, make_package
 from .fuzz import CORPUS
 from .targets import ASSETS, TARGETS, npz
 
@@ -496,7 +496,8 @@ def test_f12_ten_thousand_heights(refused: Said) -> None:
 # The rows without a number
 
 COMPILED = """
-from package.kernels import inner, outer
+import package.scope_addon
+from package.solver.kernels import inner, outer
 assert outer(0.5) == inner(0.5) + inner(1.0)
 for kernel in (inner, outer):
     (made,) = kernel.overloads.values()
@@ -504,7 +505,8 @@ for kernel in (inner, outer):
     print(sorted({(f.linkage.name, "outer" if "outer" in f.name else "inner") for f in found}))
 """
 LOADED = """
-from package.kernels import inner, outer
+import package.scope_addon
+from package.solver.kernels import inner, outer
 hits = (sum(kernel.stats.cache_hits.values()) for kernel in (inner, outer))
 print(outer(0.5) == inner(0.5) + inner(1.0), *hits)
 """

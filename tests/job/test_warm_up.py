@@ -23,7 +23,7 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.job.worker import Reporter, run
 from scope.scope_addon.job.warm_up import ROOT
-from scope.solver.compiled.code_cache import compiled_kernels
+from scope.scope_addon.machine_code.code_cache import compiled_kernels
 with tempfile.TemporaryDirectory() as folder:
     request = JobRequest(str(SAMPLE), quality="fast", end="0.5", threads=1)
     status = run(request, Path(folder), Reporter(sys.stderr))

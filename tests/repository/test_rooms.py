@@ -18,7 +18,7 @@ PRODUCT = ("solver", "scope_addon")
 # name fits better.
 SOLVER: dict[str, set[str]] = {"solver": set()}
 CAPTURE = {
-    "scope_addon/capture/media": {"scope_addon/files"},
+    "scope_addon/capture/media": {"scope_addon/files", "scope_addon/machine_code"},
     "scope_addon/capture/perception": {"scope_addon/kinematics"},
     "scope_addon/capture/camera": {"scope_addon/capture/perception"},
     "scope_addon/capture/tracking": {"scope_addon/capture/camera"},
@@ -37,6 +37,7 @@ ROOMS = {
     **SOLVER,
     # the files directly in scope_addon that every room may use, see SHARED
     "scope_addon/files": {"solver"},
+    "scope_addon/machine_code": {"scope_addon/files"},
     "scope_addon/kinematics": {"scope_addon/files"},
     **CAPTURE,
     "scope_addon/options": {"scope_addon/files"},
@@ -74,6 +75,7 @@ SHARED = (
     "footage",
     "counts",
     "json_file",
+    "processes",
     "review_spans",
     "__init__",
 )

@@ -67,7 +67,7 @@ def test_code_for_another_python_is_not_shipped(shipped, staging, monkeypatch):
 
 
 def test_the_processors_are_those_that_the_solver_looks_for(shipped):
-    from scope.solver.compiled.code_folders import LEVELS
+    from scope.scope_addon.machine_code.code_folders import LEVELS
 
     assert shipped.PROCESSORS == {
         "windows-x64": LEVELS["x86_64"][0],

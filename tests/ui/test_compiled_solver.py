@@ -29,7 +29,7 @@ compiled_solver.cache = lambda: types.SimpleNamespace(kernels=Path({kernels!r}))
 compiled_solver.load()
 assert pose_refit.compiled_solver().__name__ == "scope.solver"
 for package in ("scope", NAME):
-    folders = importlib.import_module(f"{{package}}.solver.compiled.code_folders")
+    folders = importlib.import_module(f"{{package}}.scope_addon.machine_code.code_folders")
     assert folders.places() == [Path({kernels!r})], folders.places()
 
 body = importlib.import_module(f"{{NAME}}.solver.loaders.body_file").load_body("scope")

@@ -19,7 +19,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.compiled.code_cache import compiled_kernels
+from ...machine_code.code_cache import compiled_kernels
 from ..camera.background_record import BackgroundRecord
 from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker

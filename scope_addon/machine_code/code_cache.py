@@ -12,26 +12,17 @@ import inspect
 import logging
 import pickle
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
-from numba.core import serialize
 from numba.core.caching import _Cache
-from numba.core.compiler import CompileResult
 
 from .code_files import SUFFIX, read_code, remove_code, remove_drafts, write_code
 from .code_folders import PACKAGE, SOLVER, Area, digest_of, mark_used
+from .numba_internals import load_result, payload_of, use_cache, use_kernel_compiler
 
-_rebuild: Any = CompileResult._rebuild  # these declare no types
-_dumps: Callable[[Any], bytes] = serialize.dumps
 _LOG = logging.getLogger(__name__)
-# index in what numba reduces a result to: the annotated source, of no use and with the machine's
-# paths
-_ANNOTATION = 6
-
-
 # of each kernel that this process had to compile so far: the folder of its source
 _compiling: list[Path] = []
 _refused: list[OSError] = []  # why code could not be kept
@@ -44,6 +35,22 @@ def compiled_kernels(sources: Path = SOLVER) -> int:
     :param sources: only those in this folder count.
     """
     return sum(sources == folder or sources in folder.parents for folder in list(_compiling))
+
+
+class ShippedOrOwnCode:
+    """Keeps the machine code of all kernels: see `scope.solver.code_keeper.CodeKeeper`."""
+
+    def prepare(self, kernel: Any) -> None:
+        """Let a kernel run its own copies of the kernels that it calls."""
+        use_kernel_compiler(kernel)
+
+    def keep(self, kernel: Any) -> None:
+        """Keep a kernel's machine code in a `CodeCache`."""
+        use_cache(kernel, CodeCache(kernel.py_func))
+
+    def has_code(self, kernel: Any) -> bool:
+        """Whether there is a file of a kernel, whatever it contains."""
+        return bool(kernel._cache.has_code())
 
 
 class CodeCache(_Cache):
@@ -84,7 +91,7 @@ class CodeCache(_Cache):
             if payload is None:
                 continue
             try:
-                result = _loaded(target_context, *pickle.loads(payload))
+                result = load_result(target_context, *pickle.loads(payload))
             except Exception:  # whatever an unusable file leads to, compiling it again mends it
                 remove_code(path)
                 continue
@@ -102,7 +109,7 @@ class CodeCache(_Cache):
             or any(not x.can_cache for x in data.lifted)
         ):
             return
-        payload = _payload(data)
+        payload = payload_of(data)
         for folder in self._area.own_folders():
             try:
                 write_code(folder / self._file_name(sig), self._key(sig), payload)
@@ -139,43 +146,6 @@ class CodeCache(_Cache):
 
     def _file_name(self, sig: Any) -> str:
         return f"{self._name}-{digest_of(self._key(sig))[:12]}{SUFFIX}"
-
-
-def _payload(result: Any) -> bytes:
-    """Return the machine code, what else numba keeps of a result, and the names that the code
-    defines.
-    """
-    reduced = list(result._reduce())
-    reduced[_ANNOTATION] = ""
-    module = result.library._get_module_for_linking()
-    values = [*module.functions, *module.global_variables]
-    return _dumps((tuple(reduced), {value.name for value in values if not value.is_declaration}))
-
-
-def _loaded(target_context: Any, reduced: tuple[Any, ...], names: set[str]) -> Any:
-    """Return what was kept of a result; as numba's `_rebuild`, but without reading LLVM's code.
-
-    Only kernels that are compiled later and call this one need that, and to read it takes a third
-    of the time.
-    """
-    (name, kind, (code, bitcode)), *others = reduced
-    target_context.codegen()._engine._defined_symbols |= names
-    result = _rebuild(target_context, (name, kind, (code, _no_bitcode())), *others)
-    result.library._shared_module = None
-    result.library._get_module_for_linking = partial(_read_bitcode, result.library, bitcode)
-    return result
-
-
-def _read_bitcode(library: Any, bitcode: bytes) -> Any:
-    """Return the LLVM module of a library whose code was kept."""
-    if library._shared_module is None:
-        library._shared_module = llvm.parse_bitcode(bitcode)
-    return library._shared_module
-
-
-@cache
-def _no_bitcode() -> bytes:
-    return bytes(llvm.parse_assembly("").as_bitcode())
 
 
 @cache

@@ -35,10 +35,11 @@ config: Any = numba.core.config  # these declare no types
 llvm: Any = llvmlite.binding
 user_folder: Any = appdirs.AppDirs
 
-SOLVER = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
+SOLVER = ROOT / "solver"
 # the package that contains the solver
-PACKAGE = __name__.rpartition(".compiled.")[0].rpartition(".")[0]
-SHIPPED = SOLVER.parent / "assets" / "kernels"
+PACKAGE = __name__.rpartition(".scope_addon.")[0]
+SHIPPED = ROOT / "assets" / "kernels"
 # By machine: LLVM's name of the processor that shipped code is compiled for, and the features that
 # it needs of another.
 LEVELS = {
@@ -72,7 +73,8 @@ def sources_digest(folder: Path) -> str:
     return digest_of(*texts)
 
 
-_SOLVER_DIGEST = sources_digest(SOLVER)  # while importing: what is changed later is not what runs
+# While importing: what is changed later is not what runs. This package compiles.
+_SOLVER_DIGEST = digest_of(sources_digest(SOLVER), sources_digest(Path(__file__).parent))
 
 
 class Area:
@@ -133,7 +135,7 @@ def places() -> list[Path]:
     if config.CACHE_DIR:
         return [Path(config.CACHE_DIR)]
     return [
-        Path(__file__).parent / "__pycache__",
+        SOLVER / "__pycache__",
         Path(user_folder(appname="numba", appauthor=False).user_cache_dir),
     ]
 

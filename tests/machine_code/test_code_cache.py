@@ -10,14 +10,14 @@ import subprocess
 import sys
 
 import pytest
-from scope.solver.compiled.code_files import SUFFIX, read_code, write_code
-from scope.solver.compiled.code_folders import (
+from scope.scope_addon.machine_code.code_files import SUFFIX, read_code, write_code
+from scope.scope_addon.machine_code.code_folders import (
     SOLVER,
     WITHOUT_KERNELS,
     can_run_shipped,
     shipped_processor,
 )
-from scope.solver.processes import computer
+from scope.scope_addon.processes import computer
 
 from .small_package import LONG_CALLEE, make_package
 
@@ -29,7 +29,8 @@ def add{n}(x):
 """
 # Prints the kernels' results, and which of them came from disk.
 RUN = f"""
-from package import kernels
+import package.scope_addon
+from package.solver import kernels
 found = [getattr(kernels, f"add{{n}}") for n in range({COUNT})]
 print([kernel(1.0) for kernel in found])
 print([sum(kernel.stats.cache_hits.values()) for kernel in found])
@@ -97,7 +98,7 @@ def test_content_that_numba_cannot_use_is_replaced(run, folder):
         *map(pickle.dumps, (None, (), (1, 2), (("",) * 9, set()), (({},) * 9, set()))),
     ]
     for n, (path, content) in enumerate(zip(code_files(folder / "cache"), contents, strict=True)):
-        key = repr((("package.kernels", f"add{n}", 3 + 4 * n), "(float64,)"))
+        key = repr((("package.solver.kernels", f"add{n}", 3 + 4 * n), "(float64,)"))
         assert read_code(path, key, trusted=False)
         write_code(path, key, content)
     assert run(folder, folder / "cache") == ([0] * COUNT, "")
@@ -105,11 +106,17 @@ def test_content_that_numba_cannot_use_is_replaced(run, folder):
 
 
 LINK = """
-from package.kernels import inner, outer
+import package.scope_addon
+from package.solver.kernels import inner, outer
 first = inner(1.0)
 (result,) = inner.overloads.values()
 print(sum(inner.stats.cache_hits.values()), result.library._shared_module is None)
 print(outer(1.0) == first + inner(2.0), sum(outer.stats.cache_hits.values()))
+"""
+FIRST = """
+import package.scope_addon
+from package.solver.kernels import inner
+inner(1.0)
 """
 
 
@@ -118,7 +125,7 @@ def test_code_for_other_kernels_is_read_where_one_is_compiled_that_calls_it(run_
     (make_package(tmp_path) / "kernels.py").write_text(LONG_CALLEE)
     environment = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     said = []
-    for code in ("from package.kernels import inner; inner(1.0)", LINK, LINK):
+    for code in (FIRST, LINK, LINK):
         said.append(run_code(code, tmp_path, environment).stdout.splitlines())
     assert said == [[], ["1 True", "True 0"], ["1 True", "True 1"]]
 
@@ -174,7 +181,7 @@ def test_code_that_others_could_have_written_is_not_run(run, folder):
 
 @pytest.mark.skipif(not can_run_shipped(), reason="no code is shipped for this processor")
 def test_shipped_code_is_used_and_nothing_written(run, folder):
-    shipped = folder / "assets" / "kernels"
+    shipped = folder / "package" / "assets" / "kernels"
     assert (
         run(folder, shipped, NUMBA_CPU_NAME=shipped_processor(), NUMBA_CPU_FEATURES="")[0]
         == [0] * COUNT
@@ -187,7 +194,7 @@ def test_shipped_code_is_used_and_nothing_written(run, folder):
 
 
 def test_a_changed_source_makes_code_stale(run, folder):
-    with (folder / "package" / "__init__.py").open("a") as source:
+    with (folder / "package" / "solver" / "__init__.py").open("a") as source:
         source.write("# changed\n")
     assert run(folder, folder / "cache")[0] == [0] * COUNT
     assert len(list((folder / "cache").iterdir())) == 2

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cached machine code is dropped when any file of the solver changes, not only the kernel's own;
+who waits is told. With numba's own cache, and with the extension's.
+"""
+
+import os
+
+import pytest
+
+from .small_package import make_package
+
+SOURCE = {
+    "__init__.py": "",
+    "inner.py": "from .compiled.kernel import kernel\n\n\n@kernel\ndef inner(x):\n    return x + "
+    "{value}.0\n",
+    "outer.py": (
+        "from .compiled.kernel import kernel\nfrom .inner import inner\n\n@kernel\ndef outer(x):\n "
+        "   return inner(x)\n"
+    ),
+}
+
+
+# Prints the kernel's result, and whether its code came from disk.
+RUN = """
+from package.solver.compiled.kernel import announce_compilation
+from package.solver.outer import outer
+announce_compilation(outer); announce_compilation(outer)
+print(outer(0.0), len(outer.stats.cache_hits))
+announce_compilation(outer)
+"""
+
+
+@pytest.fixture(scope="module", params=["solver", "extension"])
+def runs(request, run_code, tmp_path_factory):
+    """What is printed, and how often it is said that the solver is compiled: twice each, before and
+    after a change.
+    """
+    folder = tmp_path_factory.mktemp("kernels")
+    solver = make_package(folder)
+    before = "import package.scope_addon" if request.param == "extension" else ""
+    variables = dict(os.environ, NUMBA_CACHE_DIR=str(folder / "cache"))
+    found = []
+    for value in (1, 22):
+        for name, text in SOURCE.items():
+            if value == 1 or name == "inner.py":
+                (solver / name).write_text(text.format(value=value))
+        for _ in range(2):
+            run = run_code(before + RUN, folder, variables)
+            found.append((run.stdout.split(), run.stderr.count("Compiling the solver")))
+    kept = {path.suffix for path in (folder / "cache").rglob("*") if path.is_file()}
+    assert kept == ({".code"} if request.param == "extension" else {".nbi", ".nbc"})
+    return found
+
+
+def test_a_changed_callee_reaches_its_cached_caller(runs):
+    assert [printed for printed, _ in runs] == [
+        ["1.0", "0"],
+        ["1.0", "1"],
+        ["22.0", "0"],
+        ["22.0", "1"],
+    ]
+
+
+def test_compiling_is_announced_once(runs):
+    """The first session says why it waits; the next one finds the machine code and says nothing."""
+    assert [said for _, said in runs] == [1, 0, 1, 0]
+
+
+LATE = """
+from package.solver.outer import outer
+import package.scope_addon
+print(outer(0.0), type(outer._cache).__name__, outer._compiler.pipeline_class.__name__)
+"""
+
+
+def test_the_extension_also_keeps_the_code_of_kernels_that_were_there_before(run_code, tmp_path):
+    solver = make_package(tmp_path)
+    for name, text in SOURCE.items():
+        (solver / name).write_text(text.format(value=1))
+    variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    done = run_code(LATE, tmp_path, variables)
+    assert done.stdout.split() == ["1.0", "CodeCache", "KernelCompiler"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no folder that nobody may write to")
+def test_without_a_place_for_code_a_solver_alone_works(run_code, tmp_path):
+    solver = make_package(tmp_path)
+    for name, text in SOURCE.items():
+        (solver / name).write_text(text.format(value=1))
+    (tmp_path / "file").touch()
+    variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
+    assert run_code(RUN, tmp_path, variables).stdout.split() == ["1.0", "0"]
