@@ -15,8 +15,8 @@ from ..kinematics.smoothing import gaussian_smooth
 from ..kinematics.standing import standing_probability
 from .clip import Clip
 
-_MAX_TILT = np.radians(20.0)  # a plane through the soles that is steeper is not the floor
-_MIN_SPREAD_M = 0.3  # the slope of the floor is unobservable from soles closer together than this
+_MAX_TILT = np.radians(20.0)  # A steeper plane through the soles is not the floor.
+_MIN_SPREAD_M = 0.3  # Soles closer together do not show the slope of the floor.
 _LIFT_CUTOFF_HZ = 3.0
 
 

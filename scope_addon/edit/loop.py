@@ -15,10 +15,12 @@ from ..errors import UsageError
 from .clip import Clip, keys_within
 from .root_motion import floor_trajectory, relative_to_trajectory
 
-SPEED_WEIGHT_S = 0.1  # weighs a difference in velocity of 1 m/s like one in position of 0.1 m
-# a smaller turn per cycle is noise, and would bend a straight walk into a circle
+# A difference in velocity of 1 m/s weighs as much as one in position of 0.1 m.
+SPEED_WEIGHT_S = 0.1
+# A smaller turn per cycle is noise, and would bend a straight walk into a circle.
 MIN_TURN = np.radians(5.0)
-MAX_SPAN_KEYS = 600  # a longer span is subsampled to limit the cost of comparing all pairs of keys
+# Longer spans are subsampled, because all pairs of keys are compared.
+MAX_SPAN_KEYS = 600
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
     :param least: root mean square distance over the joints, metres.
     """
     apart = np.sqrt(_squared_distances(joints.reshape(len(joints), -1)) / joints.shape[1])
-    farthest = np.maximum.accumulate(np.triu(apart), axis=1)  # from pose a on, up to pose b
+    # The largest distance from pose a among the poses from a to b.
+    farthest = np.maximum.accumulate(np.triu(apart), axis=1)
     moves: NDArray[np.bool_] = (farthest >= least) & (apart <= 0.5 * farthest)
     return moves
 

@@ -12,7 +12,7 @@ from ..kinematics.axes import R_WORLD_MODEL
 from ..kinematics.smoothing import gaussian_smooth
 from .clip import Clip
 
-_HEADING_CUTOFF_HZ = 1.0  # low enough to remove the rotation of the hips with each step
+_HEADING_CUTOFF_HZ = 1.0  # Low enough to remove the rotation of the hips with each step.
 
 
 def floor_trajectory(

@@ -24,7 +24,8 @@ from ..motion import Motion
 from .clip import Clip, clip_from_motion, interpolate_rotations
 from .pins.corrected_motion import before_smoothing, corrected
 
-# of the filter beyond the finished motion, times its strength: four deviations of the slower one
+# How far both ends are continued, per unit of strength beyond the finished motion: four standard
+# deviations of the slower filter.
 _REACH_S = 0.3
 
 

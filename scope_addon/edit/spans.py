@@ -91,7 +91,7 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
                 continue
             right = names.index(f"right_{bare}")
             # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk, which
-            # is not turned
+            # is not turned.
             for to, source in ((left, right), (right, left)):
                 first = not names[body.parents[to]].startswith(("left_", "right_"))
                 before = np.eye(3) if first else turn

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-UP = np.array([0.0, 0.0, 1.0])  # in the world
+UP = np.array([0.0, 0.0, 1.0])  # The world's up direction.
 # Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's
 # front view.
 R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -44,7 +44,7 @@ def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArra
     up = np.asarray(up_camera, float) / np.linalg.norm(up_camera)
     forward = np.array([0.0, 0.0, 1.0])
     forward = forward - up * (forward @ up)
-    # looking straight up or down: use the image's vertical instead
+    # A camera that looks straight up or down has no heading: use the image's vertical instead.
     if np.linalg.norm(forward) < 1e-6:
         forward = np.array([0.0, 1.0, 0.0]) - up * up[1]
     forward /= np.linalg.norm(forward)

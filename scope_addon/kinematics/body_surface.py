@@ -22,11 +22,11 @@ from .added_keypoints import with_keypoints
 from .contact_points import PALMS
 from .frame_blocks import by_blocks
 
-SPACING_M = 0.05  # between the sampled vertices
-REACH_M = 0.15  # from a vertex on, up to which its tangent plane stands for the surface
-# height from which on no plane is needed: so far, a point does not move in one more fit
+SPACING_M = 0.05  # Distance between the sampled vertices.
+REACH_M = 0.15  # Radius within which a vertex's tangent plane stands for the surface.
+# Points higher than this need no plane: one more fit does not move them so far.
 AHEAD_M = 0.05
-_FRAMES = 256  # whose distances are computed at once: some 20 MB
+_FRAMES = 256  # Frames whose distances are computed at once, in some 20 MB.
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
 _LEGS = ("hip", "knee", "ankle")
 _ON_ARMS = ("elbow", "wrist", "index", "pinky", "thumb_tip", "middle_finger_tip")
@@ -60,10 +60,11 @@ class TangentPlanes:
     """
 
     normal: NDArray[np.float64]  # (T, C, 3) unit, outwards
-    offset: NDArray[np.float64]  # (T, C) metres, with the room that the arm needs around the point
-    # (T, C) of the point above the plane, metres; negative inside the body
+    # (T, C) metres, with the room that the arm needs around the point.
+    offset: NDArray[np.float64]
+    # (T, C) height of the point above the plane, metres; negative inside the body.
     height: NDArray[np.float64]
-    near: NDArray[np.bool_]  # (T, C) the surface is so near that the plane matters
+    near: NDArray[np.bool_]  # (T, C) whether the surface is so near that the plane matters
 
 
 class BodySurface:
@@ -101,7 +102,7 @@ class BodySurface:
         :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that
             frame.
         """
-        if not len(self.indices):  # a body without skin on its arms or its trunk
+        if not len(self.indices):  # The body has no skin on its arms or its trunk.
             none = np.zeros((len(R), 0))
             return TangentPlanes(np.zeros((len(R), 0, 3)), none, none, none.astype(bool))
         return TangentPlanes(*by_blocks(self._planes, R, t, frames=_FRAMES))

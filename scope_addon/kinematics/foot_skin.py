@@ -24,12 +24,12 @@ from .frame_blocks import by_blocks
 from .runs import runs
 from .standing import LEVEL_M
 
-UNDER_FLOOR_M = 0.01  # depth from which on a foot counts as under the floor
-MIN_REST_S = 0.3  # feet that rest more briefly may be at the turning point of a jump
-# rests farther from the floor are no errors of a few centimetres, but may be on a step
+UNDER_FLOOR_M = 0.01  # A foot this deep counts as under the floor.
+MIN_REST_S = 0.3  # Feet that rest more briefly may be at the turning point of a jump.
+# Rests farther from the floor are no errors of a few centimetres, but may be on a step.
 STEP_M = 0.1
-DEPTH_ERROR_M = 0.5  # no foot is taken for lower than it is by more
-_DIRECTIONS = 400  # in which the skin's outermost points are kept
+DEPTH_ERROR_M = 0.5  # Largest depth error of a foot: none is taken for lower by more.
+_DIRECTIONS = 400  # Directions in which the skin's outermost points are kept.
 
 
 class FootSkin:
@@ -43,7 +43,7 @@ class FootSkin:
         v = body.rest_vertices(betas)
         J = body.rest_joints(betas)
         self.parts = [body.joint_names.index(name) for name in FOOT_PARTS]
-        self.points: list[NDArray[np.float64]] = []  # of each part, (n, 3) from its joint
+        self.points: list[NDArray[np.float64]] = []  # One (n, 3) for each part, from its joint.
         for part in self.parts:
             own = v[body.strongest_joints == part] - J[part]
             own = own if len(own) else np.zeros((1, 3))

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
 
-HINGE = 0.3  # the sine of the angle from which on a knee bends mainly in its own plane
-# of the stretched leg's length; a knee snaps beyond, unless the leg is longer already
+HINGE = 0.3  # Sine of the least angle at which a knee bends mainly in its own plane.
+# Share of the stretched leg's length. Beyond it a knee snaps, unless the leg is longer already.
 LONGEST = 0.995
-SHORTEST = 0.35  # of the stretched leg's length, a knee bent by 140 degrees
+SHORTEST = 0.35  # Share of the stretched leg's length: a knee bent by 140 degrees.
 
 
 def move_feet(

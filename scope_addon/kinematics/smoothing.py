@@ -19,9 +19,9 @@ from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 # Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off:
 # at 4.5 Hz it passes as much noise as the 6 Hz Butterworth filter that is usual for marker data.
 ROTATION_CUTOFF_HZ = 4.5
-# from one camera, depth is an order of magnitude less accurate than the image position
+# From one camera, depth is an order of magnitude less accurate than the image position.
 DEPTH_CUTOFF_HZ = 2.0
-# some 50 MB with numpy's intermediate results; one joint at a time may exceed it
+# These take some 50 MB with numpy's intermediate results; one joint alone may exceed that.
 _ROTATIONS_AT_ONCE = 50_000
 
 

@@ -13,23 +13,24 @@ from numpy.typing import NDArray
 from .contact_points import SOLES
 from .smoothing import gaussian_smooth
 
-CONTACT_SPEED_M_S = 0.35  # v₀, across the line of sight; a swinging foot moves at 1 m/s and more
+# v₀, across the line of sight. A swinging foot moves at 1 m/s and more.
+CONTACT_SPEED_M_S = 0.35
 CONTACT_HEIGHT_M = 0.05  # h₀, above the frame's lowest sole point
-# h_p, above the lowest sole point; larger, since the trunk's depth error lies in between as well
+# h_p, above the lowest sole point. It is larger than h₀ because of the trunk's depth error.
 PALM_HEIGHT_M = 0.12
-# of the positions before their speed is computed, since noise is not motion
+# Positions are low-passed before their speed is computed, because noise is not motion.
 CONTACT_CUTOFF_HZ = 4.0
-# a₀: at the top of a jump, feet are as slow as on the floor, but they fall at 9.8 m/s². Feet on the
-# floor are accelerated upwards, by landing and taking off, but not downwards.
+# This is a₀. At the top of a jump, feet are as slow as on the floor, but they fall at 9.8 m/s².
+# Feet on the floor are accelerated upwards, by landing and taking off, but not downwards.
 FALL_M_S2 = 6.0
 # A foot in the air does not stay still. If one does for about a second, it may be higher than the
 # lowest point because its depth is wrong: it is then displaced up or down along its line of sight.
-# v₁, and of the mean of the speed
+# These are v₁, and the cutoff frequency of the mean speed.
 STILL_M_S = 0.12
 STILL_CUTOFF_HZ = 0.6
 WRONG_DEPTH_M = 0.4  # d
-UNEVEN_M = 0.6  # h_u, by which one foot may rest higher than the other on stairs or boxes
-LEVEL_M = 0.25  # h_l: feet standing farther above or below stand on something else
+UNEVEN_M = 0.6  # h_u: one foot may rest this much higher than the other on stairs or boxes.
+LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else.
 
 
 def line_of_sight(position: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
@@ -159,7 +160,7 @@ def _downward_acceleration(
     if len(times) <= 2:
         return np.zeros(velocity.shape[:2])
     down = -np.gradient(velocity @ up, times, axis=0)
-    # differences of the two outermost frames alone are mostly noise
+    # Differences of the two outermost frames alone are mostly noise.
     down[0], down[-1] = down[1], down[-2]
     falling: NDArray[np.floating[Any]] = np.maximum(down, 0.0)
     return falling

@@ -12,7 +12,7 @@ from ..json_file import load_map, save_map
 SIDED_PARTS = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
 SPINE = ("spine1", "spine2", "spine3")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-# named as in SMPL+H, from the knuckle on
+# Phalanges, from the knuckle on, with SMPL+H's names.
 PHALANGES = tuple(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3))
 PARTS = (
     *("pelvis", *SPINE, "neck", "head"),
@@ -29,7 +29,7 @@ class BoneMap:
     """
 
     parts: dict[str, str]  # bone name -> body part
-    # by bone name, 0 to 1; empty unless guessed
+    # Confidence of each bone by its name, 0 to 1; empty unless the map was guessed.
     confidence: dict[str, float] = field(default_factory=dict)
 
     def bone(self, part: str) -> str | None:

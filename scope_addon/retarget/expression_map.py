@@ -24,10 +24,11 @@ from .bone_map import is_name
 LARGEST_FACTOR = 10.0
 LARGEST_ANGLE = 180.0  # degrees
 MOVED = ("left", "up", "forward")  # channels of a control: shares of a length of the face
-# degrees about left, up and forward: down, to the left, with the left side up
+# Degrees about left, up and forward: down, to the left, with the left side up.
 TURNED = ("pitch", "yaw", "roll")
 _KIND = "expression map"
-_MIN_ARKIT = 5  # keys with ARKit's names from which others, such as visemes, are left alone
+# With so many keys of ARKit's names, others, such as visemes, are left alone.
+_MIN_ARKIT = 5
 _BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
 _SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
 _STRETCH = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}
@@ -91,7 +92,8 @@ _VRM = {
     "lookleft": {"eyeLookOutLeft": 0.5, "eyeLookInRight": 0.5},
     "lookright": {"eyeLookInLeft": 0.5, "eyeLookOutRight": 0.5},
 }
-_VROID = {  # as VRoid Studio names the keys of VRM models, after the prefix
+# VRoid Studio's names of the keys of VRM models, after the prefix.
+_VROID = {
     **{f"mth{vowel}": _VRM[vowel] for vowel in "aiueo"},
     **{
         "eyeclose": _BOTH_BLINK,

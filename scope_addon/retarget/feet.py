@@ -33,8 +33,8 @@ from ..edit.root_motion import about_z
 from .skeleton import rotated
 
 _LEVEL = np.array([1.0, 1.0, 0.0])
-_SOFT_M = 0.004  # scale of the logistic function: difference in height of heel and ball
-_DROP_S = 4 / 30  # duration, before and after, over which the pelvis is lowered
+_SOFT_M = 0.004  # Scale of the logistic function of the difference in height of heel and ball.
+_DROP_S = 4 / 30  # Time before and after, over which the pelvis is lowered.
 
 
 @dataclass(frozen=True)
@@ -73,14 +73,14 @@ def ankle_goal(
     for s, q in ((source.heel, rig.heel), (source.ball, rig.ball)):
         point = ankle + rotated(turn, s)
         rig_point = rotated(turn, q)
-        # height above its rest position on the floor
+        # The height above its rest position on the floor.
         above = point[..., 2] - floor - (source.height + s[..., 2])
         place = scales * point
         place[..., 2] = scales[2] * above + rig.height + q[..., 2]
         goals.append(place + rotated(yaw, (q - scales * s) * _LEVEL) - rig_point)
         heights.append(above)
         rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
-    # 1: the ball is in contact
+    # A weight of 1 means that the ball is in contact.
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))
     goal: NDArray[np.float64] = goals[0] + share[..., None] * (goals[1] - goals[0])
     if one_floor:

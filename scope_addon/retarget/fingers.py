@@ -102,7 +102,7 @@ def _by_geometry(
 def _below(parents: NDArray[np.intp], wrist: int) -> list[int]:
     """Return the indices of all descendants of the wrist."""
     found = {wrist}
-    for i in range(len(parents)):  # parents come before children
+    for i in range(len(parents)):  # Parents come before children.
         if int(parents[i]) in found:
             found.add(i)
     return sorted(found - {wrist})

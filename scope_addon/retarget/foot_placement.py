@@ -15,10 +15,10 @@ from .feet import FootRest, ankle_goal, flat_toes, pelvis_drop
 from .legs import solve_leg
 from .skeleton import Skeleton, head_positions, rotated
 
-# thickness of the sole, and length of the heel region
+# Thickness of the sole, and length of the heel region.
 _SOLE_M = 0.015
 _HEEL_M = 0.02
-_REACH = 0.9995  # of a leg's length; beyond it the pelvis is lowered
+_REACH = 0.9995  # Share of a leg's length beyond which the pelvis is lowered.
 _SIDES = ("left", "right")
 
 
@@ -38,7 +38,7 @@ class Legs:
     rig: FootRest
     tips: NDArray[np.float64]  # (len(toed), 3) from the ball to the tip of the toes, metres
     lengths: NDArray[np.float64]  # (L,) of the legs, nearly stretched, metres
-    # (3,) of positions: on the floor, and the rig's leg length divided by the body's
+    # (3,) scale of positions: that on the floor twice, and the ratio of leg lengths, rig to body.
     scales: NDArray[np.float64]
 
 
@@ -140,7 +140,7 @@ def _rig_foot(
     if not 0.3 * scale < share < 3 * scale or ball @ source.ball < 0:
         share = scale
         ball = np.array([*(scale * source.ball[:2]), -0.8 * height])
-    # no bone ends at the heel: proportional to the body's
+    # No bone ends at the heel, so its position is proportional to the body's.
     heel = np.array([*(share * source.heel[:2]), -height])
     return FootRest(heel, ball, height)
 
@@ -181,7 +181,7 @@ def place_feet(
         world[:, legs.toes] = flat @ (motion.alignment[legs.toes] @ rig.rotations[legs.toes])
     heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
     at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
-    left = _rows(motion.turns[:, legs.hips, :, 0])  # about which the body's knees bend
+    left = _rows(motion.turns[:, legs.hips, :, 0])  # The axis about which the body's knees bend.
     thighs = _rows(world[:, legs.hips])
     shins = _rows(world[:, legs.knees])
     solved = solve_leg(thighs, shins, at, _rows(goals), left)

@@ -23,7 +23,7 @@ _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _LARGEST_JSON = 200_000_000
 _LARGEST_FILE = 2 << 30
-_MAX_ELEMENTS = 50_000_000  # of an accessor without data, whose elements are all zero
+_MAX_ELEMENTS = 50_000_000  # Of an accessor without data: its elements are all zero.
 _DAMAGED = (
     KeyError,
     IndexError,

@@ -25,7 +25,7 @@ _LIMBS = {
     "hip": ("thigh", "upleg", "upperleg", "hip"),
     "knee": ("shin", "calf", "leg", "lowerleg", "knee"),
     "ankle": ("ankle", "foot"),
-    # SMPL calls the toes "foot", and the foot "ankle"
+    # SMPL calls the toes "foot", and the foot "ankle".
     "foot": ("toe", "toes", "toebase", "ball", "foot"),
     "collar": ("clavicle", "collar", "shoulder"),
     "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
@@ -119,7 +119,8 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
         for finger in FINGERS:
             bone = finger if finger == "thumb" else f"f_{finger}"
             found |= {f"{bone}.{k:02d}.{letter}": f"{side}_{finger}{k}" for k in (1, 2, 3)}
-    # the metarig, or an export of the deform bones alone
+    # Without a suffix, the rig is the metarig, or an export of the deform bones alone, whose names
+    # begin with DEF-.
     prefix = "" if "thigh.L" in names or suffix else "DEF-"
     return {prefix + bone: part for bone, part in found.items() if prefix + bone in names}
 
@@ -136,7 +137,7 @@ def by_name(bones: RestBones) -> dict[str, str]:
     found = _limbs_by_name(bones, cores, order)
     found |= _centre_by_name(bones, cores, order)
     thighs = [bones.names.index(b) for b, part in found.items() if part.endswith("_hip")]
-    # the nearest common ancestor of both legs
+    # The pelvis is the nearest common ancestor of both legs.
     if "pelvis" not in found.values() and len(thighs) == 2:
         shared = [
             i
@@ -202,7 +203,7 @@ def by_geometry(bones: RestBones) -> dict[str, str]:
     leaves = [i for i in range(len(parents)) if i not in set(parents.tolist())]
     height = max(float(np.ptp(heads[:, 2])), 1e-9)
     z = (heads[:, 2] - heads[:, 2].min()) / height
-    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # the arms extend along the wider axis
+    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # The arms extend along the wider axis.
     across = heads[:, axis] - np.median(heads[:, axis])
     across = across if axis == 0 else -across
     found: dict[str, str] = {}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...solver.rotations import exp, shortest_turn
 from ..kinematics.leg_reach import cross, knee_turn
 
-_MAX_STRETCH = 0.9999  # share of the leg's length; beyond it the knee would snap
+_MAX_STRETCH = 0.9999  # Share of the leg's length beyond which the knee would snap.
 
 
 def solve_leg(

@@ -18,7 +18,7 @@ from .skeleton import Skeleton
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
 # The fourth does not exist in any body: the last phalanx has no end joint.
 _NEXT |= {f"{finger}{k}": f"{finger}{k + 1}" for finger in FINGERS for k in (1, 2, 3)}
-# between two palms at rest; a larger angle means that fingers were confused
+# A larger angle between two palms at rest means that fingers were confused.
 _MAX_PALM_TURN = np.radians(100)
 
 

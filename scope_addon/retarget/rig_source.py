@@ -17,7 +17,7 @@ from .fbx_check import check_fbx
 from .gltf_check import check_gltf
 
 _LARGEST_BYTES = 4 << 30
-ROOTS = ("bone", "object", "in-place")  # where a rig stores the root motion
+ROOTS = ("bone", "object", "in-place")  # Where a rig stores the root motion.
 RIG_SUFFIXES = (".blend", ".fbx", ".glb", ".gltf")
 _SIGNATURES = {
     ".blend": (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b"),  # plain, Zstandard, gzip

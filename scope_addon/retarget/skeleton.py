@@ -52,7 +52,7 @@ class Pose:
 
     rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world
     heads: NDArray[np.float64]  # (T, B, 3) metres
-    # rotation about the vertical from the heading of the rig at rest to that of the body, radians
+    # Rotation about the vertical from the heading of the rig at rest to that of the body, radians.
     facing: float
 
 

@@ -38,7 +38,8 @@ from .rays import pixel_of
 from .solve_pins import Shot, resolve
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
-_MIXED_S = 0.12  # on both sides of a span's end, smoothing has mixed left and right
+# Smoothing has mixed left and right within this time of a span's end.
+_MIXED_S = 0.12
 
 
 def corrections_of(motion: Motion) -> tuple[Correction, ...]:

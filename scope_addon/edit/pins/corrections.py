@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ....solver.loaders.regular_file import in_one_line
 from ...errors import MotionFileError, UsageError
 
-REACH_S = 0.4  # over which a correction fades out on both sides
+REACH_S = 0.4  # Time over which a correction fades out on each side.
 FEET = ("left", "right")
 _HIGHEST_M = 1e3
 _LAST_FRAME = 1 << 53
@@ -30,8 +30,8 @@ class Pin:
 
     frame: int
     joint: str
-    pixel: tuple[float, float] | None = None  # of the upright frame, without lens distortion
-    # metres, captured world: before an upright line turns it
+    pixel: tuple[float, float] | None = None  # In the upright frame, without lens distortion.
+    # Metres, in the captured world, before an upright line turns it.
     position: tuple[float, float, float] | None = None
     reach: float = REACH_S  # seconds
 
@@ -112,9 +112,11 @@ class FeetOnFloor:
     `edit.floor.refloor`.
     """
 
-    level: bool = False  # the soles in contact too, by turning the motion without the camera
-    lift: bool = True  # also frames in which a foot is under the floor
-    # metres; of the floor that was corrected before, since the feet are put on that
+    # Whether the soles in contact are levelled too, by turning the motion without the camera.
+    level: bool = False
+    # Whether frames in which a foot is under the floor are raised as well.
+    lift: bool = True
+    # Height in metres of the floor as it was corrected before, on which the feet are put.
     height: float = 0.0
 
     def __post_init__(self) -> None:
@@ -132,7 +134,7 @@ class FeetOnFloor:
 class Upright:
     """The world, with the camera, is turned so that a line that the user drew is upright."""
 
-    rows: tuple[float, ...]  # 16 numbers of the rigid transform (4, 4), from the captured world
+    rows: tuple[float, ...]  # The rigid transform (4, 4) from the captured world, by rows.
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -165,7 +167,7 @@ class Floor:
     """
 
     frame: int
-    height: float  # metres above z = 0 of the world that the upright line has turned
+    height: float  # Metres above z = 0 of the world that the upright line has turned.
 
     def __post_init__(self) -> None:
         """Check the values.

@@ -69,10 +69,10 @@ def interpolated(
     for each in spans:
         span = keys_of_span(clip, each.first, each.last, shot)
         if not len(span) or span[0] == 0 or span[-1] == len(clip) - 1:
-            if strict:  # says why not
+            if strict:  # This raises, and says why the span cannot be interpolated.
                 out = interpolate(out, shot.time(each.first), shot.time(each.last))
             continue
-        # two keys on each side have the velocities
+        # Two keys on each side give the velocities at both ends.
         around = slice(max(span[0] - 2, 0), span[-1] + 3)
         part = interpolate(out.rows(around), out.times[span[0]], out.times[span[-1]])
         out.rotations[around] = part.rotations

@@ -58,7 +58,7 @@ def _monotone_cubic(
     m = np.zeros_like(y)
     before = slope[:-1]
     after = slope[1:]
-    # the harmonic mean, where both have the same sign
+    # The slope is the harmonic mean of both sides where these have the same sign.
     with np.errstate(divide="ignore", invalid="ignore"):
         w0 = 2 * step[1:] + step[:-1]
         w1 = step[1:] + 2 * step[:-1]

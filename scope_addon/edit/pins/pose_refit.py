@@ -37,14 +37,15 @@ GIRDLE = 10.0
 STIFF = 100.0
 PELVIS_ROTATION = 400.0
 PELVIS_POSITION = 400.0
-# 1 mm; 0.3 pixels at a focal length of 1000
+# Deviations of 1 mm, and of 0.3 pixels at a focal length of 1000.
 PINNED = 1e6
 PINNED_2D = 1e7
-# 1 cm, 3 cm
+# Deviations of 1 cm and 3 cm.
 STANDING = 1e4
 HELD = 1e3
-ABOVE_FLOOR = 1e5  # 3 mm for each point of the skin that is under the floor
-FLOOR_M = -0.8 * UNDER_FLOOR_M  # a capture leaves feet nearly a centimetre under the floor, too
+ABOVE_FLOOR = 1e5  # A deviation of 3 mm for each point of the skin that is under the floor.
+# A capture too leaves feet nearly a centimetre under the floor.
+FLOOR_M = -0.8 * UNDER_FLOOR_M
 _TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
 _LIMBS = {
     "arm": ("collar", "shoulder", "elbow", "wrist", "hand"),
@@ -60,7 +61,7 @@ class Points:
     numbers: list[int] = field(default_factory=list)
     values: list[NDArray[np.float64]] = field(default_factory=list)  # (3,) metres, or (2,) pixels
     weights: list[float] = field(default_factory=list)
-    # height that the feet's skin may not go below; None: it may be anywhere
+    # The feet's skin stays above this height; None: it may be anywhere.
     floor: float | None = None
 
     def add(self, number: int, value: NDArray[np.float64], weight: float) -> None:
@@ -261,7 +262,7 @@ class PoseRefit:
     ) -> PosePriors:
         """Return the prior on the pelvis, which may move where the trunk is corrected."""
         trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
-        # legs rather than bend than let the body move away
+        # Legs bend rather than let the body move away.
         share = 0.1 if trunk and not _bent_by(joints) else 1.0
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
         posed: PosePriors = self._solver.PosePriors(

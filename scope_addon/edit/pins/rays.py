@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# world_from_camera (4, 4), metres, and intrinsics (3, 3)
+# A camera: world_from_camera (4, 4), metres, and intrinsics (3, 3).
 Camera = tuple[NDArray[np.float64], NDArray[np.float64]]
-_STEEP = np.radians(45.0)  # from level; a camera that looks farther up or down
+_STEEP = np.radians(45.0)  # A steep camera looks farther up or down from the horizon.
 
 
 def pixel_of(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -47,7 +47,7 @@ def point_at_depth(
         normal = T[:3, 2]
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
     along = float(ray @ normal)
-    # beside or behind the camera
+    # The ray meets the plane beside or behind the camera, or nowhere.
     if along < 1e-3 * float(np.linalg.norm(ray) * np.linalg.norm(normal)):
         return nearest_on_ray(camera, pixel, point)
     place: NDArray[np.float64] = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)

@@ -38,12 +38,12 @@ from .rays import pixel_of
 from .reach import SLACK_M, within_reach
 
 _CONTACT_REACH_S = 0.25
-_FLOOR_M = 0.12  # a foot that stands within this height of z = 0 is put on it
+_FLOOR_M = 0.12  # A foot that stands within this height of z = 0 is put on it.
 _SWEEPS = 6
 _MET_M = 0.002
 _MET_PX = 0.5
-_STANDS = 0.05  # probability from which on a sole point is held
-_AROUND_S = 0.5  # beyond the span, to tell which feet stand
+_STANDS = 0.05  # Least standing probability of a sole point that is held.
+_AROUND_S = 0.5  # Time around the span that shows which feet stand.
 
 
 @dataclass(frozen=True)
@@ -144,10 +144,11 @@ class _Correction:
         )
         R, at, soles = refit.place(clip.rotations[around], clip.root[around])
         lowest = floor + FLOOR_M
-        # what feet may not go below: where they were, if that is lower
+        # Feet may not go below the floor, or below where they were if that is lower.
         self._floor = np.full(len(clip), lowest)
         self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, UP).min(axis=1))
-        self._limited: set[int] = set()  # tracks whose pins are where the limb can reach them
+        # Tracks whose pins have been moved to where the limb can reach them.
+        self._limited: set[int] = set()
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(soles, UP, times[around])
 
@@ -169,7 +170,7 @@ class _Correction:
         track = self._tracks[index]
         span = self._spans[index]
         clip = self._clip
-        before = clip.rows(span)  # a copy, as of every selection by indices
+        before = clip.rows(span)  # A copy, as every selection by indices.
         _, at, soles = self._refit.place(before.rotations, before.root)
         self._limit(index, at)
         held = [self._held(index, int(key), at[k], soles[k]) for k, key in enumerate(span)]
@@ -214,7 +215,7 @@ class _Correction:
             for joint in (joint for joint in track.joints if joint in track.points[h]):
                 points = track.points[h][joint]
                 moved[joint] = points
-                if len(points.numbers) == 1:  # not a foot that stands, which has several
+                if len(points.numbers) == 1:  # A foot that stands has several.
                     places = at[key - first], pinned
                     reached = within_reach(
                         self._refit, joint, points.values[0], places, track.cameras[h], self._slack
@@ -260,7 +261,7 @@ class _Correction:
         limb = limb_of(own[0])
         if not limb.endswith("arm") and np.isfinite(self._floor[key]):
             points.floor = float(self._floor[key])
-        # a hip moves over its foot
+        # A pinned hip moves over its standing foot; other joints release the limb's own soles.
         free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)
         for k, name in enumerate(refit.sole_names):
             if name not in free and self._standing[key, k] > _STANDS:

@@ -27,7 +27,7 @@ from .corrected_motion import shot_of
 _LARGEST = np.radians(40.0)
 _SHORTEST_PX = 10.0
 _SHORTEST_M = 0.1
-_SIDE = np.radians(30.0)  # from level, up to which a view is one from a side
+_SIDE = np.radians(30.0)  # A view from a side deviates from level by at most this angle.
 
 
 def upright_transform(

@@ -39,13 +39,13 @@ class Mouth:
     """Teeth and tongue at rest: M vertices, F quads; lengths in metres, in the model frame."""
 
     vertices: NDArray[np.float64]  # (M, 3)
-    shapedirs: NDArray[np.float64]  # (M, 3, 11), the last of growth
+    shapedirs: NDArray[np.float64]  # (M, 3, 11); the last column is that of growth
     faces: NDArray[np.int32]  # (F, 4)
     uv: NDArray[np.float64]  # (M, 2)
-    face_material: NDArray[np.uint8]  # (F,) into material_names
+    face_material: NDArray[np.uint8]  # (F,) indices into material_names
     material_names: tuple[str, ...]
     material_colors: NDArray[np.float64]  # (C, 4) linear RGBA
-    moves: tuple[Moves, ...]  # of each expression in the order of `solver.names.EXPRESSIONS`
+    moves: tuple[Moves, ...]  # One for each expression, in the order of `solver.names.EXPRESSIONS`.
 
 
 def with_teeth_and_tongue(body: Body) -> Body:

@@ -43,7 +43,7 @@ class FaceFrame:
     """
 
     axes: NDArray[np.float64]
-    mouth: float  # width: from corner to corner
+    mouth: float  # width, from corner to corner
     eyes: float  # distance between both eyes
     lids: float  # gap between the lids of an eye
 
