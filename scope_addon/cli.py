@@ -295,6 +295,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
+    from .capture.long_clips.windowed_clip import lasting
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
     from .report.capture_page import CapturedClip, write_capture_page
@@ -305,7 +306,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
             return found
         unfinished = stack.enter_context(unfinished_capture(lasting_folder(), video))
         result = capture(
-            video, body, options, progress, unfinished=unfinished, windows=args.windows_folder
+            video, body, options, progress, observe_frames=lasting(unfinished, args.windows_folder)
         )
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):

@@ -17,7 +17,7 @@ from .options import CaptureOptions, check_options
 from .stages.clock import Progress, StageClock
 from .stages.footage import Footage, Listeners, Watch
 from .stages.freed_memory import return_freed_memory
-from .stages.observe import observe
+from .stages.observe import ObserveFrames, observe
 from .stages.repair import repair
 from .stages.report import make_report
 from .stages.solve import solve
@@ -39,15 +39,12 @@ def capture(
     options: CaptureOptions,
     progress: Progress = lambda *_: None,
     watch: Watch = lambda *_: None,
-    unfinished: Path | None = None,
-    windows: Path | None = None,
+    observe_frames: ObserveFrames | None = None,
 ) -> Capture:
     """Capture the people of a video or still image, the most prominent one first.
 
-    :param unfinished: folder in which estimates and finished windows are kept while this lasts, and
-        found if an earlier capture was killed; the caller removes it. None: nothing is kept.
-    :param windows: folder with windows of a long clip that `observe_windows` has written; those
-        that are missing are observed now.
+    :param observe_frames: another way to observe the frames than all in one pass, such as `lasting`
+        of `long_clips`.
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit
         the body.
     :raises VideoError: the footage cannot be used.
@@ -58,7 +55,7 @@ def capture(
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
         footage, tracks = observe(
-            video, body, options, clock, Listeners(progress, watch), unfinished, windows
+            video, body, options, clock, Listeners(progress, watch), observe_frames
         )
     return_freed_memory()  # of the networks
     with clock.stage("solver"):

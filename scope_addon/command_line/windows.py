@@ -60,7 +60,7 @@ def window_report(
     """
     if not args.windows:
         return None
-    from ..capture.stages.windows.windowed_clip import count_windows, observe_windows
+    from ..capture.long_clips.windowed_clip import count_windows, observe_windows
 
     if args.windows == COUNT:
         count = count_windows(video, options)

@@ -115,6 +115,7 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     """Capture and write the results."""
     # Imported here, so that a missing package is reported in the panel.
     from ...solver.loaders.body_file import load_body
+    from ..capture.long_clips.windowed_clip import lasting
     from ..capture.options import capture_options
     from ..capture.pipeline import capture
     from .preview import PreviewWriter
@@ -123,7 +124,9 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
         with PreviewWriter(job_folder, reporter.send) as watch:
             body = load_body(request.values["body"])
             options = capture_options(request.values)
-            result = capture(request.footage, body, options, reporter.progress, watch, unfinished)
+            result = capture(
+                request.footage, body, options, reporter.progress, watch, lasting(unfinished)
+            )
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):

@@ -97,7 +97,7 @@ def read_description(path: Path) -> None:
 
 
 def find_estimates(path: Path) -> None:
-    from scope.scope_addon.capture.perception.kept_estimates import KeptEstimates
+    from scope.scope_addon.capture.long_clips.kept_estimates import KeptEstimates
 
     folder = path.with_name("estimates")
     folder.mkdir(exist_ok=True)
@@ -109,8 +109,8 @@ def find_estimates(path: Path) -> None:
 
 
 def load_window(path: Path) -> None:
-    from scope.scope_addon.capture.stages.windows import window_file
-    from scope.scope_addon.capture.stages.windows.plan import Window
+    from scope.scope_addon.capture.long_clips import window_file
+    from scope.scope_addon.capture.long_clips.windows import Window
 
     folder = path.with_name("windows")
     folder.mkdir(exist_ok=True)
@@ -247,10 +247,9 @@ def descriptions(_: Path) -> list[bytes]:
 
 def windows(folder: Path) -> list[bytes]:
     from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+    from scope.scope_addon.capture.long_clips.window_file import save_window
+    from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord
     from scope.scope_addon.capture.perception.region import Region
-    from scope.scope_addon.capture.stages.windows.plan import Window
-    from scope.scope_addon.capture.stages.windows.window_file import save_window
-    from scope.scope_addon.capture.stages.windows.window_record import WindowRecord
     from scope.scope_addon.capture.tracking.track import Tracklet
 
     times = 1.0 + np.arange(6) / 2

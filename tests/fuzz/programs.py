@@ -24,7 +24,7 @@ KEY = "new"
 def continued(*arguments: str) -> int:
     """Run the command line; every estimate is kept on disk when it is made."""
     from scope.scope_addon import cli
-    from scope.scope_addon.capture.perception import kept_estimates
+    from scope.scope_addon.capture.long_clips import kept_estimates
 
     kept_estimates.INTERVAL_S = 0.0
     return cli.main(arguments)

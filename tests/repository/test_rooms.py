@@ -32,6 +32,8 @@ CAPTURE = {
     "scope_addon/capture/options": {"scope_addon/capture/fitting", "scope_addon/options"},
     "scope_addon/capture/stages": {"scope_addon/capture/world", "scope_addon/capture/options"},
     "scope_addon/capture": {"scope_addon/capture/stages", "scope_addon/capture/overlay"},
+    # around the main road, which does not know of it
+    "scope_addon/capture/long_clips": {"scope_addon/capture"},
 }
 ROOMS = {
     **SOLVER,
@@ -47,7 +49,12 @@ ROOMS = {
     "scope_addon/scene": {"scope_addon/scene/character", "scope_addon/retarget"},
     "scope_addon/scene/animation_data": {"scope_addon/files"},
     "scope_addon/scene/character": {"scope_addon/scene/animation_data", "scope_addon/edit"},
-    "scope_addon/job": {"scope_addon/capture", "scope_addon/edit", "scope_addon/live"},
+    "scope_addon/job": {
+        "scope_addon/capture",
+        "scope_addon/capture/long_clips",
+        "scope_addon/edit",
+        "scope_addon/live",
+    },
     "scope_addon/cluster": {"scope_addon/job"},
     "scope_addon/report": {"scope_addon/capture/overlay", "scope_addon/kinematics"},
     "scope_addon/live": {"scope_addon/capture"},

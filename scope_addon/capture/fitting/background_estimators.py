@@ -11,7 +11,7 @@ on the speed of the threads.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from types import TracebackType
@@ -99,19 +99,10 @@ class BackgroundEstimators:
         if before is not None and self._fits.is_due(before[0]):
             self._costs.append(self._solver.submit(self._fits.costs, before[1], self._assumed))
 
-    def camera(
-        self, record: BackgroundRecord, people: Iterable[tuple[float, Observation]]
-    ) -> Camera:
-        """Return the clip's camera; an assumed focal length is replaced by the estimate from edges
-        and fits.
-
-        :param people: time and largest person of the frames from the first of the record's
-            ``edge_frames`` on; those that have been added count once.
+    def camera(self, record: BackgroundRecord) -> Camera:
+        """Return the clip's camera, once all frames were added; an assumed focal length is replaced
+        by the estimate from edges and fits.
         """
-        if self._given_camera.focal_deviation == 0.0:
-            return self._given_camera
-        for time_s, largest in people:
-            self.add(time_s, largest, record)
         self.add(math.inf, None, record)
         if self._by_edges is None:
             return self._given_camera

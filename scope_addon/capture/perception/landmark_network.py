@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 import cv2
 import numpy as np
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
 from .execution import Execution
-from .kept_estimates import KeptEstimates
 from .region import MARGIN, Region, region_from_points
 from .sessions import network_path, open_session
 
@@ -100,6 +99,22 @@ def disagreement(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.
     return float(np.linalg.norm(image - scale * space) / np.maximum(np.linalg.norm(image), 1e-12))
 
 
+class EstimateMemory(Protocol):
+    """Estimates by what the network was given, so that an earlier capture's are found again."""
+
+    def key(self, network: str, crop_rgb: NDArray[np.uint8], region: Region) -> bytes | None:
+        """Return the key of an estimate; None if it cannot be kept.
+
+        :param crop_rgb: (H, W, 3), the network's input.
+        """
+
+    def find(self, key: bytes | None) -> NDArray[np.float64] | None:
+        """Return the values (m,) that were added with a key; None if there are none."""
+
+    def add(self, key: bytes | None, values: NDArray[np.float64]) -> None:
+        """Keep the values (m,) of a key."""
+
+
 class LandmarkNetwork:
     """A landmark network (``pose_landmark_lite``, ``_full`` or ``_heavy``); stateless between
     calls.
@@ -109,8 +124,6 @@ class LandmarkNetwork:
     region gets all threads only in the heavy network; in the small ones they would mostly wait for
     each other, and decoding needs a core.
 
-    :param kept: estimates of an earlier capture, and where to keep new ones; those with masks are
-        not kept.
     :raises SetupError: the network has not been built.
     :raises ModelFileError: its file is damaged.
     """
@@ -120,13 +133,13 @@ class LandmarkNetwork:
         name: str,
         threads: int,
         execution: Execution | None = None,
-        kept: KeptEstimates | None = None,
     ) -> None:
         self._path = network_path(name)
         self._threads = threads
         self._execution = execution
         self._name = name
-        self._kept = kept or KeptEstimates()
+        # Where estimates without masks are looked for and put.
+        self.memory: EstimateMemory | None = None
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
@@ -179,8 +192,9 @@ class LandmarkNetwork:
         with_mask: bool,
     ) -> PoseEstimate:
         crop_rgb = region.cut(image_rgb, INPUT_SIZE)
-        key = None if with_mask else self._kept.key(self._name, crop_rgb, region)
-        values = self._kept.find(key)
+        memory = None if with_mask else self.memory
+        key = None if memory is None else memory.key(self._name, crop_rgb, region)
+        values = None if memory is None else memory.find(key)
         if values is not None and len(values) == _VALUES:
             return _unpacked(values, region)
         outputs = list(_OUTPUTS)
@@ -190,8 +204,8 @@ class LandmarkNetwork:
             inputs = inputs | _WITH_MASK
         landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
-        if key is not None:
-            self._kept.add(key, _packed(estimate))
+        if memory is not None:
+            memory.add(key, _packed(estimate))
         return (
             replace(estimate, mask=_probability(logits[0]).astype(np.float16))
             if with_mask

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ...options.capture import AUTO, LARGEST, OFF
 from ..options import CaptureOptions, most_people
 from ..perception.execution import Execution
-from ..perception.kept_estimates import KeptEstimates
+from ..perception.landmark_network import EstimateMemory
 from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.tracker import PeopleTracker
@@ -36,9 +36,15 @@ def network_threads(wanted: int, execution: Execution) -> int:
 
 
 def open_trackers(
-    options: CaptureOptions, threads: int, execution: Execution, kept: KeptEstimates | None = None
+    options: CaptureOptions,
+    threads: int,
+    execution: Execution,
+    memory: EstimateMemory | None = None,
 ) -> Trackers:
-    """Open the networks for people, and for what is captured only on request."""
+    """Open the networks for people, and for what is captured only on request.
+
+    :param memory: of the estimates of an earlier capture.
+    """
     people = PeopleTracker(
         options.quality,
         threads,
@@ -46,8 +52,8 @@ def open_trackers(
         detector=options.detector,
         keypoints=options.keypoints,
         execution=execution,
-        kept=kept,
     )
+    people.remember_in(memory)
     least_px = LARGE_HAND_PX if options.hands == AUTO else SMALLEST_HAND_PX
     hands = (
         None

@@ -5,22 +5,175 @@ is kept.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ....solver.body import Body
-from ...errors import NoPersonError
-from ..fitting.background_estimators import BackgroundEstimators
+from ...errors import NoPersonError, VideoError
+from ..camera.background_record import BackgroundRecord
+from ..camera.camera_rotation import BackgroundTracker
+from ..camera.intrinsics import Camera
+from ..fitting.background_estimators import KERNELS, BackgroundEstimators
 from ..fitting.focal_length import FocalFits
 from ..fitting.live_body import LiveBody
+from ..media.exposure import AutoExposure
+from ..media.frame import Frame
 from ..media.opencv_threads import opencv_in_one_thread
 from ..media.video import Video
-from ..options import CaptureOptions
+from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
-from ..tracking.track import Track
-from .clock import StageClock
+from ..perception.execution import Execution
+from ..perception.landmark_network import EstimateMemory
+from ..perception.observation import Observation
+from ..tracking.landmarks.mask_schedule import MaskSchedule
+from ..tracking.people import build_tracks
+from ..tracking.scene_cuts import SCENE_GAP_S, SceneCuts
+from ..tracking.track import Track, Tracklet
+from .clock import COMPILING, FINDING, StageClock
 from .footage import Footage, Listeners, given_camera
-from .windows.plan import plan_windows
-from .windows.windowed_clip import WindowedClip
+from .networks import Trackers, network_threads, open_trackers
+
+
+@dataclass(frozen=True)
+class ObservationJob:
+    """A clip that is to be observed, and what takes part in it."""
+
+    video: Video
+    options: CaptureOptions
+    clock: StageClock
+    listeners: Listeners
+    camera: Camera  # as options and footage describe it
+    live: LiveBody
+    background: BackgroundEstimators
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What was observed in the T frames of a clip, before it is decided who is who."""
+
+    frames: list[int]  # (T,) source frame index
+    timestamps: list[float]  # (T,) seconds
+    cut_rows: list[int]  # of the frames that begin another scene
+    tracklets: list[Tracklet]
+    background: BackgroundRecord
+    execution: str  # what the networks ran on, for the report
+    warnings: list[str]
+
+    def tracks(self, most: int) -> list[Track]:
+        """Return the tracks of at most ``most`` people; see `build_tracks`."""
+        cuts = np.zeros(len(self.timestamps))
+        cuts[self.cut_rows] = 1.0
+        times = np.array(self.timestamps) + SCENE_GAP_S * np.cumsum(cuts)
+        seen = [tracklet for tracklet in self.tracklets if tracklet.rows]
+        in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
+        return build_tracks(self.frames, times.tolist(), in_order, most)
+
+
+# Observes all frames of a clip. The plain one is `observe_frames`; `long_clips` has another.
+ObserveFrames = Callable[[ObservationJob], Observed]
+
+
+class FrameObserver:
+    """Takes the frames of a clip in order; none is kept.
+
+    :param trackers: that have seen nothing, as ``masks`` and ``background``.
+    :param pool: in which the background is followed while the networks run on the next frame.
+    """
+
+    def __init__(
+        self,
+        trackers: Trackers,
+        masks: MaskSchedule,
+        background: BackgroundTracker,
+        pool: ThreadPoolExecutor,
+        clock: StageClock,
+    ) -> None:
+        self.frames: list[int] = []
+        self.timestamps: list[float] = []
+        self.cut_rows: list[int] = []
+        self.tracklets: dict[int, Tracklet] = {}
+        self.background = background
+        self._trackers = trackers
+        self._masks = masks
+        self._pool = pool
+        self._clock = clock
+        self._cuts = SceneCuts()
+        self._exposure = AutoExposure()
+        # The next frame in the brightness that the networks are given.
+        self._upcoming_lit: NDArray[np.uint8] | None = None
+        self._following: Future[None] | None = None
+
+    def add(
+        self, frame: Frame, upcoming: Frame | None, counts: bool = True, is_sampled: bool = False
+    ) -> list[tuple[int, Observation]]:
+        """Observe the next frame, and return tracklet number and observation of each person.
+
+        :param upcoming: the frame after it; None at the end of the clip.
+        :param counts: whether the frame counts in the schedule of the masks and among the cuts.
+        :param is_sampled: whether the camera's rotation has to be estimated in this frame.
+        """
+        time_s = frame.timestamp_s
+        row = len(self.timestamps)
+        with self._clock.stage("decode"):
+            lit = self._upcoming_lit
+            if lit is None:
+                lit = self._exposure.brighten(frame.image_rgb)
+            upcoming_rgb = None if upcoming is None else upcoming.image_rgb
+            self._upcoming_lit = (
+                None if upcoming_rgb is None else self._exposure.brighten(upcoming_rgb)
+            )
+        with self._clock.stage("networks"):
+            is_cut = self._cuts.is_cut(frame.image_rgb, upcoming_rgb)
+        if is_cut:
+            self._trackers.people.forget()
+            if counts:
+                self.cut_rows.append(row)
+        observations = self._track(lit, time_s, counts)
+        self.frames.append(frame.index)
+        self.timestamps.append(time_s)
+        for number, observation in observations:
+            self.tracklets.setdefault(number, Tracklet()).add(row, observation)
+        people_px = [observation.keypoints_px for _, observation in observations]
+        with self._clock.stage("background"):
+            self._wait_for_background()
+            self._following = self._pool.submit(
+                self.background.add, frame.image_rgb, time_s, people_px, is_cut, is_sampled
+            )
+        return observations
+
+    def finish(self) -> None:
+        """Wait for the background and the reference network."""
+        self._wait_for_background()
+        for tracklet in self.tracklets.values():
+            for _, call in tracklet.references:
+                call.result()
+
+    def _track(
+        self, lit: NDArray[np.uint8], time_s: float, with_masks: bool
+    ) -> list[tuple[int, Observation]]:
+        """Return tracklet number and observation of each person in a frame (H, W, 3)."""
+        trackers = self._trackers
+        with self._clock.stage("networks"):
+            masks_are_due = with_masks and self._masks.upcoming_is_due
+            observations = trackers.people.step(lit, self._upcoming_lit, time_s, masks_are_due)
+            if with_masks:
+                observations = self._masks.add(lit, observations)
+        if trackers.hands is not None:
+            with self._clock.stage("hands"):
+                observations = trackers.hands.step(lit, observations, time_s)
+        if trackers.faces is not None:
+            with self._clock.stage("face"):
+                observations = trackers.faces.step(lit, observations, time_s)
+        return observations
+
+    def _wait_for_background(self) -> None:
+        if self._following is not None:
+            self._following.result()
 
 
 def observe(
@@ -29,40 +182,133 @@ def observe(
     options: CaptureOptions,
     clock: StageClock,
     listeners: Listeners,
-    unfinished: Path | None = None,
-    windows: Path | None = None,
+    observe_frames: ObserveFrames | None = None,
 ) -> tuple[Footage, list[Track]]:
     """Detect and track the people of all frames, the most prominent one first.
 
-    :param unfinished: folder with what an earlier capture that was killed has found, and in which
-        to keep what this one finds; None: nothing is kept.
-    :param windows: folder with windows of the clip that were observed before.
+    :param observe_frames: another way to observe the frames than all in one pass.
     :raises VideoError: there is no frame in the chosen range.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
     """
     camera = given_camera(video, options)
     live = LiveBody(body, camera, next(iter(options.heights_m), None))
-    fits = FocalFits(body)
-    plan = plan_windows(video, options.window_s)
     with (
-        BackgroundEstimators(camera, video.width, video.height, live, fits) as background,
+        BackgroundEstimators(
+            camera, video.width, video.height, live, FocalFits(body)
+        ) as background,
         opencv_in_one_thread(),
     ):
-        clip = WindowedClip(video, plan, options, clock, background.pool, unfinished)
-        footage, tracks = clip.observe(background, live, listeners, windows)
+        job = ObservationJob(video, options, clock, listeners, camera, live, background)
+        observed = (observe_frames or observe_in_one_pass)(job)
+        if not observed.timestamps:
+            raise no_frames_error(video)
+        background.wait_for_solver(
+            lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS)
+        )
+        with clock.stage("solver"):
+            footage = _footage(job, observed)
+            tracks = observed.tracks(most_people(options.people))
     if not tracks:
-        own_networks = [network for network in (options.detector, options.keypoints) if network]
-        raise _no_person_error(Path(video.path), len(footage.timestamps), own_networks)
+        raise _no_person_error(video, options, len(observed.timestamps))
     return footage, tracks
 
 
-def _no_person_error(path: Path, frames: int, own_networks: list[Path]) -> NoPersonError:
-    where = f"in the {frames} frames of {path.name}" if frames > 1 else f"in {path.name}"
+def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = None) -> Observed:
+    """Observe all frames, one after another.
+
+    :param memory: of the estimates of an earlier capture.
+    """
+    video, clock, listeners = job.video, job.clock, job.listeners
+    expected = video.expected_frames
+    listeners.progress(FINDING, 0, expected)
+    execution = Execution(job.options.provider)
+    threads = network_threads(job.options.threads, execution)
+    trackers = open_trackers(job.options, threads, execution, memory)
+    observer = new_observer(job.video, trackers, job.camera, job.background.pool, clock)
+    for done, (frame, upcoming) in enumerate(frame_pairs(iter(video), clock), start=1):
+        largest = largest_person(observer.add(frame, upcoming))
+        with clock.stage("background"):
+            job.background.add(frame.timestamp_s, largest, observer.background)
+        listeners.watch(frame, largest, job.live)
+        listeners.progress(FINDING, done, max(expected, done))
+    observer.finish()
+    return Observed(
+        observer.frames,
+        observer.timestamps,
+        observer.cut_rows,
+        list(observer.tracklets.values()),
+        observer.background.record(),
+        execution.describe(threads),
+        execution.warnings + video.warnings,
+    )
+
+
+def new_observer(
+    video: Video,
+    trackers: Trackers,
+    camera: Camera,
+    pool: ThreadPoolExecutor,
+    clock: StageClock,
+) -> FrameObserver:
+    """Return an observer of a clip's frames, or of some of them, by trackers that have seen
+    nothing.
+    """
+    masks = MaskSchedule(trackers.people.mask_network, video.expected_frames)
+    background = BackgroundTracker(camera, video.width, video.height)
+    return FrameObserver(trackers, masks, background, pool, clock)
+
+
+def largest_person(observations: list[tuple[int, Observation]]) -> Observation | None:
+    """Return the largest person of a frame; None if nobody was seen."""
+    people = [observation for _, observation in observations]
+    return max(people, key=lambda observation: observation.region.side_px, default=None)
+
+
+def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:
+    """Yield every frame with the one after it; each is decoded while the networks run on the
+    previous one.
+    """
+    with clock.stage("decode"):
+        upcoming = next(frames, None)
+    while upcoming is not None:
+        frame = upcoming
+        with clock.stage("decode"):
+            upcoming = next(frames, None)
+        yield frame, upcoming
+
+
+def no_frames_error(video: Video) -> VideoError:
+    """Return the error for a range without frames."""
+    return VideoError(
+        f"{video.path} has no frames between the given start and end; change one of them"
+    )
+
+
+def _footage(job: ObservationJob, observed: Observed) -> Footage:
+    """Return what is known of the footage apart from its people."""
+    record = observed.background
+    camera = job.background.camera(record)
+    motion = record.motion(job.camera, camera, (job.video.width, job.video.height))
+    return Footage(
+        timestamps=np.array(observed.timestamps),
+        camera=camera,
+        camera_motion=motion,
+        lines=record.lines(motion, camera),
+        cuts_s=[observed.timestamps[row] for row in observed.cut_rows],
+        execution=observed.execution,
+        warnings=observed.warnings,
+    )
+
+
+def _no_person_error(video: Video, options: CaptureOptions, frames: int) -> NoPersonError:
+    name = Path(video.path).name
+    where = f"in the {frames} frames of {name}" if frames > 1 else f"in {name}"
     networks = "".join(
         f"; if people are found without {own.name}, state in {description_path(own).name} which "
         "colours it expects"
-        for own in own_networks
+        for own in (options.detector, options.keypoints)
+        if own
     )
     return NoPersonError(
         f"no person was found {where}: at least one person must be mostly in the image and at "

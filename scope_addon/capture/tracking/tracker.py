@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from ....solver.errors import ShapeError
 from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.execution import Execution
-from ..perception.kept_estimates import KeptEstimates
-from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
+from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
 from ..perception.region import Region
@@ -87,7 +86,6 @@ class PeopleTracker:
         clip. Then only those who may turn out to be that one are tracked.
     :param detector: an ONNX file of the user's that replaces the built-in detector; see `adapters`.
     :param keypoints: the same for the landmark network.
-    :param kept: estimates of the built-in landmark networks on disk; None: none.
     :raises UsageError: the quality is unknown.
     :raises SetupError: a built-in network is missing.
     :raises ModelFileError: a user's network cannot be used.
@@ -102,17 +100,22 @@ class PeopleTracker:
         detector: Path | None = None,
         keypoints: Path | None = None,
         execution: Execution | None = None,
-        kept: KeptEstimates | None = None,
     ) -> None:
-        self._networks = networks = open_networks(
-            quality, threads, detector, keypoints, execution, kept
-        )
+        self._networks = networks = open_networks(quality, threads, detector, keypoints, execution)
         self._estimator = LandmarkEstimator(networks)
         self._reference = ReferenceEstimator(networks.reference) if networks.reference else None
         self._people = people
         self._largest_only = people is None
         self._max_live = 2 if people is None else min(people + 1, MAX_PEOPLE)
         self.reset()
+
+    def remember_in(self, memory: EstimateMemory | None) -> None:
+        """Let the built-in landmark networks look for estimates in a memory, and put new ones
+        there.
+        """
+        for network in (self._networks.landmarks, self._networks.reference):
+            if isinstance(network, LandmarkNetwork):
+                network.memory = memory
 
     def restarted(self, regions: Sequence[Region] = ()) -> PeopleTracker:
         """Return a tracker with the same networks that has seen nothing.

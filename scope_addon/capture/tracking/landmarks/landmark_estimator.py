@@ -18,7 +18,6 @@ from ....errors import SetupError
 from ...perception.adapters.box_detector import BoxDetector
 from ...perception.adapters.keypoint_network import KeypointNetwork
 from ...perception.execution import Execution
-from ...perception.kept_estimates import KeptEstimates
 from ...perception.landmark_network import LandmarkNetwork, PoseEstimate
 from ...perception.observation import PendingReference
 from ...perception.person_detector import PersonDetector
@@ -179,7 +178,6 @@ def open_networks(
     detector: Path | None,
     keypoints: Path | None,
     execution: Execution | None,
-    kept: KeptEstimates | None = None,
 ) -> TrackingNetworks:
     """Open the networks, with the parameters of `PeopleTracker`.
 
@@ -199,9 +197,9 @@ def open_networks(
         own = KeypointNetwork(keypoints, threads, execution)
         # without the reference, left and right follow from continuity alone
         with suppress(SetupError):
-            reference = LandmarkNetwork(largest, 1, execution, kept)
+            reference = LandmarkNetwork(largest, 1, execution)
         return TrackingNetworks(people, own, None, False, reference, None)
-    landmarks = LandmarkNetwork(name, threads, execution, kept)
+    landmarks = LandmarkNetwork(name, threads, execution)
     if name != largest:
-        reference = LandmarkNetwork(largest, 1, execution, kept)
+        reference = LandmarkNetwork(largest, 1, execution)
     return TrackingNetworks(people, landmarks, landmarks, reference is None, reference, reference)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Observation of a clip, window by window; a short one is a single window.
+"""Observation of a long clip, window by window.
 
 In one piece, all windows are observed in one pass; a capture that was killed goes on after its last
 finished window. Some or all of them may also have been observed before, by other processes, which
@@ -22,33 +22,57 @@ from pathlib import Path
 
 import numpy as np
 
-from ....errors import UsageError, VideoError
-from ...camera.camera_rotation import BackgroundTracker
-from ...fitting.background_estimators import KERNELS, BackgroundEstimators
-from ...fitting.live_body import LiveBody
-from ...media.frame import Frame
-from ...media.opencv_threads import opencv_in_one_thread
-from ...media.video import Video, open_video
-from ...options import CaptureOptions, most_people
-from ...perception.execution import Execution
-from ...perception.kept_estimates import KeptEstimates
-from ...perception.observation import Observation
-from ...perception.region import Region
-from ...tracking.landmarks.mask_schedule import MaskSchedule
-from ...tracking.track import Track
-from ..clock import COMPILING, FINDING, Progress, StageClock
-from ..footage import Footage, Listeners, given_camera
-from ..networks import Trackers, network_threads, open_trackers
+from ...errors import UsageError
+from ..media.frame import Frame
+from ..media.opencv_threads import opencv_in_one_thread
+from ..media.video import Video, open_video
+from ..options import CaptureOptions
+from ..perception.execution import Execution
+from ..perception.observation import Observation
+from ..perception.region import Region
+from ..stages.clock import FINDING, Progress, StageClock
+from ..stages.footage import given_camera
+from ..stages.networks import Trackers, network_threads, open_trackers
+from ..stages.observe import (
+    ObservationJob,
+    Observed,
+    ObserveFrames,
+    frame_pairs,
+    new_observer,
+    no_frames_error,
+    observe_in_one_pass,
+)
 from .joined_windows import JoinedWindows
-from .plan import Window, plan_windows
+from .kept_estimates import KeptEstimates
 from .window_file import KeptWindows, load_window, save_window
-from .window_record import WindowRecord
-from .window_run import WindowRun
+from .windows import Window, WindowRecord, WindowRun, plan_windows
 
 # Called when a window has ended, with its run and that of the next window; returns the run to go on
 # with.
 Seam = Callable[[WindowRun, WindowRun | None], WindowRun | None]
 _THREADS = 2  # in which backgrounds are followed by `observe_windows`
+
+
+def lasting(unfinished: Path | None = None, folder: Path | None = None) -> ObserveFrames:
+    """Return a way to observe the frames of a clip that divides a long one into windows, and goes
+    on where an earlier capture was killed.
+
+    :param unfinished: folder in which estimates and finished windows are kept while the capture
+        lasts, and found if an earlier one was killed; the caller removes it. None: nothing is kept.
+    :param folder: with windows of a long clip that `observe_windows` has written; those that are
+        missing are observed now.
+    """
+
+    def observe_frames(job: ObservationJob) -> Observed:
+        windows = plan_windows(job.video, job.options.window_s)
+        if len(windows) == 1:
+            return observe_in_one_pass(job, KeptEstimates(unfinished))
+        clip = WindowedClip(
+            job.video, windows, job.options, job.clock, job.background.pool, unfinished
+        )
+        return clip.observe(job, folder)
+
+    return observe_frames
 
 
 class WindowedClip:
@@ -72,7 +96,7 @@ class WindowedClip:
         self._windows = windows
         self._options = options
         self._clock = clock
-        self._kept = KeptEstimates(unfinished)
+        self._memory = KeptEstimates(unfinished)
         self._kept_windows = KeptWindows(unfinished, options, (video.width, video.height))
         self._camera = given_camera(video, options)
         self._pool = pool
@@ -81,32 +105,26 @@ class WindowedClip:
         self._trackers: Trackers | None = None
         self._joined = JoinedWindows()
 
-    def observe(
-        self,
-        background: BackgroundEstimators,
-        live: LiveBody,
-        listeners: Listeners,
-        folder: Path | None = None,
-    ) -> tuple[Footage, list[Track]]:
+    def observe(self, job: ObservationJob, folder: Path | None = None) -> Observed:
         """Observe all windows, and join them.
 
         :param folder: with the files of windows that were observed before.
         :raises VideoError: there is no frame.
         """
-        if folder is None or len(self._windows) == 1:
-            self._observe_all(background, live, listeners)
+        if folder is None:
+            self._observe_all(job)
         else:
-            self._gather(folder, listeners.progress)
+            self._gather(folder, job.listeners.progress)
         if not len(self._joined):
-            raise VideoError(
-                f"{self._video.path} has no frames between the given start and end; "
-                "change one of them"
-            )
-        background.wait_for_solver(
-            lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS)
-        )
-        with self._clock.stage("solver"):
-            return self._footage(background), self._joined.tracks(most_people(self._options.people))
+            raise no_frames_error(self._video)
+        execution = self._execution.describe(self._threads) if self._trackers else ""
+        warnings = self._execution.warnings + self._video.warnings
+        observed = self._joined.observed(execution, warnings)
+        edge_frames = observed.background.edge_frames
+        if edge_frames:
+            for time_s, largest in self._joined.largest_people(edge_frames[0].row):
+                job.background.add(time_s, largest, observed.background)
+        return observed
 
     def save(self, numbers: range, folder: Path, progress: Progress) -> tuple[list[Path], int]:
         """Observe some successive windows, and write each to a file of a folder.
@@ -134,40 +152,34 @@ class WindowedClip:
         )
         return files, frames
 
-    def _observe_all(
-        self, background: BackgroundEstimators, live: LiveBody, listeners: Listeners
-    ) -> None:
+    def _observe_all(self, job: ObservationJob) -> None:
         """Observe all windows in one pass, from the first on that an earlier capture has not
         finished.
         """
         known = self._join_kept()
-        is_single = len(self._windows) == 1
         done = len(self._joined)
         expected = self._video.expected_frames
-        listeners.progress(FINDING, done, max(expected, done))
+        job.listeners.progress(FINDING, done, max(expected, done))
         if known == len(self._windows):
             return
 
         def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
-            self._add(
-                ended,
-                is_whole=following is not None or ended.window.number + 1 == len(self._windows),
-            )
-            regions = self._joined.missed(following.record()) if following is not None else []
-            return (
-                self._warmed_up(following, regions)
-                if following is not None and regions
-                else following
-            )
+            record = self._record(ended)
+            self._joined.add(record)
+            is_last = ended.window.number + 1 == len(self._windows)
+            # A window that ended early with the footage may be whole when it is read again.
+            if following is not None or is_last:
+                self._kept_windows.save(record)
+            if following is None:
+                return None
+            regions = self._joined.missed(following.record())
+            return self._warmed_up(following, regions) if regions else following
 
         def watch(frame: Frame, largest: Observation | None) -> None:
             nonlocal done
             done += 1
-            if is_single:  # then its focal length is estimated meanwhile
-                with self._clock.stage("background"):
-                    background.add(frame.timestamp_s, largest, run.background)
-            listeners.watch(frame, largest, live)
-            listeners.progress(FINDING, done, max(expected, done))
+            job.listeners.watch(frame, largest, job.live)
+            job.listeners.progress(FINDING, done, max(expected, done))
 
         run, pairs = self._first_run(self._windows[known])
         run_windows(
@@ -188,17 +200,6 @@ class WindowedClip:
                 return window.number
             self._joined.add(record)
         return len(self._windows)
-
-    def _add(self, ended: WindowRun, is_whole: bool) -> None:
-        """Join a window, and keep it if others follow or came before.
-
-        :param is_whole: whether it did not end early with the footage, which may be whole when it
-            is read again.
-        """
-        record = self._record(ended)
-        self._joined.add(record)
-        if is_whole and len(self._windows) > 1:
-            self._kept_windows.save(record)
 
     def _first_run(self, window: Window) -> tuple[WindowRun, Iterator[tuple[Frame, Frame | None]]]:
         """Return the run of the first window that is observed, and the frames from its own first
@@ -283,48 +284,20 @@ class WindowedClip:
         """Return a run of a window with trackers that have seen nothing."""
         if self._trackers is None:
             self._trackers = open_trackers(
-                self._options, self._threads, self._execution, self._kept
+                self._options, self._threads, self._execution, self._memory
             )
         people, hands, faces = self._trackers
-        own = Trackers(
+        afresh = Trackers(
             people.restarted(regions), hands and hands.restarted(), faces and faces.restarted()
         )
-        masks = MaskSchedule(people.mask_network, self._video.expected_frames)
-        following = (
-            self._windows[window.number + 1] if window.number + 1 < len(self._windows) else None
-        )
-        return WindowRun(
-            window,
-            following,
-            own,
-            masks,
-            BackgroundTracker(self._camera, self._video.width, self._video.height),
-            self._pool,
-            self._clock,
-        )
+        observer = new_observer(self._video, afresh, self._camera, self._pool, self._clock)
+        number = window.number + 1
+        following = self._windows[number] if number < len(self._windows) else None
+        return WindowRun(window, following, observer)
 
     def _record(self, run: WindowRun) -> WindowRecord:
         warnings = self._execution.warnings + self._video.warnings
         return run.record(self._execution.describe(self._threads), warnings)
-
-    def _footage(self, background: BackgroundEstimators) -> Footage:
-        """Return what is known of the joined windows apart from the people."""
-        joined = self._joined
-        camera = self._camera
-        size = (self._video.width, self._video.height)
-        execution = self._execution.describe(self._threads) if self._trackers else joined.execution
-        warnings = self._execution.warnings + self._video.warnings
-        warnings += [text for text in joined.warnings if text not in warnings]
-        record = joined.background()
-        people = (
-            joined.largest_people(record.edge_frames[0].row) if record.edge_frames else iter(())
-        )
-        found = background.camera(record, people)
-        motion = record.motion(camera, found, size)
-        lines = record.lines(motion, found)
-        return Footage(
-            np.array(joined.timestamps), found, motion, lines, joined.cuts_s(), execution, warnings
-        )
 
 
 def _up_to_begin(
@@ -336,19 +309,6 @@ def _up_to_begin(
             return chain([pair], pairs)
         run.add(*pair)
     return pairs
-
-
-def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:
-    """Yield every frame with the one after it; each is decoded while the networks run on the
-    previous one.
-    """
-    with clock.stage("decode"):
-        upcoming = next(frames, None)
-    while upcoming is not None:
-        frame = upcoming
-        with clock.stage("decode"):
-            upcoming = next(frames, None)
-        yield frame, upcoming
 
 
 def run_windows(

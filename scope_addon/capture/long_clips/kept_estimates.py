@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ....solver.errors import ScopeError
 from ....solver.loaders.archive import read_members
 from ...atomic_write import write_npz
-from .region import Region
+from ..perception.region import Region
 
 INTERVAL_S = 20.0  # between two files: the work that a kill can cost
 LARGEST = 1 << 30  # bytes of one capture's files; some five hours

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,25 +12,26 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.intrinsics import Camera, assumed_camera
-from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
+from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.fitting.focal_length import FocalFits
+from scope.scope_addon.capture.long_clips.windowed_clip import lasting
+from scope.scope_addon.capture.long_clips.windows import WindowRun
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.stages import observe as observe_module
 from scope.scope_addon.capture.stages.clock import StageClock
 from scope.scope_addon.capture.stages.footage import Listeners
-from scope.scope_addon.capture.stages.windows.plan import plan_windows
-from scope.scope_addon.capture.stages.windows.window_run import WindowRun
-from scope.scope_addon.capture.stages.windows.windowed_clip import WindowedClip
+from scope.scope_addon.capture.stages.observe import observe
 from scope.scope_addon.capture.tracking.landmarks import landmark_estimator
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.errors import CancelledError
 from scope.solver import load_body
 
-from ...fake_people import FakeDetector, FakeLandmarks, Person, pictures
+from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
 
+BODY = load_body("scope")
 RED = (220, 30, 30)
 BLUE = (30, 30, 220)
 # three windows: frames 0 to 59, 60 to 119, and the rest
@@ -85,6 +85,8 @@ def windows_of(
         lambda name, *_: FakeLandmarks(people, "heavy" in name),
     )
     monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(people))
+    monkeypatch.setattr(observe_module, "LiveBody", lambda *_: SimpleNamespace(load=lambda: None))
+    monkeypatch.setattr(observe_module, "FocalFits", lambda _: RecordedFits(fitted))
 
     def observed(
         options: CaptureOptions,
@@ -96,24 +98,12 @@ def windows_of(
             if done >= stop_at:
                 raise CancelledError("cancelled")
 
-        with open_video(folder) as video, ThreadPoolExecutor(2) as pool:
-            clip = WindowedClip(
-                video,
-                plan_windows(video, options.window_s),
-                options,
-                StageClock(),
-                pool,
-                unfinished,
-            )
-            camera = assumed_camera(video.width, video.height, video.width)
-            live: Any = SimpleNamespace(load=lambda: None)
-            fitted.clear()
-            with BackgroundEstimators(
-                camera, video.width, video.height, live, RecordedFits(fitted)
-            ) as background:
-                return clip.observe(background, live, Listeners(progress, lambda *_: None), parts)[
-                    1
-                ]
+        fitted.clear()
+        listeners = Listeners(progress, lambda *_: None)
+        with open_video(folder) as video:
+            return observe(
+                video, BODY, options, StageClock(), listeners, lasting(unfinished, parts)
+            )[1]
 
     return observed
 
@@ -122,7 +112,7 @@ class RecordedFits(FocalFits):
     """Keeps the observations that the focal length is estimated from, and fits nothing."""
 
     def __init__(self, fitted: list[Observation]) -> None:
-        super().__init__(load_body("scope"))
+        super().__init__(BODY)
         self._fitted = fitted
 
     def costs(self, observation: Observation, camera: Camera) -> None:

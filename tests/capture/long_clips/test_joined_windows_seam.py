@@ -8,14 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
-from scope.scope_addon.capture.stages.windows.joined_windows import (
+from scope.scope_addon.capture.long_clips.joined_windows import (
     distance,
     faded,
     missed_people,
     same_people,
 )
-from scope.scope_addon.capture.stages.windows.plan import Window
-from scope.scope_addon.capture.stages.windows.window_record import WindowRecord
+from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord
 from scope.scope_addon.capture.tracking.track import Tracklet
 
 # pixels; frames

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception import kept_estimates
-from scope.scope_addon.capture.perception.kept_estimates import KeptEstimates
+from scope.scope_addon.capture.long_clips import kept_estimates
+from scope.scope_addon.capture.long_clips.kept_estimates import KeptEstimates
 from scope.scope_addon.capture.perception.region import Region
 
 REGION = Region((100.25, 50.5), 64.0, 0.1)

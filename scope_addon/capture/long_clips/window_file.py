@@ -18,22 +18,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .....solver.errors import InputError, ScopeError
-from .....solver.loaders.archive import read_members
-from ....atomic_write import write_npz
-from ...camera.background_record import BackgroundRecord
-from ...camera.heading_drift import FrameEdges
-from ...camera.line_segments import Segments
-from ...options import CaptureOptions
-from ...perception.adapters.description import description_path
-from ...perception.face.face_record import RECORD
-from ...perception.landmark_network import KEYPOINT_COUNT
-from ...perception.observation import PersonMask
-from ...perception.region import Region
-from ...tracking.appearance import SIZE as APPEARANCE_SIZE
-from ...tracking.track import Tracklet
-from .plan import Window
-from .window_record import WindowRecord, known_reference
+from ....solver.errors import InputError, ScopeError
+from ....solver.loaders.archive import read_members
+from ...atomic_write import write_npz
+from ..camera.background_record import BackgroundRecord
+from ..camera.heading_drift import FrameEdges
+from ..camera.line_segments import Segments
+from ..options import CaptureOptions
+from ..perception.adapters.description import description_path
+from ..perception.face.face_record import RECORD
+from ..perception.landmark_network import KEYPOINT_COUNT
+from ..perception.observation import PersonMask
+from ..perception.region import Region
+from ..tracking.appearance import SIZE as APPEARANCE_SIZE
+from ..tracking.track import Tracklet
+from .windows import Window, WindowRecord, known_reference
 
 MASK_SIDE = 256
 MAX_TEXT = 100_000

@@ -10,10 +10,10 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from scope.scope_addon.capture.long_clips.windows import plan_windows
 from scope.scope_addon.capture.media.video import Video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import WINDOW_S
-from scope.scope_addon.capture.stages.windows.plan import plan_windows
 
 ALL = VideoRange()
 

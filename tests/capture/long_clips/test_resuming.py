@@ -9,13 +9,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.long_clips import kept_estimates
+from scope.scope_addon.capture.long_clips.windowed_clip import lasting
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception import kept_estimates, landmark_network
+from scope.scope_addon.capture.perception import landmark_network
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.errors import CancelledError
 
-from ..conftest import ROOT
+from ...conftest import ROOT
 
 SAMPLE = ROOT / "assets" / "sample" / "sample.mp4"
 FRAMES = 20
@@ -56,9 +58,9 @@ def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks
     options = CaptureOptions(quality="fast", threads=1, wanted=VideoRange(0.0, 0.6, Fraction(30)))
     folder = tmp_path / "unfinished"
     with pytest.raises(CancelledError):
-        capture(SAMPLE, body, options, stop_at(FRAMES - 5), unfinished=folder)
+        capture(SAMPLE, body, options, stop_at(FRAMES - 5), observe_frames=lasting(folder))
     before = len(runs)
-    resumed = capture(SAMPLE, body, options, unfinished=folder).motions[0]
+    resumed = capture(SAMPLE, body, options, observe_frames=lasting(folder)).motions[0]
     after = len(runs) - before
     whole = capture(SAMPLE, body, options).motions[0]
     # what was under way at the stop is run again
@@ -73,13 +75,13 @@ def test_a_stopped_capture_of_a_long_clip_goes_on_in_its_middle(tmp_path, body, 
     options = CaptureOptions(quality="fast", threads=1, window_s=0.2, wanted=VideoRange(0.0, 0.6))
     folder = tmp_path / "unfinished"
     with pytest.raises(CancelledError):
-        capture(SAMPLE, body, options, stop_at(FRAMES - 5), unfinished=folder)
+        capture(SAMPLE, body, options, stop_at(FRAMES - 5), observe_frames=lasting(folder))
     assert len(list(folder.glob("windows-*/*.npz"))) == 2
     for estimates in folder.glob("*.npz"):
         estimates.unlink()
     before = len(runs)
-    resumed = capture(SAMPLE, body, options, unfinished=folder).motions[0]
+    resumed = capture(SAMPLE, body, options, observe_frames=lasting(folder)).motions[0]
     after = len(runs) - before
-    whole = capture(SAMPLE, body, options).motions[0]
+    whole = capture(SAMPLE, body, options, observe_frames=lasting()).motions[0]
     assert 2 * after < len(runs) - before - after
     assert_same(resumed, whole)

@@ -13,14 +13,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...camera.background_record import BackgroundRecord, joined_backgrounds
-from ...perception.observation import Observation
-from ...perception.region import Region
-from ...tracking.association import cheapest_links
-from ...tracking.people import build_tracks
-from ...tracking.scene_cuts import SCENE_GAP_S
-from ...tracking.track import Track, Tracklet, trunk_px
-from .window_record import WindowRecord
+from ..camera.background_record import BackgroundRecord, joined_backgrounds
+from ..perception.observation import Observation
+from ..perception.region import Region
+from ..stages.observe import Observed
+from ..tracking.association import cheapest_links
+from ..tracking.track import Tracklet, trunk_px
+from .windows import WindowRecord
 
 _NOWHERE = Region((0.0, 0.0), 1.0, 0.0)
 # mean distance of the keypoints in sides of the region, below which two tracklets are one person
@@ -91,21 +90,22 @@ class JoinedWindows:
         self._numbers = numbers
         self._last = record
 
-    def tracks(self, most: int) -> list[Track]:
-        """Return the tracks of at most ``most`` people; see `build_tracks`."""
-        cuts = np.zeros(len(self))
-        cuts[self._cut_rows] = 1.0
-        times = (np.array(self.timestamps) + SCENE_GAP_S * np.cumsum(cuts)).tolist()
-        people = sorted((t for t in self._people if t.rows), key=lambda tracklet: tracklet.rows[0])
-        return build_tracks(self._frames, times, people, most)
+    def observed(self, execution: str, warnings: list[str]) -> Observed:
+        """Return what was observed in the whole clip; there must be a frame.
 
-    def background(self) -> BackgroundRecord:
-        """Return the background of the whole clip; there must be a frame."""
-        return joined_backgrounds(self._backgrounds, self._firsts)
-
-    def cuts_s(self) -> list[float]:
-        """Return the times of the first frames after cuts."""
-        return [self.timestamps[row] for row in self._cut_rows]
+        :param execution: what the networks of this process ran on; empty: it has run none.
+        :param warnings: of this process.
+        """
+        more = [text for text in self.warnings if text not in warnings]
+        return Observed(
+            self._frames,
+            self.timestamps,
+            self._cut_rows,
+            self._people,
+            joined_backgrounds(self._backgrounds, self._firsts),
+            execution or self.execution,
+            warnings + more,
+        )
 
     def largest_people(self, first_row: int) -> Iterator[tuple[float, Observation]]:
         """Yield the time and the largest person of each frame from a row on in which somebody was
