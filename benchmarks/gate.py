@@ -152,7 +152,7 @@ def ratios(body: Body, rounds: int) -> dict[str, float]:
     runs["iteration"] = iteration_run(make_problem(23, 10, 120, everything=True))
     runs["prior"] = prior_run(make_problem(23, 10, 52, joint_flow=True))
     times = take_turns(runs, dict.fromkeys(runs, SPARSE_BATCH), rounds)
-    speeds = [capture(SAMPLE, body, CaptureOptions(quality="fast")).report["fps"] for _ in range(3)]
+    speeds = [capture(SAMPLE, body, CaptureOptions(quality="fast")).report.fps for _ in range(3)]
     return {
         "time of a step over the joint prior's": times["step"] / times["prior"],
         "time of an iteration over a step's": times["iteration"] / times["step"],

@@ -327,7 +327,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                 )
                 write_capture_page(args.report, clip, lambda i, n: progress("report", i, n))
                 written.append(args.report)
-            report = dict(result.report, outputs=[str(p) for p in written])
+            report = result.report.as_json() | {"outputs": [str(path) for path in written]}
             if args.finished_file:
                 write_finished(args.finished_file, report)
     for warning in report["warnings"]:

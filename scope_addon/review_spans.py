@@ -16,18 +16,12 @@ from .motion import Motion
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 FAR_SHARE = 0.03
 LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
-REASONS = {
-    "unseen": "not visible: the pose is filled in",
-    "far": "the body is far from the footage: check these frames",
-    "unsure": "low confidence: check these frames",
-    "floor": "a foot is under the floor",
-}
 
 
 @dataclass(frozen=True)
 class Span:
     """Rows ``first`` to ``last`` of a motion, inclusive, and why they should be reviewed: a key of
-    ``REASONS``.
+    ``notices.REASONS``.
     """
 
     reason: str

@@ -69,16 +69,16 @@ def end_to_end(
     """
     cpu = time.process_time()
     result = capture(video, body, CaptureOptions(quality=quality, people=people))
-    frames = result.report["frames"]
+    frames = result.report.frames
     saving = _save_all(result)
-    rates = result.report["fps"]
+    rates = result.report.fps
     return {
         "end_to_end": frames / (frames / rates["total"] + saving),
         "networks": rates["networks"],
         "solver": rates["solver"],
         "cpu_ms_per_frame": 1e3 * (time.process_time() - cpu) / frames,
         "frames": frames,
-        "people": result.report["people"],
+        "people": result.report.people,
     }
 
 

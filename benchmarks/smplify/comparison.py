@@ -81,7 +81,7 @@ def _clip(
         objective = Objective(body, prior, frame_of(motion, int(row)))
         fits.append(objective.fit().x)
         took.append(1e3 * (time.process_time() - since))
-    ours = 1e3 / whole.report["fps"]["solver"]
+    ours = 1e3 / whole.report.fps["solver"]
     columns: Columns = (
         (
             "SMPLify's objective, dense, each frame",
@@ -91,7 +91,7 @@ def _clip(
         (
             "Scope, each frame",
             motion.joints_cam[rows].astype(float),
-            1e3 / raw.report["fps"]["solver"],
+            1e3 / raw.report.fps["solver"],
         ),
         ("Scope, the clip", whole.motions[0].joints_cam[rows].astype(float), ours),
     )

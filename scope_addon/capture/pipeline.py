@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ...solver.body import Body
+from ..capture_report import Report
 from ..footage import display_text
 from ..motion import Motion
 from .media.video import Video, open_video
@@ -27,10 +27,10 @@ from .world.camera_path import CameraPath
 
 @dataclass
 class Capture:
-    """One motion per person and the machine-readable report."""
+    """One motion per person and the report."""
 
     motions: list[Motion]
-    report: dict[str, Any]
+    report: Report
 
 
 def capture(

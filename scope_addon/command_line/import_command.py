@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from ...solver.loaders.skeletons import SKELETONS
+from ..capture_report import warnings_as_json
 from ..counts import counted
 from ..options import Place
 from ..scene.export.output_paths import SUFFIXES
@@ -75,6 +76,6 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
         "body": imported.body.name,
         "frames": frames,
         "frame_rate": rate,
-        "warnings": imported.notes,
+        **warnings_as_json(imported.notes),
         "outputs": [str(path) for path in written],
     }

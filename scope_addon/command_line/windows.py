@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..capture_report import warnings_as_json
 from ..errors import UsageError
 from ..job.clips.task import COUNT, WINDOWS, WINDOWS_FOLDER
 from .arguments import path_argument
@@ -74,4 +75,4 @@ def window_report(
     files, frames = observe_windows(
         video, options, range(first, end), args.windows_folder, progress
     )
-    return {"frames": frames, "outputs": [str(file) for file in files], "warnings": []}
+    return {"frames": frames, "outputs": [str(file) for file in files], **warnings_as_json([])}

@@ -131,7 +131,7 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):
             motion.save(job_folder / name)
-    reporter.send("result", motions=names, report=result.report)
+    reporter.send("result", motions=names, report=result.report.as_json())
 
 
 def _caches(job_folder: Path) -> Path | None:

@@ -129,7 +129,7 @@ def run_live(
         options.quality, network_threads(options.threads, execution), people, execution=execution
     )
     for warning in execution.warnings:  # fewer cores than threads, or a provider that fell back
-        listeners.say(warning)
+        listeners.say(str(warning))
     LiveBody(body, assumed_camera(*CAMERA_SIZE, CAMERA_SIZE[0])).load()
     statistics = Statistics()
     reader = NewestFrame(source, clock, options.reconnect_s, listeners.say, listeners.received)

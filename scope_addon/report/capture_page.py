@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from html import escape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +15,14 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..atomic_write import atomic_path, reason
 from ..capture.media.video_range import FootageRange
+from ..capture_report import Report
 from ..counts import counted
 from ..errors import OutputError
 from ..footage import display_text
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
-from ..review_spans import FAR_SHARE, REASONS, Span, body_confidence, find_review_spans
+from ..notices import REASONS, Notice, TimeText
+from ..review_spans import FAR_SHARE, Span, body_confidence, find_review_spans
 from . import page
 from .footage_pictures import Picture, Progress, overlay_pictures
 from .machine import machine, versions
@@ -42,7 +42,6 @@ _SHORT = {
 }
 _MAX_SPANS = 60  # that the page lists
 _GAP_S = 0.25  # between spans that are listed as one
-_AT_TIME = re.compile(r"at (\d+\.\d) s")  # in warnings
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class CapturedClip:
     video: Path
     motions: Sequence[Motion]
     body: Body
-    report: dict[str, Any]
+    report: Report
     command: str
     wanted: FootageRange | None = None
 
@@ -94,7 +93,7 @@ def capture_page(
     ]
     spans = [_review(motion, clip.body) for motion in clip.motions]
     colors = [page.person_color(n) for n in range(len(clip.motions))]
-    warnings = clip.report["warnings"]
+    warnings = clip.report.warnings
     thinned = (
         ""
         if len(rows) == len(first)
@@ -119,7 +118,7 @@ def capture_page(
                 {
                     "Machine": machine(),
                     "Versions": versions(),
-                    "Networks on": clip.report["execution"],
+                    "Networks on": clip.report.execution,
                 },
                 single=True,
             ),
@@ -134,18 +133,18 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
     """Return the facts at the head of the page."""
     report = clip.report
     motion = clip.motions[0]
-    rate = report["frame_rate"][0] / report["frame_rate"][1]
+    rate = report.frame_rate[0] / report.frame_rate[1]
     width, height = motion.image_size.tolist()
     return {
         "Duration": f"{len(motion) / rate:.2f} s, {counted(len(motion), 'frame')} at {rate:.6g} "
         "per second",
         "Image": f"{width} × {height}",
-        "People": counted(report["people"], "person", "people"),
-        "Preset": str(report["quality"]),
-        "Body": str(report["body"]),
-        "Camera": str(report["camera"]),
-        "Reprojection error": f"{report['reprojection_px']:.1f} px",
-        "Speed": f"{report['fps']['total']:.1f} frames per second",
+        "People": counted(report.people, "person", "people"),
+        "Preset": report.quality,
+        "Body": report.body,
+        "Camera": report.camera,
+        "Reprojection error": f"{report.reprojection_px:.1f} px",
+        "Speed": f"{report.fps['total']:.1f} frames per second",
     }
 
 
@@ -230,17 +229,19 @@ def face_rows(motion: Motion) -> list[tuple[str, NDArray[np.float64]]]:
 
 
 def marked_spans(
-    motions: Sequence[Motion], spans: Sequence[Sequence[Span]], warnings: Sequence[str]
+    motions: Sequence[Motion], spans: Sequence[Sequence[Span]], warnings: Sequence[Notice]
 ) -> list[MarkedSpan]:
     """Return what the plots mark: the spans of each motion that should be reviewed, and the times
     in warnings.
     """
     times = motions[0].timestamps
     marked = [_marked(span, times, n, motions) for n, of_one in enumerate(spans) for span in of_one]
-    for text in warnings:
-        at = [float(match[1]) for match in _AT_TIME.finditer(text)]
+    for warning in warnings:
+        named = [part.seconds for part in warning.parts() if isinstance(part, TimeText)]
         marked += [
-            MarkedSpan(time, time, "warned", text) for time in at if times[0] <= time <= times[-1]
+            MarkedSpan(time, time, "warned", str(warning))
+            for time in named
+            if times[0] <= time <= times[-1]
         ]
     return marked
 
@@ -252,21 +253,19 @@ def time_axis(times: NDArray[np.float64]) -> Axis:
     return Axis(first, last if last > first else first + 1.0, unit="s")
 
 
-def warning_list(warnings: Sequence[str]) -> list[Markup]:
+def warning_list(warnings: Sequence[Notice]) -> list[Markup]:
     """Return the warnings as the command line prints them; a time in one moves the page there."""
     if not warnings:
         return [Markup('<p class="none">None.</p>\n')]
     items = []
-    for text in warnings:
-        parts = []
-        end = 0
-        for match in _AT_TIME.finditer(text):
-            parts += [
-                escape(text[end : match.start()]),
-                page.seek_button(match[0], float(match[1])),
-            ]
-            end = match.end()
-        items.append(f"<li>{''.join(parts)}{escape(text[end:])}</li>")
+    for warning in warnings:
+        parts = [
+            page.seek_button(part.text, part.seconds)
+            if isinstance(part, TimeText)
+            else escape(part)
+            for part in warning.parts()
+        ]
+        items.append(f"<li>{''.join(parts)}</li>")
     return [Markup(f'<ul class="warnings">{"".join(items)}</ul>\n')]
 
 

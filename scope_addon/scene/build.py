@@ -20,6 +20,7 @@ from ..footage import display_text
 from ..kinematics.face.expressions import body_with_mouth, expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
+from ..notices import Notice, notice
 from . import camera
 from .animation_data import timing
 from .animation_data.actions import Channels
@@ -98,7 +99,7 @@ class BuildResult:
     people: list[Person]
     frame_rate: float  # of the scene, frames per second
     frame_range: tuple[float, float]  # first and last key
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[Notice] = field(default_factory=list)
 
 
 def build_scene(
@@ -167,11 +168,7 @@ def _build(
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length
     if abs(unit - 1.0) > 1e-6:
-        warnings.append(
-            f"the scene's unit is {unit:g} m, but the capture is in metres: scale the new objects "
-            f"by {1 / unit:g}, or "
-            "set Unit Scale to 1 in the scene's properties; exported files have the true size"
-        )
+        warnings.append(notice("scene_unit", unit_m=unit, scale=1 / unit))
     if options.resolution == "set":
         camera.set_resolution(scene, collection)
     if options.active_camera and people[0].camera is not None:
@@ -186,14 +183,10 @@ def _build(
     return BuildResult(collection, people, rate, (first, last), warnings)
 
 
-def _face_warnings(motions: list[Motion], body: Body) -> list[str]:
+def _face_warnings(motions: list[Motion], body: Body) -> list[Notice]:
     if expressions_of(body) or not any(motion.face for motion in motions):
         return []
-    return [
-        f"the body '{body.name}' has no expressions, so it does not show the face, which is in the "
-        "motion file; the "
-        "built-in bodies do"
-    ]
+    return [notice("no_expressions", body=body.name)]
 
 
 def _set_frame_range(
@@ -264,9 +257,9 @@ def _build_cameras(
     collection: bpy.types.Collection,
     footage: str | Path | None,
     options: BuildOptions,
-) -> list[str]:
+) -> list[Notice]:
     """Create the camera of every person, shared by people in the same clip; return warnings."""
-    warnings: list[str] = []
+    warnings: list[Notice] = []
     for index, person in enumerate(people):
         shared = next(
             (p.camera for p in people[:index] if camera.same_camera(p.motion, person.motion)), None
@@ -278,12 +271,7 @@ def _build_cameras(
             f"{name}_camera", person.motion, collection, person.frames
         )
         if camera.pixel_aspect(person.motion) != (1.0, 1.0) and options.resolution == "keep":
-            warnings.append(
-                "the footage's pixels are not square, and the pixel aspect belongs to the scene, "
-                "not the camera: "
-                "set the scene's resolution from the footage, as Compare with Footage does, for an "
-                "exact overlay"
-            )
+            warnings.append(notice("pixel_aspect"))
         if footage is not None:
             warnings += camera.show_footage(person.camera, footage, person.motion, person.frames)
     return warnings

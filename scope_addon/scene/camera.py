@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from ..errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
+from ..notices import Notice, notice
 from .animation_data.actions import Channels, fcurves_of
 from .animation_data.stored_values import stored_numbers
 from .axes import blender_brown_distortion, blender_camera_matrix
@@ -133,7 +134,7 @@ def same_camera(a: Motion, b: Motion) -> bool:
 
 def show_footage(
     camera: bpy.types.Object, footage: str | Path, motion: Motion, frames: NDArray[np.float64]
-) -> list[str]:
+) -> list[Notice]:
     """Show the footage as the camera's background, in step with the poses.
 
     Blender shows one frame of a movie clip per frame of the scene, so footage of a distorting lens
@@ -159,12 +160,18 @@ def show_footage(
     show = _show_clip if motion.dist.any() else undistorted
     size, warnings = show(camera.data, background, path, motion, frames)
     if not min(size):
-        return [f"Blender cannot decode {path.name}, so the camera shows no footage"]
+        return [notice("undecodable_footage", footage=path.name)]
     if tuple(motion.image_size) != size:
+        captured_width, captured_height = motion.image_size.tolist()
         warnings.append(
-            f"Blender shows {path.name} at {size[0]} x {size[1]}, but it was captured at "
-            f"{motion.image_size[0]} x "
-            f"{motion.image_size[1]}: turn or scale the camera's background image"
+            notice(
+                "footage_size",
+                footage=path.name,
+                width=size[0],
+                height=size[1],
+                captured_width=captured_width,
+                captured_height=captured_height,
+            )
         )
     return warnings
 
@@ -175,7 +182,7 @@ def _show_picture(
     path: Path,
     motion: Motion,
     frames: NDArray[np.float64],
-) -> tuple[tuple[int, int], list[str]]:
+) -> tuple[tuple[int, int], list[Notice]]:
     """Show a picture, or numbered ones; return the size in pixels, and warnings."""
     background.source = "IMAGE"
     background.image = bpy.data.images.load(str(path), check_existing=True)
@@ -191,7 +198,7 @@ def _show_clip(
     path: Path,
     motion: Motion,
     frames: NDArray[np.float64],
-) -> tuple[tuple[int, int], list[str]]:
+) -> tuple[tuple[int, int], list[Notice]]:
     """Show footage of a distorting lens; return the size in pixels, and warnings."""
     # Always a new clip, because another capture may have another start or lens.
     clip = bpy.data.movieclips.load(str(path))
@@ -203,16 +210,12 @@ def _show_clip(
     _set_lens_distortion(clip, background, motion)
     if (drift := _drift(motion, frames)) <= 1.0:
         return size, []
-    return size, [
-        f"the background image drifts from the motion by up to {drift:.0f} frames, because the "
-        "scene does not have the "
-        "footage's constant frame rate and the lens distorts; the motion keeps its speed"
-    ]
+    return size, [notice("footage_drifts", frames=drift)]
 
 
 def show_footage_again(
     camera: bpy.types.Object, motion: Motion, frames: NDArray[np.float64]
-) -> list[str]:
+) -> list[Notice]:
     """Show the camera's footage in step with poses that were moved in time; keep how opaque it is.
 
     :param frames: (T,) scene frame of each pose.
@@ -267,7 +270,7 @@ def _show_video(
     path: Path,
     motion: Motion,
     frames: NDArray[np.float64],
-) -> tuple[tuple[int, int], list[str]]:
+) -> tuple[tuple[int, int], list[Notice]]:
     """Show a video as an image, whose frame is keyed unless each frame of the scene shows the next
     one.
 
@@ -300,19 +303,14 @@ def _show_picture_sequence(
     first: Path,
     motion: Motion,
     frames: NDArray[np.float64],
-) -> list[str]:
+) -> list[Notice]:
     """Show numbered pictures in step with the poses, from the first one on; return warnings."""
     found = [LAST_NUMBER.search(picture.stem) for picture in numbered_from(first)]
     numbers = np.array([int(match.group()) for match in found if match])
     if len(numbers) == 0:  # a single picture
         return []
     if len(numbers) <= motion.frames.max() or numbers[-1] >= _MAX_DURATION:
-        return [
-            f"Blender cannot show the image sequence from {first.name} on, because images are "
-            "missing or their "
-            "numbers are too large, so the camera shows that image only; renumber the files "
-            "consecutively to show all"
-        ]
+        return [notice("image_numbers", first=first.name)]
     background.image.source = "SEQUENCE"
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
     poses = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(int)

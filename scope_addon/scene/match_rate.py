@@ -17,6 +17,7 @@ from collections.abc import Iterable
 import bpy
 
 from ..motion import Motion
+from ..notices import Notice
 from .animation_data import timing
 from .animation_data.actions import fcurves, frame_range
 from .animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
@@ -28,6 +29,7 @@ from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
 from .datablock_names import holds
+from .frame_spans import FrameSpan
 from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
 
 _MARKER = re.compile(
@@ -41,7 +43,7 @@ def change_rate(
     rate: float,
     people: dict[bpy.types.Object, Motion | None],
     rigs: Iterable[tuple[bpy.types.Object, bpy.types.Object]],
-) -> list[str]:
+) -> list[Notice]:
     """Set the scene's frame rate, and move the captures in time so that they keep their speed.
 
     :param rate: frames per second.
@@ -82,12 +84,12 @@ def change_rate(
     return warnings
 
 
-def retimed_spans(spans: str, person: bpy.types.Object, rate: float, former: float) -> str:
-    """Move the frames of a result's spans, such as ``12-18,40``."""
+def retimed_spans(
+    spans: Iterable[FrameSpan], person: bpy.types.Object, rate: float, former: float
+) -> list[FrameSpan]:
+    """Move the frames of a result's spans."""
     move = Retiming(start_frame(person), rate / former)
-    return re.sub(
-        r"(?<!\d)-?\d{1,7}(?!\d)", lambda found: str(round(move.frame(int(found.group())))), spans
-    )
+    return [FrameSpan(*(round(move.frame(frame)) for frame in span)) for span in spans]
 
 
 def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -218,9 +220,9 @@ def _retime_markers(
 
 def _show_footage(
     scene: bpy.types.Scene, people: dict[bpy.types.Object, Motion | None], rate: float
-) -> list[str]:
+) -> list[Notice]:
     """Show the footage of every capture's cameras in step with the moved keys."""
-    warnings: list[str] = []
+    warnings: list[Notice] = []
     for collection in scene.collection.children_recursive:
         seen: list[Motion] = []
         own = list(collection.objects)

@@ -25,6 +25,7 @@ from ..kinematics.contact_points import SOLES
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.standing import standing_probability
 from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
+from ..notices import Notice, notice
 from .layouts import SmplMotion, read_smpl_motion
 
 DEFAULT_RATE = 30.0  # frames per second
@@ -41,7 +42,7 @@ class Imported:
 
     motion: Motion
     body: Body
-    notes: list[str] = field(default_factory=list)
+    notes: list[Notice] = field(default_factory=list)
 
 
 def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float = 0.0) -> Imported:
@@ -104,37 +105,34 @@ def convert(
     :param path: names the motion.
     """
     exact = body.name in ("smpl", "smplh", "smplx", "star") or source.body_model == body.name
-    notes: list[str] = []
+    notes: list[Notice] = []
     betas = np.zeros(body.P)
     if exact:
         count = min(body.P, source.betas.size)
         betas[:count] = source.betas[:count]
         if source.gender != body.gender:
             notes.append(
-                f"the motion is of a {source.gender} body, but '{body.name}' is {body.gender}"
+                notice(
+                    "other_gender",
+                    gender=source.gender,
+                    body=body.name,
+                    body_gender=body.gender,
+                )
             )
     else:
-        notes.append(
-            "the poses were applied as they are to Scope's own body, whose rest pose and "
-            "proportions differ from "
-            "SMPL's; with your SMPL, SMPL+H or SMPL-X file as the body, the motion is exact"
-        )
+        notes.append(notice("other_body"))
     poses, missing = _for_body(source, body)
     if missing:
-        notes.append(f"the body '{body.name}' has no {missing}, whose motion was left out")
+        notes.append(notice("parts_left_out", body=body.name, parts=missing))
     frames_per_second = source.rate or rate or DEFAULT_RATE
     if source.rate is None and not rate:
-        notes.append(
-            f"the file states no frame rate; {DEFAULT_RATE:g} frames per second were assumed"
-        )
+        notes.append(notice("rate_not_stated", rate=DEFAULT_RATE))
     if source.trans is None:
-        notes.append("the file holds no translation: the pelvis stays in place")
+        notes.append(notice("no_translation"))
     trans = np.zeros((len(source), 3)) if source.trans is None else source.trans
     axis, sure = (up, True) if up != "auto" else _up_axis(poses, body, source.usual_up)
     if not sure:
-        notes.append(
-            f"the file's up axis is not clear from the motion; {_AXIS_TEXT[axis]} was assumed"
-        )
+        notes.append(notice("unsure_up", axis=_AXIS_TEXT[axis]))
     R = R_WORLD_FILE[axis]
     J0 = body.rest_joints(betas)[0]
     poses[:, 0] = log(R @ exp(poses[:, 0]))
@@ -144,10 +142,7 @@ def convert(
     if not exact or axis != "z":
         root[:, 2] -= floor
     if axis != "z":
-        notes.append(
-            f"{_AXIS_TEXT[axis]} points up in the file; the motion was placed on the "
-            "floor by its feet"
-        )
+        notes.append(notice("other_up", axis=_AXIS_TEXT[axis]))
     motion = _motion(body, betas, poses, root - J0, contact, frames_per_second)
     motion.gender = source.gender
     motion.source = path.name

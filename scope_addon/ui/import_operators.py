@@ -14,7 +14,7 @@ from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
 from .declared_properties import blender_property
 from .preferences import preferences
-from .reporting import ReportingOperator, rpt_, sentence
+from .reporting import ReportingOperator, iface_, rpt_, sentence
 from .view.view_operators import show_new_capture
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
         show_new_capture(context)
         notes = list(dict.fromkeys(note for imported in found for note in imported.notes))
         if notes:
-            self.report({"WARNING"}, sentence("; ".join(notes)))
+            self.report({"WARNING"}, sentence("; ".join(note.text(iface_) for note in notes)))
             return ""
         return rpt_("Imported {files}", files=", ".join(path.name for path in paths))
 
@@ -123,6 +123,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
 def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: BuildOptions) -> None:
     """Build one motion and store it and its result with the scene"""
+    from ..capture_report import Report
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
     from .capture.frame_rate_operators import rate_warnings
@@ -145,7 +146,7 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
         *rate_warnings(result.frame_rate, rate, "motion"),
         *result.warnings,
     ]
-    report = {"warnings": warnings}
+    report = Report(warnings=warnings)
     show_result(result.collection.scope_result, str(footage or ""), report, result)
     scene.scope.capture = result.collection
 

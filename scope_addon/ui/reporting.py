@@ -9,6 +9,7 @@ import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
 from ..footage import display_text
+from ..notices import Notice, Translate
 from .translations import CONTEXT
 
 
@@ -42,6 +43,11 @@ def sentence(error: Exception | str, name: str = "") -> str:
     if (name and text.startswith(display_text(name))) or "." in first.rstrip("."):
         return text
     return text[:1].upper() + text[1:]
+
+
+def warning_text(warning: Notice, translate: Translate = iface_) -> str:
+    """Return a warning as the panel shows it, in the user's language by default."""
+    return sentence(warning.text(translate), str(warning.values.get("footage", "")))
 
 
 class ReportingOperator(bpy.types.Operator):

@@ -43,7 +43,7 @@ def test_the_world_of_a_panning_camera_does_not_move(shared, tmp_path):
     found = {name: capture(tmp_path / f"{name}.mp4", body, options) for name in ("stand", "pan")}
     stand, moving = (found[name].motions[0] for name in ("stand", "pan"))
 
-    assert found["stand"].report["camera_turns_deg"] == 0.0
+    assert found["stand"].report.camera_turns_deg == 0.0
     assert np.ptp(stand.world_from_camera, axis=0).max() == 0.0
     first = moving.world_from_camera[0, :3, :3]
     turned = np.swapaxes(first[None], 1, 2) @ moving.world_from_camera[:, :3, :3]

@@ -59,8 +59,8 @@ def captured(detector: Path | None = None, keypoints: Path | None = None) -> Cap
 def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path]) -> None:
     ours = captured()
     theirs = captured(*own_networks)
-    assert theirs.report["detector"] == str(own_networks[0])
-    assert theirs.report["execution"] == "CPU, 1 thread"
+    assert theirs.report.detector == str(own_networks[0])
+    assert theirs.report.execution == "CPU, 1 thread"
     motion = theirs.motions[0]
     assert motion.valid.all()
     truth = np.load(SAMPLE.with_name("sample_truth.npz"))["joints_cam"][motion.frames]

@@ -15,8 +15,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.clock import at_times
+from scope.scope_addon.capture_report import Report
 from scope.scope_addon.errors import OutputError, VideoError
+from scope.scope_addon.notices import OTHER, notice
 from scope.scope_addon.report.capture_page import (
     CapturedClip,
     capture_page,
@@ -66,7 +67,7 @@ class Page(HTMLParser):
             self.texts.setdefault(self._open[-1], []).append(data)
 
 
-def report(people: int = 1, **given) -> dict:
+def report(people: int = 1, **given) -> Report:
     found = {
         "people": people,
         "quality": "best",
@@ -75,7 +76,7 @@ def report(people: int = 1, **given) -> dict:
         "execution": "CPU, 2 threads",
     }
     rates = {"frame_rate": [30, 1], "fps": {"total": 12.3}, "reprojection_px": 2.5, "warnings": []}
-    return {**found, **rates, **given}
+    return Report(**{**found, **rates, **given})
 
 
 def clip(body, video: Path, people: int = 1, **given) -> CapturedClip:
@@ -101,7 +102,10 @@ def footage(tmp_path) -> Path:
 
 @pytest.mark.parametrize("people", [1, 7])
 def test_the_page_is_well_formed_and_all_that_users_name_is_text(body, people):
-    warnings = [f"{HOSTILE} cuts to another scene {at_times([0.1, 0.2])}", "javascript:alert(1)"]
+    warnings = [
+        notice("cuts", footage=HOSTILE, times=[0.1, 0.2]),
+        notice(OTHER, text="javascript:alert(1)"),
+    ]
     pictures = [small_picture(row, np.zeros((H, W, 3), np.uint8)) for row in (0, 8)]
     about = clip(body, Path(HOSTILE.replace("/", "")), people, warnings=warnings, camera=HOSTILE)
     text = capture_page(about, np.arange(FRAMES), pictures)
@@ -153,25 +157,25 @@ def test_the_data_of_the_view_is_json_that_cannot_end_its_element(body):
 
 
 def test_times_in_warnings_lead_to_their_frames_and_the_text_stays_as_printed():
-    said = f"a.mp4 cuts to another scene {at_times([2.0, 4.1])}: capture each scene separately"
+    said = notice("cuts", footage="a.mp4", times=[2.0, 4.1])
     page = Page("".join(warning_list([said])))
     assert [a["data-time"] for tag, a in page.elements if tag == "button"] == ["2.0000", "4.1000"]
     assert (
         "".join(page.texts["li"][:1] + page.texts["button"][:1])
         == "a.mp4 cuts to another scene at 2.0 s"
     )
-    assert "".join(re.sub("<[^>]*>", "", "".join(warning_list([said])))).strip() == said
+    assert "".join(re.sub("<[^>]*>", "", "".join(warning_list([said])))).strip() == str(said)
 
 
 def test_warnings_are_marked_at_their_times(body):
-    text = f"a.mp4 cuts to another scene {at_times([0.2, 9.0])}"  # the clip ends at 8/30 s
-    page = capture_page(clip(body, Path("a.mp4"), warnings=[text]), np.arange(FRAMES), [])
+    warning = notice("cuts", footage="a.mp4", times=[0.2, 9.0])  # the clip ends at 8/30 s
+    page = capture_page(clip(body, Path("a.mp4"), warnings=[warning]), np.arange(FRAMES), [])
     marks = re.findall(
         r'<rect class="span warned" x="([\d.]+)" y="0" width="([\d.]+)" '
         r'height="100"><title>([^<]*)<',
         page,
     )
-    assert marks == [("750.0", "1.5", text)] * 2  # in both plots of lines
+    assert marks == [("750.0", "1.5", str(warning))] * 2  # in both plots of lines
 
 
 def test_frames_without_the_person_are_listed_and_marked(body):

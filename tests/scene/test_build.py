@@ -170,7 +170,7 @@ def test_a_scene_in_centimetres_gives_a_warning(body, make_motion):
     bpy.context.scene.unit_settings.scale_length = 0.01
     warnings = build_scene([make_motion(body, 2)], body).warnings
     assert len(warnings) == 1
-    assert "by 100," in warnings[0]
+    assert "by 100," in str(warnings[0])
 
 
 def test_one_collection_and_one_camera_for_the_people_of_a_capture(

@@ -324,7 +324,7 @@ def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make
     motion.dist[0] = -0.1
     result = build_scene([motion], body, footage=clip)
     assert len(result.warnings) == 1
-    assert "drifts from the motion by up to 4 frames" in result.warnings[0]
+    assert "drifts from the motion by up to 4 frames" in str(result.warnings[0])
 
 
 def test_a_picture_is_shown_in_the_background(body, make_motion, tmp_path):
@@ -371,7 +371,7 @@ def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_mo
     result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
     assert result.people[0].camera.data.background_images[0].image.source == "FILE"
     assert len(result.warnings) == 1
-    assert "the camera shows that image only" in result.warnings[0]
+    assert "the camera shows that image only" in str(result.warnings[0])
 
 
 def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
@@ -381,4 +381,4 @@ def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
     image.file_format = "PNG"
     image.save()
     result = build_scene([make_motion(body, 1)], body, footage=picture)
-    assert any("32 x 48" in warning for warning in result.warnings)
+    assert any("32 x 48" in warning for warning in map(str, result.warnings))

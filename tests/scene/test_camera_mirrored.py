@@ -58,7 +58,7 @@ def mirrored(tmp_path, matrix):
         captured = next(iter(video)).image_rgb
     advice = [
         re.search("mirrored by its metadata, .* switch on Flip ([XY])", text)
-        for text in video.warnings
+        for text in map(str, video.warnings)
     ]
     return path, captured, next(match.group(1) for match in advice if match)
 

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...notices import Notice
 from ..camera.background_record import BackgroundRecord, joined_backgrounds
 from ..perception.observation import Observation
 from ..perception.region import Region
@@ -41,7 +42,7 @@ class JoinedWindows:
         self._last: WindowRecord | None = None
         self._backgrounds: list[BackgroundRecord] = []
         self._firsts: list[int] = []
-        self.warnings: list[str] = []
+        self.warnings: list[Notice] = []
         self.execution = ""
 
     def __len__(self) -> int:
@@ -68,7 +69,7 @@ class JoinedWindows:
         self.execution = self.execution or record.execution
         if len(record) == record.first:
             return
-        self.warnings += [text for text in record.warnings if text not in self.warnings]
+        self.warnings += [each for each in record.warnings if each not in self.warnings]
         first = record.first
         base = len(self._frames)
         shift = self._frames[base - first] - int(record.indices[0]) if 0 < first <= base else 0
@@ -90,13 +91,13 @@ class JoinedWindows:
         self._numbers = numbers
         self._last = record
 
-    def observed(self, execution: str, warnings: list[str]) -> Observed:
+    def observed(self, execution: str, warnings: list[Notice]) -> Observed:
         """Return what was observed in the whole clip; there must be a frame.
 
         :param execution: what the networks of this process ran on; empty: it has run none.
         :param warnings: of this process.
         """
-        more = [text for text in self.warnings if text not in warnings]
+        more = [each for each in self.warnings if each not in warnings]
         return Observed(
             self._frames,
             self.timestamps,

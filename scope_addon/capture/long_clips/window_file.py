@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from ....solver.errors import InputError, ScopeError
 from ....solver.loaders.archive import read_members
 from ...atomic_write import write_npz
+from ...capture_report import warnings_as_json
+from ...notices import Notice, notices_of
 from ..camera.background_record import BackgroundRecord
 from ..camera.heading_drift import FrameEdges
 from ..camera.line_segments import Segments
@@ -90,7 +92,7 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
     window = record.window
     background = record.background
     segments = [edge.segments for edge in background.edge_frames]
-    text = json.dumps({"execution": record.execution, "warnings": list(record.warnings)}).encode()
+    text = {"execution": record.execution, **warnings_as_json(record.warnings)}
     arrays = {
         "geometry": [window.number, window.anchor_s, window.begin_s, window.end_s, *size],
         "rows": [record.first, record.anchor],
@@ -108,7 +110,7 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
         "anchor_regions": [
             (number, *_region_row(r)) for number, r in record.anchor_regions.items()
         ],
-        "text": np.frombuffer(text, np.uint8),
+        "text": np.frombuffer(json.dumps(text).encode(), np.uint8),
         **_people_arrays(record.tracklets),
     }
     write_npz(path, {name: _as_declared(name, value) for name, value in arrays.items()})
@@ -304,14 +306,14 @@ def _region(row: list[float]) -> Region:
     return Region((x, y), side_px, rotation)
 
 
-def _text(encoded: NDArray[np.uint8]) -> tuple[str, tuple[str, ...]]:
+def _text(encoded: NDArray[np.uint8]) -> tuple[str, list[Notice]]:
     """Return execution and warnings.
 
     :raises InputError: they are no text.
     """
     try:
         read = json.loads(encoded.tobytes())
-        return str(read["execution"]), tuple(str(text) for text in read["warnings"])
+        return str(read["execution"]), notices_of(read)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"the text of a window cannot be read: {error}") from error
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...notices import Notice
 from ..camera.background_record import BackgroundRecord
 from ..media.frame import Frame
 from ..media.video import Video
@@ -93,7 +94,7 @@ class WindowRecord:
     cut_rows: list[int]
     background: BackgroundRecord
     execution: str = ""
-    warnings: Sequence[str] = ()
+    warnings: Sequence[Notice] = ()
 
     def __len__(self) -> int:
         return len(self.timestamps)
@@ -150,7 +151,7 @@ class WindowRun:
             self._anchor_regions = {number: each.region for number, each in observations}
         return largest_person(observations)
 
-    def record(self, execution: str = "", warnings: Sequence[str] = ()) -> WindowRecord:
+    def record(self, execution: str = "", warnings: Sequence[Notice] = ()) -> WindowRecord:
         """Return what was found so far."""
         observer = self._observer
         observer.finish()

@@ -23,6 +23,7 @@ from ...footage import (
     pictures_in,
     sequence_pattern,
 )
+from ...notices import Notice, notice
 from .stills.still_images import read_picture
 
 _NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
@@ -39,7 +40,7 @@ class PictureSequence:
 
     paths: list[Path]
     slots: list[int]
-    warnings: list[str]
+    warnings: list[Notice]
 
     @classmethod
     def from_paths(cls, paths: list[Path], name: str) -> PictureSequence:
@@ -55,14 +56,15 @@ class PictureSequence:
         missing = slots[-1] + 1 - len(paths)
         if missing <= 0:
             return cls(paths, slots, [])
-        between = f"{name}: {missing} numbers between {numbers[0]} and {numbers[-1]} have no image"
-        if 2 * missing > slots[-1] + 1:
-            return cls(
-                paths,
-                list(range(len(paths))),
-                [f"{between}, so the images were read as consecutive frames"],
-            )
-        return cls(paths, slots, [f"{between}; the time of these frames was kept free"])
+        is_order_alone = 2 * missing > slots[-1] + 1
+        warning = notice(
+            "consecutive_images" if is_order_alone else "missing_images",
+            footage=name,
+            missing=missing,
+            first=numbers[0],
+            last=numbers[-1],
+        )
+        return cls(paths, list(range(len(paths))) if is_order_alone else slots, [warning])
 
     def time(self, index: int, fps: Fraction) -> float:
         """Calculate at how many seconds a picture is shown."""

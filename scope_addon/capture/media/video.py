@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
+from ...notices import Notice, notice
 from .frame import Frame
 from .frame_readers import DEFAULT_FPS, PyavReader, estimate_fps, exact_fps, next_time
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
@@ -61,7 +62,7 @@ class Video:
     fps: Fraction
     frame_count: int
     focal_35mm: float | None = None
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[Notice] = field(default_factory=list)
     wanted: VideoRange = field(default_factory=VideoRange)
     _source_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
@@ -188,11 +189,7 @@ def _open_sequence(path: Path, sequence: PictureSequence, requested: FootageRang
     video._sequence = sequence
     video.warnings += sequence.warnings
     if requested.fps is None and count > 1:
-        video.warnings.append(
-            f"{path.name}: images have no frame rate, so 30 frames per second were assumed; set "
-            "another with "
-            "--fps on the command line"
-        )
+        video.warnings.append(notice("assumed_frame_rate", footage=path.name))
     return video
 
 
@@ -203,14 +200,10 @@ def _open_still(path: Path, requested: FootageRange) -> Video:
     height, width = picture.rgb.shape[:2]
     video = Video(path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, _still=picture.rgb)
     if requested != VideoRange():
-        video.warnings.append(
-            f"{path.name} is a single image: a start, an end or a frame rate has no effect"
-        )
+        video.warnings.append(notice("range_of_image", footage=path.name))
     if picture.length > 1:
         video.warnings.append(
-            f"{path.name} is an animation of {picture.length} images, and only the first was "
-            "captured; "
-            "convert it to an .mp4 or a .gif to capture all of them"
+            notice("first_of_animation", footage=path.name, images=picture.length)
         )
     return video
 
@@ -239,11 +232,7 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     if flip:
-        video.warnings.append(
-            f"{path.name} is mirrored by its metadata, which Blender ignores; there, switch on "
-            f"Flip {flip} of the "
-            "camera's background image"
-        )
+        video.warnings.append(notice("mirrored", footage=path.name, axis=flip))
     if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
         raise VideoError(
             f"{path} lasts {frame_count / float(fps):.1f} s, but the start is at "
@@ -254,9 +243,12 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
         video.fps = min(wanted.fps, fps)
         if wanted.fps > fps:
             video.warnings.append(
-                f"{path.name} has {float(fps):g} frames per second; {float(wanted.fps):g} would "
-                "repeat some, "
-                "so each was used once"
+                notice(
+                    "frame_rate_above_footage",
+                    footage=path.name,
+                    rate=float(fps),
+                    wanted=float(wanted.fps),
+                )
             )
     return video
 
@@ -337,10 +329,7 @@ class _Decoder:
         if self._stop.is_set():
             return
         if resized:
-            self._warn(
-                f"the frame size changes within {video.path.name}; all frames were scaled "
-                "to the first one's"
-            )
+            self._warn(notice("frame_size_changes", footage=video.path.name))
         self._warn_of_end(index, time or 0.0)
 
     def _warn_of_end(self, index: int, time: float) -> None:
@@ -355,15 +344,15 @@ class _Decoder:
         last = min(float((video.frame_count - 1) / video.source_fps), video.wanted.end_s)
         if missing > max(1, video.frame_count // 50) and time < 0.95 * last:
             self._warn(
-                f"decoding {video.path.name} stopped after {index} of about {video.frame_count} "
-                "frames; "
-                "the file may be damaged or incomplete"
+                notice(
+                    "decoding_stopped",
+                    footage=video.path.name,
+                    decoded=index,
+                    total=video.frame_count,
+                )
             )
         if time <= video.wanted.end_s and self._has_grown():
-            self._warn(
-                f"{video.path.name} grew while it was read; capture it again once it is "
-                "written completely"
-            )
+            self._warn(notice("growing_file", footage=video.path.name))
 
     def _has_grown(self) -> bool:
         """Return whether the file is still being written, as .mkv and .ts files are by
@@ -377,6 +366,6 @@ class _Decoder:
         except OSError:  # removed, or a network folder that is gone: everything was read
             return False
 
-    def _warn(self, text: str) -> None:
-        if text not in self._video.warnings:
-            self._video.warnings.append(text)
+    def _warn(self, warning: Notice) -> None:
+        if warning not in self._video.warnings:
+            self._video.warnings.append(warning)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...errors import UsageError
+from ...notices import Notice, notice
 
 AUTO = "auto"
 CPU = "cpu"
@@ -44,7 +45,7 @@ class Execution:
     """
 
     provider: str = CPU
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[Notice] = field(default_factory=list)
     used: list[str] = field(default_factory=list)
     failed: set[str] = field(default_factory=set)
 
@@ -66,9 +67,11 @@ class Execution:
             labels = [label for ort_name, label in PROVIDERS.values() if ort_name in available]
             self._warn(
                 self.provider,
-                f"{PROVIDERS[self.provider][1]} was requested, but this onnxruntime has only "
-                f"{', '.join(labels)}; "
-                "the networks run on the CPU",
+                notice(
+                    "provider_missing",
+                    provider=PROVIDERS[self.provider][1],
+                    available=", ".join(labels),
+                ),
             )
         return [*(name for name in usable if name not in self.failed), CPU]
 
@@ -82,15 +85,12 @@ class Execution:
         warn.
         """
         text = " ".join(str(why).split())
-        self._warn(
-            name,
-            f"{PROVIDERS[name][1]} cannot run the networks ({text}); they run on the CPU instead",
-        )
+        self._warn(name, notice("provider_failed", provider=PROVIDERS[name][1], reason=text))
 
-    def _warn(self, name: str, text: str) -> None:
+    def _warn(self, name: str, warning: Notice) -> None:
         if name not in self.failed:
             self.failed.add(name)
-            self.warnings.append(text)
+            self.warnings.append(warning)
 
     def describe(self, threads: int) -> str:
         """Describe the providers that were used, such as "CUDA" or "CPU, 2 threads"."""

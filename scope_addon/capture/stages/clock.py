@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The time spent in each stage of a capture, and times in the footage as text."""
+"""The time spent in each stage of a capture."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-MAX_TIMES = 4  # that are listed in a sentence
 FINDING = "finding the person"  # a stage, in which the footage is decoded and observed
 # a stage of the first capture on a computer for which no machine code is shipped
 COMPILING = "compiling the solver"
@@ -37,11 +36,3 @@ class StageClock:
         """Return the frames per second of each stage and of all together (``total``)."""
         seconds = dict(self.seconds, total=sum(self.seconds.values()))
         return {name: round(frames / max(s, 1e-9), 2) for name, s in seconds.items()}
-
-
-def at_times(times_s: list[float]) -> str:
-    """Write times as "at 2.0 s and at 4.1 s"; if there are many, only the first few."""
-    listed = [f"at {t:.1f} s" for t in times_s[:MAX_TIMES]]
-    more = len(times_s) - len(listed)
-    listed += [f"{more} more times"] if more else []
-    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...notices import Notice
 from ..camera.background_record import CameraMotion
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
@@ -42,7 +43,7 @@ class Footage:
     lines: Lines  # of the background, in the first frame's camera axes
     cuts_s: list[float]
     execution: str  # what the networks ran on, for the report
-    warnings: list[str]
+    warnings: list[Notice]
 
 
 def given_camera(video: Video, options: CaptureOptions) -> Camera:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from typing import NamedTuple
 
+from ...notices import notice
 from ...options.capture import AUTO, LARGEST, OFF
 from ..options import CaptureOptions, most_people
 from ..perception.execution import Execution
@@ -29,9 +30,7 @@ def network_threads(wanted: int, execution: Execution) -> int:
     """
     cores = os.cpu_count() or 1
     if wanted > cores:
-        execution.warnings.append(
-            f"{wanted} threads were requested, but there are only {cores} cores"
-        )
+        execution.warnings.append(notice("too_many_threads", threads=wanted, cores=cores))
     return min(wanted or cores, cores)
 
 

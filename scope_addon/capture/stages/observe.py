@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...errors import NoPersonError, VideoError
+from ...notices import Notice
 from ..camera.background_record import BackgroundRecord
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera
@@ -62,7 +63,7 @@ class Observed:
     tracklets: list[Tracklet]
     background: BackgroundRecord
     execution: str  # what the networks ran on, for the report
-    warnings: list[str]
+    warnings: list[Notice]
 
     def tracks(self, most: int) -> list[Track]:
         """Return the tracks of at most ``most`` people; see `build_tracks`."""

@@ -13,21 +13,19 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.names import BODY_JOINTS
-from ...counts import counted
+from ...capture_report import Report
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
 from ...motion import Motion
+from ...notices import Notice, Value, notice
 from ...options.capture import ON
 from ..media.video import Video
 from ..options import CaptureOptions
 from ..world.world_frame import LINES, UP_DEVIATIONS_DEG
-from .clock import at_times
 from .footage import Footage
 from .solve import Solved
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
-_ESTIMATED = "somebody is taller or smaller than estimated: give everybody's height"
-_GIVEN = "the heights are given in another order than the people, the most prominent first"
 
 
 def make_report(
@@ -37,8 +35,8 @@ def make_report(
     footage: Footage,
     solved: Solved,
     rates: dict[str, float],
-) -> dict[str, Any]:
-    """Assemble the report that ``--json`` prints.
+) -> Report:
+    """Assemble the report.
 
     :param rates: frames per second by stage.
     """
@@ -46,87 +44,84 @@ def make_report(
     camera = footage.camera
     motion = footage.camera_motion
     is_still = len(footage.timestamps) == 1
-    return {
-        "source": str(video.path),
-        "frames": len(footage.timestamps),
-        "people": len(motions),
-        "valid_frames": int(motions[0].valid.sum()),
-        "per_person": [_about_person(body, motion) for motion in motions],
-        "quality": options.quality,
-        "detector": str(options.detector or "built-in"),
-        "keypoints": str(options.keypoints or "built-in"),
-        "execution": footage.execution,
-        "body": body.name,
-        "camera": camera.source,
-        "camera_turns_deg": 0.0 if motion.is_static else round(motion.largest_turn_deg, 2),
-        "camera_travels_m": round(
+    return Report(
+        source=str(video.path),
+        frames=len(footage.timestamps),
+        people=len(motions),
+        valid_frames=int(motions[0].valid.sum()),
+        per_person=[_about_person(body, motion) for motion in motions],
+        quality=options.quality,
+        detector=str(options.detector or "built-in"),
+        keypoints=str(options.keypoints or "built-in"),
+        execution=footage.execution,
+        body=body.name,
+        camera=camera.source,
+        camera_turns_deg=0.0 if motion.is_static else round(motion.largest_turn_deg, 2),
+        camera_travels_m=round(
             float(np.linalg.norm(np.diff(solved.path.center, axis=0), axis=1).sum()), 2
         ),
-        "up": solved.up_source,
-        "up_deviation_deg": UP_DEVIATIONS_DEG[solved.up_source][is_still],
-        "focal_px": float(camera.intrinsics[0, 0]),
-        "focal_deviation": round(camera.focal_deviation, 3),
-        "frame_rate": [video.fps.numerator, video.fps.denominator],
-        "fps": rates,
-        "reprojection_px": float(motions[0].residual_px[motions[0].valid].mean()),
-        "iterations": solved.iterations,
-        "cuts_s": [round(t, 3) for t in footage.cuts_s],
-        "warnings": footage.warnings
+        up=solved.up_source,
+        up_deviation_deg=UP_DEVIATIONS_DEG[solved.up_source][is_still],
+        focal_px=float(camera.intrinsics[0, 0]),
+        focal_deviation=round(camera.focal_deviation, 3),
+        frame_rate=[video.fps.numerator, video.fps.denominator],
+        fps=rates,
+        reprojection_px=float(motions[0].residual_px[motions[0].valid].mean()),
+        iterations=solved.iterations,
+        cuts_s=[round(t, 3) for t in footage.cuts_s],
+        warnings=footage.warnings
         + up_warnings(Path(video.path).name, solved.up_source, is_still)
         + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
         + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
-    }
+    )
 
 
 def capture_warnings(
     name: str, options: CaptureOptions, cuts_s: list[float], motions: list[Motion]
-) -> list[str]:
-    """List what a user should know about the result, in sentences; ``name`` is the footage's."""
+) -> list[Notice]:
+    """List what a user should know about the result; ``name`` is the footage's."""
     warnings = []
     if cuts_s:
-        times = at_times(cuts_s)
-        warnings.append(
-            f"{name} cuts to another scene {times}: capture each scene separately, with a start "
-            "and end time"
-        )
-    if len(options.heights_m) > len(motions):
-        found = f"{len(motions)} people were found" if len(motions) > 1 else "one person was found"
-        warnings.append(f"{name}: {len(options.heights_m)} heights were given, but {found}")
-    for number, motion in enumerate(motions, 1):
-        who = "the person" if len(motions) == 1 else f"person {number}"
-        missing = int((~motion.valid).sum())
-        if missing:
-            frames = counted(len(motion), "frame")
+        warnings.append(notice("cuts", footage=name, times=cuts_s))
+    heights = len(options.heights_m)
+    people = len(motions)
+    if heights > people == 1:
+        warnings.append(notice("heights_for_one", footage=name, heights=heights))
+    elif heights > people:
+        warnings.append(notice("heights_for_several", footage=name, heights=heights, people=people))
+    for person, motion in numbered(motions):
+        unseen = int((~motion.valid).sum())
+        if unseen:
             warnings.append(
-                f"{name}: {who} was not seen in {missing} of {frames}; these are filled in"
+                notice(
+                    "unseen_frames",
+                    footage=name,
+                    person=person,
+                    unseen=unseen,
+                    total=len(motion),
+                )
             )
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
-            warnings.append(f"{name}: the legs of {who} were not seen, so their motion is a guess")
+            warnings.append(notice("unseen_legs", footage=name, person=person))
         if options.hands == ON and not any(hand_frames(motion).values()):
-            warnings.append(
-                f"{name}: no hands of {who} were found; come closer, or show the palms to the "
-                "camera more often"
-            )
+            warnings.append(notice("no_hands", footage=name, person=person))
         if options.face and not face_frames(motion).get("face_frames"):
-            warnings.append(
-                f"{name}: the face of {who} was not found; come closer, and look towards the camera"
-            )
+            warnings.append(notice("no_face", footage=name, person=person))
     return warnings
 
 
-def up_warnings(name: str, up_source: str, is_still: bool) -> list[str]:
+def numbered(motions: list[Motion]) -> list[tuple[int, Motion]]:
+    """Return the motions with the people's numbers in notices: 0 is the only person."""
+    return [(0, motions[0])] if len(motions) == 1 else list(enumerate(motions, 1))
+
+
+def up_warnings(name: str, up_source: str, is_still: bool) -> list[Notice]:
     """Say where the up direction is a guess: in a still image without edges of walls, doors or
     floors.
     """
     if up_source == LINES or not is_still:
         return []
-    deviation = UP_DEVIATIONS_DEG[up_source][is_still]
-    return [
-        f"{name}: no edges in this picture show which way is up, so it follows from the people's "
-        "posture alone, and "
-        f"the result may lean by {deviation:.0f} degrees or more: check it from the side, and "
-        "rotate it if it does"
-    ]
+    return [notice("guessed_up", footage=name, degrees=UP_DEVIATIONS_DEG[up_source][is_still])]
 
 
 def face_frames(motion: Motion) -> dict[str, Any]:
@@ -197,79 +192,86 @@ def _legs_confidence(motion: Motion) -> float:
 
 def floor_warnings(
     name: str, body: Body, motions: list[Motion], heights_given: int = 0
-) -> list[str]:
-    """List in sentences where people stand on other floors or on steps, and where feet are under
-    the floor.
+) -> list[Notice]:
+    """List where people stand on other floors or on steps, and where feet are under the floor.
 
     There are none on uneven ground, which has no floor.
 
     :param heights_given: of how many people the height was known.
     """
     warnings = []
-    for number, motion in enumerate(motions, 1):
+    for person, motion in numbered(motions):
         if motion.uneven_ground:
             continue
-        who = "the person" if len(motions) == 1 else f"person {number}"
         heights = foot_heights(motion, body)
-        scale = "" if len(motions) == 1 else _GIVEN if heights_given >= len(motions) else _ESTIMATED
-        about = [
-            *_other_floors(who, heights, motion, scale),
-            *_steps(who, body, motion),
-            *_under_floor(who, heights, motion),
+        wrong_scale = ""
+        if len(motions) > 1:
+            all_given = heights_given >= len(motions)
+            wrong_scale = "given_heights" if all_given else "estimated_heights"
+        of_person: dict[str, Value] = {"footage": name, "person": person}
+        warnings += [
+            *_other_floors(of_person, heights, motion, wrong_scale),
+            *_steps(of_person, body, motion),
+            *_under_floor(of_person, heights, motion),
         ]
-        warnings += [f"{name}: {text}" for text in about]
     return warnings
 
 
-def _other_floors(who: str, heights: NDArray[np.float64], motion: Motion, scale: str) -> list[str]:
+def _other_floors(
+    of_person: dict[str, Value], heights: NDArray[np.float64], motion: Motion, wrong_scale: str
+) -> list[Notice]:
     """List the other floors of a person.
 
-    :param scale: what else puts a person off the floor of another from the first frame on; empty
-        for one person. With a size that is wrong by a quarter, a person is a quarter too near or
-        too far, and so above or below the others.
+    :param of_person: values of the notices: the footage, and who it is.
+    :param wrong_scale: what else puts a person off the floor of another from the first frame on;
+        empty for one person. With a size that is wrong by a quarter, a person is a quarter too near
+        or too far, and so above or below the others.
     """
-    texts = []
+    warnings = []
     for side, find in (("below", lower_floors), ("above", upper_floors)):
         spans = find(heights, motion.foot_contact, motion.timestamps)
         if spans:
-            most = max(float(np.abs(heights[slice(*span)].min(axis=1)).max()) for span in spans)
-            when = at_times([float(motion.timestamps[first]) for first, _ in spans])
-            whole = (
-                "capture the part that matters, with a start and end time, or with uneven ground"
+            height = max(float(np.abs(heights[slice(*span)].min(axis=1)).max()) for span in spans)
+            from_the_start = spans[0][0] <= motion.valid.argmax()
+            warnings.append(
+                notice(
+                    "other_floor",
+                    **of_person,
+                    height_m=height,
+                    side=side,
+                    times=[float(motion.timestamps[first]) for first, _ in spans],
+                    cause=wrong_scale if wrong_scale and from_the_start else "several_floors",
+                )
             )
-            if scale and spans[0][0] <= motion.valid.argmax():
-                cause = f", so either {scale}; or the clip has more than one floor: {whole}"
-            else:
-                cause = f", so the clip has more than one floor: {whole}"
-            texts.append(f"{who} stands up to {most:.1f} m {side} the floor {when}{cause}")
-    return texts
+    return warnings
 
 
-def _steps(who: str, body: Body, motion: Motion) -> list[str]:
+def _steps(of_person: dict[str, Value], body: Body, motion: Motion) -> list[Notice]:
     if np.array_equal(motion.poses, motion.poses_raw):
         return []
     rests = steps(foot_heights(motion, body, raw=True), motion.foot_contact, motion.timestamps)
     if not rests:
         return []
     first, height = max(rests, key=lambda rest: abs(rest[1]))
-    side = "above" if height > 0 else "below"
-    when = at_times([float(motion.timestamps[first])])
     return [
-        f"the feet of {who} rest {100 * abs(height):.0f} cm {side} the floor {when}, as on a step; "
-        "they were put on "
-        "it. For stairs and slopes, capture with uneven ground"
+        notice(
+            "step",
+            **of_person,
+            height_cm=100 * abs(float(height)),
+            side="above" if height > 0 else "below",
+            times=[float(motion.timestamps[first])],
+        )
     ]
 
 
-def _under_floor(who: str, heights: NDArray[np.float64], motion: Motion) -> list[str]:
+def _under_floor(
+    of_person: dict[str, Value], heights: NDArray[np.float64], motion: Motion
+) -> list[Notice]:
     lowest = heights.min(axis=1)
     for span in lower_floors(heights, motion.foot_contact, motion.timestamps):
         lowest[slice(*span)] = 0.0
-    count = int((lowest < -UNDER_FLOOR_M).sum())
-    if not count:
+    under = int((lowest < -UNDER_FLOOR_M).sum())
+    if not under:
         return []
-    deepest = -100 * float(lowest.min())
-    return [
-        f"a foot of {who} is up to {deepest:.0f} cm under the floor in {count} of "
-        f"{counted(len(motion), 'frame')}"
-    ]
+    depth_cm = -100 * float(lowest.min())
+    return [notice("under_floor", **of_person, depth_cm=depth_cm, under=under, total=len(motion))]

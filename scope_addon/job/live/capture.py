@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ....solver.errors import ScopeError
+from ...capture_report import warnings_as_json
 from ...live.outputs.footage import Footage
 from ...live.outputs.people_recording import PeopleRecording
 from ...live.outputs.pose_values import values
 from ...live.run import Listeners, LiveOptions, LiveProgress, run_live
 from ...live.sources import Picture, Source, open_source
+from ...notices import OTHER, Notice, notice
 from .commands import Commands
 from .request import LiveRequest
 
@@ -66,17 +68,20 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     facts = {
         "camera": camera.source if camera else "",
         "fps": {"total": report["poses_per_second"]},
+        **warnings_as_json(warnings),
     }
-    send("result", motions=[path.name for path in saved], report={**facts, "warnings": warnings})
+    send("result", motions=[path.name for path in saved], report=facts)
 
 
-def save_footage(footage: Footage) -> list[str]:
+def save_footage(footage: Footage) -> list[Notice]:
     """Finish the video of a recording, which is not lost if that fails; return what went wrong."""
     try:
         footage.save()
     except ScopeError as error:
-        return [str(error)]
-    return [f"{footage.missing} in the footage"] if footage.missing else []
+        return [notice(OTHER, text=str(error))]
+    if footage.lost == 0:
+        return []
+    return [notice("lost_frame" if footage.lost == 1 else "lost_frames", lost=footage.lost)]
 
 
 class _Sender:

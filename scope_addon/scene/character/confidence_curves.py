@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...motion import Motion
-from ...review_spans import REASONS, find_review_spans
+from ...notices import REASONS
+from ...review_spans import find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
 
 CONFIDENCE = "confidence"

@@ -22,6 +22,7 @@ from ....solver.body import Body
 from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, UsageError
 from ...motion import Motion
+from ...notices import Notice
 from ..animation_data import actions
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from ..character.bone_display import remove_if_unused
@@ -187,7 +188,7 @@ def export_motions(
     build_options: BuildOptions | None = None,
     export_options: ExportOptions | None = None,
     progress: Progress | None = None,
-) -> tuple[list[Path], list[str]]:
+) -> tuple[list[Path], list[Notice]]:
     """Build the motions in a temporary scene, write one or more files, and leave the session as it
     was.
 
@@ -203,7 +204,7 @@ def export_motions(
     for each in paths:
         check_output(each)
     written: list[Path] = []
-    warnings: list[str] = []
+    warnings: list[Notice] = []
     scene_paths = [p for p in paths if Path(p).suffix.lower() != ".npz"]
     for each in (p for p in paths if p not in scene_paths):
         written += export(each, motions=motions)

@@ -14,6 +14,7 @@ import bpy
 from ....solver.body import Body
 from ...errors import UsageError
 from ...motion import Motion
+from ...notices import Notice, notice
 from ...retarget.expression_map import ExpressionMap
 from ...retarget.rig_source import RigSource
 from ..build import BuildOptions, build_scene
@@ -42,7 +43,7 @@ def export_on_rig(
     source: RigSource,
     options: RigExportOptions,
     footage: Path | None = None,
-) -> tuple[list[Path], list[str]]:
+) -> tuple[list[Path], list[Notice]]:
     """Retarget every person's motion to a copy of the rig, write one or more files, and leave the
     session as it was.
 
@@ -63,10 +64,7 @@ def export_on_rig(
             rig = load_rig(source, result.collection)
             bones = rig_bone_map(source, rig)
             if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
-                warnings.append(
-                    f"the bones of '{rig.name}' were guessed from its rest pose alone; "
-                    "check the result"
-                )
+                warnings.append(notice("guessed_bones", rig=rig.name))
             if len(motions) > 1:
                 if travel is None:
                     travel = common_travel(
@@ -110,7 +108,7 @@ def _retarget_face(
     source: RigSource,
     *,
     bones_move_it: bool,
-) -> list[str]:
+) -> list[Notice]:
     """Retarget the captured expressions, if there are any, to the rig's meshes; return warnings.
 
     :param bones_move_it: whether bones show the expressions, so that there may be no shape keys.
@@ -125,7 +123,7 @@ def _retarget_face(
     except UsageError as error:
         if given is not None:
             raise
-        return [f"the face was not retargeted: {error}"]
+        return [notice("face_not_retargeted", reason=str(error))]
     return []
 
 

@@ -17,6 +17,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError
+from ...notices import Notice, notice
 from ...retarget.bone_map import PHALANGES
 from ...retarget.skeleton import Skeleton
 from ..character.root_object import root_object, topmost
@@ -183,7 +184,7 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
 
 def blocked_bones(
     rig: bpy.types.Object, names: list[str], turns: NDArray[np.float64], wanted: NDArray[np.float64]
-) -> list[str]:
+) -> list[Notice]:
     """Return warnings about bones that deviate from the motion although they can be rotated, such
     as a leg with IK.
 
@@ -201,14 +202,12 @@ def blocked_bones(
     blocked = [name for name, angle in zip(names, off, strict=True) if angle > _MAX_DEVIATION]
     if not blocked:
         return []
-    others = {1: "", 2: f" and '{blocked[-1]}'"}.get(
-        len(blocked), f" and {len(blocked) - 1} other bones"
-    )
-    return [
-        f"'{blocked[0]}'{others} of '{rig.name}' cannot follow the motion: mute the constraints or "
-        "drivers that "
-        "control them, such as IK, or put the bones that control them into the list"
-    ]
+    first, *others = blocked
+    if not others:
+        return [notice("blocked_bone", bone=first, rig=rig.name)]
+    if len(others) == 1:
+        return [notice("blocked_two_bones", bone=first, other=others[0], rig=rig.name)]
+    return [notice("blocked_bones", bone=first, others=len(others), rig=rig.name)]
 
 
 def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:

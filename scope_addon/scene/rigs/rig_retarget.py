@@ -16,6 +16,7 @@ from ....solver.errors import InputError
 from ...edit.clip import Clip
 from ...edit.root_motion import about_z, floor_trajectory
 from ...errors import UsageError
+from ...notices import Notice
 from ...retarget.bone_map import BoneMap
 from ...retarget.expression_map import ExpressionMap
 from ...retarget.guess import RestBones, guess
@@ -79,7 +80,7 @@ class RetargetResult:
     """
 
     action: bpy.types.Action
-    warnings: list[str]
+    warnings: list[Notice]
     travel: float
 
 

@@ -9,22 +9,24 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ....solver.loaders.body_file import load_body
+from ...capture_report import Report
 from ...errors import UsageError, VideoError
-from ...footage import display_text
 from ...job.cache import Cache, CachedCapture
 from ...job.process import ROOT, START_SCRIPT, WorkerProcess
 from ...job.progress.job_progress import BUILDING, JobProgress
 from ...job.progress.stage_times import kind_of, load_stage_times, save_stage_times
 from ...job.request import JobRequest, code_version
 from ...motion import Motion
+from ...notices import notice
 from ...options import Place
 from ...options.body_choice import chosen_body
 from ...scene.build import BuildOptions, BuildResult, build_scene
@@ -145,7 +147,7 @@ class CaptureJob:
             [(path, path.read_bytes()) for path in captured.motions],
             self._request.values["body"],
             self._request.footage,
-            captured.report,
+            Report.from_json(captured.report),
             self._options,
         )
 
@@ -155,7 +157,7 @@ def build_capture(
     contents: Sequence[tuple[Path, bytes]],
     body: str,
     footage: str,
-    report: Mapping[str, Any],
+    report: Report,
     options: BuildOptions,
 ) -> BuildResult:
     """Build a capture in a scene, show its result, and store its motions.
@@ -167,18 +169,16 @@ def build_capture(
     :raises ScopeError: the motions cannot be built; the scene is unchanged.
     """
     motions = [Motion.load(path, content) for path, content in contents]
-    warnings = list(report.get("warnings", ()))
+    warnings = list(report.warnings)
     shows_footage = bool(footage) and Path(footage).is_file()
     if footage and not shows_footage:
-        warnings.append(f"{footage} no longer exists, so the camera shows no footage")
+        warnings.append(notice("missing_footage", footage=footage))
     with window_shows(scene):
         result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
     store_motions(result, [content for _, content in contents], body)
     if options.frame_rate == "keep" and len(motions[0]) > 1:
         warnings += rate_warnings(result.frame_rate, float(motions[0].mocap_framerate))
-    report = dict(
-        report, warnings=[display_text(warning) for warning in warnings + result.warnings]
-    )
+    report = replace(report, warnings=warnings + result.warnings)
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
     return result

@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
 
 from ...footage import display_text
+from ...scene.frame_spans import parse_spans
 from .. import warm_up
 from ..export_operators import FORMATS, is_available
 from ..files.file_field import draw_file
 from ..presets import SCOPE_PT_capture_presets
-from ..reporting import iface_
+from ..reporting import iface_, warning_text
 from ..translations import CONTEXT
 from ..view.comparison import camera_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
 from .captures import draw_captures, people_of, people_text, shown_capture
 from .frame_rate_operators import differs, keyed_for
+from .result import stored_warning
 
 if TYPE_CHECKING:
     from ...job.progress.job_progress import JobProgress
@@ -287,20 +288,11 @@ def _draw_warning(
     context: bpy.types.Context, box: bpy.types.UILayout, warning: bpy.types.PropertyGroup
 ) -> None:
     """Draw a warning, and for each of its spans a button that goes to the first frame."""
-    draw_text(context, box, warning.text, "ERROR")
+    draw_text(context, box, warning_text(stored_warning(warning)), "ERROR")
     if warning.spans:
         grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
-        for span in warning.spans.split(","):
-            if (frame := first_frame(span)) is not None:
-                grid.operator("scope.go_to_frame", text=span).frame = frame
-
-
-def first_frame(span: str) -> int | None:
-    """Return the first frame of a span: 12 of ``12-18``, -3 of ``-3-4``; None if the text is
-    none.
-    """
-    found = re.fullmatch(r"(-?\d{1,7})(--?\d{1,7})?", span, re.ASCII)
-    return int(found.group(1)) if found else None
+        for span in parse_spans(warning.spans):
+            grid.operator("scope.go_to_frame", text=str(span)).frame = span.first
 
 
 def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:

@@ -33,8 +33,9 @@ def _clear_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Conte
 class SCOPE_PG_warning(bpy.types.PropertyGroup):
     """A warning about the result."""
 
-    text: StringProperty()
-    spans: StringProperty()  # scene frames, such as "12-18,40"
+    text: StringProperty()  # in English
+    record: StringProperty()  # JSON of the notice, from which it is shown in other languages
+    spans: StringProperty()  # scene frames; see `frame_spans`
 
 
 class SCOPE_PG_result(bpy.types.PropertyGroup):

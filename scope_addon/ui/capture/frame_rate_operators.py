@@ -7,38 +7,45 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ...notices import Notice, notice
 from ...scene.animation_data.stored_values import stored_rate
+from ...scene.frame_spans import parse_spans, spans_text
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
-from ..reporting import ReportingOperator, rpt_, sentence, tip_
+from ..reporting import ReportingOperator, rpt_, tip_
 from .captures import people_of, shown_capture
+from .result import add_warning, stored_warning
 
 if TYPE_CHECKING:
     from ...motion import Motion
 
 _SAME = 0.01  # frames per second
 _WHOLE = 1e-5  # how far the keys' distance may be from whole frames, of which thousands add up
-RATE_WARNING = "the scene keeps its"  # how the warnings begin that another frame rate settles
-DRIFT_WARNING = "the background image drifts"
+# Warnings that another frame rate settles.
+_OF_RATE = ("scene_rate", "scene_rate_multiple", "footage_drifts")
 
 
-def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list[str]:
+def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list[Notice]:
     """Return the warning that a scene keeps another frame rate than a motion has, and where its
     keys lie, if so.
 
     :param scene_rate: frames per second of the scene.
     :param rate: frames per second of the motion; 0 for a still image.
-    :param what: has the other rate.
+    :param what: has the other rate: a key of ``notices.PHRASES``.
     """
     if not rate > 0 or abs(rate - scene_rate) <= _SAME:
         return []
     apart = scene_rate / rate
-    is_whole = apart > 1.5 and abs(apart - round(apart)) < _WHOLE
-    lie = f"are {round(apart)} frames apart" if is_whole else "lie between frames"
-    return [
-        f"{RATE_WARNING} {scene_rate:.5g} frames/s, the {what} has {rate:.5g}: keys {lie}; Match "
-        "Frame Rate changes "
-        "the scene's rate and moves them"
-    ]
+    if apart > 1.5 and abs(apart - round(apart)) < _WHOLE:
+        return [
+            notice(
+                "scene_rate_multiple",
+                scene_rate=scene_rate,
+                what=what,
+                rate=rate,
+                apart=round(apart),
+            )
+        ]
+    return [notice("scene_rate", scene_rate=scene_rate, what=what, rate=rate)]
 
 
 def differs(scene: bpy.types.Scene) -> bool:
@@ -148,7 +155,10 @@ def _motion(person: bpy.types.Object) -> Motion | None:
 
 
 def _update_results(
-    scene: bpy.types.Scene, rate: float, keyed: dict[bpy.types.Object, float], warnings: list[str]
+    scene: bpy.types.Scene,
+    rate: float,
+    keyed: dict[bpy.types.Object, float],
+    warnings: list[Notice],
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate"""
     from ...scene.datablock_names import holds
@@ -161,17 +171,18 @@ def _update_results(
             continue
         shown = result.warnings
         for index in reversed(range(len(shown))):
-            if shown[index].text.startswith((sentence(RATE_WARNING), sentence(DRIFT_WARNING))):
+            if stored_warning(shown[index]).code in _OF_RATE:
                 shown.remove(index)
             elif shown[index].spans:
-                shown[index].spans = retimed_spans(shown[index].spans, person, rate, keyed[person])
+                spans = parse_spans(shown[index].spans)
+                moved = retimed_spans(spans, person, rate, keyed[person])
+                shown[index].spans = spans_text(moved)
         if not person.get("scope_resampled"):  # which has keys on every frame
-            for text in rate_warnings(
-                rate, result.footage_rate, "footage" if result.footage else "motion"
-            ):
-                shown.add().text = sentence(text)
-    for text in dict.fromkeys(warnings):
-        scene.scope.result.warnings.add().text = sentence(text)
+            what = "footage" if result.footage else "motion"
+            for warning in rate_warnings(rate, result.footage_rate, what):
+                add_warning(result, warning)
+    for warning in dict.fromkeys(warnings):
+        add_warning(scene.scope.result, warning)
 
 
 CLASSES = (SCOPE_OT_match_frame_rate,)

@@ -5,28 +5,33 @@ review.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...capture_report import Report
 from ...motion import Motion
-from ...review_spans import REASONS, Span, find_review_spans
+from ...notices import Notice, notice, notice_from
+from ...review_spans import Span, find_review_spans
 from ...scene.build import BuildResult
 from ...scene.camera import pixel_aspect
-from ..reporting import sentence
+from ...scene.frame_spans import FrameSpan, spans_text
+from ..reporting import warning_text
 
 _MAX_SPANS = 12  # number of buttons
 
 
 def show_result(
-    shown: bpy.types.PropertyGroup, footage: str, report: dict[str, Any], result: BuildResult
+    shown: bpy.types.PropertyGroup, footage: str, report: Report, result: BuildResult
 ) -> None:
     """Fill the properties that the result panel shows.
 
     :param shown: the properties, which are overwritten.
-    :param report: report of the capture pipeline.
     """
     shown.footage = footage
     shown.people = len(result.people)
@@ -40,43 +45,62 @@ def show_result(
     sigmas = sigmas[np.isfinite(sigmas)]
     shown.sigma_cm = 100.0 * float(np.median(sigmas)) if sigmas.size else 0.0
     shown.heights = ", ".join(
-        _height(person) for person in report.get("per_person", ()) if "height_m" in person
+        _height(person) for person in report.per_person if "height_m" in person
     )
-    shown.frames_per_second = float(report.get("fps", {}).get("total", 0.0))
+    shown.frames_per_second = float(report.fps.get("total", 0.0))
     first = result.people[0].motion
     shown.footage_rate = first.mocap_framerate if len(first) > 1 else 0.0
-    shown.camera = str(report.get("camera", ""))
-    shown.execution = str(report.get("execution", ""))
+    shown.camera = str(report.camera)
+    shown.execution = str(report.execution)
     shown.resolution = [int(n) for n in first.image_size]
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
-    for line in report.get("warnings", ()):
-        _add_warning(shown, sentence(str(line), first.source))
-    for index, person in enumerate(result.people):
-        whose = "" if len(result.people) == 1 else f"person {index + 1}: "
-        for reason, spans in frame_warnings(
-            person.motion, person.frames, person.under_floor
-        ).items():
-            _add_warning(shown, sentence(whose + REASONS[reason]), spans)
+    for warning in report.warnings:
+        add_warning(shown, warning)
+    for index, person in enumerate(result.people, 1):
+        number = 0 if len(result.people) == 1 else index
+        spans = review_spans(person.motion, person.frames, person.under_floor)
+        for reason, of_reason in spans.items():
+            add_warning(shown, notice("review", person=number, reason=reason), of_reason)
 
 
-def frame_warnings(
+def review_spans(
     motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]
-) -> dict[str, str]:
+) -> dict[str, list[FrameSpan]]:
     """Return the review spans of a motion in scene frames, by reason; at most the longest
     ``_MAX_SPANS`` of each.
 
     :param frames: (T,) scene frame of each pose.
     :param under_floor: (T,) poses with a foot under the floor.
-    :return: reason, a key of ``REASONS``, to spans such as ``12-18,40``.
+    :return: reason, a key of ``REASONS``, to spans.
     """
     by_reason: dict[str, list[Span]] = {}
     for span in find_review_spans(motion, under_floor=under_floor):
         by_reason.setdefault(span.reason, []).append(span)
-    return {reason: _text(spans, frames) for reason, spans in by_reason.items()}
+    return {reason: _in_scene(spans, frames) for reason, spans in by_reason.items()}
 
 
-def _height(person: dict[str, Any]) -> str:
+def add_warning(
+    shown: bpy.types.PropertyGroup, warning: Notice, spans: Sequence[FrameSpan] = ()
+) -> None:
+    """Store a warning with a result: its English text, and the record from which it is shown in the
+    user's language.
+    """
+    stored = shown.warnings.add()
+    stored.text = warning_text(warning, str)
+    stored.record = json.dumps(warning.as_json())
+    stored.spans = spans_text(spans)
+
+
+def stored_warning(stored: bpy.types.PropertyGroup) -> Notice:
+    """Return a warning of a result. Of one whose record is damaged or missing, the text is left."""
+    record = None
+    with suppress(ValueError, RecursionError):
+        record = json.loads(stored.record)
+    return notice_from(record, stored.text, lambda found: warning_text(found, str))
+
+
+def _height(person: Mapping[str, Any]) -> str:
     """Return a stature with its standard deviation, where that is known, from the report about a
     person.
     """
@@ -86,17 +110,10 @@ def _height(person: dict[str, Any]) -> str:
     return f"{person['height_m']:.2f} m ± {sigma_m:.{2 if sigma_m >= 0.01 else 3}f}"
 
 
-def _text(spans: list[Span], frames: NDArray[np.float64]) -> str:
+def _in_scene(spans: list[Span], frames: NDArray[np.float64]) -> list[FrameSpan]:
+    """Return the longest spans in scene frames, in chronological order."""
     longest = sorted(spans, key=lambda span: span.first - span.last)[:_MAX_SPANS]
-    texts = []
-    for span in sorted(longest, key=lambda span: span.first):
-        a = round(float(frames[span.first]))
-        b = round(float(frames[span.last]))
-        texts.append(f"{a}" if a == b else f"{a}-{b}")
-    return ",".join(texts)
-
-
-def _add_warning(shown: bpy.types.PropertyGroup, text: str, spans: str = "") -> None:
-    warning = shown.warnings.add()
-    warning.text = text
-    warning.spans = spans
+    return [
+        FrameSpan(round(float(frames[span.first])), round(float(frames[span.last])))
+        for span in sorted(longest, key=lambda span: span.first)
+    ]

@@ -21,12 +21,14 @@ from ....solver.body import Body
 from ....solver.errors import ScopeError
 from ....solver.loaders.body_file import load_body
 from ...atomic_write import remove_abandoned
+from ...capture_report import Report
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import display_text
 from ...job.live.cameras import camera_source
 from ...job.live.process import PRESENCES, LiveProcess, ShownPose
 from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
+from ...notices import OTHER, Notice, notice
 from ...options import Place, options_at
 from ...options.body_choice import chosen_body
 from ...scene.datablock_names import is_in_layer
@@ -75,7 +77,7 @@ class LiveJob:
         self.status = LiveStatus()
         self.recording = self.finishing = self.cancelled = False
         self._record_at_s: float | None = None  # while a countdown runs
-        self.warnings: list[str] = []  # of the retargeting of a recording
+        self.warnings: list[Notice] = []  # of the retargeting of a recording
         self.poses = 0  # shown so far
         self._scene_uid = scene.session_uid
         self._request = live_request(scene)
@@ -277,7 +279,9 @@ class LiveJob:
         if self._kept and Path(self._kept).is_file():
             # Capture then captures the take once more
             self._footage = scene.scope.footage = str(self._kept)
-        built = build_capture(scene, contents, body, self._footage, result["report"], options)
+        built = build_capture(
+            scene, contents, body, self._footage, Report.from_json(result["report"]), options
+        )
         self._remove_bodies()
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()
@@ -287,7 +291,7 @@ class LiveJob:
                         bpy.context, built.people[0].armature
                     ).warnings
             except ScopeError as error:  # the recording is there, and can be retargeted later
-                self.warnings = [str(error)]
+                self.warnings = [notice(OTHER, text=str(error))]
         self._worker.close()
 
 

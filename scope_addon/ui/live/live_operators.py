@@ -8,7 +8,7 @@ import bpy
 from .. import warm_up
 from ..capture.capture_operators import state as capture_state
 from ..capture.job_operator import JobOperator
-from ..reporting import sentence, tip_
+from ..reporting import tip_, warning_text
 from ..view.sidebar import redraw_sidebars
 from ..view.view_operators import frame_selected, hide_startup_cube
 from ..view.viewports import viewports
@@ -85,7 +85,7 @@ class SCOPE_OT_live(JobOperator):
             return {"CANCELLED"}
         if not running:
             for warning in job.warnings:
-                self.report({"WARNING"}, sentence(warning))
+                self.report({"WARNING"}, warning_text(warning))
             self.report(
                 {"INFO"}, "Live capture recorded" if job.recording else "Live capture stopped"
             )

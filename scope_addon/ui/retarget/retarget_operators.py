@@ -11,7 +11,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from ..reporting import ReportingOperator, rpt_, sentence, tip_
+from ..reporting import ReportingOperator, rpt_, tip_, warning_text
 from .bone_list import fill_list, listed_map
 from .face_list import bones_move, fill_expressions, listed_or_guessed
 from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
@@ -103,7 +103,7 @@ class SCOPE_OT_retarget(_RigOperator):
         assert source is not None  # checked by poll
         result = retarget_to_chosen_rig(context, source)
         if result.warnings:
-            self.report({"WARNING"}, sentence(result.warnings[0]))
+            self.report({"WARNING"}, warning_text(result.warnings[0]))
             return ""
         return rpt_(
             "'{rig}' is now animated by the action '{action}'"

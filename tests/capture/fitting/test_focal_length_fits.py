@@ -130,8 +130,8 @@ def test_a_given_focal_length_is_not_estimated(body, monkeypatch):
     monkeypatch.setattr(FocalFits, "costs", never)
     options = CaptureOptions(quality="fast", fov_deg=40.0, wanted=VideoRange(0, 0.2))
     result = capture(SAMPLE, body, options)
-    assert result.report["camera"] == "given, 40 degrees"
-    assert result.report["focal_deviation"] == 0.0
+    assert result.report.camera == "given, 40 degrees"
+    assert result.report.focal_deviation == 0.0
 
 
 def test_fits_in_a_slow_thread_are_waited_for(body, monkeypatch):
@@ -149,5 +149,5 @@ def test_fits_in_a_slow_thread_are_waited_for(body, monkeypatch):
     np.testing.assert_array_equal(slowly.motions[0].poses, quick.motions[0].poses)
     assumed = choose_camera(640, 362).intrinsics[0, 0]
     truth = np.load(SAMPLE.with_name("sample_truth.npz"))["intrinsics"][0, 0]
-    estimate = quick.report["focal_px"]
+    estimate = quick.report.focal_px
     assert abs(np.log(estimate / truth)) < abs(np.log(assumed / truth))

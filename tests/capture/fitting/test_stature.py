@@ -200,11 +200,11 @@ def test_a_known_height_sets_size_and_distance():
         result = capture(SAMPLE, body, options)
         motion = result.motions[0]
         assert body.stature(motion.betas) == pytest.approx(height_m, abs=0.015)
-        assert result.report["per_person"][0]["height_m"] == pytest.approx(height_m, abs=0.015)
-        assert result.report["per_person"][0]["height_sigma_m"] == pytest.approx(0.005, abs=0.002)
+        assert result.report.per_person[0]["height_m"] == pytest.approx(height_m, abs=0.015)
+        assert result.report.per_person[0]["height_sigma_m"] == pytest.approx(0.005, abs=0.002)
         assert any(
             "2 heights were given, but one person was found" in text
-            for text in result.report["warnings"]
+            for text in map(str, result.report.warnings)
         )
         found[height_m] = np.linalg.norm(motion.joints_cam[:, 0], axis=1).mean()
     assert found[1.9] / found[1.5] == pytest.approx(1.9 / 1.5, rel=0.05)

@@ -22,10 +22,14 @@ from scope.scope_addon.capture.perception.face.face_record import RECORD
 from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.track import Tracklet
+from scope.scope_addon.notices import notice
 
 SIZE = (640, 480)
 FRAMES = 12
 WINDOW = Window(3, 7.5, 8.0, 12.0)
+
+
+NOTICE = notice("cuts", footage="a.mp4", times=[0.5])
 
 
 def record(seed: int = 0) -> WindowRecord:
@@ -62,7 +66,7 @@ def record(seed: int = 0) -> WindowRecord:
     cuts = [4]
     indices = np.arange(FRAMES) + 30
     return WindowRecord(
-        WINDOW, indices, times, sums, 2, 9, people, {0: region}, cuts, background, "CPU", ("dark",)
+        WINDOW, indices, times, sums, 2, 9, people, {0: region}, cuts, background, "CPU", [NOTICE]
     )
 
 
@@ -88,7 +92,7 @@ def test_everything_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 def test_a_window_without_people_is_read(tmp_path: Path) -> None:
-    empty = replace(record(), tracklets={}, anchor_regions={}, cut_rows=[], warnings=())
+    empty = replace(record(), tracklets={}, anchor_regions={}, cut_rows=[], warnings=[])
     save_window(tmp_path, empty, SIZE)
     read = load_window(tmp_path, WINDOW, SIZE)
     assert read is not None

@@ -44,7 +44,7 @@ def test_pictures_are_in_numerical_order(folder: Path, name: str) -> None:
         assert video.fps == 12
         assert (video.frame_count, video.width, video.height) == (6, 30, 20)
         assert [f.timestamp_s for f in frames] == pytest.approx([k / 12 for k in range(6)])
-        (warning,) = video.warnings
+        (warning,) = map(str, video.warnings)
         assert "88 numbers between 7 and 100 have no image" in warning
 
 
@@ -58,7 +58,7 @@ def test_without_a_rate_30_is_assumed(folder: Path) -> None:
         assert video.frame_count == 1
     with open_video(folder) as video:
         assert video.fps == 30
-        assert any("--fps on the command line" in warning for warning in video.warnings)
+        assert any("--fps on the command line" in warning for warning in map(str, video.warnings))
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_missing_pictures_leave_gaps_and_give_a_warning(
         assert [f.timestamp_s for f in video] == pytest.approx([t / 10 for t in times])
         assert [f.index for f in video] == list(range(len(numbers)))
         assert (
-            [says in warning for warning in video.warnings] == [True]
+            [says in warning for warning in map(str, video.warnings)] == [True]
             if says
             else not video.warnings
         )
@@ -106,7 +106,7 @@ def test_a_damaged_picture_ends_the_sequence_with_a_warning(folder: Path) -> Non
     (folder / "walk_9.png").write_bytes(b"no picture any more")
     with open_video(folder, VideoRange(fps=Fraction(10))) as video:
         assert [int(f.image_rgb[0, 0, 0]) for f in video] == [7, 8]
-        assert any("stopped after 2" in warning for warning in video.warnings)
+        assert any("stopped after 2" in warning for warning in map(str, video.warnings))
 
 
 def test_missing_pictures_are_errors(tmp_path: Path) -> None:

@@ -95,7 +95,7 @@ def test_an_unavailable_provider_gives_one_warning(runtime) -> None:
     open_session(Path("m.onnx"), 1, execution)
     open_session(Path("m.onnx"), 1, execution)
     assert fake.asked == [[CPU_NAME]] * 2
-    (warning,) = execution.warnings
+    (warning,) = map(str, execution.warnings)
     assert "CUDA was requested, but this onnxruntime has only CoreML, CPU" in warning
 
 
@@ -107,7 +107,7 @@ def test_a_failing_provider_is_not_tried_again(runtime, how: str) -> None:
         open_session(Path("m.onnx"), 1, execution)
     assert len([a for a in fake.asked if a[0] != CPU_NAME]) == 1
     assert execution.used == [CPU]
-    (warning,) = execution.warnings
+    (warning,) = map(str, execution.warnings)
     assert "CUDA cannot run the networks" in warning
     assert "\n" not in warning
 
@@ -160,4 +160,4 @@ def test_the_real_cpu(tmp_path: Path) -> None:
         pytest.skip("this machine has TensorRT")
     assert session.get_session_options().intra_op_num_threads == 2
     assert execution.used == [CPU]
-    assert "TensorRT was requested" in execution.warnings[0]
+    assert "TensorRT was requested" in str(execution.warnings[0])

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Seconds of stages by a clock that the test turns, and times of footage as text."""
+"""Seconds of stages by a clock that the test turns."""
 
 from __future__ import annotations
 
 import pytest
-from scope.scope_addon.capture.stages.clock import StageClock, at_times
+from scope.scope_addon.capture.stages.clock import StageClock
 
 
 def test_stages_add_up_also_when_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,16 +31,3 @@ def test_a_stage_that_took_no_time_has_a_rate() -> None:
     found = StageClock()
     found.seconds["decode"] = 0.0
     assert found.rates(3)["decode"] > 1e6
-
-
-@pytest.mark.parametrize(
-    ("times_s", "text"),
-    [
-        ([2.04], "at 2.0 s"),
-        ([2.0, 4.12], "at 2.0 s and at 4.1 s"),
-        ([1.0, 2.0, 3.0, 4.0], "at 1.0 s, at 2.0 s, at 3.0 s and at 4.0 s"),
-        ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "at 1.0 s, at 2.0 s, at 3.0 s, at 4.0 s and 2 more times"),
-    ],
-)
-def test_times_are_listed_up_to_the_fourth(times_s: list[float], text: str) -> None:
-    assert at_times(times_s) == text

@@ -52,7 +52,7 @@ def test_a_face_that_was_never_seen_has_no_rate(motion):
 
 def test_a_still_without_edges_says_that_up_is_a_guess():
     """And how far it may be off; clips, and pictures with edges, say nothing."""
-    (warning,) = up_warnings("a.jpg", BODIES, is_still=True)
+    (warning,) = map(str, up_warnings("a.jpg", BODIES, is_still=True))
     assert "a.jpg" in warning
     assert "11 degrees" in warning
     assert up_warnings("a.jpg", LINES, is_still=True) == []

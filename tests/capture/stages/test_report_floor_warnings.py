@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.report import floor_warnings
+from scope.scope_addon.capture.stages import report
 from scope.solver import rotations
 
 from ...made_motion import made_motion
@@ -32,6 +32,10 @@ def standing(body, height, raw=None):
 
 def from_second(second, height):
     return np.where(np.arange(90) >= 30 * second, height, 0.0)
+
+
+def floor_warnings(*arguments) -> list[str]:
+    return list(map(str, report.floor_warnings(*arguments)))
 
 
 def test_nothing_is_said_of_somebody_on_the_floor(body):

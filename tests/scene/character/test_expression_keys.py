@@ -74,7 +74,7 @@ def test_a_motion_without_a_face_gets_no_keys(whole_body, make_motion):
 
 def test_a_body_without_expressions_says_so(body, make_motion):
     built = build_scene([replace(make_motion(body, 4), face=made_face(4, jawOpen=JAW))], body)
-    assert "has no expressions" in built.warnings[0]
+    assert "has no expressions" in str(built.warnings[0])
     assert built.people[0].mesh.data.shape_keys.key_blocks.keys()[-1] == f"Shape{body.P - 1:03d}"
 
 

@@ -313,7 +313,7 @@ def test_bones_blocked_by_a_constraint_are_reported(source):
     constraint = rig.pose.bones[bone_of["left_knee"]].constraints.new("IK")
     constraint.target = target
     constraint.chain_count = 2
-    (warning,) = run(source, rig).warnings
+    (warning,) = map(str, run(source, rig).warnings)
     assert "'thigh_l'" in warning
     assert "cannot follow the motion: mute the constraints" in warning
     constraint.mute = True

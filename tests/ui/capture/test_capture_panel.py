@@ -9,6 +9,7 @@ import pytest
 from scope.scope_addon.job.progress.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import start_of, strips_of
+from scope.scope_addon.scene.frame_spans import parse_spans
 from scope.scope_addon.ui.capture import capture_job
 from scope.scope_addon.ui.capture.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
@@ -265,15 +266,13 @@ def test_comparing_a_hidden_capture_is_an_error(fake_worker, footage, way):
 
 
 def test_warnings_name_their_frames(fake_worker, footage):
-    from scope.scope_addon.ui.capture.capture_panel import first_frame
-
     captured(fake_worker, footage)
     scene = bpy.context.scene
-    spans = scene.scope.result.warnings[1].spans.split(",")
-    assert [first_frame(span) for span in spans] == [4, 8]
+    spans = parse_spans(scene.scope.result.warnings[1].spans)
+    assert [span.first for span in spans] == [4, 8]
     bpy.ops.scope.go_to_frame(frame=8)
     assert scene.frame_current == 8
-    assert [first_frame(span) for span in ("-12--4", "-3-4", "7")] == [-12, -3, 7]
+    assert parse_spans("-12--4,-3-4,7") == [(-12, -4), (-3, 4), (7, 7)]
     # one marker for both spans, which are close together
     assert [m.frame for m in scene.timeline_markers] == [4]
 

@@ -6,6 +6,7 @@ keys stay.
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.capture_report import Report
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
@@ -32,7 +33,7 @@ def built(start=START, **changes):
     show_result(
         result.collection.scope_result,
         "",
-        {"warnings": ["the scene keeps its 20 frames/s"]},
+        Report(warnings=rate_warnings(20.0, 30.0)),
         result,
     )
     bpy.context.scene.scope.capture = result.collection
@@ -252,7 +253,7 @@ def test_a_rate_that_was_changed_by_hand_is_taken_into_account(scene):
 
 def test_a_picture_has_no_frame_rate(scene, standing):
     result = build_scene([motion_of(walk(0.0))], BODY, None, BuildOptions())
-    show_result(result.collection.scope_result, "", {}, result)
+    show_result(result.collection.scope_result, "", Report(), result)
     with pytest.raises(RuntimeError, match="no captured video"):
         bpy.ops.scope.match_frame_rate()
 
@@ -267,7 +268,7 @@ def test_a_picture_has_no_frame_rate(scene, standing):
     ],
 )
 def test_keys_are_whole_frames_apart_only_if_they_stay_so(scene_rate, rate, said):
-    (text,) = rate_warnings(scene_rate, rate)
+    (text,) = map(str, rate_warnings(scene_rate, rate))
     assert f"keys {said}" in text
 
 

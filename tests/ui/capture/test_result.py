@@ -4,9 +4,17 @@
 from types import SimpleNamespace
 
 import numpy as np
+from scope.scope_addon.capture_report import Report
+from scope.scope_addon.notices import OTHER, notice
 from scope.scope_addon.scene.build import build_scene
+from scope.scope_addon.scene.frame_spans import FrameSpan
 from scope.scope_addon.ui.capture import capture_panel
-from scope.scope_addon.ui.capture.result import frame_warnings, show_result
+from scope.scope_addon.ui.capture.result import (
+    add_warning,
+    review_spans,
+    show_result,
+    stored_warning,
+)
 from scope.scope_addon.ui.reporting import sentence
 
 from ...made_motion import made_motion
@@ -17,9 +25,9 @@ def test_spans_are_listed_by_reason_in_scene_frames(body):
     motion.valid[[0, 20]] = False
     under = np.zeros(30, bool)
     under[3:6] = True
-    assert frame_warnings(motion, np.arange(30) + 10.0, under) == {
-        "unseen": "10,30",
-        "floor": "13-15",
+    assert review_spans(motion, np.arange(30) + 10.0, under) == {
+        "unseen": [(10, 10), (30, 30)],
+        "floor": [(13, 15)],
     }
 
 
@@ -32,12 +40,11 @@ def test_heights_and_joints_with_their_deviations(body):
         {"height_m": 1.741, "height_sigma_m": 0.0913},
         {"height_m": 1.5, "height_sigma_m": 0.005},
     )
-    show_result(
-        shown, "", {"per_person": [*heights, {"height_m": 1.62, "height_sigma_m": None}]}, result
-    )
+    unsure = {"height_m": 1.62, "height_sigma_m": None}
+    show_result(shown, "", Report(per_person=[*heights, unsure]), result)
     assert shown.heights == "1.74 m ± 0.09, 1.50 m ± 0.005, 1.62 m"
     assert np.isclose(shown.sigma_cm, 5.2, atol=1e-5)
-    show_result(shown, "", {}, result)
+    show_result(shown, "", Report(), result)
     assert shown.heights == ""
 
 
@@ -46,16 +53,25 @@ def test_a_warning_keeps_the_name_of_the_footage(body):
     motion.source = "my walk.mp4"
     result = build_scene([motion], body)
     shown = result.collection.scope_result
-    show_result(
-        shown,
-        "",
-        {"warnings": ["my walk.mp4: the person was not seen", "the lens is a guess"]},
-        result,
-    )
-    assert [w.text for w in shown.warnings][:2] == [
-        "my walk.mp4: the person was not seen",
-        "The lens is a guess",
-    ]
+    unseen = notice("unseen_legs", footage="my walk.mp4", person=0)
+    show_result(shown, "", Report(warnings=[unseen, notice("pixel_aspect")]), result)
+    texts = [stored.text for stored in shown.warnings]
+    assert texts[0].startswith("my walk.mp4: the legs of the person were not seen")
+    assert texts[1].startswith("The footage's pixels are not square")
+
+
+def test_a_stored_warning_is_known_by_its_record_and_else_by_its_text(body):
+    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    shown = build_scene([motion], body).collection.scope_result
+    drifts = notice("footage_drifts", frames=3.0)
+    add_warning(shown, drifts, [FrameSpan(3, 5), FrameSpan(8, 8)])
+    stored = shown.warnings[0]
+    assert stored_warning(stored) == drifts
+    assert stored.spans == "3-5,8"
+    for record in ("", "[" * 100_000, "3", '{"code": "footage_drifts", "values": {"frames": 4.0}}'):
+        stored.record = record
+        assert str(stored_warning(stored)) == stored.text
+        assert stored_warning(stored).code == OTHER
 
 
 def test_a_sentence_begins_with_a_capital_but_not_a_file_name():
@@ -71,7 +87,7 @@ def test_figures_are_wrapped_to_the_width_of_the_sidebar(body):
     shown = result.collection.scope_result
     drawn = []
     heights = [{"height_m": 1.7, "height_sigma_m": 0.1}] * 4
-    show_result(shown, "", {"camera": "estimated, 52 degrees", "per_person": heights}, result)
+    show_result(shown, "", Report(camera="estimated, 52 degrees", per_person=heights), result)
     layout = SimpleNamespace(label=lambda text="", icon="NONE": drawn.append(text))
     layout.column = lambda align=False: layout
     region = SimpleNamespace(width=260)

@@ -474,7 +474,7 @@ def test_a_capture_with_hands_from_file_to_motion(shared):
     m = result.motions[0]
     assert m.body_model == "scope_h"
     assert m.keypoints2d.shape[1] == len(m.keypoints2d_names) == 33 + 42
-    assert result.report["per_person"][0]["left_hand_frames"] > 0.8 * len(m)
+    assert result.report.per_person[0]["left_hand_frames"] > 0.8 * len(m)
     index = [body.keypoint_names.index(str(name)) for name in m.keypoints2d_names[33:]]
     R, t = body.forward_kinematics(
         exp(m.poses.reshape(len(m), -1, 3).astype(float)), m.trans.astype(float), m.betas
@@ -504,9 +504,9 @@ def test_auto_captures_large_hands_and_leaves_the_fingers_of_small_ones_at_rest(
         capture(shared / f"data/clips/{name}.mp4", body, replace(options, wanted=wanted))
         for name, wanted in clips.items()
     )
-    assert large.report["per_person"][0]["right_hand_frames"] == len(large.motions[0])
-    assert small.report["per_person"][0]["right_hand_frames"] == 0
-    assert not any("hands" in warning for warning in small.report["warnings"])
+    assert large.report.per_person[0]["right_hand_frames"] == len(large.motions[0])
+    assert small.report.per_person[0]["right_hand_frames"] == 0
+    assert not any("hands" in warning for warning in map(str, small.report.warnings))
     fingers = [
         body.joint_names.index(f"right_{name}{k}")
         for name in ("index", "middle")

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What users should know about a result: the code of every warning, its English sentence, and how
+the values in it are written.
+
+A part of Scope that warns returns a ``Notice``, made by ``notice("cuts", footage=..., times=...)``.
+Whoever shows it writes the sentence: ``str`` in English, ``text`` in another language, ``parts``
+with the times in the footage apart. Standard library only.
+"""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+MAX_TIMES = 4  # that are listed in a sentence
+OTHER = "other"  # the code of a sentence that is none of ours, such as an error's message
+
+Value = str | int | float | list[float]
+Translate = Callable[[str], str]
+
+# In braces, the names of values. After a colon, how a value is written: as Python does it, or
+# - who: of whom the warning is; 0 is the only person, n the n-th one
+# - whose: the same before a sentence, and nothing for the only person
+# - frames: a count with its noun
+# - times: a list of times in the footage, in seconds
+# - phrase: one of the phrases below, by its key.
+SENTENCES = {
+    OTHER: "{text}",
+    # footage
+    "assumed_frame_rate": "{footage}: images have no frame rate, so 30 frames per second were "
+    "assumed; set another with --fps on the command line",
+    "range_of_image": "{footage} is a single image: a start, an end or a frame rate has no effect",
+    "first_of_animation": "{footage} is an animation of {images} images, and only the first was "
+    "captured; convert it to an .mp4 or a .gif to capture all of them",
+    "mirrored": "{footage} is mirrored by its metadata, which Blender ignores; there, switch on "
+    "Flip {axis} of the camera's background image",
+    "frame_rate_above_footage": "{footage} has {rate:g} frames per second; {wanted:g} would "
+    "repeat some, so each was used once",
+    "frame_size_changes": "the frame size changes within {footage}; all frames were scaled to the "
+    "first one's",
+    "decoding_stopped": "decoding {footage} stopped after {decoded} of about {total} frames; the "
+    "file may be damaged or incomplete",
+    "growing_file": "{footage} grew while it was read; capture it again once it is written "
+    "completely",
+    "missing_images": "{footage}: {missing} numbers between {first} and {last} have no image; the "
+    "time of these frames was kept free",
+    "consecutive_images": "{footage}: {missing} numbers between {first} and {last} have no image, "
+    "so the images were read as consecutive frames",
+    # networks
+    "provider_missing": "{provider} was requested, but this onnxruntime has only {available}; the "
+    "networks run on the CPU",
+    "provider_failed": "{provider} cannot run the networks ({reason}); they run on the CPU instead",
+    "too_many_threads": "{threads} threads were requested, but there are only {cores} cores",
+    # the captured people
+    "cuts": "{footage} cuts to another scene {times:times}: capture each scene separately, with a "
+    "start and end time",
+    "heights_for_one": "{footage}: {heights} heights were given, but one person was found",
+    "heights_for_several": "{footage}: {heights} heights were given, but {people} people were "
+    "found",
+    "unseen_frames": "{footage}: {person:who} was not seen in {unseen} of {total:frames}; these "
+    "are filled in",
+    "unseen_legs": "{footage}: the legs of {person:who} were not seen, so their motion is a guess",
+    "no_hands": "{footage}: no hands of {person:who} were found; come closer, or show the palms to "
+    "the camera more often",
+    "no_face": "{footage}: the face of {person:who} was not found; come closer, and look towards "
+    "the camera",
+    "guessed_up": "{footage}: no edges in this picture show which way is up, so it follows from "
+    "the people's posture alone, and the result may lean by {degrees:.0f} degrees or more: check "
+    "it from the side, and rotate it if it does",
+    "other_floor": "{footage}: {person:who} stands up to {height_m:.1f} m {side:phrase} the floor "
+    "{times:times}, so {cause:phrase}",
+    "step": "{footage}: the feet of {person:who} rest {height_cm:.0f} cm {side:phrase} the floor "
+    "{times:times}, as on a step; they were put on it. For stairs and slopes, capture with uneven "
+    "ground",
+    "under_floor": "{footage}: a foot of {person:who} is up to {depth_cm:.0f} cm under the floor "
+    "in {under} of {total:frames}",
+    "review": "{person:whose}{reason:phrase}",
+    # the scene
+    "no_expressions": "the body '{body}' has no expressions, so it does not show the face, which "
+    "is in the motion file; the built-in bodies do",
+    "scene_unit": "the scene's unit is {unit_m:g} m, but the capture is in metres: scale the new "
+    "objects by {scale:g}, or set Unit Scale to 1 in the scene's properties; exported files have "
+    "the true size",
+    "scene_rate": "the scene keeps its {scene_rate:.5g} frames/s, the {what:phrase} has "
+    "{rate:.5g}: keys lie between frames; Match Frame Rate changes the scene's rate and moves them",
+    "scene_rate_multiple": "the scene keeps its {scene_rate:.5g} frames/s, the {what:phrase} has "
+    "{rate:.5g}: keys are {apart} frames apart; Match Frame Rate changes the scene's rate and "
+    "moves them",
+    "pixel_aspect": "the footage's pixels are not square, and the pixel aspect belongs to the "
+    "scene, not the camera: set the scene's resolution from the footage, as Compare with Footage "
+    "does, for an exact overlay",
+    "missing_footage": "{footage} no longer exists, so the camera shows no footage",
+    "undecodable_footage": "Blender cannot decode {footage}, so the camera shows no footage",
+    "footage_size": "Blender shows {footage} at {width} x {height}, but it was captured at "
+    "{captured_width} x {captured_height}: turn or scale the camera's background image",
+    "footage_drifts": "the background image drifts from the motion by up to {frames:.0f} frames, "
+    "because the scene does not have the footage's constant frame rate and the lens distorts; the "
+    "motion keeps its speed",
+    "image_numbers": "Blender cannot show the image sequence from {first} on, because images are "
+    "missing or their numbers are too large, so the camera shows that image only; renumber the "
+    "files consecutively to show all",
+    # a live capture
+    "lost_frame": "{lost} frame is missing in the footage",
+    "lost_frames": "{lost} frames are missing in the footage",
+    # a rig
+    "guessed_bones": "the bones of '{rig}' were guessed from its rest pose alone; check the result",
+    "face_not_retargeted": "the face was not retargeted: {reason}",
+    "blocked_bone": "'{bone}' of '{rig}' cannot follow the motion: mute the constraints or drivers "
+    "that control them, such as IK, or put the bones that control them into the list",
+    "blocked_two_bones": "'{bone}' and '{other}' of '{rig}' cannot follow the motion: mute the "
+    "constraints or drivers that control them, such as IK, or put the bones that control them into "
+    "the list",
+    "blocked_bones": "'{bone}' and {others} other bones of '{rig}' cannot follow the motion: mute "
+    "the constraints or drivers that control them, such as IK, or put the bones that control them "
+    "into the list",
+    # an imported motion
+    "other_gender": "the motion is of a {gender} body, but '{body}' is {body_gender}",
+    "other_body": "the poses were applied as they are to Scope's own body, whose rest pose and "
+    "proportions differ from SMPL's; with your SMPL, SMPL+H or SMPL-X file as the body, the motion "
+    "is exact",
+    "parts_left_out": "the body '{body}' has no {parts}, whose motion was left out",
+    "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
+    "no_translation": "the file holds no translation: the pelvis stays in place",
+    "unsure_up": "the file's up axis is not clear from the motion; {axis} was assumed",
+    "other_up": "{axis} points up in the file; the motion was placed on the floor by its feet",
+}
+
+# Why frames should be reviewed.
+REASONS = {
+    "unseen": "not visible: the pose is filled in",
+    "far": "the body is far from the footage: check these frames",
+    "unsure": "low confidence: check these frames",
+    "floor": "a foot is under the floor",
+}
+_SEVERAL_FLOORS = (
+    "the clip has more than one floor: capture the part that matters, with a start and end time, "
+    "or with uneven ground"
+)
+PHRASES = REASONS | {
+    "above": "above",
+    "below": "below",
+    "footage": "footage",
+    "motion": "motion",
+    # why somebody is not on the floor
+    "several_floors": _SEVERAL_FLOORS,
+    "estimated_heights": "either somebody is taller or smaller than estimated: give everybody's "
+    f"height; or {_SEVERAL_FLOORS}",
+    "given_heights": "either the heights are given in another order than the people, the most "
+    f"prominent first; or {_SEVERAL_FLOORS}",
+}
+# The parts of sentences that ``who``, ``frames`` and ``times`` stand for.
+THE_PERSON = "the person"
+PERSON = "person {number}"
+ONE_FRAME = "{count} frame"
+FRAMES = "{count} frames"
+AT_TIME = "at {seconds} s"
+MORE_TIMES = "{count} more times"
+AND = "and"
+PARTS = (THE_PERSON, PERSON, ONE_FRAME, FRAMES, AT_TIME, MORE_TIMES, AND)
+
+
+class TimeText(NamedTuple):
+    """A time in the footage, as a sentence says it."""
+
+    text: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something that a user should know: a key of ``SENTENCES``, and the values in its sentence."""
+
+    code: str
+    values: Mapping[str, Value] = field(default_factory=dict)
+
+    def __hash__(self) -> int:
+        """Return a hash for sets of notices; values, which may be lists, have none."""
+        return hash(self.code)
+
+    def __str__(self) -> str:
+        """Return the English sentence."""
+        return self.text(str)
+
+    def text(self, translate: Translate) -> str:
+        """Return the sentence in the language of ``translate``, which takes English texts."""
+        parts = self.parts(translate)
+        return "".join(part.text if isinstance(part, TimeText) else part for part in parts)
+
+    def parts(self, translate: Translate = str) -> list[str | TimeText]:
+        """Return the sentence as its texts and the times in the footage between them.
+
+        :raises KeyError: the code is unknown, or a value is missing.
+        :raises ValueError: a value does not have the type that the sentence needs. Also TypeError.
+        """
+        parts: list[str | TimeText] = []
+        for literal, name, spec, _ in string.Formatter().parse(translate(SENTENCES[self.code])):
+            parts.append(literal)
+            if name is not None:
+                parts += _written(self.values[name], spec or "", translate)
+        return parts
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the notice for a file or another process."""
+        return {"code": self.code, "values": dict(self.values)}
+
+
+def notice(code: str, **values: Value) -> Notice:
+    """Return the notice of this code with these values."""
+    return Notice(code, values)
+
+
+def notice_from(record: object, sentence: str, written: Callable[[Notice], str] = str) -> Notice:
+    """Return the notice that another version or process has recorded beside its sentence.
+
+    :param record: as of ``Notice.as_json``; anything else, or a record that does not make the
+        sentence, gives a notice that says the sentence alone.
+    :param written: how the sentence was written.
+    """
+    if isinstance(record, Mapping):
+        code = record.get("code")
+        values = record.get("values")
+        if isinstance(code, str) and isinstance(values, Mapping):
+            found = Notice(code, dict(values))
+            with suppress(KeyError, ValueError, TypeError, AttributeError):
+                if written(found) == sentence:
+                    return found
+    return notice(OTHER, text=sentence)
+
+
+def notices_of(report: Mapping[str, Any]) -> list[Notice]:
+    """Return the notices of a report as JSON has it: their sentences are its ``warnings``, their
+    records its ``notices``, which may be missing.
+    """
+    sentences = [str(sentence) for sentence in report.get("warnings", ())]
+    records = report.get("notices")
+    if not isinstance(records, list) or len(records) != len(sentences):
+        records = [None] * len(sentences)
+    return [notice_from(*each) for each in zip(records, sentences, strict=True)]
+
+
+def _written(value: Value, spec: str, translate: Translate) -> list[str | TimeText]:
+    """Return how a sentence writes one of its values."""
+    if spec == "who":
+        return [_person(value, translate)]
+    if spec == "whose":
+        return [f"{_person(value, translate)}: " if value else ""]
+    if spec == "frames":
+        return [translate(ONE_FRAME if value == 1 else FRAMES).format(count=value)]
+    if spec == "phrase":
+        return [translate(PHRASES[str(value)])]
+    if spec == "times":
+        if not isinstance(value, list):
+            raise TypeError(f"times must be a list, not {value!r}")
+        return _times(value, translate)
+    return [format(value, spec)]
+
+
+def _person(number: Value, translate: Translate) -> str:
+    return translate(PERSON).format(number=number) if number else translate(THE_PERSON)
+
+
+def _times(times_s: list[float], translate: Translate) -> list[str | TimeText]:
+    """Write times as "at 2.0 s and at 4.1 s"; if there are many, only the first few."""
+    listed: list[str | TimeText] = []
+    for time_s in times_s[:MAX_TIMES]:
+        seconds = f"{time_s:.1f}"
+        listed.append(TimeText(translate(AT_TIME).format(seconds=seconds), float(seconds)))
+    more = len(times_s) - len(listed)
+    if more:
+        listed.append(translate(MORE_TIMES).format(count=more))
+    written = listed[:1]
+    for index, time in enumerate(listed[1:], 2):
+        written += [f" {translate(AND)} " if index == len(listed) else ", ", time]
+    return written
