@@ -84,6 +84,8 @@ SHARED = (
     "json_file",
     "processes",
     "review_spans",
+    "notices",
+    "capture_report",
     "__init__",
 )
 # in docs/architecture.md, which says so
