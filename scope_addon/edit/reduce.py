@@ -64,7 +64,7 @@ def _keep(
 ) -> NDArray[np.intp]:
     """Split a span at its worst key while the error exceeds the bound (Ramer, Douglas and Peucker).
 
-    :param error: of the keys in a slice when interpolated between two keys.
+    :param error: returns the errors of the keys in a slice, interpolated between two keys.
     """
     keep = np.zeros(len(times), bool)
     keep[[0, -1]] = True

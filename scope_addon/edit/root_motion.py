@@ -66,7 +66,7 @@ def with_trajectory(
 def about_z(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return rotations (T, 3, 3) about the vertical.
 
-    :param angles: of any shape with T entries, radians.
+    :param angles: T angles in any shape, radians.
     """
     c = np.cos(angles)
     s = np.sin(angles)

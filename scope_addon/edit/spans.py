@@ -133,7 +133,8 @@ def _velocities(clip: Clip, k: int, side: int) -> tuple[NDArray[np.float64], NDA
     """Return the velocities at key k, from the neighbouring key on ``side``; zeros where there is
     none.
 
-    :return: of the joints (K+1, 3), radians per second; of the pelvis (3,), metres per second.
+    :return: angular velocities of the joints (K+1, 3), radians per second, and the velocity of the
+        pelvis (3,), metres per second.
     """
     i, j = (k - 1, k) if side < 0 else (k, k + 1)
     if i < 0 or j >= len(clip):

@@ -84,8 +84,8 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
     """Return the (T, 4) heights of the lowest skin of left heel, left toes, right heel and right
     toes; z = 0 the floor.
 
-    :param body: that of the motion.
-    :param raw: of the motion before smoothing and contact.
+    :param body: the motion's body.
+    :param raw: use the motion before smoothing and contact.
     """
     betas = np.asarray(motion.betas, float)
     skin = FootSkin(body, betas)

@@ -26,7 +26,7 @@ def by_blocks(
 
     :param compute: maps arrays (t, ...) to a tuple of arrays (t, ...), for any number t of frames.
     :param arrays: (T, ...) each.
-    :param frames: of a block; by default `BLOCK_FRAMES`.
+    :param frames: number of frames in a block; by default `BLOCK_FRAMES`.
     :return: arrays (T, ...).
     """
     T = len(arrays[0])

@@ -30,7 +30,7 @@ def find_fingers(
 ) -> dict[str, str]:
     """Find the bones of the fingers below each wrist.
 
-    :param names: of the B bones, parents before children.
+    :param names: names of the B bones, parents before children.
     :param parents: (B,) indices, -1 for none.
     :param heads: (B, 3) at rest.
     :param wrists: index of the hand's bone, by side.

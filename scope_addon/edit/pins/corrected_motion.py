@@ -63,9 +63,9 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
 def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | None = None) -> float:
     """Return how far a joint is from its pin: pixels of a pin in the image, metres of one in space.
 
-    :param place: (3,) metres, where the joint is in the world; where the motion has it if None.
-    :return: 0 in frames that the motion does not have, and without ``place`` of fingers, which
-        depend on the body.
+    :param place: (3,) metres, the joint in the world; if None, the motion's own.
+    :return: the distance; 0 in frames that the motion does not have, and for fingers without
+        ``place``, because they depend on the body.
     """
     rows = np.flatnonzero(motion.frames == pin.frame)
     if not len(rows) or (place is None and pin.joint not in BODY_JOINTS):
@@ -157,7 +157,7 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
 def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
     """Apply the motion's edits, contacts, pins, upright line and floor to another smoothing of it.
 
-    :param clip: in the captured world, with its sides exchanged already.
+    :param clip: the motion in the captured world, with its sides exchanged already.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     clip = _pinned(clip, motion, body)

@@ -58,12 +58,13 @@ def edited(
 def interpolated(
     clip: Clip, spans: Iterable[Interpolation], shot: Shot, *, strict: bool = False
 ) -> Clip:
-    """Interpolate spans of source frames, one after the other, those that have a key on both sides;
-    others stay.
+    """Interpolate spans of source frames, one after the other, where they have a key on both sides.
 
-    :param shot: of the footage, on the clip's clock.
-    :param strict: refuse the others.
-    :raises UsageError: one has no key, or none on one side, and ``strict``.
+    Other spans stay as they are.
+
+    :param shot: the footage's frames and times, on the clip's clock.
+    :param strict: refuse the other spans.
+    :raises UsageError: ``strict``, and a span has no key, or none on one side.
     """
     out = clip.copy()
     for each in spans:

@@ -40,7 +40,7 @@ def within_reach(
         pinned in space, (3,).
     :param camera: world_from_camera (4, 4) and intrinsics (3, 3), for a target in pixels.
     :param slack: metres that may be added to the limb's length.
-    :return: as ``target``; of the pelvis always (3,).
+    :return: the place in the form of ``target``; for the pelvis always (3,).
     """
     at, pinned = places
     if joint == "pelvis" and len(target) == 2 and camera is not None:

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far pins put feet under the floor, where one asks for it: otherwise the fit keeps them
-above.
-"""
+"""How far pins put feet under the floor. The fit keeps them above it unless a pin asks for more."""
 
 from __future__ import annotations
 
@@ -20,9 +18,10 @@ def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
     """Return how far a foot is under the floor because of what was measured, metres, and in how
     many frames.
 
-    :param body: that of the motion.
-    :return: of feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins;
-        or 0 and 0, as on uneven ground.
+    :param body: the motion's body.
+    :return: the largest depth and the number of frames, of feet that are more than
+        `UNDER_FLOOR_M` under the floor and lower than without pins; 0 and 0 if there are none,
+        and on uneven ground.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     if motion.uneven_ground:

@@ -54,7 +54,7 @@ def moves_of(data: Mapping[str, NDArray[Any]], count: int, path: Path) -> tuple[
     """Return what each expression moves, in the order of `solver.names.EXPRESSIONS`.
 
     :param data: starts (53,), vertices (n,), moves (n, 3) and step_m, see `read_face_file`.
-    :param count: of the vertices that it may move.
+    :param count: number of vertices that it may move.
     :raises ModelFileError: the arrays contradict each other.
     """
     starts = data["starts"].astype(np.intp)
