@@ -63,7 +63,7 @@ from .errors import (
     lacks_memory,
     system_error_message,
 )
-from .footage import json_text
+from .footage import is_url, json_text
 from .installed import CAPTURE, check_installed
 from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
@@ -371,7 +371,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         given = non_default_arguments(args)
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
-        batch = Batch(folder, out, args.program, given, formats, extras)
+        batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out))
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         stack.enter_context(
             interrupted("finished clips are kept; run the same command again to continue")

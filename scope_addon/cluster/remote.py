@@ -8,6 +8,7 @@ a reader finds the earlier file or the complete new one.
 
 from __future__ import annotations
 
+import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -90,8 +91,8 @@ def mirror_footage(url: str, out: str, folder: Path) -> Path:
 
 
 def mirror_results(url: str, folder: Path) -> Path:
-    """Make a folder with an empty file for each result below a URL, and with the report of the
-    previous batch.
+    """Make a folder with a file of zeros of the same size for each result below a URL, and with the
+    report of the previous batch.
 
     :raises OutputError: the store cannot be read.
     :raises UsageError: the URL cannot be used.
@@ -99,8 +100,12 @@ def mirror_results(url: str, folder: Path) -> Path:
     with store_errors(OutputError, url):
         names = names_below(url)
         _touch(folder, names)
+        file_system, root = _open(url)
+        sizes = {path: about["size"] for path, about in file_system.find(root, detail=True).items()}
+        for name in names:
+            # Of a file with a hole, nothing is written to the disk.
+            os.truncate(folder / name, sizes.get(f"{root}/{name}") or 0)
         if REPORT_NAME in names:
-            file_system, root = _open(url)
             file_system.get_file(f"{root}/{REPORT_NAME}", str(folder / REPORT_NAME))
     return folder
 

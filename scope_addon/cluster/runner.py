@@ -271,7 +271,7 @@ class DaskRunner:
             return self._give_up(key, entry["message"], blame=False)
         if entry["status"] == worker_side.LOST:
             return self._give_up(key, entry["message"])
-        content = entry.pop("content", {})
+        content = entry.get("content", {})
         if entry["status"] == DIVIDED:
             return self._divide(key, attempt, task, entry)
         if is_part(task):

@@ -17,7 +17,7 @@ from typing import Any
 
 from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError
-from ..job.clips.task import file_hash
+from ..job.clips.finished import file_hash
 from ..processes import has_ended, owner
 
 ATTEMPTS = ".scope-attempts"

@@ -31,7 +31,6 @@ from ..job.clips.task import (
     Extras,
     capture_clip,
     failure,
-    file_hash,
 )
 from ..job.request import program_version
 from . import remote
@@ -138,7 +137,9 @@ def capture_on_worker(
         if "message" in entry:
             entry["message"] = entry["message"].replace(local.footage, task.footage)
         try:
-            return entry | {"content": _content(Path(local.out), entry, task.out)}
+            if entry["status"] == "done" and is_url(task.out):
+                _upload(Path(local.out), entry["outputs"], task.out)
+            return entry
         except (ScopeError, OSError) as error:
             return {
                 "status": LOST,
@@ -146,16 +147,11 @@ def capture_on_worker(
             }
 
 
-def _content(folder: Path, entry: Entry, out: str) -> dict[str, dict[str, Any]]:
-    """Return what the results contain, after they are uploaded if the attempt is in a store."""
-    content = {}
-    for name in entry["outputs"] if entry["status"] == "done" else []:
-        file = folder / name
-        content[name] = {"sha256": file_hash(file), "bytes": file.stat().st_size}
-        if is_url(out):
-            with remote.store_errors(OutputError, out):
-                remote.upload(file, f"{out}/{name}")
-    return content
+def _upload(folder: Path, names: list[str], out: str) -> None:
+    """Upload results to the store that an attempt is in."""
+    for name in names:
+        with remote.store_errors(OutputError, out):
+            remote.upload(folder / name, f"{out}/{name}")
 
 
 def _is_wanted(worker: Worker, key: str) -> bool:

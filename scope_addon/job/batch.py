@@ -4,8 +4,8 @@ clips are skipped.
 
 ``scope-batch.json`` in the output folder is rewritten as clips finish, so that an interrupted batch
 can continue. A clip is finished if its content (SHA-256), the options and the program are unchanged
-and its result files exist. Clips whose results were complete when a batch was killed, before it has
-written the report, are known by `clips.finished`.
+and its result files have the sizes and SHA-256 that the report says. Clips whose results were
+complete when a batch was killed, before it has written the report, are known by `clips.finished`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..atomic_write import atomic_path
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
 from .clips.find import find_clips
-from .clips.finished import finished_file
+from .clips.finished import finished_file, has_content
 from .clips.runner import LocalRunner, Runner
 from .clips.task import FINISHED, NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
 from .request import program_version
@@ -43,6 +43,8 @@ class Batch:
     :param options: arguments of every capture: flag to text; None for a flag that takes no value.
     :param suffixes: suffixes of the result files, such as ``.npz``.
     :param extras: what else to write of each clip.
+    :param is_mirror: the output folder stands for a store and has files of the same sizes, so that
+        results of an earlier batch are compared by their sizes alone.
     :raises InputError: the folder of footage does not exist.
     """
 
@@ -54,6 +56,7 @@ class Batch:
         options: dict[str, str | None],
         suffixes: Sequence[str],
         extras: Extras = NO_EXTRAS,
+        is_mirror: bool = False,
     ) -> None:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder; give the folder with the footage")
@@ -62,6 +65,7 @@ class Batch:
         self.report_file = out / REPORT_NAME
         self.settings = CaptureSettings(options, tuple(suffixes), extras)
         self._program = list(program)
+        self._is_mirror = is_mirror
         self._basis = self.settings.basis(program_version(ROOT))
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
@@ -143,15 +147,18 @@ class Batch:
             )
 
     def _is_finished(self, entry: Entry) -> bool:
-        """Return whether an entry of the previous report is of a finished clip whose files still
-        exist.
+        """Return whether an entry of the previous report is of a finished clip whose files are
+        still as they were written.
         """
         if entry.get("status") not in FINISHED:
             return False
         outputs = entry.get("outputs")
         with suppress(OSError):  # of a name that no file can have
-            return isinstance(outputs, list) and all(
-                isinstance(p, str) and (self.out / p).is_file() for p in outputs
+            is_list_of_names = isinstance(outputs, list) and all(
+                isinstance(name, str) for name in outputs
+            )
+            return is_list_of_names and has_content(
+                self.out, outputs, entry.get("content", {}), sizes_alone=self._is_mirror
             )
         return False
 

@@ -177,6 +177,22 @@ def test_finished_clips_are_skipped_and_changed_ones_captured(folder, tmp_path):
     assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
 
 
+@pytest.mark.parametrize("damage", ["", "x", "longer than it was"])
+def test_clips_whose_results_were_damaged_are_captured_again(folder, tmp_path, damage):
+    """An emptied or replaced file is no result, whatever its name says."""
+    out = tmp_path / "out"
+    batch(folder, out).run(1)
+    calls(folder)
+    whole = (out / "a.npz").read_bytes()
+    (out / "a.npz").write_text(damage)
+    (out / "e.glb").write_text(damage)
+    report = batch(folder, out).run(1)
+    assert sorted(calls(folder)) == ["a.mp4", "b.mov", "d.avi", "e.webm"]
+    assert (out / "a.npz").read_bytes() == whole
+    assert report["counts"]["done"] == 2
+    assert report["counts"]["skipped"] == 0
+
+
 def test_results_may_be_on_another_disk(folder, tmp_path):
     """A folder inside the output folder is a link, as users make it who run out of space."""
     (folder / "later").mkdir()
@@ -386,7 +402,7 @@ def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_agai
             (clips / "a.mp4").write_bytes(SAMPLE.read_bytes() + b"x")
         elif change == "results":
             (clips / "a.mp4").write_bytes(SAMPLE.read_bytes())
-            (out / "a.npz").touch()
+            (out / "a.npz").write_bytes(bytes((out / "a.npz").stat().st_size))
         assert main(arguments, program=refuses) == 1, change
         assert "captured again" in capfd.readouterr().err
 

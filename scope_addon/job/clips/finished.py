@@ -2,15 +2,17 @@
 """The record that a process of a batch leaves beside its clip's results when they are complete.
 
 A batch that is killed before it has written its report does not know what its processes have
-finished. The record has the clip's key in its name, and the process's report with the sizes and
-times of the files, so that files which something else has written since do not count. The batch
+finished. The record has the clip's key in its name, and the process's report with the files' sizes
+and SHA-256, so that files which something else has written since do not count. The batch
 removes the record once its report contains the clip.
 """
 
 from __future__ import annotations
 
 import glob
+import hashlib
 import json
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -41,9 +43,10 @@ def write_finished(file: Path, report: dict[str, Any]) -> None:
     :param report: of the process, with its ``outputs``.
     """
     with suppress(OSError, OutputError):
-        stamps = [_stamp(Path(path)) for path in report["outputs"]]
+        content = content_of(Path(), report["outputs"])
         with atomic_path(file) as temporary:
-            temporary.write_text(json_text({"report": report, "stamps": stamps}), encoding="utf-8")
+            record = {"report": report, "content": content}
+            temporary.write_text(json_text(record), encoding="utf-8")
 
 
 def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
@@ -59,7 +62,7 @@ def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
         report = found["report"]
         outputs = report["outputs"]
         is_here = bool(outputs) and all(Path(path).is_relative_to(out) for path in outputs)
-        is_same = is_here and found["stamps"] == [_stamp(Path(path)) for path in outputs]
+        is_same = is_here and has_content(Path(), outputs, found["content"])
         return dict(report) if is_same and isinstance(report["warnings"], list) else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
@@ -77,6 +80,45 @@ def remove_finished(out: Path, name: str) -> None:
             path.unlink(missing_ok=True)
 
 
-def _stamp(path: Path) -> list[int]:
-    status = path.stat()
-    return [status.st_size, status.st_mtime_ns]
+def content_of(folder: Path, names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return the ``sha256`` and ``bytes`` of each file in a folder, by its name.
+
+    :raises OSError: a file cannot be read.
+    """
+    content = {}
+    for name in names:
+        file = folder / name
+        content[name] = {"sha256": file_hash(file), "bytes": file.stat().st_size}
+    return content
+
+
+def has_content(
+    folder: Path, names: Sequence[str], content: object, sizes_alone: bool = False
+) -> bool:
+    """Return whether the files in a folder are those that `content_of` described.
+
+    :param content: as `content_of` returned it, or whatever a damaged record has in its place.
+    :param sizes_alone: do not compare the SHA-256.
+    :raises OSError: a file cannot be read, or its name cannot be one.
+    """
+    if not isinstance(content, dict) or sorted(content) != sorted(names):
+        return False
+    for name in names:
+        described = content[name]
+        if not isinstance(described, dict):
+            return False
+        file = folder / name
+        if not file.is_file() or file.stat().st_size != described.get("bytes"):
+            return False
+        if not sizes_alone and file_hash(file) != described.get("sha256"):
+            return False
+    return True
+
+
+def file_hash(file: Path) -> str:
+    """Return the SHA-256 of a file's content.
+
+    :raises OSError: it cannot be read.
+    """
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -19,7 +19,14 @@ from typing import Any, NamedTuple
 from ...errors import NO_PERSON, system_error_message
 from ...footage import PICTURE_SUFFIXES
 from .find import OVERLAY
-from .finished import FINISHED_FILE, finished_file, read_finished, remove_finished
+from .finished import (
+    FINISHED_FILE,
+    content_of,
+    file_hash,
+    finished_file,
+    read_finished,
+    remove_finished,
+)
 
 # options that only a batch passes
 SHOWN_COMMAND = "--shown-command"
@@ -158,7 +165,10 @@ def capture_clip(
     entry["seconds"] = round(time.monotonic() - start, 2)
     report = _last_object(stdout)
     if status == 0 and report is not None:
-        return entry | _outcome(report, out)
+        try:
+            return entry | _outcome(report, out)
+        except OSError as error:
+            return entry | failure(task, f"a result cannot be read again ({error})")
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
     return entry | failure(
@@ -178,9 +188,12 @@ def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry
             "status": task.previous["status"].replace("done", "skipped"),
         }
     report = read_finished(record, Path(task.out)) if record and not task.again else None
-    return (
-        None if report is None else entry | _outcome(report, Path(task.out)) | {"status": "skipped"}
-    )
+    if report is None:
+        return None
+    try:
+        return entry | _outcome(report, Path(task.out)) | {"status": "skipped"}
+    except OSError:
+        return None
 
 
 def failure(task: ClipTask, message: str) -> Entry:
@@ -189,11 +202,15 @@ def failure(task: ClipTask, message: str) -> Entry:
 
 
 def _outcome(report: dict[str, Any], out: Path) -> Entry:
-    """Return what the report of a process that has ended well adds to the clip's entry."""
+    """Return what the report of a process that has ended well adds to the clip's entry.
+
+    :raises OSError: a result cannot be read.
+    """
     if report.get("windows"):
         return {"status": DIVIDED, "windows": report["windows"]}
     outputs = [Path(p).relative_to(out).as_posix() for p in report.pop("outputs")]
-    return {"status": "done", "outputs": outputs, "report": report}
+    content = content_of(out, outputs)
+    return {"status": "done", "outputs": outputs, "content": content, "report": report}
 
 
 def _arguments(
@@ -238,15 +255,6 @@ def _key(basis: str, footage: Path) -> str:
 def _add_files(digest: hashlib._Hash, files: Iterable[Path]) -> None:
     for file in files:
         digest.update(bytes.fromhex(file_hash(file)))
-
-
-def file_hash(file: Path) -> str:
-    """Return the SHA-256 of a file's content.
-
-    :raises OSError: it cannot be read.
-    """
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _last_object(text: str) -> dict[str, Any] | None:

@@ -47,10 +47,10 @@ def test_changed_and_missing_results_do_not_count(written, tmp_path):
     result.write_text("longer result")
     os.utime(result, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert read_finished(record, tmp_path) is None
-    result.write_text("result")
-    os.utime(result, ns=(status.st_atime_ns, status.st_mtime_ns + 10**9))
-    assert read_finished(record, tmp_path) is None
+    result.write_text("damage")  # as long as the result
     os.utime(result, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert read_finished(record, tmp_path) is None
+    result.write_text("result")
     assert read_finished(record, tmp_path) is not None
     result.unlink()
     assert read_finished(record, tmp_path) is None
@@ -69,7 +69,7 @@ def test_results_elsewhere_do_not_count(written, tmp_path):
         "[]",
         "3",
         '{"report": 3}',
-        '{"report": {"outputs": 3, "warnings": []}, "stamps": []}',
+        '{"report": {"outputs": 3, "warnings": []}, "content": {}}',
         '{"a":' * 10**5,
     ],
 )

@@ -314,9 +314,7 @@ def test_a_span_is_corrected_as_far_as_there_is_a_motion(rig, start, end):
     assert (entry["first"], entry["last"]) == (start, 91)
 
 
-@pytest.mark.parametrize(
-    "operator", ["foot_stands", "exchange_sides", "interpolate_span", "loop"]
-)
+@pytest.mark.parametrize("operator", ["foot_stands", "exchange_sides", "interpolate_span", "loop"])
 def test_a_span_the_wrong_way_round_is_said_with_the_frames_of_the_scene(rig, operator):
     with pytest.raises(
         RuntimeError, match="The span ends in frame 30, before it begins in frame 40; swap them"
