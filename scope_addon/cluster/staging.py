@@ -9,8 +9,11 @@ can therefore not publish anything, because only this machine renames results.
 from __future__ import annotations
 
 import errno
+import os
+import re
 import secrets
 import shutil
+import stat
 import time
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,8 @@ from ..processes import has_ended, owner
 
 ATTEMPTS = ".scope-attempts"
 TOKEN = "token"  # file by which a worker shows that it sees the same folder
+# Of a batch's folder: computer, process and the beginning of its token.
+_OWN_NAME = re.compile("[0-9a-f]{8}-[0-9]+-[0-9a-f]{8}")
 _ABANDONED_S = 7 * 24 * 3600.0  # of another computer's batch, which may take days for a clip
 
 
@@ -35,6 +40,11 @@ class Staging:
     def __init__(self, out: Path) -> None:
         self._out = out
         self.token = secrets.token_hex(16)
+        if (out / ATTEMPTS).is_symlink():
+            raise OutputError(
+                f"{out / ATTEMPTS} is a link to another folder; a batch makes and removes folders "
+                "there: remove the link, or choose another output folder"
+            )
         _remove_abandoned(out / ATTEMPTS)
         self.folder = out / ATTEMPTS / f"{owner()}-{self.token[:8]}"
         try:
@@ -102,12 +112,16 @@ def _rename(staged: Path, final: Path) -> None:
 
 
 def _remove_abandoned(folder: Path) -> None:
-    """Remove the folders of batches that do not run any more."""
+    """Remove the folders of batches that do not run any more, and nothing that a batch has not
+    made: a folder with another name, without a token, or behind a link is somebody else's.
+    """
     try:
         found = list(folder.iterdir())
     except OSError:
         return
     for path in found:
+        if not _OWN_NAME.fullmatch(path.name) or path.is_symlink() or not _is_own(path):
+            continue
         try:
             old = time.time() - path.stat().st_mtime > _ABANDONED_S
         except OSError:
@@ -115,6 +129,18 @@ def _remove_abandoned(folder: Path) -> None:
         if old or has_ended(path.name):
             shutil.rmtree(path, ignore_errors=True)
     _remove_if_empty(folder)
+
+
+def _is_own(folder: Path) -> bool:
+    """Return whether a folder has the file that every batch writes into its own first, or nothing
+    yet.
+    """
+    try:
+        if not os.listdir(folder):
+            return True
+        return stat.S_ISREG((folder / TOKEN).lstat().st_mode)
+    except OSError:
+        return False
 
 
 def _remove_if_empty(folder: Path) -> None:

@@ -7,6 +7,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 from scope.scope_addon.cluster.staging import TOKEN, Staging
@@ -107,3 +108,45 @@ def test_a_folder_that_cannot_be_written_is_a_sentence(tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(OutputError, match="cannot write"):
         Staging(tmp_path / "out")
+
+
+def aged(path):
+    """Let a file or folder look a month old."""
+    month_ago = time.time() - 30 * 24 * 3600
+    os.utime(path, (month_ago, month_ago), follow_symlinks=False)
+
+
+def test_a_link_to_another_folder_is_refused_and_nothing_there_is_removed(out, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "footage").mkdir(parents=True)
+    aged(elsewhere / "footage")
+    (out / ".scope-attempts").symlink_to(elsewhere)
+    with pytest.raises(OutputError, match="is a link to another folder"):
+        Staging(out)
+    assert os.listdir(elsewhere) == ["footage"]
+
+
+def test_only_old_folders_that_a_batch_has_made_are_removed(out, tmp_path):
+    attempts = out / ".scope-attempts"
+    foreign = "0badcafe-12-0123abcd"  # of another computer, whose process cannot be asked about
+    own = attempts / foreign
+    own.mkdir(parents=True)
+    (own / TOKEN).write_text("token")
+    named_alike = attempts / foreign.replace("12", "13")
+    named_alike.mkdir()
+    (named_alike / "take.mp4").write_text("footage")
+    other_name = attempts / "footage"
+    other_name.mkdir()
+    (other_name / TOKEN).write_text("not a batch's")
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / TOKEN).write_text("not a batch's")
+    link = attempts / foreign.replace("12", "14")
+    link.symlink_to(outside)
+    for path in (own, named_alike, other_name, outside, link):
+        aged(path)
+    staging = Staging(out)
+    staging.close()
+    assert sorted(os.listdir(attempts)) == sorted([named_alike.name, other_name.name, link.name])
+    assert names(named_alike) == ["take.mp4"]
+    assert names(outside) == [TOKEN]
