@@ -140,9 +140,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "without keypoint-jump repair": {
         "replacements": ((repair_module, "repair_keypoint_jumps", _as_given),)
     },
-    "without the stance": {
-        "replacements": ((solve_module, "ground_all", lambda shot, *given: given),)
-    },
+    "without the stance": {"replacements": ((solve_module, "ground_all", lambda *_: None),)},
     "without balance in it": {"replacements": ((stance_module, "balancing_rotations", _upright),)},
     "without the floor in it": {"replacements": (_stance_without("contact"),)},
     "without contact": {
@@ -183,7 +181,7 @@ class Observed:
         shot = replace(self.shot, smoothing=smoothing and self.shot.smoothing)
         given = self.tracks if outline else [replace(track, masks=()) for track in self.tracks]
         with replaced(replacements):
-            repaired = (repair(track, shot.camera) for track in given)
+            repaired = [repair(track, shot.camera) for track in given]
             motions = solve(shot, repaired, lambda *_: None).motions
         return [replace(motion, timestamps=self.timestamps) for motion in motions]
 

@@ -59,11 +59,11 @@ def replay(frames: int, people: int) -> dict[str, float]:
     tracks = build_tracks(range(frames), [k / fps for k in range(frames)], tracklets, people)
     del tracklets, tracklet, tracker
     return_freed_memory()
-    repaired = (repair_left_right(tracks.pop(0), camera) for _ in range(people))
+    tracks = [repair_left_right(track, camera) for track in tracks]
     shot = Shot(
         body, camera, CameraPath.static(frames), Lines.none(), Fraction(fps), size, SAMPLE.name
     )
-    motions = solve(shot, repaired, lambda *_: None).motions
+    motions = solve(shot, tracks, lambda *_: None).motions
     peaks["solver"] = peak_mib()
     with tempfile.TemporaryDirectory() as folder:
         for k, motion in enumerate(motions):

@@ -59,10 +59,9 @@ def capture(
         )
     return_freed_memory()  # of the networks
     with clock.stage("solver"):
-        repaired = (repair(tracks.pop(0), footage.camera) for _ in range(len(tracks)))
-        solved = solve(
-            shot_of(video, body, options, footage), repaired, progress, options.heights_m
-        )
+        tracks = [repair(track, footage.camera) for track in tracks]
+        shot = shot_of(video, body, options, footage)
+        solved = solve(shot, tracks, progress, options.heights_m)
         motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))

@@ -220,19 +220,19 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
 
     :param memory: of the estimates of an earlier capture.
     """
-    video, clock, listeners = job.video, job.clock, job.listeners
+    video = job.video
     expected = video.expected_frames
-    listeners.progress(FINDING, 0, expected)
+    job.listeners.progress(FINDING, 0, expected)
     execution = Execution(job.options.provider)
     threads = network_threads(job.options.threads, execution)
     trackers = open_trackers(job.options, threads, execution, memory)
-    observer = new_observer(job.video, trackers, job.camera, job.background.pool, clock)
-    for done, (frame, upcoming) in enumerate(frame_pairs(iter(video), clock), start=1):
+    observer = new_observer(video, trackers, job.camera, job.background.pool, job.clock)
+    for done, (frame, upcoming) in enumerate(frame_pairs(iter(video), job.clock), start=1):
         largest = largest_person(observer.add(frame, upcoming))
-        with clock.stage("background"):
+        with job.clock.stage("background"):
             job.background.add(frame.timestamp_s, largest, observer.background)
-        listeners.watch(frame, largest, job.live)
-        listeners.progress(FINDING, done, max(expected, done))
+        job.listeners.watch(frame, largest, job.live)
+        job.listeners.progress(FINDING, done, max(expected, done))
     observer.finish()
     return Observed(
         observer.frames,

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.loaders.body_file import CHILD_BELOW_M
 from ...kinematics.single_precision import to_single_precision
@@ -46,49 +47,139 @@ class Solved:
     up_source: str
 
 
+class Person:
+    """One person on the way from track to motion: holds what later steps need, and frees the rest.
+
+    For a clip of an hour, each of ``prepared``, ``fit``, ``raw`` and ``placed`` takes hundreds of
+    megabytes. The first two are there until `refine` and `settle` have made the other two of them,
+    those until `finish`. `Shot` holds what all people share.
+
+    :param height_m: the person's stature, if it is known, metres.
+    """
+
+    prepared: PreparedTrack
+    fit: FittedTrack  # in each frame's camera
+    raw: RawMotion
+    placed: PlacedTrack
+
+    def __init__(
+        self, shot: Shot, track: Track, height_m: float | None, progress: Progress
+    ) -> None:
+        """Lift the track to 3D, and set up the person's priors. Fingers are left out where no hand
+        is seen.
+        """
+        fingers = track.hands is not None and bool((track.hands[:, :, 0, 2] > 0).any())
+        prepared = prepare_track(shot.body, track, shot.camera, height_m, fingers)
+        self._progress = progress
+        self.track = track.without_depth()
+        # With its keypoints where the network places them, for the reprojection error.
+        self.body = prepared.whole_body
+        lifted = to_single_precision(prepared.lifted)
+        self.prepared = to_single_precision(replace(prepared, track=self.track, lifted=lifted))
+
+    def fit_alone(self) -> None:
+        """Fit one shape, and every frame with it, in the frame's camera."""
+        self.fit = to_single_precision(fit_track(self.prepared, self._progress))
+
+    def fit_with_height(self, height_m: float) -> None:
+        """Fit again, as tall as others on the same floor make the person."""
+        self.prepared = self.prepared.with_height(
+            max(height_m, CHILD_BELOW_M), FLOOR_STATURE_SIGMA * height_m
+        )
+        self.fit_alone()
+
+    def fitted_places(self, shot: Shot) -> PlacedTrack:
+        """Return the smoothed fit without gaps, in the first frame's camera axes."""
+        whole = self.fit.with_fingers_at_rest(self.prepared)
+        return place_track(shot.body, self.track, whole, True, shot.path, shot.uneven_ground)
+
+    def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> None:
+        """Add to the measurements the distance and lean that follow from floor, feet and balance.
+
+        :param placed: see `fitted_places`.
+        :param T_floor_camera: (4, 4) camera to world, with this person's floor at z = 0.
+        """
+        stance = shot.path.stance_to_frames(stance_on_ground(placed, T_floor_camera))
+        self.prepared, start = ground(self.prepared, self.fit, stance)
+        self.fit = to_single_precision(start)
+
+    def refine(self, shot: Shot) -> None:
+        """Fit all frames together, and from there each alone once more, which is the raw motion."""
+        is_smoothed = shot.smoothing and not shot.is_still
+        if is_smoothed:
+            self.fit = fit_clip(self.prepared, self.fit, shot.path, self._progress)
+            return_freed_memory()
+        raw = self.fit if shot.is_still else self._fit_frames_alone()
+        if not is_smoothed:
+            self.fit = raw
+        self.raw = RawMotion.of(self.track, raw.with_fingers_at_rest(self.prepared), shot.path)
+
+    def _fit_frames_alone(self) -> FittedTrack:
+        raw = to_single_precision(fit_each_frame(self.prepared, self.fit, self._progress))
+        sigma_m = self.fit.joint_sigma_m
+        return replace(raw, joint_sigma_m=sigma_m, height_sigma_m=self.fit.height_sigma_m)
+
+    def settle(self, shot: Shot) -> None:
+        """Place the finished motion, and let go of the measurements."""
+        whole = to_single_precision(self.fit).with_fingers_at_rest(self.prepared)
+        del self.prepared, self.fit
+        self.placed = place_track(
+            shot.body, self.track, whole, False, shot.path, shot.uneven_ground
+        )
+
+    def finish(self, shot: Shot, world: SharedWorld, number: int) -> Motion:
+        """Raise the feet out of the floor, and assemble the motion of the ``number``-th person of
+        the world.
+        """
+        placed = self.placed
+        fitted = FittedPerson(self.track, self.raw, self.body)
+        del self.placed, self.raw
+        contact = placed.contact(world.up)
+        if not shot.uneven_ground and (shot.smoothing or shot.is_still):
+            placed = raise_feet(placed, contact, world.floor_from_camera(number))
+        return assemble_motion(shot, fitted, placed, contact, world.T_world_camera)
+
+
 def solve(
-    shot: Shot, tracks: Iterable[Track], progress: Progress, heights_m: Sequence[float] = ()
+    shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float] = ()
 ) -> Solved:
     """Fit each person separately, estimate the world they share, and transform the motions to it.
 
-    For a clip of an hour, each list below takes hundreds of megabytes, so it is deleted as soon as
-    possible.
-
-    :param tracks: the most prominent person's first; an iterator that keeps none saves 40 MB each.
+    :param tracks: the most prominent person's first.
     :param heights_m: known statures of the first people, metres.
     """
-    prepared = prepare(shot, tracks, heights_m)
+    people = prepare(shot, tracks, progress, heights_m)
     return_freed_memory()
-    count = len(prepared)
-    fits = [
-        to_single_precision(fit_track(each, progress_of_person(progress, k, count)))
-        for k, each in enumerate(prepared)
-    ]
-    prepared, fits = resize_people(shot, prepared, fits, heights_m, progress)
-    shot = replace(shot, path=find_camera_path(shot, prepared[0], fits[0]))
-    iterations = fits[0].iterations
-    known = [(each.track, each.whole_body) for each in prepared]
+    for person in people:
+        person.fit_alone()
+    resize_people(shot, people, len(heights_m))
+    shot = replace(shot, path=find_camera_path(shot, people[0]))
+    iterations = people[0].fit.iterations
     if not shot.is_still:
-        prepared, fits = ground_all(shot, prepared, fits)
-    return_freed_memory()
-    people = []
-    placed = []
-    for k, (track, body) in enumerate(known):
-        raw, finished = refine(
-            shot, prepared.pop(0), fits.pop(0), progress_of_person(progress, k, count)
-        )
-        people.append(FittedPerson(track, RawMotion.of(track, raw, shot.path), body))
-        del raw
-        placed.append(place(shot, track, finished, smoothing=False))
-        del finished
-    del known, track, body
-    return_freed_memory()
-    world = find_world(placed, shot.lines)
-    motions: list[Motion] = []
-    while people:
+        ground_all(shot, people)
+    for person in people:
         return_freed_memory()
-        motions.append(finish(shot, people.pop(0), placed.pop(0), world, len(motions)))
+        person.refine(shot)
+        person.settle(shot)
+    return_freed_memory()
+    world = find_world([person.placed for person in people], shot.lines)
+    motions = []
+    for number, person in enumerate(people):
+        return_freed_memory()
+        motions.append(person.finish(shot, world, number))
     return Solved(motions, shot.path, iterations, world.up_source)
+
+
+def prepare(
+    shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float]
+) -> list[Person]:
+    """Return the people of tracks, lifted to 3D."""
+    count = len(tracks)
+    heights = [*heights_m, *[None] * count]
+    return [
+        Person(shot, track, heights[k], progress_of_person(progress, k, count))
+        for k, track in enumerate(tracks)
+    ]
 
 
 def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
@@ -107,125 +198,42 @@ def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
     return report
 
 
-def prepare(shot: Shot, tracks: Iterable[Track], heights_m: Sequence[float]) -> list[PreparedTrack]:
-    """Lift every track to 3D and set up its priors. The fingers of people of whom no hand is seen
-    are left out.
-    """
-    out = []
-    for k, track in enumerate(tracks):
-        height_m = heights_m[k] if k < len(heights_m) else None
-        fingers = track.hands is not None and bool((track.hands[:, :, 0, 2] > 0).any())
-        each = prepare_track(shot.body, track, shot.camera, height_m, fingers)
-        lifted = to_single_precision(each.lifted)
-        out.append(to_single_precision(replace(each, track=track.without_depth(), lifted=lifted)))
-    return out
-
-
-def place(shot: Shot, track: Track, fit: FittedTrack, smoothing: bool = True) -> PlacedTrack:
-    """Fill the gaps of a fit, smooth it, and transform it to the first frame's camera axes."""
-    return place_track(shot.body, track, fit, smoothing, shot.path, shot.uneven_ground)
-
-
-def place_each(
-    shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
-) -> list[PlacedTrack]:
-    """Place the fit of each person; see `place`."""
-    pairs = zip(prepared, fits, strict=True)
-    return [place(shot, each.track, fit.with_fingers_at_rest(each)) for each, fit in pairs]
-
-
-def resize_people(
-    shot: Shot,
-    prepared: Sequence[PreparedTrack],
-    fits: Sequence[FittedTrack],
-    heights_m: Sequence[float],
-    progress: Progress,
-) -> tuple[list[PreparedTrack], list[FittedTrack]]:
+def resize_people(shot: Shot, people: Sequence[Person], known: int) -> None:
     """Fit those again whose size contradicts that of somebody of known stature on the same floor.
 
     The camera's travel is not known yet, so with a camera that travels, sizes follow from the
     clip's first places.
+
+    :param known: of how many people, the first ones, the stature is known.
     """
-    prepared, fits, count = list(prepared), list(fits), len(prepared)
-    if not 0 < len(heights_m) < count or shot.uneven_ground:
-        return prepared, fits
-    placed = place_each(shot, prepared, fits)
+    if not 0 < known < len(people) or shot.uneven_ground:
+        return
+    placed = [person.fitted_places(shot) for person in people]
     up = find_world(placed, shot.lines).up
-    people = [stander(each, up, k < len(heights_m)) for k, each in enumerate(placed)]
+    standers = [stander(each, up, k < known) for k, each in enumerate(placed)]
     del placed
     return_freed_memory()
-    for k, factor in enumerate(relative_sizes(people)):
+    for person, alone, factor in zip(people, standers, relative_sizes(standers), strict=True):
         if abs(np.log(factor)) > MIN_RESIZE:
-            height_m = factor * people[k].stature_m
-            prepared[k] = prepared[k].with_height(
-                max(height_m, CHILD_BELOW_M), FLOOR_STATURE_SIGMA * height_m
-            )
-            fits[k] = to_single_precision(
-                fit_track(prepared[k], progress_of_person(progress, k, count))
-            )
-    return prepared, fits
+            person.fit_with_height(factor * alone.stature_m)
 
 
-def find_camera_path(shot: Shot, first: PreparedTrack, fit: FittedTrack) -> CameraPath:
+def find_camera_path(shot: Shot, first: Person) -> CameraPath:
     """Return the camera's path; the travel of a rotating camera is estimated from one person's
     feet.
     """
     if shot.path.is_static or shot.is_still:
         return shot.path
-    [placed] = place_each(shot, [first], [fit])
+    placed = first.fitted_places(shot)
     up = find_world([placed], shot.lines).up
     center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
     return replace(shot.path, center=center)
 
 
-def ground_all(
-    shot: Shot, prepared: Sequence[PreparedTrack], fits: Sequence[FittedTrack]
-) -> tuple[list[PreparedTrack], list[FittedTrack]]:
-    """Add to each person's measurements the distance and lean that follow from floor, feet and
-    balance.
-    """
-    placed = place_each(shot, prepared, fits)
+def ground_all(shot: Shot, people: Sequence[Person]) -> None:
+    """Put the people on the floor that they share; see `Person.ground`."""
+    placed = [person.fitted_places(shot) for person in people]
     world = find_world(placed, shot.lines)
     return_freed_memory()
-    grounded = []
-    starts = []
-    for k, (each, fit) in enumerate(zip(prepared, fits, strict=True)):
-        stance = stance_on_ground(placed[k], world.floor_from_camera(k))
-        measured, start = ground(each, fit, shot.path.stance_to_frames(stance))
-        grounded.append(measured)
-        starts.append(to_single_precision(start))
-    return grounded, starts
-
-
-def refine(
-    shot: Shot, prepared: PreparedTrack, start: FittedTrack, progress: Progress
-) -> tuple[FittedTrack, FittedTrack]:
-    """Return the raw motion, of which every frame is fitted alone, and the finished one, of all
-    frames together.
-
-    Both are of the whole body.
-    """
-    if shot.is_still:
-        start = start.with_fingers_at_rest(prepared)
-        return start, start
-    finished = fit_clip(prepared, start, shot.path, progress) if shot.smoothing else start
-    del start
-    return_freed_memory()
-    raw = to_single_precision(fit_each_frame(prepared, finished, progress))
-    raw = replace(raw, joint_sigma_m=finished.joint_sigma_m, height_sigma_m=finished.height_sigma_m)
-    raw = raw.with_fingers_at_rest(prepared)
-    return raw, to_single_precision(finished).with_fingers_at_rest(
-        prepared
-    ) if shot.smoothing else raw
-
-
-def finish(
-    shot: Shot, person: FittedPerson, placed: PlacedTrack, world: SharedWorld, number: int
-) -> Motion:
-    """Raise the feet of one person, the ``number``-th of the world, out of the floor, and assemble
-    the motion.
-    """
-    contact = placed.contact(world.up)
-    if not shot.uneven_ground and (shot.smoothing or shot.is_still):
-        placed = raise_feet(placed, contact, world.floor_from_camera(number))
-    return assemble_motion(shot, person, placed, contact, world.T_world_camera)
+    for number, person in enumerate(people):
+        person.ground(shot, placed[number], world.floor_from_camera(number))

@@ -63,6 +63,6 @@ def test_fingers_are_left_out_of_the_fit_unless_a_hand_is_seen_in_some_frame(bod
     """Of each person separately: in a hand's absence, they would take most of the time."""
     track = steps(0.0)
     tracks = [track, with_hands(track), with_hands(track, frame=len(track) - 1)]
-    prepared = prepare(replace(seen(track), body=body), tracks, ())
-    assert [each.body.K for each in prepared] == [body.K - FINGERS, body.K - FINGERS, body.K]
-    assert [each.whole_body.K for each in prepared] == 3 * [body.K]
+    people = prepare(replace(seen(track), body=body), tracks, lambda *_: None, ())
+    assert [each.prepared.body.K for each in people] == [body.K - FINGERS, body.K - FINGERS, body.K]
+    assert [each.prepared.whole_body.K for each in people] == 3 * [body.K]
