@@ -37,6 +37,8 @@ from .command_line.outputs import (
     checked_rig,
     default_outputs,
     distinct_paths,
+    files_to_read,
+    refuse_inputs,
     summary,
     write_outputs,
 )
@@ -285,7 +287,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
             "give a VIDEO to capture"
         )
     outputs = distinct_paths(args.output) or default_outputs(video)
-    check_outputs(outputs, video, args.overlay, args.report)
+    check_outputs(outputs, vars(args) | {"video": video}, args.overlay, args.report)
     check_blender(outputs)
     check_memory_limit(
         with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs)
@@ -372,6 +374,8 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
         batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out))
+        clips_read = [path for path in batch.clips(args.recursive).values() if path.is_file()]
+        refuse_inputs(batch.results(args.recursive), [*files_to_read(vars(args)), *clips_read])
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         stack.enter_context(
             interrupted("finished clips are kept; run the same command again to continue")

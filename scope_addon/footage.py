@@ -41,6 +41,7 @@ FOOTAGE_SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
 # of an image, 134 million: more than footage has; a few bytes of a file can declare any number
 MAX_PIXELS = 1 << 27
 LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+NUMBER_SIGN = re.compile(r"#+|%0?\d*d")  # stands for the number in a pattern of names
 
 
 def sequence_pattern(picture: Path) -> str:
@@ -88,6 +89,20 @@ def numbered_from(first: Path) -> list[Path]:
     before = first.stem[: number.start()]
     after = first.stem[number.end() :] + first.suffix
     return numbered(first.parent, before, after, int(number.group()))
+
+
+def files_of_footage(path: Path) -> list[Path]:
+    """Return every file that footage may be read from: a video or picture and those that continue
+    its sequence, the pictures of a pattern such as ``walk_####.png``, or all files of a folder.
+    """
+    if path.is_dir():
+        return [each for each in path.iterdir() if each.is_file()]
+    if path.is_file():
+        return [path, *numbered_from(path)]
+    sign = NUMBER_SIGN.search(path.name)
+    if sign is None or not path.parent.is_dir():
+        return []
+    return numbered(path.parent, path.name[: sign.start()], path.name[sign.end() :])
 
 
 def is_url(text: object) -> bool:

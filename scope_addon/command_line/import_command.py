@@ -52,7 +52,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     :raises ScopeError: an argument is invalid, the motion cannot be used, or an output failed.
     """
     outputs = distinct_paths(args.output) or [args.motion.parent / f"{stem_of(args.motion)}.glb"]
-    check_outputs(outputs, args.motion)
+    check_outputs(outputs, vars(args))
     check_blender(outputs)
     values = values_in_range(args, Place.IMPORT)
     # Imported here, so that errors in the arguments are printed immediately.

@@ -52,7 +52,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
         return _list_formats(args.source, quiet=args.json)
     check_memory_limit(with_scene=False)
     options = _checked(values)
-    check_outputs(_paths(values), Path(args.source), overlay=values["keep_footage"])
+    check_outputs(_paths(values), vars(args), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
     from ...solver.loaders.body_file import load_body
     from ..live.outputs.footage import Footage

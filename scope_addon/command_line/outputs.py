@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import argparse
+import glob
 import os
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +15,7 @@ from ...solver.body import Body
 from ...solver.loaders.body_file import ASSETS
 from ..counts import counted
 from ..errors import UsageError
-from ..footage import display_text
+from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
 from ..options import option
@@ -61,12 +63,63 @@ def _is_shipped(folder: Path) -> bool:
     return folder.resolve().is_relative_to(ASSETS.resolve())
 
 
+# Arguments and options that name footage, or another file to read.
+FOOTAGE = ("video", "source")
+OTHER_INPUTS = (
+    *("motion", "body", "calibration", "retarget", "bone_map", "expression_map"),
+    *("detector", "keypoints"),
+)
+
+
+def files_to_read(values: Mapping[str, Any]) -> list[Path]:
+    """Return every existing file that a command's arguments and options name: all that they read
+    and none may write.
+
+    :param values: of arguments and options, by their names.
+    """
+    files: list[Path] = []
+    for name in FOOTAGE:
+        value = values.get(name)
+        if value is not None and not is_url(value):
+            files += files_of_footage(Path(value))
+    for name in OTHER_INPUTS:
+        if values.get(name) is not None:
+            path = Path(values[name])
+            # A network's description lies beside it.
+            files += [path, path.with_suffix(".json")] if path.suffix == ".onnx" else [path]
+    return [path for path in files if os.path.isfile(path)]
+
+
+def refuse_inputs(paths: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write a file that is read, by whatever path or link.
+
+    :param paths: that are going to be written.
+    :param inputs: existing files.
+    :raises UsageError: a path is one of the inputs.
+    """
+    read = {}
+    for each in inputs:
+        status = each.stat()
+        read[status.st_dev, status.st_ino] = each
+    for path in paths:
+        try:
+            status = path.stat()
+        except OSError:
+            continue  # it does not exist yet
+        if (status.st_dev, status.st_ino) in read:
+            raise UsageError(f"{path} is the input itself; choose another name")
+
+
 def check_outputs(
-    outputs: list[Path], video: Path, overlay: Path | None = None, report: Path | None = None
+    outputs: list[Path],
+    inputs: Mapping[str, Any],
+    overlay: Path | None = None,
+    report: Path | None = None,
 ) -> None:
     """Check, before the capture starts, that the outputs, overlay and page can be written after it.
 
-    :raises UsageError: an output has an unknown suffix, is a folder, or is the footage itself.
+    :param inputs: values of the command's arguments and options; see `files_to_read`.
+    :raises UsageError: an output has an unknown suffix, is a folder, or is what is read.
     :raises OutputError: see `check_output`.
     """
     for path in outputs:
@@ -75,9 +128,12 @@ def check_outputs(
         check_output(overlay, OVERLAY_SUFFIXES)
     if report:
         check_output(report, REPORT_SUFFIXES)
-    for path in [*outputs, *filter(None, (overlay, report))]:
-        if path.exists() and video.exists() and path.samefile(video):
-            raise UsageError(f"{path} is the input itself; choose another name")
+    written = [*outputs, *filter(None, (overlay, report))]
+    for path in outputs:
+        # Several people have a file each in formats that have room for one.
+        alike = path.with_name(f"{path.stem}.person1{path.suffix}")
+        written += path.parent.glob(f"{glob.escape(alike.stem[:-1])}*{alike.suffix}")
+    refuse_inputs(written, files_to_read(inputs))
 
 
 def check_blender(outputs: list[Path]) -> None:
@@ -125,9 +181,6 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
             "--retarget needs an output that can contain a rig, such as -o OUT.glb; a "
             "motion file cannot"
         )
-    for path in scene_files:
-        if path.exists() and path.samefile(rig.path):
-            raise UsageError(f"{path} is the rig's own file; choose another name")
     load_blender()
     from ..scene.rigs.rig_file import check_rig
     from .bounded_import import bounded_import

@@ -22,10 +22,10 @@ from ...solver.errors import InputError
 from ..atomic_write import atomic_path
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
-from .clips.find import find_clips
+from .clips.find import OVERLAY, find_clips
 from .clips.finished import finished_file, has_content
 from .clips.runner import LocalRunner, Runner
-from .clips.task import FINISHED, NO_EXTRAS, CaptureSettings, ClipTask, Entry, Extras
+from .clips.task import FINISHED, NO_EXTRAS, REPORT, CaptureSettings, ClipTask, Entry, Extras
 from .request import program_version
 
 REPORT_NAME = "scope-batch.json"
@@ -74,6 +74,16 @@ class Batch:
         """Return the clips by the name of their results; see `find_clips`."""
         several = self.settings.options.get("--people") not in (None, "1", "largest")
         return find_clips(self.folder, self.out, recursive=recursive, several_people=several)
+
+    def results(self, recursive: bool) -> list[Path]:
+        """Return the paths of all results of one person that the batch may write."""
+        suffixes = [*self.settings.suffixes]
+        if self.settings.extras.reports:
+            suffixes.append(f"{REPORT}.html")
+        if self.settings.extras.overlays:
+            suffixes += [f"{OVERLAY}.mp4", f"{OVERLAY}.png"]
+        names = self.clips(recursive)
+        return [self.out / f"{name}{suffix}" for name in names for suffix in suffixes]
 
     def run(
         self,
@@ -154,10 +164,9 @@ class Batch:
             return False
         outputs = entry.get("outputs")
         with suppress(OSError):  # of a name that no file can have
-            is_list_of_names = isinstance(outputs, list) and all(
-                isinstance(name, str) for name in outputs
-            )
-            return is_list_of_names and has_content(
+            if not isinstance(outputs, list) or not all(isinstance(n, str) for n in outputs):
+                return False
+            return has_content(
                 self.out, outputs, entry.get("content", {}), sizes_alone=self._is_mirror
             )
         return False

@@ -6,7 +6,6 @@ picture and a rate.
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from ...errors import VideoError
 from ...footage import (
     LAST_NUMBER,
+    NUMBER_SIGN,
     is_sequence,
     numbered,
     numbered_from,
@@ -25,8 +25,6 @@ from ...footage import (
 )
 from ...notices import Notice, notice
 from .stills.still_images import read_picture
-
-_NUMBER_SIGN = re.compile(r"#+|%0?\d*d")
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
                 f"({', '.join(sorted(kinds.values())[:3])}, …); "
                 "give the pattern you mean, such as walk_####.png, or a single image"
             )
-    elif (sign := _NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
+    elif (sign := NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
         found = numbered(path.parent, path.name[: sign.start()], path.name[sign.end() :])
     elif rate_given and path.is_file():
         following = numbered_from(path)

@@ -368,7 +368,7 @@ def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):
     before = rig.read_bytes()
     done = shell("capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", rig)
     assert done.returncode == 2
-    assert "rig's own file" in done.stderr
+    assert "is the input itself" in done.stderr
     done = shell(
         "capture", SAMPLE, "--retarget", rig, "--rig-object", "Rig1", "-o", tmp_path / "out.npz"
     )
