@@ -13,6 +13,7 @@ from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.footage import display_text
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.options import Place, options_at
 
 # several would wait for each other in busy loops
 BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]
@@ -297,8 +298,13 @@ def test_help_lists_every_option(capsys):
         cli.build_parser().parse_args(["capture", "--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
+    words = text.split()
+    without_breaks = "".join(words)
     for suffix in cli.SUFFIXES:
         assert suffix in text
+    for each in options_at(Place.COMMAND_LINE):
+        assert each.flag in words
+        assert "".join((each.argument.help or each.help).split()) in without_breaks, each.flag
 
 
 def test_hands_need_a_body_with_fingers(tmp_path, capsys):

@@ -5,15 +5,16 @@ opened.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ...solver.body import Body
 from ..errors import UsageError
-from ..options import OPTIONS, Place, option, options_at
-from ..options.capture import ALL, LARGEST, OFF
+from ..options import Place, option, options_at
+from ..options.capture import ALL, LARGEST, OFF, CaptureDeclaration
+from ..options.networks import NetworkDeclaration
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.hand_measurements import require_fingers
@@ -26,37 +27,17 @@ from .perception.sessions import landmark_network_name
 from .tracking.tracker import MAX_PEOPLE
 
 WINDOW_S = 120.0
-_DEFAULT = {option.name: option.default for option in OPTIONS}
 
 
 @dataclass(frozen=True)
-class CaptureOptions:
+class CaptureOptions(CaptureDeclaration, NetworkDeclaration):
     """How to capture; the defaults suit a phone clip of one person.
 
-    Its fields are the options of `Place.CAPTURE`, typed; ``start``, ``end`` and ``fps`` together
-    are ``wanted``.
+    Its fields are the declared options, of which ``start``, ``end`` and ``fps`` together are
+    ``wanted``.
     """
 
-    quality: str = _DEFAULT["quality"]  # fast, balanced, best
-    # how many at most; "all"; "largest": the most prominent one over the clip
-    people: int | str = _DEFAULT["people"]
-    # most prominent person first; others are estimated
-    heights_m: Sequence[float] = _DEFAULT["heights_m"]
-    focal_mm: float | None = _DEFAULT["focal_mm"]
-    fov_deg: float | None = _DEFAULT["fov_deg"]
-    calibration: Path | None = _DEFAULT["calibration"]
     wanted: FootageRange = VideoRange()  # range of frames
-    smoothing: bool = _DEFAULT["smoothing"]
-    # feet rest at any height, not on one horizontal floor
-    uneven_ground: bool = _DEFAULT["uneven_ground"]
-    threads: int = _DEFAULT["threads"]  # 0: as many as there are cores
-    # off, auto, on: the fingers as well; the body needs finger joints
-    hands: str = _DEFAULT["hands"]
-    face: bool = _DEFAULT["face"]  # expressions and gaze as well
-    provider: str = _DEFAULT["provider"]  # what the networks run on; see `execution`
-    # the user's own networks, ONNX files; see `adapters`
-    detector: Path | None = _DEFAULT["detector"]
-    keypoints: Path | None = _DEFAULT["keypoints"]
     # of which clips at least twice as long are observed one after another
     window_s: float = WINDOW_S
 

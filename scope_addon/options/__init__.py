@@ -4,9 +4,9 @@ part of Scope.
 
 The arguments of the command line (`command_line.arguments`), the request to the worker
 (`job.request`), and the properties of the panel and of the preferences (`ui.declared_properties`)
-are made from these records. The typed fields of `capture.options.CaptureOptions` take their
-defaults from them; a test compares the two. To add an option, add a record to `capture`,
-`networks`, `output`, `motion_import` or `live`.
+are made from these records. The dataclasses in `capture` and `networks` declare what the pipeline
+reads: `capture.options.CaptureOptions` has their fields. To add an option, add it to one of these,
+or a record to `output`, `motion_import` or `live`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .live import LIVE_OPTIONS
 from .motion_import import IMPORT_OPTIONS
 from .networks import NETWORK_OPTIONS
 from .output import OUTPUT_OPTIONS, REPORT_OPTIONS
-from .record import Argument, Choice, Option, Place, Property
+from .record import Argument, Choice, Option, Place, Property, Section
 
 # In the order of the command line's help.
 OPTIONS: tuple[Option, ...] = (
@@ -28,7 +28,17 @@ OPTIONS: tuple[Option, ...] = (
     *REPORT_OPTIONS,
 )
 
-__all__ = ["OPTIONS", "Argument", "Choice", "Option", "Place", "Property", "option", "options_at"]
+__all__ = [
+    "OPTIONS",
+    "Argument",
+    "Choice",
+    "Option",
+    "Place",
+    "Property",
+    "Section",
+    "option",
+    "options_at",
+]
 
 
 def options_at(place: Place) -> tuple[Option, ...]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from .record import Argument, Choice, Option, Place, Property
+from .record import Argument, Choice, Option, Place, Property, Section, declared, options_of
 
 # people
 LARGEST = "largest"
@@ -18,7 +20,7 @@ OFF = "off"
 AUTO = "auto"
 ON = "on"
 
-_EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PANEL
+_EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.PANEL
 _LIVE = Place.LIVE | Place.LIVE_WORKER
 
 QUALITIES = (
@@ -89,11 +91,20 @@ def _range_limit(settings: Any, name: str) -> str | None:
 
 _TIME = {"step": 10, "precision": 2, "subtype": "TIME_ABSOLUTE", "unit": "TIME_ABSOLUTE"}
 
-CAPTURE_OPTIONS = (
-    Option("quality", str, "best", _EVERYWHERE, "speed versus accuracy", choices=QUALITIES),
-    Option(
-        "people",
-        (int, str),
+
+@dataclass(frozen=True)
+class CaptureDeclaration:
+    """The options that the pipeline reads are fields; those among them that only the panel or the
+    command line has are class variables.
+    """
+
+    quality: str = declared(
+        "best",
+        _EVERYWHERE,
+        "speed versus accuracy",
+        choices=QUALITIES,
+    )
+    people: int | str = declared(
         LARGEST,
         _EVERYWHERE,
         "people to capture",
@@ -113,8 +124,8 @@ CAPTURE_OPTIONS = (
                 settings.people_count if settings.people == "COUNT" else settings.people.lower()
             ),
         ),
-    ),
-    Option(
+    )
+    people_count: ClassVar[Option] = Option(
         "people_count",
         int,
         2,
@@ -123,8 +134,8 @@ CAPTURE_OPTIONS = (
         minimum=1,
         maximum=12,
         blender=Property(label="At Most"),
-    ),
-    Option(
+    )
+    start: ClassVar[Option] = Option(
         "start",
         str,
         None,
@@ -142,8 +153,8 @@ CAPTURE_OPTIONS = (
             value=lambda settings: _range_limit(settings, "range_start"),
             keywords=_TIME,
         ),
-    ),
-    Option(
+    )
+    end: ClassVar[Option] = Option(
         "end",
         str,
         None,
@@ -159,24 +170,24 @@ CAPTURE_OPTIONS = (
             value=lambda settings: _range_limit(settings, "range_end"),
             keywords=_TIME,
         ),
-    ),
-    Option(
+    )
+    use_range: ClassVar[Option] = Option(
         "use_range",
         bool,
         False,
         Place.PANEL,
         "capture only a part of the video",
         blender=Property(label="Part of the Video"),
-    ),
-    Option(
+    )
+    fps: ClassVar[Option] = Option(
         "fps",
         str,
         None,
         Place.COMMAND_LINE | Place.WORKER,
         "frame rate of the capture, such as 12 or 29.97",
         argument=Argument(metavar="N", default_text="the footage's"),
-    ),
-    Option(
+    )
+    body: ClassVar[Option] = Option(
         "body",
         str,
         "scope",
@@ -187,17 +198,15 @@ CAPTURE_OPTIONS = (
             "own .npz or .pkl file"
         ),
         blender=Property(choices=BODIES),
-    ),
-    Option(
+    )
+    body_file: ClassVar[Option] = Option(
         "body_file",
         Path,
         None,
         Place.PANEL,
         "SMPL, SMPL+H, SMPL-X or STAR model (.npz or .pkl); if empty, the one in the preferences",
-    ),
-    Option(
-        "hands",
-        str,
+    )
+    hands: str = declared(
         OFF,
         _EVERYWHERE,
         "capture the fingers as well, on the body with hands; takes longer",
@@ -209,24 +218,21 @@ CAPTURE_OPTIONS = (
             " only of hands that are large enough in the image; --hands alone means on",
             bare=ON,
         ),
-    ),
-    Option(
-        "face",
-        bool,
+        blender=Property(section=Section.PERSON),
+    )
+    face: bool = declared(
         False,
         _EVERYWHERE,
         "capture the expressions of the face and the gaze as well; takes longer",
-    ),
-    Option(
-        "heights_m",
-        float,
+        blender=Property(section=Section.PERSON),
+    )
+    heights_m: Sequence[float] = declared(
         (),
         _EVERYWHERE | _LIVE,
         "heights of the people, most prominent first; sets the scale of the scene",
         unit="m",
         minimum=0.5,
         maximum=2.6,
-        several=True,
         argument=Argument("--height", "CM[,CM...]", parse=_parse_heights, default_text="estimated"),
         # Not Blender's unit LENGTH, which would display the value in the scene's units.
         blender=Property(
@@ -242,18 +248,16 @@ CAPTURE_OPTIONS = (
             value=lambda settings: (settings.height_cm / 100,) if settings.height_cm else (),
             keywords={"step": 100, "precision": 0},
         ),
-    ),
-    Option(
+    )
+    lens: ClassVar[Option] = Option(
         "lens",
         str,
         "auto",
         Place.PANEL,
         "where the camera's focal length comes from",
         choices=LENSES,
-    ),
-    Option(
-        "focal_mm",
-        float,
+    )
+    focal_mm: float | None = declared(
         None,
         _EVERYWHERE | _LIVE,
         "35 mm equivalent focal length of the camera",
@@ -270,10 +274,8 @@ CAPTURE_OPTIONS = (
             value=lambda settings: settings.focal_mm if settings.lens == "FOCAL" else None,
             keywords={"soft_max": 200.0},
         ),
-    ),
-    Option(
-        "fov_deg",
-        float,
+    )
+    fov_deg: float | None = declared(
         None,
         _EVERYWHERE | _LIVE,
         "field of view along the longer side of the image",
@@ -291,10 +293,8 @@ CAPTURE_OPTIONS = (
             value=lambda settings: math.degrees(settings.fov) if settings.lens == "FOV" else None,
             keywords={"subtype": "ANGLE"},
         ),
-    ),
-    Option(
-        "calibration",
-        Path,
+    )
+    calibration: Path | None = declared(
         None,
         _EVERYWHERE | _LIVE,
         "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, "
@@ -305,23 +305,22 @@ CAPTURE_OPTIONS = (
             "Calibration",
             value=lambda settings: settings.calibration_file if settings.lens == "FILE" else None,
         ),
-    ),
-    Option(
-        "smoothing",
-        bool,
+    )
+    smoothing: bool = declared(
         True,
         _EVERYWHERE,
         "remove jitter and lock feet in contact with the floor; off keeps the per-frame solution",
         argument=Argument(help="keep the per-frame solution: no smoothing, no foot locking"),
-        blender=Property(label="Smooth"),
-    ),
-    Option(
-        "uneven_ground",
-        bool,
+        blender=Property(label="Smooth", section=Section.MOTION),
+    )
+    uneven_ground: bool = declared(
         False,
         _EVERYWHERE,
         "people walk on stairs, steps or slopes: feet rest at any height instead of on one "
         "horizontal floor",
         argument=Argument(help="feet rest at any height, as on stairs or slopes, not on one floor"),
-    ),
-)
+        blender=Property(section=Section.MOTION),
+    )
+
+
+CAPTURE_OPTIONS = options_of(CaptureDeclaration)

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from .record import Argument, Choice, Option, Place, Property
+from .record import Argument, Choice, Place, Property, declared, options_of
 
-_NETWORKS = Place.COMMAND_LINE | Place.WORKER | Place.CAPTURE | Place.PREFERENCES
+_NETWORKS = Place.COMMAND_LINE | Place.WORKER | Place.PREFERENCES
 
 PROVIDERS = (
     Choice("auto", "Automatic", "A supported GPU if there is one, otherwise the CPU", 0),
@@ -23,10 +24,12 @@ PROVIDERS = (
     Choice("coreml", "Core ML", "Apple silicon", 5),
 )
 
-NETWORK_OPTIONS = (
-    Option(
-        "detector",
-        Path,
+
+@dataclass(frozen=True)
+class NetworkDeclaration:
+    """What the networks are, and where they run."""
+
+    detector: Path | None = declared(
         None,
         _NETWORKS,
         "custom person detector, an .onnx file",
@@ -36,10 +39,8 @@ NETWORK_OPTIONS = (
             "Person Detector",
             "Custom detector (.onnx): YOLOX, YOLOv4, YOLOv8 and similar; built-in if empty",
         ),
-    ),
-    Option(
-        "keypoints",
-        Path,
+    )
+    keypoints: Path | None = declared(
         None,
         _NETWORKS,
         "custom keypoint network, an .onnx file",
@@ -50,10 +51,8 @@ NETWORK_OPTIONS = (
             "Custom keypoint network (.onnx): RTMPose, HRNet, ViTPose and similar; built-in if "
             "empty",
         ),
-    ),
-    Option(
-        "provider",
-        str,
+    )
+    provider: str = declared(
         "auto",
         _NETWORKS | Place.LIVE | Place.LIVE_WORKER,
         "execution provider for the networks",
@@ -66,10 +65,8 @@ NETWORK_OPTIONS = (
             "the result shows a"
             " warning",
         ),
-    ),
-    Option(
-        "threads",
-        int,
+    )
+    threads: int = declared(
         0,
         _NETWORKS | Place.LIVE | Place.LIVE_WORKER,
         "CPU threads for the networks; 0: all cores",
@@ -79,5 +76,7 @@ NETWORK_OPTIONS = (
             metavar="N", help="CPU threads for the networks", default_text="all cores"
         ),
         blender=Property(maximum=256),
-    ),
-)
+    )
+
+
+NETWORK_OPTIONS = options_of(NetworkDeclaration)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .record import Argument, Choice, Option, Place, Property
+from .record import Argument, Choice, Option, Place, Property, Section
 
 SHAPES = (
     Choice("keyed", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
@@ -139,6 +139,7 @@ OUTPUT_OPTIONS = (
         Place.PANEL,
         "how the scene's frame rate is set",
         choices=FRAME_RATES,
+        blender=Property(section=Section.SCENE),
     ),
     Option(
         "start_frame",
@@ -147,7 +148,7 @@ OUTPUT_OPTIONS = (
         Place.PANEL,
         "scene frame at which the footage starts",
         minimum=0,
-        blender=Property(label="First Frame"),
+        blender=Property(label="First Frame", section=Section.SCENE),
     ),
     Option(
         "set_frame_range",
@@ -155,14 +156,7 @@ OUTPUT_OPTIONS = (
         True,
         Place.PANEL,
         "set the scene's frame range to the captured frames",
-    ),
-    Option(
-        "with_markers",
-        bool,
-        True,
-        Place.PANEL,
-        "add timeline markers where the motion should be reviewed",
-        blender=Property(label="Markers"),
+        blender=Property(section=Section.SCENE),
     ),
     Option(
         "with_camera",
@@ -170,7 +164,15 @@ OUTPUT_OPTIONS = (
         True,
         Place.PANEL,
         "add the estimated camera, with the footage in its background",
-        blender=Property(label="Camera with Footage"),
+        blender=Property(label="Camera with Footage", section=Section.SCENE),
+    ),
+    Option(
+        "with_markers",
+        bool,
+        True,
+        Place.PANEL,
+        "add timeline markers where the motion should be reviewed",
+        blender=Property(label="Markers", section=Section.SCENE),
     ),
 )
 

@@ -7,9 +7,11 @@ Blender loads this when it starts, and makes named tuples in a third of the time
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import Field, field, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import NoneType
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 
 class Place(enum.Flag):
@@ -17,7 +19,7 @@ class Place(enum.Flag):
 
     COMMAND_LINE = enum.auto()
     WORKER = enum.auto()  # part of the request to the worker process
-    CAPTURE = enum.auto()  # a field of CaptureOptions, which experiments set as well
+    CAPTURE = enum.auto()  # a field of CaptureOptions
     PANEL = enum.auto()  # a property of the scene
     PREFERENCES = enum.auto()  # a property of the extension's preferences
     EXPORT = enum.auto()  # a property of the export operator
@@ -25,6 +27,16 @@ class Place(enum.Flag):
     LIVE = enum.auto()  # an argument of the command that captures a camera or stream
     LIVE_WORKER = enum.auto()  # part of the request to the worker process of a live capture
     LIVE_PANEL = enum.auto()  # a property of the scene for live captures
+
+
+class Section(enum.Enum):
+    """A group of options that the panel draws one below the other, in the order of their
+    declaration.
+    """
+
+    PERSON = enum.auto()
+    MOTION = enum.auto()
+    SCENE = enum.auto()
 
 
 class Choice(NamedTuple):
@@ -75,6 +87,7 @@ class Property(NamedTuple):
     :param value: returns the option's value, given the properties of the panel or of the
         preferences.
     :param keywords: further arguments of Blender's property, such as ``subtype``.
+    :param section: where the panel draws it; None: the panel's code says where.
     """
 
     name: str = ""
@@ -87,6 +100,7 @@ class Property(NamedTuple):
     choices: tuple[Choice, ...] = ()
     value: Callable[[Any], Any] | None = None
     keywords: dict[str, Any] = {}
+    section: Section | None = None
 
 
 class Option(NamedTuple):
@@ -163,3 +177,37 @@ class Option(NamedTuple):
         if isinstance(value, str) and self.choices and value not in self.values:
             return f"must be one of {', '.join(self.values)}, not {value!r}"
         return ""
+
+
+def declared(default: Any, places: Place, help: str, **details: Any) -> Any:
+    """Declare an option as a field of a frozen dataclass, which gives its name and type.
+
+    :param details: the further fields of the `Option`.
+    """
+    return field(default=default, metadata={"places": places, "help": help, "details": details})
+
+
+def options_of(declaration: type) -> tuple[Option, ...]:
+    """Return the options that a dataclass declares, in their order: its fields, and the `Option`
+    records among its class variables.
+    """
+    types = get_type_hints(declaration)
+    by_name = {each.name: each for each in fields(declaration)}
+    return tuple(
+        _option(by_name[name], types[name]) if name in by_name else getattr(declaration, name)
+        for name in declaration.__annotations__
+    )
+
+
+def _option(declared_field: Field[Any], annotation: Any) -> Option:
+    """Return the option that a field declares; ``X | None`` is X, ``Sequence[X]`` several X."""
+    types = [each for each in get_args(annotation) if each is not NoneType] or [annotation]
+    return Option(
+        declared_field.name,
+        types[0] if len(types) == 1 else tuple(types),
+        declared_field.default,
+        declared_field.metadata["places"] | Place.CAPTURE,
+        declared_field.metadata["help"],
+        several=get_origin(annotation) is Sequence,
+        **declared_field.metadata["details"],
+    )

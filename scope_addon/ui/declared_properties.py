@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..options import Choice, Option, Place, options_at
+from ..options import Choice, Option, Place, Section, options_at
 from .files.file_field import path_text, text_name
 from .translations import CONTEXT
 
@@ -87,6 +87,15 @@ def limits_of(option: Option) -> tuple[float | None, float | None]:
     low = option.minimum if declared.minimum is None and same_unit else declared.minimum
     high = option.maximum if declared.maximum is None and same_unit else declared.maximum
     return low, high
+
+
+def draw_section(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, section: Section
+) -> None:
+    """Draw the properties of a section of the panel."""
+    for option in options_at(Place.PANEL):
+        if option.blender.section is section:
+            layout.prop(settings, property_name(option))
 
 
 def option_values(settings: Any, place: Place) -> dict[str, Any]:

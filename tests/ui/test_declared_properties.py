@@ -6,16 +6,20 @@ store.
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import pytest
 from scope.scope_addon import options as declarations
-from scope.scope_addon.options import OPTIONS, Option, Place, Property, option, options_at
+from scope.scope_addon.options import OPTIONS, Option, Place, Property, Section, option, options_at
 from scope.scope_addon.scene.animation_data.timing import RATE_POLICIES
 from scope.scope_addon.scene.character.shape_keys import MODES
+from scope.scope_addon.ui.capture import capture_panel
 from scope.scope_addon.ui.capture.capture_job import capture_request
 from scope.scope_addon.ui.declared_properties import (
     choices_of,
+    draw_section,
     option_values,
     property_name,
     with_options,
@@ -173,3 +177,18 @@ def test_a_new_option_appears_in_the_panel(monkeypatch):
     finally:
         del bpy.types.Scene.scope_extended
         bpy.utils.unregister_class(ExtendedSettings)
+
+
+def test_a_section_draws_its_options_in_their_order():
+    drawn = []
+    layout = SimpleNamespace(prop=lambda settings, name: drawn.append(name))
+    draw_section(layout, bpy.context.scene.scope, Section.SCENE)
+    assert drawn == ["frame_rate", "start_frame", "set_frame_range", "with_camera", "with_markers"]
+
+
+def test_every_option_of_the_panel_is_drawn_once():
+    """By its section, or by name in the code of the capture panel, not by both."""
+    source = Path(capture_panel.__file__).read_text(encoding="utf-8")
+    for each in options_at(Place.PANEL):
+        named = f'settings, "{property_name(each)}"' in source
+        assert named != (each.blender.section is not None), each.name

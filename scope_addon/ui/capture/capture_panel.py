@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...footage import display_text
+from ...options import Section
 from ...scene.frame_spans import parse_spans
 from .. import warm_up
+from ..declared_properties import draw_section
 from ..export_operators import FORMATS, is_available
 from ..files.file_field import draw_file
 from ..presets import SCOPE_PT_capture_presets
@@ -112,8 +114,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         if settings.body == "FILE":
             draw_file(layout, settings, "body_file", text="File")
         layout.prop(settings, "height_cm")
-        layout.prop(settings, "hands")
-        layout.prop(settings, "face")
+        draw_section(layout, settings, Section.PERSON)
         layout.prop(settings, "shape")
         layout.prop(settings, "lens")
         if settings.lens == "FOCAL":
@@ -122,8 +123,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
             layout.prop(settings, "fov", text="Angle")
         elif settings.lens == "FILE":
             draw_file(layout, settings, "calibration_file", text="File")
-        layout.prop(settings, "smoothing")
-        layout.prop(settings, "uneven_ground")
+        draw_section(layout, settings, Section.MOTION)
         layout.prop(settings, "use_range")
         if settings.use_range:
             column = layout.column(align=True)
@@ -144,11 +144,7 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
         layout = _split(self.layout)
         settings = context.scene.scope
         layout.enabled = state.job is None
-        layout.prop(settings, "frame_rate")
-        layout.prop(settings, "start_frame")
-        layout.prop(settings, "set_frame_range")
-        layout.prop(settings, "with_camera")
-        layout.prop(settings, "with_markers")
+        draw_section(layout, settings, Section.SCENE)
 
 
 class SCOPE_PT_result(Tab, bpy.types.Panel):
