@@ -6,6 +6,7 @@ in the source.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import bpy
 import scope
 from scope.scope_addon import ui
 from scope.scope_addon.job.progress.job_progress import BUILDING, FIRST_ONLY, STAGES
+from scope.scope_addon.notices import PARTS, PHRASES, SENTENCES
 from scope.scope_addon.ui.pins.pin_tool import HANDLES
 from scope.scope_addon.ui.translations import CONTEXT
 
@@ -52,6 +54,12 @@ CORRECTIONS = {
     *(f"{what} Exchanged" for what in ("Sides", "Arms", "Legs")),
 }
 _STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, BUILDING)}
+# Texts of warnings; of some, a sentence consists of values alone.
+_NOTICES = {
+    text
+    for text in (*SENTENCES.values(), *PHRASES.values(), *PARTS)
+    if any(map(str.isalpha, re.sub(r"\{[^}]*\}", "", text)))
+}
 _LOOKUPS = {"iface_", "rpt_", "tip_", "translate"}
 _LAYOUT_TEXTS = {"text", "placeholder", "title", "message", "confirm_text"}
 
@@ -68,7 +76,7 @@ def stage_texts() -> set[str]:
 
 def interface_texts() -> set[Message]:
     """Return the context and text of everything to translate."""
-    found = {(DEFAULT, text) for text in _JOINTS | CORRECTIONS | stage_texts()}
+    found = {(DEFAULT, text) for text in _JOINTS | CORRECTIONS | _NOTICES | stage_texts()}
     for module in ui._MODULES:
         for cls in module.CLASSES:
             found |= set(_of_class(cls))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import bpy
 import pytest
+from scope.scope_addon.notices import SENTENCES, Notice
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.ui import reporting
 from scope.scope_addon.ui import translations as translations_module
@@ -100,6 +101,21 @@ def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
     assert ("Operator", "Left Foot Stands") in texts  # literal that a loop gives to a layout
     assert (CONTEXT, "{count} people") in texts  # either branch of a lookup's condition
     assert ("*", "Capture finished") in texts  # report
+
+
+@every_language
+def test_every_warning_is_written_in_every_language_with_its_values(language):
+    texts = {entry[ENGLISH]: entry[language] for entry in TABLE.texts}
+    samples = {"who": 3, "whose": 0, "frames": 456, "times": [7.8], "phrase": "motion"}
+    shown = {"who": "3", "whose": "", "frames": "456", "times": "7.8", "phrase": texts["motion"]}
+    for code, sentence in SENTENCES.items():
+        fields = {name: spec for _, name, spec, _ in string.Formatter().parse(sentence) if name}
+        values = {
+            name: samples.get(spec, 12.0 if spec else f"<{name}>") for name, spec in fields.items()
+        }
+        said = Notice(code, values).text(lambda text: texts.get(text, text))
+        for name, spec in fields.items():
+            assert shown.get(spec, "12" if spec else f"<{name}>") in said, (code, name)
 
 
 @pytest.mark.parametrize("language", ["de", "es", "fr"])
