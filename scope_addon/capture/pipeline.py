@@ -15,12 +15,19 @@ from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
 from .stages.clock import Progress, StageClock
-from .stages.footage import Footage, Listeners, Watch
-from .stages.freed_memory import return_freed_memory
-from .stages.observe import ObserveFrames, observe
+from .stages.observe import (
+    Footage,
+    Listeners,
+    ObserveFrames,
+    Watch,
+    observe,
+)
 from .stages.repair import repair
 from .stages.report import make_report
-from .stages.solve import solve
+from .stages.solve import (
+    return_freed_memory,
+    solve,
+)
 from .world.assemble import Shot
 from .world.camera_path import CameraPath
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.perception.face.face_landmarks import (
+from ...scope_addon.capture.perception.face_landmarks import (
     EXPRESSION_POINTS,
     ExpressionNetwork,
     FaceNetwork,

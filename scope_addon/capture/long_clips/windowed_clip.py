@@ -23,24 +23,30 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import UsageError
-from ..media.frame import Frame
+from ..media.frame import (
+    Frame,
+)
 from ..media.opencv_threads import opencv_in_one_thread
 from ..media.video import Video, open_video
 from ..options import CaptureOptions
-from ..perception.execution import Execution
 from ..perception.observation import Observation
 from ..perception.region import Region
+from ..perception.sessions import (
+    Execution,
+)
 from ..stages.clock import FINDING, Progress, StageClock
-from ..stages.footage import given_camera
-from ..stages.networks import Trackers, network_threads, open_trackers
 from ..stages.observe import (
     ObservationJob,
     Observed,
     ObserveFrames,
+    Trackers,
     frame_pairs,
+    given_camera,
+    network_threads,
     new_observer,
     no_frames_error,
     observe_in_one_pass,
+    open_trackers,
 )
 from .joined_windows import JoinedWindows
 from .kept_estimates import KeptEstimates

@@ -20,9 +20,14 @@ from numpy.typing import NDArray
 
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
-from .conversion.deinterlace import FIELD_CODECS, deinterlaced
-from .conversion.hdr import hdr_rgb
+from .deinterlace import (
+    FIELD_CODECS,
+    deinterlaced,
+)
 from .file_names import utf8_name
+from .hdr import (
+    hdr_rgb,
+)
 from .image_size import check_size
 
 if TYPE_CHECKING:

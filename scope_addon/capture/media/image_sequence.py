@@ -24,7 +24,9 @@ from ...footage import (
     sequence_pattern,
 )
 from ...notices import Notice, notice
-from .stills.still_images import read_picture
+from .still_images import (
+    read_picture,
+)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,9 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, VideoError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
-from ..media.frame import Frame
+from ..media.frame import (
+    Frame,
+)
 from ..media.video import Video, open_video
 from ..media.video_range import FootageRange
 from ..perception.landmark_network import KEYPOINT_COUNT

@@ -15,11 +15,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .execution import Execution
 from .landmark_network import KEYPOINT_NAMES, disagreement
 from .person_detector import decode, make_anchors, merge_overlapping
 from .region import Region, box_along
-from .sessions import network_path, open_session
+from .sessions import (
+    Execution,
+    network_path,
+    open_session,
+)
 
 INPUT_SIZE = 224
 HAND_NAMES = (

@@ -13,9 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
-from .execution import Execution
 from .region import MARGIN, Region, region_from_points
-from .sessions import network_path, open_session
+from .sessions import (
+    Execution,
+    network_path,
+    open_session,
+)
 
 if TYPE_CHECKING:
     import onnxruntime

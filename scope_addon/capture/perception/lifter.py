@@ -30,7 +30,9 @@ from numpy.typing import NDArray
 from ....solver.errors import ModelFileError, ShapeError
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
-from .sessions import open_session
+from .sessions import (
+    open_session,
+)
 
 LIFTER_FILE = Path(__file__).resolve().parents[3] / "assets" / "lifter" / "lifter.onnx"
 KEYPOINT_COUNT = 33

@@ -10,10 +10,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .execution import Execution
 from .letterbox import fit_in
 from .region import Region, region_from_points
-from .sessions import network_path, open_session
+from .sessions import (
+    Execution,
+    network_path,
+    open_session,
+)
 
 INPUT_SIZE = 224
 SCORE_THRESHOLD = 0.5

@@ -5,39 +5,176 @@ is kept.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...errors import NoPersonError, VideoError
-from ...notices import Notice
-from ..camera.background_record import BackgroundRecord
+from ...notices import (
+    Notice,
+    notice,
+)
+from ...options.capture import (
+    AUTO,
+    LARGEST,
+    OFF,
+)
+from ..camera.background_record import (
+    BackgroundRecord,
+    CameraMotion,
+)
 from ..camera.camera_rotation import BackgroundTracker
-from ..camera.intrinsics import Camera
+from ..camera.intrinsics import (
+    Camera,
+    choose_camera,
+)
+from ..camera.line_segments import (
+    Lines,
+)
 from ..fitting.background_estimators import KERNELS, BackgroundEstimators
 from ..fitting.focal_length import FocalFits
-from ..fitting.live_body import LiveBody
-from ..media.exposure import AutoExposure
-from ..media.frame import Frame
+from ..fitting.live_body import (
+    LiveBody,
+)
+from ..media.frame import (
+    AutoExposure,
+    Frame,
+)
 from ..media.opencv_threads import opencv_in_one_thread
-from ..media.video import Video
-from ..options import CaptureOptions, most_people
+from ..media.video import (
+    Video,
+)
+from ..options import (
+    CaptureOptions,
+    most_people,
+)
 from ..perception.adapters.description import description_path
-from ..perception.execution import Execution
-from ..perception.landmark_network import EstimateMemory
-from ..perception.observation import Observation
-from ..tracking.landmarks.mask_schedule import MaskSchedule
-from ..tracking.people import build_tracks
+from ..perception.landmark_network import (
+    EstimateMemory,
+)
+from ..perception.observation import (
+    Observation,
+)
+from ..perception.sessions import (
+    Execution,
+)
+from ..tracking.face.face_tracker import (
+    FaceTracker,
+)
+from ..tracking.hands.hand_tracker import (
+    LARGE_HAND_PX,
+    SMALLEST_HAND_PX,
+    HandTracker,
+)
+from ..tracking.mask_schedule import (
+    MaskSchedule,
+)
+from ..tracking.people import (
+    build_tracks,
+)
 from ..tracking.scene_cuts import SCENE_GAP_S, SceneCuts
 from ..tracking.track import Track, Tracklet
-from .clock import COMPILING, FINDING, StageClock
-from .footage import Footage, Listeners, given_camera
-from .networks import Trackers, network_threads, open_trackers
+from ..tracking.tracker import (
+    PeopleTracker,
+)
+from .clock import (
+    COMPILING,
+    FINDING,
+    Progress,
+    StageClock,
+)
+
+# Called with each decoded frame, its largest person, and the object that fits the body to such an
+# observation.
+Watch = Callable[[Frame, Observation | None, LiveBody], None]
+
+
+@dataclass(frozen=True)
+class Listeners:
+    """Callbacks that report the work in progress."""
+
+    progress: Progress
+    watch: Watch
+
+
+@dataclass(frozen=True)
+class Footage:
+    """What is known of the footage once all frames were observed, apart from its people."""
+
+    timestamps: NDArray[np.float64]  # (T,) seconds
+    camera: Camera
+    camera_motion: CameraMotion
+    lines: Lines  # of the background, in the first frame's camera axes
+    cuts_s: list[float]
+    execution: str  # what the networks ran on, for the report
+    warnings: list[Notice]
+
+
+def given_camera(video: Video, options: CaptureOptions) -> Camera:
+    """Return the camera as options and footage describe it."""
+    return choose_camera(
+        video.width,
+        video.height,
+        focal_mm=options.focal_mm,
+        fov_deg=options.fov_deg,
+        calibration=options.calibration,
+        metadata_focal_mm=video.focal_35mm,
+    )
+
+
+class Trackers(NamedTuple):
+    """The trackers of people, and of what is captured only on request."""
+
+    people: PeopleTracker
+    hands: HandTracker | None
+    faces: FaceTracker | None
+
+
+def network_threads(wanted: int, execution: Execution) -> int:
+    """Return how many threads to use: at most as many as there are cores, since more would wait for
+    each other.
+    """
+    cores = os.cpu_count() or 1
+    if wanted > cores:
+        execution.warnings.append(notice("too_many_threads", threads=wanted, cores=cores))
+    return min(wanted or cores, cores)
+
+
+def open_trackers(
+    options: CaptureOptions,
+    threads: int,
+    execution: Execution,
+    memory: EstimateMemory | None = None,
+) -> Trackers:
+    """Open the networks for people, and for what is captured only on request.
+
+    :param memory: of the estimates of an earlier capture.
+    """
+    people = PeopleTracker(
+        options.quality,
+        threads,
+        None if options.people == LARGEST else most_people(options.people),
+        detector=options.detector,
+        keypoints=options.keypoints,
+        execution=execution,
+    )
+    people.remember_in(memory)
+    least_px = LARGE_HAND_PX if options.hands == AUTO else SMALLEST_HAND_PX
+    hands = (
+        None
+        if options.hands == OFF
+        else HandTracker(threads, execution=execution, least_px=least_px)
+    )
+    # The face's small layers take twice the processor time in two threads, which mostly wait for
+    # each other.
+    return Trackers(people, hands, FaceTracker(1, execution=execution) if options.face else None)
 
 
 @dataclass(frozen=True)

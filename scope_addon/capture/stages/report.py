@@ -21,8 +21,12 @@ from ...options.capture import ON
 from ..media.video import Video
 from ..options import CaptureOptions
 from ..world.world_frame import LINES, UP_DEVIATIONS_DEG
-from .footage import Footage
-from .solve import Solved
+from .observe import (
+    Footage,
+)
+from .solve import (
+    Solved,
+)
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,13 +22,24 @@ from ..tracking.track import Track
 from ..world.above_floor import raise_feet
 from ..world.assemble import FittedPerson, Shot, assemble_motion
 from ..world.camera_path import CameraPath, camera_travel
-from ..world.clip.clip_fit import fit_clip
+from ..world.clip_fit import (
+    fit_clip,
+)
 from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
 from ..world.stance import stance_on_ground
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
-from .freed_memory import return_freed_memory
+
+
+def return_freed_memory() -> None:
+    """Have glibc return what it keeps for later; nothing with other C libraries, which return it
+    themselves.
+    """
+    if sys.platform.startswith("linux"):
+        with suppress(OSError, AttributeError):  # musl has no such function
+            ctypes.CDLL(None).malloc_trim(0)
+
 
 # Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults
 # best, less suits children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).

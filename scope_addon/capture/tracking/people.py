@@ -1,16 +1,202 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The people of a clip: collects the tracker's observations, and finally decides on identities and
+"""Association of tracklets: which ones belong to a person who was occluded, or away for a while.
+
+The end of a tracklet and the start of a later one are linked when position, motion, size and
+appearance match:
+
+    cost = |Δposition| / (0.15 + 0.8 · gap) + 3 · Δappearance + |log(size ratio)|
+
+with the gap in seconds and Δposition in sides of the region. Δposition is the mean of two
+distances: from the start to the end's position extrapolated forward, and from the end to the
+start's position extrapolated backward. The links of a clip are chosen together, for the least total
+cost.
+
+The people of a clip: collects the tracker's observations, and finally decides on identities and
 prominence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .association import link
-from .track import Track, Tracklet, make_track
+from .appearance import (
+    distance,
+)
+from .track import (
+    Track,
+    Tracklet,
+    make_track,
+)
+
+POSITION_SIGMA = 0.15  # sides of the region
+SPEED_SIGMA = 0.8  # sides per second: nobody keeps exactly the same velocity
+APPEARANCE_WEIGHT = 3.0
+MAX_LINK_COST = 3.0
+# after a longer gap the position carries no information, so the appearance has to match closely
+LONG_GAP_S = 2.0
+LONG_GAP_MAX_APPEARANCE = 0.35
+LONG_GAP_COST = 2.0
+_VELOCITY_WINDOW_S = 0.25  # of a tracklet's end, for its velocity
+_MAX_EXTRAPOLATION_S = 0.5
+_MAX_VELOCITY_FRAMES = 60
+_NO_LINK = 1e6
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of a tracklet: seconds, trunk (2,) px, velocity (2,) px/s forward in time, side of
+    the region px.
+    """
+
+    time: float
+    center_px: NDArray[np.float64]
+    velocity_px: NDArray[np.float64]
+    side_px: float
+
+
+def link(tracklets: Sequence[Tracklet], times: Sequence[float]) -> list[list[int]]:
+    """Group tracklets into people.
+
+    :param tracklets: in any order; their rows index ``times``.
+    :param times: seconds of each frame of the clip.
+    :return: each person's tracklet numbers in order of time. Every tracklet that has a frame is in
+        exactly one list.
+    """
+    used = [k for k, t in enumerate(tracklets) if t.rows]
+    starts = [_end(tracklets[k], times, first=True) for k in used]
+    ends = [_end(tracklets[k], times, first=False) for k in used]
+    cost = np.full((len(used), len(used)), _NO_LINK)
+    for i, end in enumerate(ends):
+        for j, start in enumerate(starts):
+            if start.time > end.time:
+                difference = distance(tracklets[used[i]].appearance, tracklets[used[j]].appearance)
+                cost[i, j] = link_cost(end, start, difference)
+    successor = cheapest_links(cost, MAX_LINK_COST)
+    has_predecessor = set(successor.values())
+    people = []
+    for first in range(len(used)):
+        if first in has_predecessor:
+            continue
+        chain = [first]
+        while chain[-1] in successor:
+            chain.append(successor[chain[-1]])
+        people.append([used[k] for k in chain])
+    return people
+
+
+def link_cost(end: End, start: End, appearance_distance: float) -> float:
+    """Compute the cost of the module's equation.
+
+    :param appearance_distance: 0..1, see `appearance.distance`.
+    """
+    gap = start.time - end.time
+    size_change = abs(float(np.log(start.side_px / end.side_px)))
+    if gap > LONG_GAP_S:
+        if appearance_distance > LONG_GAP_MAX_APPEARANCE:
+            return _NO_LINK
+        return (
+            LONG_GAP_COST * (0.5 + 0.5 * appearance_distance / LONG_GAP_MAX_APPEARANCE)
+            + 0.5 * size_change
+        )
+    side = (start.side_px + end.side_px) / 2
+    elapsed = min(gap, _MAX_EXTRAPOLATION_S)
+    forward = np.linalg.norm(start.center_px - end.center_px - end.velocity_px * elapsed)
+    backward = np.linalg.norm(start.center_px - start.velocity_px * elapsed - end.center_px)
+    position = float(forward + backward) / (2 * side) / (POSITION_SIGMA + SPEED_SIGMA * gap)
+    return position + APPEARANCE_WEIGHT * appearance_distance + size_change
+
+
+def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]:
+    """Choose the links with the least sum of ``cost - max_cost``, among those cheaper than
+    ``max_cost``.
+
+    The problem splits into groups of rows and columns that can be linked to each other; each is
+    solved separately.
+
+    :param cost: (N, M) of linking a row to a column.
+    :param max_cost: a link that costs as much is no better than none.
+    :return: the column of each linked row.
+    """
+    is_open = cost < max_cost
+    links: dict[int, int] = {}
+    remaining = set(np.flatnonzero(is_open.any(axis=1)).tolist())
+    while remaining:
+        rows = {remaining.pop()}
+        columns = np.zeros(cost.shape[1], bool)
+        while True:
+            columns = is_open[sorted(rows)].any(axis=0)
+            grown = set(np.flatnonzero(is_open[:, columns].any(axis=1)).tolist())
+            if grown == rows:
+                break
+            rows = grown
+        remaining -= rows
+        r = np.array(sorted(rows))
+        c = np.flatnonzero(columns)
+        # an extra column for each row that stays without a link
+        padded = np.concatenate([cost[np.ix_(r, c)] - max_cost, np.zeros((len(r), len(r)))], axis=1)
+        for i, j in enumerate(assign(padded)):
+            if j < len(c) and is_open[r[i], c[j]]:
+                links[int(r[i])] = int(c[j])
+    return links
+
+
+def assign(cost: NDArray[np.float64]) -> list[int]:
+    """Solve the assignment problem by shortest augmenting paths, in O(N²M).
+
+    :param cost: (N, M), N <= M.
+    :return: the column of each row, all different, with the least total cost.
+    """
+    rows, columns = cost.shape
+    row_price = np.zeros(rows + 1)
+    column_price = np.zeros(columns + 1)
+    row_of = np.full(columns + 1, -1)  # the last column holds the row that is being added
+    for new in range(rows):
+        row_of[columns] = new
+        at = columns
+        shortest = np.full(columns, np.inf)
+        came_from = np.full(columns, columns)
+        visited = np.zeros(columns + 1, bool)
+        while row_of[at] >= 0:
+            visited[at] = True
+            row = row_of[at]
+            length = cost[row] - row_price[row] - column_price[:columns]
+            better = ~visited[:columns] & (length < shortest)
+            shortest[better] = length[better]
+            came_from[better] = at
+            nearest = int(np.where(visited[:columns], np.inf, shortest).argmin())
+            step = shortest[nearest]
+            row_price[row_of[visited]] += step
+            column_price[visited] -= step
+            shortest[~visited[:columns]] -= step
+            at = nearest
+        while at != columns:
+            row_of[at] = row_of[came_from[at]]
+            at = int(came_from[at])
+    column_of = [-1] * rows
+    for column in range(columns):
+        if row_of[column] >= 0:
+            column_of[row_of[column]] = column
+    return column_of
+
+
+def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
+    rows = tracklet.rows if first else tracklet.rows[::-1]
+    time = times[rows[0]]
+    counted = zip(range(_MAX_VELOCITY_FRAMES), rows, strict=False)
+    near = [k for k, row in counted if abs(times[row] - time) <= _VELOCITY_WINDOW_S]
+    index = np.array(near) if first else len(tracklet.rows) - 1 - np.array(near)
+    t = np.array([times[tracklet.rows[k]] for k in index])
+    centers = np.array([tracklet.centers_px[k] for k in index])
+    velocity = np.zeros(2)
+    if len(t) > 2:
+        off = t - t.mean()
+        velocity = off @ (centers - centers.mean(axis=0)) / max(float(off @ off), 1e-9)
+    return End(time, centers[0], velocity, float(np.median([tracklet.sides_px[k] for k in index])))
+
 
 MIN_SHARE = 0.02  # of the frames; a person who was seen in fewer is a mistake of the detector
 MIN_INTERVAL_S = 0.3  # the same for the longest time without interruption

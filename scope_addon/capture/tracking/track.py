@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..perception.face.face_record import RECORD
+from ..perception.face_record import (
+    RECORD,
+)
 from ..perception.landmark_network import KEYPOINT_COUNT
 from ..perception.observation import Observation, PendingReference, PersonMask
 from .appearance import SIZE as APPEARANCE_SIZE

@@ -20,15 +20,22 @@ from numpy.typing import NDArray
 
 from ....solver.errors import ShapeError
 from ..perception.adapters.keypoint_network import KeypointNetwork
-from ..perception.execution import Execution
 from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
 from ..perception.region import Region
+from ..perception.sessions import (
+    Execution,
+)
 from .appearance import appearance
 from .frame_clock import FRAME_S, FrameClock
-from .landmarks.landmark_estimator import LandmarkEstimator, ReferenceEstimator, open_networks
-from .landmarks.plausibility import (
+from .landmark_estimator import (
+    LandmarkEstimator,
+    ReferenceEstimator,
+    open_networks,
+)
+from .left_right import looks_swapped, swap_ratio
+from .plausibility import (
     DISAGREEMENT_THRESHOLD,
     PRESENCE_THRESHOLD,
     is_center_in_image,
@@ -38,7 +45,6 @@ from .landmarks.plausibility import (
     share_in_image,
     share_within,
 )
-from .left_right import looks_swapped, swap_ratio
 from .search_schedule import EAGER_S, SearchSchedule
 from .tracked_target import TrackedTarget
 

@@ -9,15 +9,18 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.capture.perception.execution import (
+from scope.scope_addon.capture.perception import (
+    sessions,
+)
+from scope.scope_addon.capture.perception.sessions import (
     CHOICES,
     CPU,
     PROVIDERS,
     Execution,
     SerializedSession,
+    network_path,
+    open_session,
 )
-from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.options import option
 

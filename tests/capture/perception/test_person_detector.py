@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception import sessions
+from scope.scope_addon.capture.perception import (
+    sessions,
+)
 from scope.scope_addon.capture.perception.letterbox import fit_in
 from scope.scope_addon.capture.perception.person_detector import (
     PersonDetector,
@@ -19,7 +21,10 @@ from scope.scope_addon.capture.perception.person_detector import (
     small_squares,
     squares,
 )
-from scope.scope_addon.capture.perception.sessions import network_path, open_session
+from scope.scope_addon.capture.perception.sessions import (
+    network_path,
+    open_session,
+)
 from scope.scope_addon.errors import SetupError, UsageError
 from scope.solver.errors import ModelFileError
 

@@ -13,7 +13,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.capture.perception import sessions
+from scope.scope_addon.capture.perception import (
+    sessions,
+)
 from scope.scope_addon.errors import SetupError
 
 PROGRAM = """

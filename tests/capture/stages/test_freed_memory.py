@@ -13,7 +13,7 @@ import pytest
 # itself.
 PROGRAM = """
 import os
-from scope.scope_addon.capture.stages.freed_memory import return_freed_memory
+from scope.scope_addon.capture.stages.solve import return_freed_memory
 
 def resident_mib():
     with open("/proc/self/statm") as file:

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
-from ..execution import Execution
 from ..letterbox import fit_in
 from ..person_detector import Detection, overlap_clusters
+from ..sessions import (
+    Execution,
+)
 from .description import Description, description_path, read_description
 from .graph import PIXELS_BGR, UNIT, Graph, Normalization, Outputs, finite
 

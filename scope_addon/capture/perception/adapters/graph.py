@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
 from .....solver.loaders.regular_file import check_regular
-from ..execution import Execution
-from ..sessions import open_session
+from ..sessions import (
+    Execution,
+    open_session,
+)
 from .description import Description, description_path
 from .network_process import NetworkProcess
 

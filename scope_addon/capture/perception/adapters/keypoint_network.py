@@ -32,9 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
-from ..execution import Execution
 from ..landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..region import Region, box_along
+from ..sessions import (
+    Execution,
+)
 from .description import Description, description_path, read_description
 from .graph import IMAGENET, Graph, Outputs, finite
 from .keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet

@@ -31,8 +31,11 @@ from numpy.typing import NDArray
 from .....solver.errors import ModelFileError
 from .....solver.loaders.npz import read_npz
 from .....solver.rotations import log
-from ...perception.face.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
-from ...perception.face.face_record import (
+from ...perception.face_landmarks import (
+    EXPRESSION_POINTS,
+    ExpressionNetwork,
+)
+from ...perception.face_record import (
     gaze,
     kept_landmarks,
     landmarks_of,

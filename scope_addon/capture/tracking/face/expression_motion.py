@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from .....solver.names import EXPRESSIONS
 from ....kinematics.smoothing import gaussian_smooth
 from ....motion import FACE_KEYS
-from ...perception.face.face_record import CONTOURS, eye_light_of, parts
+from ...perception.face_record import (
+    CONTOURS,
+    eye_light_of,
+    parts,
+)
 
 CALM_HZ = 2.0  # cut-off frequency at rest
 NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face

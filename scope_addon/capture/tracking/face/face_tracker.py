@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.execution import Execution
-from ...perception.face.face_landmarks import (
+from ...perception.face_landmarks import (
     HEAD,
     ExpressionNetwork,
     FaceEstimate,
@@ -23,9 +22,14 @@ from ...perception.face.face_landmarks import (
     facing,
     region_from_body,
 )
-from ...perception.face.face_record import record
+from ...perception.face_record import (
+    record,
+)
 from ...perception.observation import Observation
 from ...perception.region import Region
+from ...perception.sessions import (
+    Execution,
+)
 from ..frame_clock import PATIENCE_S, is_search_due
 
 PRESENCE_THRESHOLD = 0.5

@@ -22,7 +22,11 @@ from numpy.typing import NDArray
 
 from .....solver.rotations import exp
 from ...camera.intrinsics import Camera
-from ...perception.face.face_record import landmarks_of, parts, presence_of
+from ...perception.face_record import (
+    landmarks_of,
+    parts,
+    presence_of,
+)
 from ...perception.lifter import camera_towards
 from .expression_fit import aligned, load_response
 

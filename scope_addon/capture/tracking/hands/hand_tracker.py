@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.execution import Execution
 from ...perception.hand_landmarks import (
     HAND_POINTS,
     PALM_THRESHOLD,
@@ -26,6 +25,9 @@ from ...perception.hand_landmarks import (
 )
 from ...perception.observation import Observation
 from ...perception.region import Region
+from ...perception.sessions import (
+    Execution,
+)
 from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
 from .hand_assignment import (
     DETECTED,
@@ -35,6 +37,7 @@ from .hand_assignment import (
     SAME_WRIST,
     SECOND,
     SECOND_TENTATIVE,
+    SUPPORT_S,
     SURE_WRIST,
     TENTATIVE,
     Key,
@@ -42,7 +45,6 @@ from .hand_assignment import (
     without_duplicates,
 )
 from .hand_sight import Found, Sight, better, followed_regions
-from .tentative_hands import SUPPORT_S
 
 AGAIN_PRESENCE = 0.03  # the same where a hand is looked for that was found in the frame after
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import (
+from scope.scope_addon.capture.perception.face_landmarks import (
     EXPRESSION_POINTS,
     ExpressionNetwork,
 )

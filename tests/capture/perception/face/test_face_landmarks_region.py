@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import (
+from scope.scope_addon.capture.perception.face_landmarks import (
     FACE_POINTS,
     region_from_body,
     region_from_landmarks,

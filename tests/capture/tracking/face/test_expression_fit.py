@@ -8,12 +8,15 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import (
+from scope.scope_addon.capture.perception.face_landmarks import (
     FACE_POINTS,
     FaceEstimate,
     FaceNetwork,
 )
-from scope.scope_addon.capture.perception.face.face_record import parts, record
+from scope.scope_addon.capture.perception.face_record import (
+    parts,
+    record,
+)
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
 from scope.scope_addon.capture.tracking.face.expression_fit import fitted, load_response, view_terms

@@ -7,12 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face.face_landmarks import (
+from scope.scope_addon.capture.perception.face_landmarks import (
     EXPRESSION_POINTS,
     ExpressionNetwork,
     FaceNetwork,
 )
-from scope.scope_addon.capture.perception.face.face_record import RECORD, gaze, parts, record
+from scope.scope_addon.capture.perception.face_record import (
+    RECORD,
+    gaze,
+    parts,
+    record,
+)
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
 from scope.scope_addon.capture.tracking.face.expression_fit import fitted, with_expressions

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.face.face_landmarks import (
+from scope.scope_addon.capture.perception.face_landmarks import (
     FACE_POINTS,
     FaceEstimate,
     eye_light,
     region_from_body,
 )
-from scope.scope_addon.capture.perception.face.face_record import eye_light_of, parts
+from scope.scope_addon.capture.perception.face_record import (
+    eye_light_of,
+    parts,
+)
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region

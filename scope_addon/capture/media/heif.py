@@ -19,7 +19,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ....footage import MAX_PIXELS
+from ...footage import (
+    MAX_PIXELS,
+)
 
 CODED = (b"hvc1", b"av01")
 MAX_TILES = 1000  # ffmpeg's limit

@@ -21,15 +21,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .....solver import MotionFit, State
-from .....solver.rotations import exp, log
-from ....kinematics.body_surface import BodySurface
-from ...fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
-from ...fitting.prepared_track import PreparedTrack
-from ...fitting.weights import motion_priors
-from ..camera_path import CameraPath
-from .clip_window import ClipWindow
-from .limb_search import search_limbs
+from ....solver import (
+    MotionFit,
+    State,
+)
+from ....solver.rotations import (
+    exp,
+    log,
+)
+from ...kinematics.body_surface import (
+    BodySurface,
+)
+from ..fitting.frame_sequence import (
+    LONGEST_COAST_S,
+    FittedTrack,
+)
+from ..fitting.prepared_track import (
+    PreparedTrack,
+)
+from ..fitting.weights import (
+    motion_priors,
+)
+from .camera_path import (
+    CameraPath,
+)
+from .clip_window import (
+    ClipWindow,
+)
+from .limb_search import (
+    search_limbs,
+)
 
 # unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
 WINDOW_UNKNOWNS = 36_000

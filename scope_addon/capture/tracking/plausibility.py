@@ -10,9 +10,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.landmark_network import PoseEstimate
-from ...perception.region import Region, bounds, inside
-from ..left_right import mean_distance
+from ..perception.landmark_network import (
+    PoseEstimate,
+)
+from ..perception.region import (
+    Region,
+    bounds,
+    inside,
+)
+from .left_right import (
+    mean_distance,
+)
 
 PRESENCE_THRESHOLD = 0.5
 # See PoseEstimate.spread and .disagreement. Hands are detected as people with scores of up to 0.86,

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import av
 
+
 # cd/m² of the reference white (ITU-R BT.2408), which becomes the brightest light of SDR
 WHITE = 203.0
 PEAK = 1000.0  # cd/m² from which on everything is white

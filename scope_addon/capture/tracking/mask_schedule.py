@@ -11,8 +11,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...perception.landmark_network import LandmarkNetwork
-from ...perception.observation import Observation, PersonMask
+from ..perception.landmark_network import (
+    LandmarkNetwork,
+)
+from ..perception.observation import (
+    Observation,
+    PersonMask,
+)
 
 MASKS = 16  # for a clip, about; 8 give the same shape on real clips
 MIN_STRIDE = 6  # frames between two masks in short clips

@@ -14,17 +14,41 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ....errors import SetupError
-from ...perception.adapters.box_detector import BoxDetector
-from ...perception.adapters.keypoint_network import KeypointNetwork
-from ...perception.execution import Execution
-from ...perception.landmark_network import LandmarkNetwork, PoseEstimate
-from ...perception.observation import PendingReference
-from ...perception.person_detector import PersonDetector
-from ...perception.region import Region
-from ...perception.sessions import landmark_network_name
-from ..tracked_target import MIN_VELOCITY_FRAMES, TrackedTarget
-from .plausibility import is_in_image, is_plausible, is_same_region
+from ...errors import (
+    SetupError,
+)
+from ..perception.adapters.box_detector import (
+    BoxDetector,
+)
+from ..perception.adapters.keypoint_network import (
+    KeypointNetwork,
+)
+from ..perception.landmark_network import (
+    LandmarkNetwork,
+    PoseEstimate,
+)
+from ..perception.observation import (
+    PendingReference,
+)
+from ..perception.person_detector import (
+    PersonDetector,
+)
+from ..perception.region import (
+    Region,
+)
+from ..perception.sessions import (
+    Execution,
+    landmark_network_name,
+)
+from .plausibility import (
+    is_in_image,
+    is_plausible,
+    is_same_region,
+)
+from .tracked_target import (
+    MIN_VELOCITY_FRAMES,
+    TrackedTarget,
+)
 
 MAX_PENDING = 2  # calls that are not finished, each of which keeps its frame in memory
 

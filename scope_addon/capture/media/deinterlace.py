@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import av
 
+
 # Whose decoders give each field as a frame of its own, half as high, and mark it as interlaced.
 FIELD_CODECS = ("hevc", "vvc")
 

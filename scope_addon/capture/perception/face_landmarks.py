@@ -17,11 +17,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .....solver.names import EXPRESSIONS
-from ..execution import Execution
-from ..landmark_network import KEYPOINT_NAMES
-from ..region import Region, box_along
-from ..sessions import network_path, open_session
+from ....solver.names import (
+    EXPRESSIONS,
+)
+from .landmark_network import (
+    KEYPOINT_NAMES,
+)
+from .region import (
+    Region,
+    box_along,
+)
+from .sessions import (
+    Execution,
+    network_path,
+    open_session,
+)
 
 INPUT_SIZE = 256
 FACE_POINTS = 478  # the mesh of 468 points, then the right and the left iris, five points each

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .....solver import (
+from ....solver import (
     Fit,
     Floor,
     FootContacts,
@@ -29,13 +29,30 @@ from .....solver import (
     fit_tree,
     make_tree,
 )
-from .....solver.compiled.tree import Tree, with_fixed_shape
-from ....kinematics.body_surface import BodySurface
-from ....kinematics.contact_points import contact_point_positions
-from ....kinematics.runs import runs
-from ...fitting.prepared_track import PreparedTrack
-from ...fitting.weights import CLIP_STEPS, ROBUST, clip_stages
-from ..camera_path import CameraPath
+from ....solver.compiled.tree import (
+    Tree,
+    with_fixed_shape,
+)
+from ...kinematics.body_surface import (
+    BodySurface,
+)
+from ...kinematics.contact_points import (
+    contact_point_positions,
+)
+from ...kinematics.runs import (
+    runs,
+)
+from ..fitting.prepared_track import (
+    PreparedTrack,
+)
+from ..fitting.weights import (
+    CLIP_STEPS,
+    ROBUST,
+    clip_stages,
+)
+from .camera_path import (
+    CameraPath,
+)
 
 # of a rest; see `resting_places`
 MIN_PROBABILITY = 0.5
