@@ -20,6 +20,7 @@ from ..motion import Motion
 from ..notices import Notice
 from .animation_data import timing
 from .animation_data.actions import fcurves, frame_range
+from .animation_data.frame_spans import FrameSpan, parse_spans
 from .animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
 from .animation_data.stored_values import start_frame
 from .camera import same_camera, show_footage_again
@@ -29,13 +30,9 @@ from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
 from .datablock_names import holds
-from .frame_spans import FrameSpan
 from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
 
-_MARKER = re.compile(
-    rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) "
-    rf"(-?\d+)(?:-(-?\d+))?"
-)
+_MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")
 
 
 def change_rate(
@@ -88,8 +85,15 @@ def retimed_spans(
     spans: Iterable[FrameSpan], person: bpy.types.Object, rate: float, former: float
 ) -> list[FrameSpan]:
     """Move the frames of a result's spans."""
-    move = Retiming(start_frame(person), rate / former)
-    return [FrameSpan(*(round(move.frame(frame)) for frame in span)) for span in spans]
+    return retimed(spans, Retiming(start_frame(person), rate / former))
+
+
+def retimed(spans: Iterable[FrameSpan], retiming: Retiming) -> list[FrameSpan]:
+    """Move spans in time."""
+    return [
+        FrameSpan(round(retiming.frame(span.first)), round(retiming.frame(span.last)))
+        for span in spans
+    ]
 
 
 def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -207,15 +211,12 @@ def _retime_markers(
         inside = [
             p for p, span in ranges.items() if span and span[0] - 1 <= marker.frame <= span[1] + 1
         ]
-        if found is None or int(found.group(2)) != marker.frame or not inside:
+        spans = parse_spans(found[2]) if found else []
+        if found is None or [span.first for span in spans] != [marker.frame] or not inside:
             continue
-        ends = [
-            str(round(moves[inside[-1]].frame(int(end))))
-            for end in found.groups()[1:]
-            if end is not None
-        ]
-        marker.name = f"{found.group(1)} {'-'.join(ends)}"
-        marker.frame = int(ends[0])
+        (moved,) = retimed(spans, moves[inside[-1]])
+        marker.name = f"{found[1]} {moved}"
+        marker.frame = moved.first
 
 
 def _show_footage(

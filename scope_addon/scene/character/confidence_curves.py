@@ -19,6 +19,7 @@ from ...motion import Motion
 from ...notices import REASONS
 from ...review_spans import find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
+from ..animation_data.frame_spans import in_scene
 
 CONFIDENCE = "confidence"
 CONTACT = "contact"
@@ -95,12 +96,10 @@ def add_review_markers(
     )[:_MAX_MARKERS]
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
-        first = round(float(frames[span.first]))
-        last = round(float(frames[span.last]))
-        at = f"{first}" if first == last else f"{first}-{last}"
+        at = in_scene(span, frames)
         name = f"{prefix}{MARKER_NAMES[span.reason]} {at}"
-        if (name, first) not in there:
-            scene.timeline_markers.new(name, frame=first)
+        if (name, at.first) not in there:
+            scene.timeline_markers.new(name, frame=at.first)
     return len(spans)
 
 

@@ -10,7 +10,7 @@ import bpy
 
 from ...footage import display_text
 from ...options import Section
-from ...scene.frame_spans import parse_spans
+from ...scene.animation_data.frame_spans import parse_spans
 from .. import warm_up
 from ..declared_properties import draw_section
 from ..export_operators import FORMATS, is_available
@@ -23,7 +23,7 @@ from . import preview_picture
 from .capture_operators import state
 from .captures import draw_captures, people_of, people_text, shown_capture
 from .frame_rate_operators import differs, keyed_for
-from .result import stored_warning
+from .stored_warnings import stored_warning
 
 if TYPE_CHECKING:
     from ...job.progress.job_progress import JobProgress

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...notices import Notice, notice
+from ...scene.animation_data.frame_spans import parse_spans, spans_text
 from ...scene.animation_data.stored_values import stored_rate
-from ...scene.frame_spans import parse_spans, spans_text
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from ..reporting import ReportingOperator, rpt_, tip_
 from .captures import people_of, shown_capture
-from .result import add_warning, stored_warning
+from .stored_warnings import add_warning, stored_warning
 
 if TYPE_CHECKING:
     from ...motion import Motion

@@ -5,9 +5,7 @@ review.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -16,12 +14,12 @@ from numpy.typing import NDArray
 
 from ...capture_report import Report
 from ...motion import Motion
-from ...notices import Notice, notice, notice_from
+from ...notices import notice
 from ...review_spans import Span, find_review_spans
+from ...scene.animation_data.frame_spans import FrameSpan, in_scene
 from ...scene.build import BuildResult
 from ...scene.camera import pixel_aspect
-from ...scene.frame_spans import FrameSpan, spans_text
-from ..reporting import warning_text
+from .stored_warnings import add_warning
 
 _MAX_SPANS = 12  # number of buttons
 
@@ -77,27 +75,12 @@ def review_spans(
     by_reason: dict[str, list[Span]] = {}
     for span in find_review_spans(motion, under_floor=under_floor):
         by_reason.setdefault(span.reason, []).append(span)
-    return {reason: _in_scene(spans, frames) for reason, spans in by_reason.items()}
-
-
-def add_warning(
-    shown: bpy.types.PropertyGroup, warning: Notice, spans: Sequence[FrameSpan] = ()
-) -> None:
-    """Store a warning with a result: its English text, and the record from which it is shown in the
-    user's language.
-    """
-    stored = shown.warnings.add()
-    stored.text = warning_text(warning, str)
-    stored.record = json.dumps(warning.as_json())
-    stored.spans = spans_text(spans)
-
-
-def stored_warning(stored: bpy.types.PropertyGroup) -> Notice:
-    """Return a warning of a result. Of one whose record is damaged or missing, the text is left."""
-    record = None
-    with suppress(ValueError, RecursionError):
-        record = json.loads(stored.record)
-    return notice_from(record, stored.text, lambda found: warning_text(found, str))
+    found = {}
+    for reason, spans in by_reason.items():
+        longest = sorted(spans, key=lambda span: span.first - span.last)[:_MAX_SPANS]
+        in_order = sorted(longest, key=lambda span: span.first)
+        found[reason] = [in_scene(span, frames) for span in in_order]
+    return found
 
 
 def _height(person: Mapping[str, Any]) -> str:
@@ -108,12 +91,3 @@ def _height(person: Mapping[str, Any]) -> str:
     if sigma_m is None:
         return f"{person['height_m']:.2f} m"
     return f"{person['height_m']:.2f} m ± {sigma_m:.{2 if sigma_m >= 0.01 else 3}f}"
-
-
-def _in_scene(spans: list[Span], frames: NDArray[np.float64]) -> list[FrameSpan]:
-    """Return the longest spans in scene frames, in chronological order."""
-    longest = sorted(spans, key=lambda span: span.first - span.last)[:_MAX_SPANS]
-    return [
-        FrameSpan(round(float(frames[span.first])), round(float(frames[span.last])))
-        for span in sorted(longest, key=lambda span: span.first)
-    ]

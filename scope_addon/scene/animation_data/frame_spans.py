@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spans of scene frames, as a result in a .blend file has them: ``12-18,40``. Standard library
-only.
+"""Spans of scene frames, as results and markers in a .blend file have them: ``12-18,40``. Loaded
+while Blender starts.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ...review_spans import Span
 
 _SPAN = re.compile(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", re.ASCII)
 
@@ -20,6 +26,14 @@ class FrameSpan(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.first}" if self.first == self.last else f"{self.first}-{self.last}"
+
+
+def in_scene(span: Span, frames: NDArray[np.float64]) -> FrameSpan:
+    """Return a span of a motion in scene frames.
+
+    :param frames: (T,) scene frame of each pose.
+    """
+    return FrameSpan(round(float(frames[span.first])), round(float(frames[span.last])))
 
 
 def parse_spans(text: str) -> list[FrameSpan]:
