@@ -75,6 +75,7 @@ ROOMS = {
     "scope_addon/cli": {"scope_addon/command_line"},
 }
 SHARED = (
+    "arrays",
     "errors",
     "installed",
     "motion",

@@ -19,9 +19,9 @@ from dataclasses import dataclass, field, replace
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.rotations import exp, log
+from ...arrays import BoolArray, Float64Array
 from ...kinematics.smoothing import fill_rotation_gaps
 from .heading_drift import FrameEdges, remove_heading_drift
 from .intrinsics import Camera
@@ -37,8 +37,8 @@ REVEALING_S = 30.0  # from the first frame with edges on, edges that people hid 
 class CameraMotion:
     """The camera's rotation during T frames."""
 
-    R_first_camera: NDArray[np.float64]  # (T, 3, 3) the camera's axes in those of the first frame
-    known: NDArray[np.bool_]  # (T,) frames in which it was estimated; elsewhere it is interpolated
+    R_first_camera: Float64Array  # (T, 3, 3) the camera's axes in those of the first frame
+    known: BoolArray  # (T,) frames in which it was estimated; elsewhere it is interpolated
 
     @property
     def is_static(self) -> bool:
@@ -60,12 +60,12 @@ class BackgroundRecord:
     those before.
     """
 
-    times: NDArray[np.float64]  # (T,) seconds
-    R_first_camera: NDArray[np.float64]  # (T, 3, 3) as followed; identity where not known
-    known: NDArray[np.bool_]  # (T,)
+    times: Float64Array  # (T,) seconds
+    R_first_camera: Float64Array  # (T, 3, 3) as followed; identity where not known
+    known: BoolArray  # (T,)
     inlier_shares: list[float]  # of the corners, in the frames that were followed
     edge_frames: list[FrameEdges] = field(default_factory=list)
-    bars: list[NDArray[np.float64]] = field(default_factory=list)  # in the first of the edge frames
+    bars: list[Float64Array] = field(default_factory=list)  # in the first of the edge frames
 
     def motion(
         self, followed_with: Camera, camera: Camera, image_size: tuple[int, int]
@@ -126,7 +126,7 @@ class BackgroundRecord:
         return bool(is_early) and not is_rotated(self.R_first_camera[edge.row])
 
 
-def is_rotated(R: NDArray[np.float64]) -> bool:
+def is_rotated(R: Float64Array) -> bool:
     """Return whether a rotation (3, 3) is larger than that of a camera on a tripod."""
     return bool(np.degrees(np.linalg.norm(log(R))) >= STATIC_DEG)
 
@@ -171,11 +171,11 @@ def joined_backgrounds(
 
 
 def _faded(
-    R: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    R_after: NDArray[np.float64],
-    known_after: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+    R: Float64Array,
+    known: BoolArray,
+    R_after: Float64Array,
+    known_after: BoolArray,
+) -> Float64Array:
     """Return rotations (T, 3, 3) whose last n frames go over to those of the next window.
 
     :param known: (T,).
@@ -193,7 +193,7 @@ def _faded(
     return out
 
 
-def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> NDArray[np.float64]:
+def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> Float64Array:
     """Return the rotation (3, 3) from the axes of one window to those of the window before.
 
     Where no frame is known in both, the camera is taken to have kept the last direction that is
@@ -210,5 +210,5 @@ def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> NDArr
         total = before.R_first_camera[seen[-1]] if len(seen) else np.eye(3)
     U, _, Vt = np.linalg.svd(total)
     U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
-    link: NDArray[np.float64] = U @ Vt
+    link: Float64Array = U @ Vt
     return link

@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Float64Array, FloatArray, Uint8Array
+
 MIN_WIDTH = 0.03  # of the side
 MAX_DIFFERENCE = 0.01  # of the side, between the widths of opposite bars
 DARK = 24  # of 255, in every channel: black, after compression
@@ -30,7 +32,7 @@ MIN_STEP_SHARE = 0.7
 MAX_DETAIL = 0.2  # of the picture's, on average
 
 
-def find_bars(image_rgb: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+def find_bars(image_rgb: Uint8Array) -> list[Float64Array]:
     """Find pairs of opposite bars of equal width; a dark sky alone has no counterpart.
 
     :param image_rgb: (H, W, 3).
@@ -58,7 +60,7 @@ def find_bars(image_rgb: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
     return bars
 
 
-def longer_content_side(bars: Sequence[NDArray[np.float64]], width: int, height: int) -> float:
+def longer_content_side(bars: Sequence[Float64Array], width: int, height: int) -> float:
     """Return the longer side, in pixels, of the content between the bars.
 
     :param bars: (4,) each, as `find_bars` returns them.
@@ -69,7 +71,7 @@ def longer_content_side(bars: Sequence[NDArray[np.float64]], width: int, height:
     return float(max(width - sizes[is_upright, 0].sum(), height - sizes[~is_upright, 1].sum()))
 
 
-def _black_bars(bright: NDArray[np.floating[Any]]) -> tuple[int, int] | None:
+def _black_bars(bright: FloatArray) -> tuple[int, int] | None:
     """Return the widths of black bars at both ends of n lines, from the share (n,) of bright pixels
     in each.
     """

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.errors import InputError
+from ...arrays import Float64Array
 from ...json_file import read_json_object
 
 _FORMAT = (
@@ -60,11 +60,11 @@ class Calibration:
     """
 
     path: Path
-    intrinsics: NDArray[np.float64]  # (3, 3)
-    dist: NDArray[np.float64]  # (5,) OpenCV's k1, k2, p1, p2, k3
+    intrinsics: Float64Array  # (3, 3)
+    dist: Float64Array  # (5,) OpenCV's k1, k2, p1, p2, k3
     size: tuple[float, float] | None
 
-    def intrinsics_for(self, width: int, height: int) -> NDArray[np.float64]:
+    def intrinsics_for(self, width: int, height: int) -> Float64Array:
         """Return the intrinsics (3, 3) in pixels of footage of this size.
 
         :raises InputError: the footage has other proportions than the calibration pictures, or the
@@ -151,7 +151,7 @@ def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
-def _numbers(value: Any) -> NDArray[np.float64] | None:
+def _numbers(value: Any) -> Float64Array | None:
     """Return an array of finite numbers of any shape, or None if the value is something else."""
     try:
         array = np.asarray(value, float)
@@ -160,7 +160,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:
     return array if np.isfinite(array).all() else None
 
 
-def _intrinsics(path: Path, value: Any) -> NDArray[np.float64]:
+def _intrinsics(path: Path, value: Any) -> Float64Array:
     K = _numbers(value)
     if K is None or K.shape != (3, 3):
         raise InputError(f"{path}: intrinsics must be three rows of three numbers; {_FORMAT}")
@@ -186,7 +186,7 @@ def _intrinsics(path: Path, value: Any) -> NDArray[np.float64]:
     return K
 
 
-def _distortion(path: Path, value: Any) -> NDArray[np.float64]:
+def _distortion(path: Path, value: Any) -> Float64Array:
     if value is None:
         return np.zeros(_BROWN_COUNT)
     dist = _numbers(value)
@@ -217,7 +217,7 @@ def _size(path: Path, value: Any) -> tuple[float, float] | None:
     return float(size[0]), float(size[1])
 
 
-def _can_be_undistorted(dist: NDArray[np.float64], radius: float) -> bool:
+def _can_be_undistorted(dist: Float64Array, radius: float) -> bool:
     """Return whether each point of the picture up to a radius corresponds to one direction nearby.
 
     A point at r is imaged at r (1 + k1 r² + k2 r⁴ + k3 r⁶), which has to grow with r and to reach

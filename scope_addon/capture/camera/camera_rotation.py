@@ -27,6 +27,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array
 from ..perception.region import inside, surroundings
 from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, is_rotated
 from .bars import find_bars
@@ -61,11 +62,11 @@ class BackgroundTracker:
         self._tolerance = INLIER_PX / (self._scale * camera.intrinsics[0, 0])  # radians
         self._random = np.random.default_rng(0)
         self._times: list[float] = []
-        self._rotations: list[NDArray[np.float64] | None] = []
+        self._rotations: list[Float64Array | None] = []
         self._last_used = -np.inf
-        self._image: NDArray[np.uint8] | None = None  # the working image
-        self._points: NDArray[np.float32] = np.zeros((0, 2), np.float32)  # in the working image
-        self._key_rays: NDArray[np.float64] = np.zeros((0, 3))
+        self._image: Uint8Array | None = None  # the working image
+        self._points: Float32Array = np.zeros((0, 2), np.float32)  # in the working image
+        self._key_rays: Float64Array = np.zeros((0, 3))
         self._key_count = 0
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
@@ -73,11 +74,11 @@ class BackgroundTracker:
         # the first one is the first frame in which somebody is seen
         self.edge_frames: list[FrameEdges] = []
         self._hidden = HiddenBackground((width, height))
-        self.bars: list[NDArray[np.float64]] = []  # in that frame
+        self.bars: list[Float64Array] = []  # in that frame
 
     def add(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         time_s: float,
         people: Sequence[NDArray[Any]],
         is_cut: bool = False,
@@ -149,7 +150,7 @@ class BackgroundTracker:
             times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars
         )
 
-    def _is_edge_frame(self, R_first_camera: NDArray[np.float64]) -> bool:
+    def _is_edge_frame(self, R_first_camera: Float64Array) -> bool:
         """Return whether to detect edges in the last frame: at intervals, once the camera (3, 3)
         has rotated.
         """
@@ -159,7 +160,7 @@ class BackgroundTracker:
         return elapsed_s >= EDGE_INTERVAL_S and is_rotated(R_first_camera)
 
     def _may_reveal_edges(
-        self, R_first_camera: NDArray[np.float64], people: Sequence[NDArray[Any]]
+        self, R_first_camera: Float64Array, people: Sequence[NDArray[Any]]
     ) -> bool:
         """Return whether people of the first edge frame have moved away from background that they
         hid in it.
@@ -174,9 +175,7 @@ class BackgroundTracker:
         is_due = elapsed_s >= EDGE_INTERVAL_S and since_first_s <= REVEALING_S
         return is_due and self._hidden.share_in_view(people) >= REVEALED_SHARE
 
-    def _follow(
-        self, image: NDArray[np.uint8], boxes: Sequence[NDArray[np.float64]]
-    ) -> NDArray[np.float64] | None:
+    def _follow(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> Float64Array | None:
         """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if
         it is unknown.
         """
@@ -198,7 +197,7 @@ class BackgroundTracker:
             return None
         return R
 
-    def _shrink(self, image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _shrink(self, image_rgb: Uint8Array) -> Uint8Array:
         """Return the working image, grey; pixels are skipped before areas are averaged, which saves
         time.
         """
@@ -209,9 +208,9 @@ class BackgroundTracker:
         grey = cv2.cvtColor(
             cv2.resize(coarse, self._size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY
         )
-        return cast(NDArray[np.uint8], grey)
+        return cast(Uint8Array, grey)
 
-    def _begin_key(self, image: NDArray[np.uint8], boxes: Sequence[NDArray[np.float64]]) -> None:
+    def _begin_key(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
         mask = np.full(image.shape, 255, np.uint8)
         for x0, y0, x1, y1 in boxes:
             mask[max(0, int(y0)) : max(0, int(y1) + 1), max(0, int(x0)) : max(0, int(x1) + 1)] = 0
@@ -222,27 +221,27 @@ class BackgroundTracker:
         self._image = image
         self._R_key_last = np.eye(3)
 
-    def _rays(self, points: NDArray[np.float32]) -> NDArray[np.float64]:
+    def _rays(self, points: Float32Array) -> Float64Array:
         """Return the (n, 3) unit directions, in camera axes, of points (n, 2) in the working
         image.
         """
         # A working pixel's centre in the full image: OpenCV scales areas, not their centres.
         full = ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
         rays = self._camera.rays(full)
-        unit: NDArray[np.float64] = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        unit: Float64Array = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         return unit
 
-    def _box(self, box_px: NDArray[Any]) -> NDArray[np.float64]:
+    def _box(self, box_px: NDArray[Any]) -> Float64Array:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
         return box_px * self._scale + [-4.0, -4.0, 4.0, 4.0]
 
 
 def consensus_rotation(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
+    a: Float64Array,
+    b: Float64Array,
     tolerance: float,
     random: np.random.Generator,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[Float64Array, BoolArray]:
     """Find the rotation R with b = R a that most directions agree with.
 
     :param a: (n, 3) unit vectors, n at least 2.
@@ -267,21 +266,21 @@ def consensus_rotation(
     return best, agree
 
 
-def _kabsch(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _kabsch(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the (..., 3, 3) rotations that best take directions a (..., n, 3) to b."""
     U, _, Vt = np.linalg.svd(np.swapaxes(b, -1, -2) @ a)
     sign = np.sign(np.linalg.det(U @ Vt))
     U[..., :, 2] *= sign[..., None]
-    R: NDArray[np.float64] = U @ Vt
+    R: Float64Array = U @ Vt
     return R
 
 
 def _flow(
-    before: NDArray[np.uint8],
-    after: NDArray[np.uint8],
-    points: NDArray[np.float32],
-    near: NDArray[np.float32] | None = None,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    before: Uint8Array,
+    after: Uint8Array,
+    points: Float32Array,
+    near: Float32Array | None = None,
+) -> tuple[Float32Array, BoolArray]:
     """Follow corners (n, 2) from one working image to another.
 
     :param near: (n, 2) where to look for them, without an image pyramid.
@@ -324,15 +323,15 @@ class HiddenBackground:
         """
         return float((self._hidden & ~self._covered(people)).mean())
 
-    def hides(self, points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+    def hides(self, points: FloatArray) -> BoolArray:
         """Return (n,) whether each point (n, 2) of the image, in pixels, was hidden so far."""
         column, row = (
             np.clip((points + 0.5) / self._cell_px, 0, CELLS - 1).astype(int).reshape(-1, 2).T
         )
-        hidden: NDArray[np.bool_] = self._hidden[row * CELLS + column]
+        hidden: BoolArray = self._hidden[row * CELLS + column]
         return hidden
 
-    def _covered(self, people: Sequence[NDArray[Any]]) -> NDArray[np.bool_]:
+    def _covered(self, people: Sequence[NDArray[Any]]) -> BoolArray:
         """Return whether each cell is wholly behind one of the people."""
         margin = 0.5 * np.concatenate([self._cell_px, -self._cell_px])
         return inside(self._centers, [surroundings(points) + margin for points in people])

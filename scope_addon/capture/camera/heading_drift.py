@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.rotations import exp, log
+from ...arrays import Float64Array
 from ...kinematics.smoothing import gaussian_smooth
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
@@ -51,12 +51,12 @@ class FrameEdges:
 
 
 def remove_heading_drift(
-    R_first_camera: NDArray[np.float64],
-    times: NDArray[np.float64],
+    R_first_camera: Float64Array,
+    times: Float64Array,
     edge_frames: Sequence[FrameEdges],
     camera: Camera,
     image_size: tuple[int, int],
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Correct the camera's rotation where the edges of enough frames agree on three directions.
 
     :param R_first_camera: (T, 3, 3) the camera's axes in the first frame's, with drift.
@@ -88,21 +88,19 @@ def remove_heading_drift(
     rows = np.array([first.row, *(row for row, _ in known)])
     vectors = np.array([np.zeros(3), *(vector for _, vector in known)])
     drifts = np.stack([np.interp(times, times[rows], vectors[:, k]) for k in range(3)], axis=1)
-    corrected: NDArray[np.float64] = (
-        exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
-    )
-    aligned: NDArray[np.float64] = corrected[0].T @ corrected
+    corrected: Float64Array = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
+    aligned: Float64Array = corrected[0].T @ corrected
     return aligned
 
 
 def _drift(
-    lines: Lines, axes: NDArray[np.float64], start: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    lines: Lines, axes: Float64Array, start: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Return δ (3, 3) from ``start``, and how much each of the directions ``axes`` (3, 3) explains,
     in sides.
     """
     E = start.T
-    supports: NDArray[np.float64] = np.zeros(3)
+    supports: Float64Array = np.zeros(3)
     for sigma in KERNEL_WIDTHS:
         H, g, supports = line_normal_equations(lines, axes @ E.T, sigma)
         E = exp(np.linalg.solve(H + 1e-3 * np.eye(3), g)) @ E

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
 from .calibration import read_calibration
 
@@ -34,13 +35,13 @@ class Camera:
     source.
     """
 
-    intrinsics: NDArray[np.float64]  # (3, 3)
-    dist: NDArray[np.float64]  # (5,)
+    intrinsics: Float64Array  # (3, 3)
+    dist: Float64Array  # (5,)
     source: str  # as the report gives it
     # relative error of the focal length, one standard deviation; 0: given
     focal_deviation: float = 0.0
 
-    def undistort(self, points_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def undistort(self, points_px: FloatArray) -> FloatArray:
         """Return pixels (..., 2) as an ideal pinhole camera with the same intrinsics would see
         them.
         """
@@ -53,21 +54,21 @@ class Camera:
         reshaped: NDArray[Any] = undistorted.reshape(points_px.shape)
         return reshaped
 
-    def rays(self, points_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def rays(self, points_px: FloatArray) -> Float64Array:
         """Return the (..., 3) lines of sight of pixels (..., 2), in camera axes, with z = 1."""
         K = self.intrinsics
         flat = (self.undistort(points_px) - K[:2, 2]) / [K[0, 0], K[1, 1]]
         return np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
 
 
-def pinhole(width: int, height: int, focal_px: float) -> NDArray[np.float64]:
+def pinhole(width: int, height: int, focal_px: float) -> Float64Array:
     """Return (3, 3) intrinsics with square pixels and the principal point in the middle of the
     image.
     """
     return np.array([[focal_px, 0.0, width / 2], [0.0, focal_px, height / 2], [0.0, 0.0, 1.0]])
 
 
-def scaled_intrinsics(intrinsics: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+def scaled_intrinsics(intrinsics: Float64Array, scale: float) -> Float64Array:
     """Return the intrinsics (3, 3) of a scaled image; pixel centres have integer coordinates, the
     corner is at -1/2.
     """

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array
 from ..perception.region import inside, surroundings
 from .intrinsics import Camera
 
@@ -27,15 +28,15 @@ BAR_MARGIN_PX = 6.0  # uncertainty of a bar's edge
 class Lines:
     """Straight lines as a camera sees them, the longest first."""
 
-    normals: NDArray[np.float64]  # (N, 3) of the planes that they span with the camera's centre
-    lengths: NDArray[np.float64]  # (N,) in sides of the picture
+    normals: Float64Array  # (N, 3) of the planes that they span with the camera's centre
+    lengths: Float64Array  # (N,) in sides of the picture
 
     @classmethod
     def none(cls) -> Lines:
         """Return no lines."""
         return cls(np.zeros((0, 3)), np.zeros(0))
 
-    def rotated(self, R_new_camera: NDArray[np.float64]) -> Lines:
+    def rotated(self, R_new_camera: Float64Array) -> Lines:
         """Return the lines in other axes, those of ``R_new_camera`` (3, 3)."""
         return Lines(self.normals @ R_new_camera.T, self.lengths)
 
@@ -44,8 +45,8 @@ class Lines:
 class Segments:
     """Straight edges in a picture, the longest first."""
 
-    ends_px: NDArray[np.float64]  # (N, 2, 2)
-    lengths: NDArray[np.float64]  # (N,) in sides of the picture
+    ends_px: Float64Array  # (N, 2, 2)
+    lengths: Float64Array  # (N,) in sides of the picture
 
     @classmethod
     def none(cls) -> Segments:
@@ -62,7 +63,7 @@ class Segments:
         order = np.argsort(-lengths, kind="stable")
         return cls(ends[order], lengths[order])
 
-    def where(self, chosen: NDArray[np.bool_]) -> Segments:
+    def where(self, chosen: BoolArray) -> Segments:
         """Return some of the segments, those for which ``chosen`` (N,) is True."""
         return Segments(self.ends_px[chosen], self.lengths[chosen])
 
@@ -71,7 +72,7 @@ class Segments:
         return Lines(plane_normals(camera.rays(self.ends_px)), self.lengths)
 
 
-def plane_normals(rays: NDArray[np.floating[Any]]) -> NDArray[Any]:
+def plane_normals(rays: FloatArray) -> NDArray[Any]:
     """Return the (N, 3) unit normals of the planes through the camera's centre and each edge.
 
     :param rays: (N, 2, 3) directions to the ends of each edge.
@@ -82,10 +83,10 @@ def plane_normals(rays: NDArray[np.floating[Any]]) -> NDArray[Any]:
 
 
 def find_segments(
-    image_rgb: NDArray[np.uint8],
+    image_rgb: Uint8Array,
     people: Sequence[NDArray[Any]],
     working_side_px: int = WORKING_SIDE_PX,
-    bars: Sequence[NDArray[np.float64]] = (),
+    bars: Sequence[Float64Array] = (),
 ) -> Segments:
     """Find the straight edges of a picture's background.
 

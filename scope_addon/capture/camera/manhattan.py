@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Float32Array, Float64Array
 from .line_segments import Lines, Segments, plane_normals
 
 MAX_TILT = np.radians(25.0)  # between the picture's vertical and the direction of vertical edges
@@ -43,10 +44,10 @@ _TILTED = np.stack([np.zeros_like(_TILTS), -np.cos(_TILTS), np.sin(_TILTS)], axi
 class Edges:
     """The longest edges of a picture."""
 
-    ends: NDArray[np.float32]  # (N, 2, 2) pixels, relative to the picture's middle
-    middle: NDArray[np.float32]  # (N, 2)
-    along: NDArray[np.float32]  # (N, 2) unit vectors
-    weight: NDArray[np.float32]  # (N,) lengths in sides of the picture
+    ends: Float32Array  # (N, 2, 2) pixels, relative to the picture's middle
+    middle: Float32Array  # (N, 2)
+    along: Float32Array  # (N, 2) unit vectors
+    weight: Float32Array  # (N,) lengths in sides of the picture
 
     @classmethod
     def of(cls, segments: Segments, width: int, height: int) -> Edges:
@@ -56,7 +57,7 @@ class Edges:
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         return cls(ends, ends.mean(axis=1), along, segments.lengths[:MAX_EDGES].astype(np.float32))
 
-    def axes(self, focal_px: float) -> tuple[float, NDArray[np.float64]]:
+    def axes(self, focal_px: float) -> tuple[float, Float64Array]:
         """Find the three directions that explain most of the edges.
 
         :return: the sides of the picture that they explain; their (3, 3) rows u, h, u × h, in
@@ -92,8 +93,8 @@ class Edges:
         self,
         candidates: Sequence[NDArray[Any]],
         normals: NDArray[Any],
-        equations: NDArray[np.float32],
-    ) -> tuple[float, NDArray[np.float64]]:
+        equations: Float32Array,
+    ) -> tuple[float, Float64Array]:
         """Return what `axes` does, where one of the candidates is up."""
         ups = np.asarray(candidates).reshape(-1, 3)
         # along the edges, if they are horizontal
@@ -115,9 +116,7 @@ class Edges:
         best = int(score.argmax())
         return float(score[best]), np.array([ups[which[best]], level[best], across[best]], float)
 
-    def _up_candidates(
-        self, normals: NDArray[Any], equations: NDArray[np.float32]
-    ) -> list[NDArray[Any]]:
+    def _up_candidates(self, normals: NDArray[Any], equations: Float32Array) -> list[NDArray[Any]]:
         """Return distinct directions near the picture's vertical in which pairs of edges intersect,
         the best first.
         """
@@ -137,7 +136,7 @@ class Edges:
             rest = rest[rest @ rest[0] < np.cos(MIN_CANDIDATE_ANGLE)]
         return chosen
 
-    def _equations(self, focal_px: float) -> NDArray[np.float32]:
+    def _equations(self, focal_px: float) -> Float32Array:
         """Return (3, 3 N): a direction d times it is, for each edge, f d_xy − d_z m and its
         component across the edge.
 
@@ -153,7 +152,7 @@ class Edges:
         )
 
 
-def _sine2(directions: NDArray[Any], equations: NDArray[np.float32]) -> NDArray[Any]:
+def _sine2(directions: NDArray[Any], equations: Float32Array) -> NDArray[Any]:
     """Return (n, N) sin² of the angles between each edge and the vanishing points of directions (n,
     3).
     """
@@ -174,7 +173,7 @@ def _explained(sine2: NDArray[Any]) -> NDArray[Any]:
     return explained
 
 
-def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> NDArray[Any]:
+def intersection_directions(normals: NDArray[Any], up: Float64Array) -> NDArray[Any]:
     """Return the (n, 3) directions near ``up`` (3,) in which pairs of lines with these normals (N,
     3) intersect.
     """
@@ -189,10 +188,10 @@ def intersection_directions(normals: NDArray[Any], up: NDArray[np.float64]) -> N
 
 def line_normal_equations(
     lines: Lines,
-    directions: NDArray[np.float64],
+    directions: Float64Array,
     sigma: float,
-    value: NDArray[np.float64] | float = 1.0,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    value: Float64Array | float = 1.0,
+) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Compute the normal equations of a small rotation ω of three directions, each line assigned to
     the nearest one.
 
@@ -212,6 +211,6 @@ def line_normal_equations(
     explained = lines.lengths * np.exp(-0.5 * np.square(residual / sigma))
     weight = explained * np.broadcast_to(value, 3)[nearest]
     J = np.cross(np.take_along_axis(directions, nearest[..., None], -2), lines.normals)
-    g: NDArray[np.float64] = -((weight * residual)[..., None, :] @ J)[..., 0, :]
+    g: Float64Array = -((weight * residual)[..., None, :] @ J)[..., 0, :]
     supports = np.where(nearest[..., None] == np.arange(3), explained[..., None], 0.0).sum(axis=-2)
     return (weight[..., None] * J).swapaxes(-1, -2) @ J, g, supports

@@ -29,9 +29,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.rotations import exp
+from ...arrays import Float64Array
 from .line_segments import Lines
 from .manhattan import PLANE_SIGMA, line_normal_equations
 
@@ -63,19 +63,19 @@ class UpEstimate:
     ``level``.
     """
 
-    up: NDArray[np.float64] | None = None  # (3,)
+    up: Float64Array | None = None  # (3,)
     # (3,) the horizontal direction of most lines, such as a fence's
-    level: NDArray[np.float64] | None = None
+    level: Float64Array | None = None
 
 
 @dataclass(frozen=True)
 class _Axes:
-    directions: NDArray[np.float64]  # (3, 3) rows u, h, u × h
-    supports: NDArray[np.float64]  # (3,) sides of the picture along each
+    directions: Float64Array  # (3, 3) rows u, h, u × h
+    supports: Float64Array  # (3,) sides of the picture along each
     score: float
 
 
-def estimate_up_from_lines(lines: Lines, up: NDArray[np.float64]) -> UpEstimate:
+def estimate_up_from_lines(lines: Lines, up: Float64Array) -> UpEstimate:
     """Estimate the up direction and a horizontal direction; None for what the lines do not
     determine.
 
@@ -104,32 +104,28 @@ def estimate_up_from_lines(lines: Lines, up: NDArray[np.float64]) -> UpEstimate:
     return UpEstimate(found if has_up else None, level if has_level else None)
 
 
-def _grid(up: NDArray[np.float64]) -> NDArray[np.float64]:
+def _grid(up: Float64Array) -> Float64Array:
     """Return (n, 3) unit vectors around one."""
     across = np.linalg.svd(up[None])[2][1:]
     steps = np.tan(np.arange(-MAX_LEAN, MAX_LEAN + 1e-9, GRID_STEP))
     v = up + (steps[:, None, None] * across[0] + steps[:, None] * across[1]).reshape(-1, 3)
     v /= np.linalg.norm(v, axis=1, keepdims=True)
-    near: NDArray[np.float64] = v[v @ up > np.cos(MAX_LEAN)]
+    near: Float64Array = v[v @ up > np.cos(MAX_LEAN)]
     return near
 
 
-def _best_on_grid(lines: Lines, up: NDArray[np.float64]) -> NDArray[np.float64]:
+def _best_on_grid(lines: Lines, up: Float64Array) -> Float64Array:
     """Return the axes (n, 3, 3) of the best up directions around one, each with its best horizontal
     directions.
     """
     ups = _grid(up)
     found = [_best_with_ups(ups[k : k + _BLOCK], lines) for k in range(0, len(ups), _BLOCK)]
     support, axes = (np.concatenate(each) for each in zip(*found, strict=True))
-    best: NDArray[np.float64] = axes[
-        np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]
-    ]
+    best: Float64Array = axes[np.argsort(-_score(support, ups, up), kind="stable")[:MAX_REFINED]]
     return best
 
 
-def _best_with_ups(
-    ups: NDArray[np.float64], lines: Lines
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _best_with_ups(ups: Float64Array, lines: Lines) -> tuple[Float64Array, Float64Array]:
     """Return the support and the axes (n, 3, 3) of the best horizontal directions for each of the
     up directions (n, 3).
 
@@ -155,7 +151,7 @@ def _best_with_ups(
     return support[rows, best], np.stack([ups, level[rows, best], across[rows, best]], axis=1)
 
 
-def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float64]) -> list[_Axes]:
+def _refined(directions: Float64Array, lines: Lines, up: Float64Array) -> list[_Axes]:
     """Refine each of the axes (n, 3, 3)."""
     for _ in range(REFINEMENT_STEPS):
         H, g, _ = line_normal_equations(lines, directions, PLANE_SIGMA, VALUE)
@@ -172,11 +168,9 @@ def _refined(directions: NDArray[np.float64], lines: Lines, up: NDArray[np.float
     return [_Axes(*each) for each in zip(directions, supports, scores.tolist(), strict=True)]
 
 
-def _score(
-    support: NDArray[np.float64], u: NDArray[np.float64], up: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _score(support: Float64Array, u: Float64Array, up: Float64Array) -> Float64Array:
     """Return the scores (n,) of up directions (n, 3) that explain so much."""
-    scores: NDArray[np.float64] = KAPPA * support - 0.5 * np.square(
+    scores: Float64Array = KAPPA * support - 0.5 * np.square(
         np.arccos(np.clip(u @ up, -1.0, 1.0)) / BODY_SIGMA
     )
     return scores

@@ -16,9 +16,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from types import TracebackType
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...arrays import Float64Array
 from ...machine_code.code_cache import compiled_kernels
 from ..camera.background_record import BackgroundRecord
 from ..camera.bars import longer_content_side
@@ -54,7 +52,7 @@ class BackgroundEstimators:
         self._longer_px = float(max(width, height))
         self._assumed = assumed_camera(width, height, self._longer_px)
         self._by_edges: Future[Camera] | None = None
-        self._costs: list[Future[NDArray[np.float64] | None]] = []
+        self._costs: list[Future[Float64Array | None]] = []
         self._loading = self._solver.submit(live.load)
 
     def __enter__(self) -> BackgroundEstimators:

@@ -30,9 +30,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body
+from ...arrays import Float64Array
 from ..camera.intrinsics import ASSUMED_DEVIATION, Camera, assumed_camera, estimated_camera, pinhole
 from ..camera.line_segments import Segments
 from ..camera.manhattan import Edges
@@ -70,7 +70,7 @@ def camera_by_edges(segments: Segments, width: int, height: int, longer_px: floa
 
 
 def camera_by_fits(
-    camera: Camera, assumed: Camera, costs: list[NDArray[np.float64]], longer_px: float
+    camera: Camera, assumed: Camera, costs: list[Float64Array], longer_px: float
 ) -> Camera:
     """Combine the camera's focal length with the likelihood from fits of the body.
 
@@ -106,14 +106,12 @@ def focal_from_edges(
     return (assumed_px * float(np.exp(mean)), deviation) if deviation < MAX_DEVIATION else None
 
 
-def _log_posterior(log_ratio: NDArray[np.float64], scores: list[float]) -> NDArray[np.float64]:
-    log_p: NDArray[np.float64] = KAPPA * np.array(scores) - 0.5 * np.square(
-        log_ratio / ASSUMED_DEVIATION
-    )
+def _log_posterior(log_ratio: Float64Array, scores: list[float]) -> Float64Array:
+    log_p: Float64Array = KAPPA * np.array(scores) - 0.5 * np.square(log_ratio / ASSUMED_DEVIATION)
     return log_p
 
 
-def _moments(log_ratio: NDArray[np.float64], log_p: NDArray[np.float64]) -> tuple[float, float]:
+def _moments(log_ratio: Float64Array, log_p: Float64Array) -> tuple[float, float]:
     """Return mean and standard deviation of log(f / f_0), integrated over unevenly spaced
     values.
     """
@@ -142,7 +140,7 @@ class FocalFits:
         self._gap_s = 2 * self._gap_s
         return True
 
-    def costs(self, observation: Observation, camera: Camera) -> NDArray[np.float64] | None:
+    def costs(self, observation: Observation, camera: Camera) -> Float64Array | None:
         """Return the (5,) costs of fits at the camera's focal length times e^`LOG_RATIOS`; None if
         a fit fails.
 
@@ -169,9 +167,7 @@ class FocalFits:
         return np.array(costs)
 
 
-def log_likelihood(
-    costs: list[NDArray[np.float64]], log_ratio: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def log_likelihood(costs: list[Float64Array], log_ratio: Float64Array) -> Float64Array:
     """Return the (n,) log likelihood of focal lengths, up to a constant.
 
     :param costs: (5,) of each fitted frame, from `FocalFits.costs`.

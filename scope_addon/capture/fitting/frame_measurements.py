@@ -11,12 +11,11 @@ it.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
+from ...arrays import Float64Array, FloatArray
 from ..perception.landmark_network import KEYPOINT_NAMES
 from .weights import WEIGHTS
 
@@ -54,7 +53,7 @@ class Measurer:
     :param intrinsics: (3, 3) K in pixels.
     """
 
-    def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
+    def __init__(self, body: Body, intrinsics: Float64Array) -> None:
         self.body = body
         self.intrinsics = intrinsics
         self._unproject = np.linalg.inv(intrinsics)
@@ -83,20 +82,18 @@ class Measurer:
             np.array([KEYPOINT_NAMES.index(p[k]) for p in pairs]) for k in (0, 1)
         )
 
-    def rays(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def rays(self, pixels: FloatArray) -> FloatArray:
         """Convert undistorted pixels (..., 2) to normalized image coordinates (..., 2)."""
-        normalized: NDArray[np.floating[Any]] = (
-            pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
-        )
+        normalized: FloatArray = pixels @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         return normalized
 
     def measure(
         self,
-        pixels: NDArray[np.floating[Any]],
-        confidence: NDArray[np.floating[Any]],
-        points: NDArray[np.floating[Any]],
-        sigma: NDArray[np.floating[Any]],
-        root_cam: NDArray[np.floating[Any]] | None = None,
+        pixels: FloatArray,
+        confidence: FloatArray,
+        points: FloatArray,
+        sigma: FloatArray,
+        root_cam: FloatArray | None = None,
     ) -> Measurements:
         """Return the measurements of one frame.
 
@@ -132,7 +129,7 @@ class Measurer:
         )
 
     def with_head(
-        self, measured: Measurements, across: NDArray[np.floating[Any]], certainty: float
+        self, measured: Measurements, across: FloatArray, certainty: float
     ) -> Measurements:
         """Add the direction (3,) from the right to the left ear, camera axes; ``certainty``:
         0..1.
@@ -149,9 +146,7 @@ class Measurer:
         )
         return replace(measured, orientation_field=head)
 
-    def contradicts(
-        self, measurements: Measurements, joints_cam: NDArray[np.floating[Any]]
-    ) -> bool:
+    def contradicts(self, measurements: Measurements, joints_cam: FloatArray) -> bool:
         """Whether some bone of a fit contradicts a confident direction of the lifter.
 
         :param joints_cam: (K+1, 3) the fitted joints, camera frame.
@@ -170,7 +165,7 @@ class Measurer:
         away = (bones * directions).sum(axis=1) < CONTRADICTION_COS * lengths
         return bool((away & (confidence > MIN_CONFIDENCE)).any())
 
-    def joint_confidence(self, confidence: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def joint_confidence(self, confidence: FloatArray) -> Float64Array:
         """Return the mean confidence of the landmarks in which each joint's rotation is visible.
 
         These are the keypoints of its own part, away from the joint, and if there are none, those
@@ -196,10 +191,10 @@ class Measurer:
 
 
 def place(
-    world: NDArray[np.floating[Any]],
-    rays: NDArray[np.floating[Any]],
-    weight: NDArray[np.floating[Any]],
-) -> NDArray[np.float64]:
+    world: FloatArray,
+    rays: FloatArray,
+    weight: FloatArray,
+) -> Float64Array:
     """Return the (3,) translation that moves hip-centred points onto their rays: t of the module's
     equation.
 
@@ -219,5 +214,5 @@ def place(
     return np.array([*(b_mean + x_mean * z), z])
 
 
-def _root_prior(root_cam: NDArray[np.floating[Any]]) -> PosePriors:
+def _root_prior(root_cam: FloatArray) -> PosePriors:
     return PosePriors([0], np.eye(3)[None], root_cam[None], [0.0], [1 / ROOT_SIGMA_M**2])

@@ -11,13 +11,12 @@ there, for as long as the refit of a frame costs less than was gained.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make_tree
 from ....solver.compiled.tree import with_fixed_shape
+from ...arrays import BoolArray, FloatArray
 from .hand_measurements import smooth_fingers
 from .prepared_track import PreparedTrack
 from .weights import ROBUST, WEIGHTS, cold_stages, warm_stages
@@ -32,14 +31,14 @@ class FittedTrack:
     valid state.
     """
 
-    rotations: NDArray[np.floating[Any]]  # (T, K+1, 3, 3); row 0 R_camera_root, the others Ω
-    t_camera_root: NDArray[np.floating[Any]]  # (T, 3) the pelvis, metres
-    betas: NDArray[np.floating[Any]]  # (P,)
-    valid: NDArray[np.bool_]  # (T,)
-    joint_confidence: NDArray[np.floating[Any]]  # (T, K+1) 0..1
+    rotations: FloatArray  # (T, K+1, 3, 3); row 0 R_camera_root, the others Ω
+    t_camera_root: FloatArray  # (T, 3) the pelvis, metres
+    betas: FloatArray  # (P,)
+    valid: BoolArray  # (T,)
+    joint_confidence: FloatArray  # (T, K+1) 0..1
     iterations: float  # mean per frame
     # (T, K+1, 2) of `joint_sigma`, NaN where not valid
-    joint_sigma_m: NDArray[np.floating[Any]] | None = None
+    joint_sigma_m: FloatArray | None = None
     height_sigma_m: float = float("nan")  # standard deviation of the stature of `betas`
 
     def with_fingers_at_rest(self, prepared: PreparedTrack) -> FittedTrack:
@@ -81,7 +80,7 @@ class FrameSequence:
     :param betas: (P,) shape of the person, the same in all frames.
     """
 
-    def __init__(self, prepared: PreparedTrack, betas: NDArray[np.floating[Any]]) -> None:
+    def __init__(self, prepared: PreparedTrack, betas: FloatArray) -> None:
         T = len(prepared.track)
         body = prepared.body
         self._prepared = prepared
@@ -95,9 +94,7 @@ class FrameSequence:
         # The fingers of hands that are not seen are smoothed before they are stored in single
         # precision.
         precision = np.float32 if prepared.hands is None else np.float64
-        self._rotations: NDArray[np.floating[Any]] = np.tile(
-            np.eye(3).astype(precision), (T, body.K + 1, 1, 1)
-        )
+        self._rotations: FloatArray = np.tile(np.eye(3).astype(precision), (T, body.K + 1, 1, 1))
         self._root = np.zeros((T, 3))
         self._valid = np.zeros(T, bool)
         self._cost = np.zeros(T)

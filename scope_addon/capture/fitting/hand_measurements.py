@@ -11,14 +11,13 @@ fingers while a hand is not seen.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body, Keypoints2D, Measurements, OrientationField, Priors
 from ....solver.residuals import joint_limits
 from ....solver.rotations import exp, log
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...errors import UsageError
 from ...kinematics.smoothing import fill_rotation_gaps
 from ..perception.hand_landmarks import HAND_NAMES, HAND_POINTS, SIDES
@@ -99,7 +98,7 @@ class HandMeasurer:
     :raises UsageError: the body has no finger joints.
     """
 
-    def __init__(self, body: Body, intrinsics: NDArray[np.float64]) -> None:
+    def __init__(self, body: Body, intrinsics: Float64Array) -> None:
         self._body = body
         self._unproject = np.linalg.inv(intrinsics)
         self.indices = np.array(
@@ -115,16 +114,16 @@ class HandMeasurer:
             for pairs in (self._from, self._to)
         )
 
-    def _points(self, side: int) -> NDArray[np.intp]:
+    def _points(self, side: int) -> IndexArray:
         """Return the solver's (21,) indices of a hand's keypoints; joints where possible, so that
         bones share parts.
         """
-        points: NDArray[np.intp] = self.indices[side].copy()
+        points: IndexArray = self.indices[side].copy()
         joints = [self.wrists[side], *(self.fingers[side][k] for k in (12, 13, 14, *range(12)))]
         points[_JOINTS] = len(self._body.keypoint_names) + np.array(joints)
         return points
 
-    def add(self, measured: Measurements, hands: NDArray[np.floating[Any]]) -> Measurements:
+    def add(self, measured: Measurements, hands: FloatArray) -> Measurements:
         """Add the hands to the measurements of a frame.
 
         :param hands: (2, 21, 6) undistorted pixels, confidence and world landmarks; confidence 0
@@ -159,16 +158,14 @@ class HandMeasurer:
             ),
         )
 
-    def _directions(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def _directions(self, hands: FloatArray) -> FloatArray:
         """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         R_virtual_camera = camera_towards(rays)
-        bones: NDArray[np.floating[Any]] = (
-            hands[:, self._to, 3:] - hands[:, self._from, 3:]
-        ) @ R_virtual_camera
+        bones: FloatArray = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
         return bones
 
-    def joint_confidence(self, hands: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def joint_confidence(self, hands: FloatArray) -> Float64Array:
         """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T,
         2, 21, 6).
         """
@@ -219,11 +216,11 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
 
 
 def smooth_fingers(
-    rotations: NDArray[np.floating[Any]],
+    rotations: FloatArray,
     fingers: list[list[int]],
-    seen: NDArray[np.bool_],
-    times: NDArray[np.float64],
-) -> NDArray[np.floating[Any]]:
+    seen: BoolArray,
+    times: Float64Array,
+) -> FloatArray:
     """Fill in the fingers of hands that are not seen with smooth motion.
 
     Rotations are interpolated between the frames in which the hand was seen. The farther these are

@@ -23,9 +23,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body
+from ...arrays import Float64Array
 from ..perception.landmark_network import KEYPOINT_NAMES
 
 # Millimetres in the axes of the rest pose: to the person's left, up, forwards. The right side is
@@ -62,7 +62,7 @@ def with_keypoint_offsets(body: Body) -> Body:
     return replace(body, keypoint_template=template)
 
 
-def offset(name: str) -> NDArray[np.float64]:
+def offset(name: str) -> Float64Array:
     """Return the (3,) offset d of a keypoint, metres."""
     if name in OFFSETS_MM:
         return np.array(OFFSETS_MM[name]) / 1000

@@ -9,12 +9,11 @@ Only frames that are shown cost time, and the motion does not depend on which fr
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body, Measurements, Stage, StandingPoints, State, View, fit_motion
+from ...arrays import FloatArray
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..perception.lifter import HIPS
@@ -32,7 +31,7 @@ class LivePose:
     fitted with.
     """
 
-    vertices_cam: NDArray[np.floating[Any]]
+    vertices_cam: FloatArray
     body: Body
     camera: Camera
 
@@ -94,9 +93,7 @@ class LiveBody:
         return None if found is None else found.state
 
 
-def _part_poses(
-    body: Body, state: State
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+def _part_poses(body: Body, state: State) -> tuple[FloatArray, FloatArray]:
     """Return part poses (K+1, 3, 3) and (K+1, 3), camera frame."""
     rotations = np.concatenate([state.R_camera_root[None], state.Omega])
     return body.forward_kinematics(

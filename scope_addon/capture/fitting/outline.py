@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ....solver import Body, ClipFit, Fit, fit_clip
 from ....solver.residuals.image.outline import FLOATS, INTS, pack
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...kinematics.added_keypoints import with_keypoints
 from ...kinematics.body_surface import one_per_cell
 from ..camera.intrinsics import Camera
@@ -147,7 +148,7 @@ class OutlineMeasurer:
         weights = np.full(len(rows), OUTSIDE_WEIGHT), np.full(len(rows), INSIDE_WEIGHT)
         return pack(self.first + rows, delta[rows], m, n, weights, sigmas)
 
-    def _with_shape(self, betas: NDArray[np.float64]) -> Body:
+    def _with_shape(self, betas: Float64Array) -> Body:
         """Return the body whose template has this shape, which the frames of a round share."""
         known, shaped = self._shaped
         if not np.array_equal(known, betas):
@@ -158,7 +159,7 @@ class OutlineMeasurer:
             self._shaped = betas.copy(), shaped
         return shaped
 
-    def _crop(self, region: Region, points_cam: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _crop(self, region: Region, points_cam: Float64Array) -> Float64Array:
         """Project points (n, 3) to pixels (n, 2) of the mask."""
         if not len(points_cam):
             return np.zeros((0, 2))
@@ -168,7 +169,7 @@ class OutlineMeasurer:
         )[0][:, 0]
         return region.crop_from_image(pixels.astype(np.float64)) * SIZE - 0.5
 
-    def _coverage(self, skin: NDArray[np.float64], region: Region) -> NDArray[np.bool_]:
+    def _coverage(self, skin: Float64Array, region: Region) -> BoolArray:
         """Return (256, 256) bool: where in the mask's region the body is."""
         at = np.full((len(skin), 2), np.nan)
         front = skin[:, 2] > NEAR_M
@@ -179,8 +180,8 @@ class OutlineMeasurer:
 
 
 def _crossings(
-    probability: NDArray[np.floating[Any]], at: NDArray[np.float64], normal: NDArray[np.float64]
-) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
+    probability: FloatArray, at: Float64Array, normal: Float64Array
+) -> tuple[IndexArray, Float64Array, Float64Array]:
     """Find the nearest crossing of one half along each normal, outwards: rows (n,), places (n, 2),
     normals (n, 2).
     """
@@ -222,7 +223,7 @@ def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
 def fit_shape_to_outline(
     prepared: PreparedTrack,
     masks: list[tuple[int, PersonMask]],
-    root_cam: NDArray[np.floating[Any]] | None,
+    root_cam: FloatArray | None,
 ) -> ClipFit:
     """Estimate one shape from the frames of some masks, as `usable_masks` returns them.
 

@@ -6,13 +6,12 @@ body.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
 from ....solver.loaders.body_file import CHILD_BELOW_M
+from ...arrays import FloatArray, IndexArray
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
@@ -35,15 +34,15 @@ class Stance:
     In each frame's camera or in the first frame's axes.
     """
 
-    root_cam: NDArray[np.floating[Any]]  # (T, 3) the pelvis
-    turn: NDArray[np.floating[Any]]  # (T, 3, 3) rotations to apply to the whole body
-    floor_normal: NDArray[np.floating[Any]]  # (T, 3) unit, upwards
-    floor_offset: NDArray[np.floating[Any]]  # (T,) normal . p on the floor
+    root_cam: FloatArray  # (T, 3) the pelvis
+    turn: FloatArray  # (T, 3, 3) rotations to apply to the whole body
+    floor_normal: FloatArray  # (T, 3) unit, upwards
+    floor_offset: FloatArray  # (T,) normal . p on the floor
     # (T, 6) probability that each contact point rests on the floor
-    contact: NDArray[np.floating[Any]]
-    resting: NDArray[np.floating[Any]]  # (T, 6) probability that it rests on anything
+    contact: FloatArray
+    resting: FloatArray  # (T, 6) probability that it rests on anything
 
-    def floor(self, k: int, indices: NDArray[np.intp]) -> Floor:
+    def floor(self, k: int, indices: IndexArray) -> Floor:
         """Return the floor of frame ``k`` for the solver.
 
         Feet that are not in contact may be below the floor as well as above it, as on stairs.
@@ -66,21 +65,21 @@ class PreparedTrack:
     whole_body: Body  # the same with fingers, also where no hand is seen and they are not fitted
     track: Track
     measurer: Measurer
-    pixels: NDArray[np.floating[Any]]  # (T, J, 2) keypoints without lens distortion
+    pixels: FloatArray  # (T, J, 2) keypoints without lens distortion
     lifted: Lifted
     priors: Priors  # with unknown shape
     weights: Weights
     hand_measurer: HandMeasurer | None = None
     # (T, 2, 21, 6) as in the track, undistorted; None: not fitted
-    hands: NDArray[np.floating[Any]] | None = None
+    hands: FloatArray | None = None
     # (T, 4) direction across it, certainty; None: no face looked for
-    head: NDArray[np.floating[Any]] | None = None
+    head: FloatArray | None = None
     camera: Camera | None = None  # of the masks; None where the track has none
     is_stature_given: bool = False  # by the user
     # in each frame's camera; the body's last keypoints are then its contact points
     stance: Stance | None = None
 
-    def measure(self, k: int, root_cam: NDArray[np.floating[Any]] | None = None) -> Measurements:
+    def measure(self, k: int, root_cam: FloatArray | None = None) -> Measurements:
         """Return the measurements of the body in frame ``k``.
 
         :param root_cam: (3,) known position of the pelvis, camera frame, metres.
@@ -107,13 +106,13 @@ class PreparedTrack:
         return self.hand_measurer.add(measured, self.hands[k])
 
     @property
-    def contact_point_indices(self) -> NDArray[np.intp]:
+    def contact_point_indices(self) -> IndexArray:
         """The (6,) keypoint indices of the contact points, which the body has if there is a
         stance.
         """
         return np.arange(len(CONTACT_POINTS)) + len(self.body.keypoint_names) - len(CONTACT_POINTS)
 
-    def rotated(self, R: NDArray[np.floating[Any]]) -> PreparedTrack:
+    def rotated(self, R: FloatArray) -> PreparedTrack:
         """Rotate the lifted points about the hips; the image measurements stay as they are.
 
         :param R: (T, 3, 3) rotations in camera axes.
@@ -122,7 +121,7 @@ class PreparedTrack:
         rotated = (points @ np.swapaxes(R, 1, 2).astype(points.dtype)).astype(points.dtype)
         return replace(self, lifted=replace(self.lifted, points=rotated))
 
-    def with_stance(self, stance: Stance, betas: NDArray[np.floating[Any]]) -> PreparedTrack:
+    def with_stance(self, stance: Stance, betas: FloatArray) -> PreparedTrack:
         """Add the pelvis and the floor, and to the body points on the arms and the contact points
         of this shape.
 
@@ -144,7 +143,7 @@ class PreparedTrack:
         """
         return replace(self, priors=with_stature(self.priors, self.body, height_m, sigma_m))
 
-    def priors_with_shape(self, betas: NDArray[np.floating[Any]]) -> Priors:
+    def priors_with_shape(self, betas: FloatArray) -> Priors:
         """Return the priors for a known shape (P,)."""
         return replace(
             self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY
@@ -208,7 +207,7 @@ def prepare_track(
     )
 
 
-def lift(measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]]) -> Lifted:
+def lift(measurer: Measurer, track: Track, pixels: FloatArray) -> Lifted:
     """Lift the keypoints of a track by the lifting network, with the landmark network's estimate of
     depth where it has one.
 

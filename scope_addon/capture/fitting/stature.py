@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ....solver import Body, Priors
 from ....solver.loaders.body_file import CHILD_BELOW_M, body_with_children, growth_of, load_body
+from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
 
 SIGMA_M = 0.005
@@ -73,7 +74,7 @@ def with_population(priors: Priors, body: Body) -> Priors:
 
 
 def stature_sigma(
-    body: Body, betas: NDArray[np.floating[Any]], information: NDArray[Any], is_given: bool
+    body: Body, betas: FloatArray, information: NDArray[Any], is_given: bool
 ) -> float:
     """Return the standard deviation of the stature h(β), metres: σ² = gᵀ Λ⁻¹ g + s², with s = 0
     where it was given.
@@ -146,7 +147,7 @@ def _most_probable_stature(body: Body, deviations: float) -> float:
     return body.stature(betas)
 
 
-def _population(body: Body, is_child: bool) -> NDArray[np.float64]:
+def _population(body: Body, is_child: bool) -> Float64Array:
     """Return the information (P,) of the coefficients among adults or among children."""
     information = np.ones(body.P)
     growth = growth_of(body)
@@ -155,7 +156,7 @@ def _population(body: Body, is_child: bool) -> NDArray[np.float64]:
     return information
 
 
-def _extremes_at(body: Body, height_m: float) -> tuple[float, NDArray[np.float64]]:
+def _extremes_at(body: Body, height_m: float) -> tuple[float, Float64Array]:
     """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this
     height.
     """
@@ -169,7 +170,7 @@ def _extremes_at(body: Body, height_m: float) -> tuple[float, NDArray[np.float64
     return h0, g
 
 
-def _shape_at(body: Body, betas: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+def _shape_at(body: Body, betas: Float64Array) -> tuple[float, Float64Array]:
     """Return h₀ and g (P,) of the highest and the lowest vertex of this shape."""
     heights = body.rest_vertices(betas)[:, 1]
     top = int(heights.argmax())

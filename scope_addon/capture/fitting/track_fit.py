@@ -13,12 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import ClipFit, Fit, State, fit_clip
+from ...arrays import FloatArray, IndexArray
 from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline import PRIOR_SHARE, fit_shape_to_outline, usable_masks
@@ -111,9 +110,7 @@ def fit_each_frame(
     return frames.fitted()
 
 
-def _fit_shape(
-    prepared: PreparedTrack, root_cam: NDArray[np.floating[Any]] | None = None
-) -> ClipFit:
+def _fit_shape(prepared: PreparedTrack, root_cam: FloatArray | None = None) -> ClipFit:
     """Estimate one shape from frames spread over the clip.
 
     The keypoint network misplaces a keypoint in the same way in every frame, so many frames
@@ -146,8 +143,8 @@ def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
     return stature_sigma(prepared.body, shape.beta, information, prepared.is_stature_given)
 
 
-def _spread(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+def _spread(indices: IndexArray, count: int) -> IndexArray:
     """Return at most ``count`` of the indices, evenly spread."""
     rows = np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
-    chosen: NDArray[np.intp] = indices[rows]
+    chosen: IndexArray = indices[rows]
     return chosen

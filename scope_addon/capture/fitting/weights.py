@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import Body, MotionPrior, Options, Stage, Weights
+from ...arrays import Float64Array
 
 # Inverse variances: 5 px at a focal length of 1600 px (0.003 in normalized coordinates) for 2D
 # keypoints, 0.35 m for the depth of 3D keypoints to which the lifter gives 0.1 m (its errors are
@@ -134,7 +134,7 @@ def clip_stages(weights: Weights, steps: int = CLIP_STEPS) -> tuple[Stage, ...]:
     return (Stage(clip_weights(weights), 1e-3, steps),)
 
 
-def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, MotionPrior]:
+def motion_priors(body: Body, times: Float64Array) -> tuple[MotionPrior, MotionPrior]:
     """Return the weights of what couples frames, for a first and a second fit: the second lets go
     of hard landings.
 
@@ -169,7 +169,7 @@ def motion_priors(body: Body, times: NDArray[np.float64]) -> tuple[MotionPrior, 
     )
 
 
-def joint_weights(body: Body) -> NDArray[np.float64]:
+def joint_weights(body: Body) -> Float64Array:
     """Return the (K,) relative weights of the joints in the joint prior."""
     weights = np.ones(body.K)
     for k, name in enumerate(body.joint_names[1:]):

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float32Array
 from ...notices import Notice
 from ..camera.background_record import BackgroundRecord, joined_backgrounds
 from ..perception.observation import Observation
@@ -204,9 +204,7 @@ def distance(earlier: Tracklet, later: Tracklet, offset: int, rows: tuple[int, i
     return float(np.mean(found)) if found else np.inf
 
 
-def faded(
-    earlier: Tracklet, later: Tracklet, offset: int, overlap: int
-) -> dict[int, NDArray[np.float32]]:
+def faded(earlier: Tracklet, later: Tracklet, offset: int, overlap: int) -> dict[int, Float32Array]:
     """Return the values of the shared frames, which go over from the earlier tracklet to the later
     one.
 
@@ -220,7 +218,7 @@ def faded(
     if distance(earlier, later, offset, (0, overlap)) > SAME_POSE:
         return {}
     places = {row - offset: k for k, row in enumerate(earlier.rows)}
-    values: dict[int, NDArray[np.float32]] = {}
+    values: dict[int, Float32Array] = {}
     for k, row in enumerate(later.rows):
         if row < overlap and row in places:
             a = np.float32((row + 1) / (overlap + 1))

@@ -17,10 +17,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.errors import ScopeError
 from ....solver.loaders.archive import read_members
+from ...arrays import Float64Array, Uint8Array
 from ...atomic_write import write_npz
 from ..perception.region import Region
 
@@ -30,7 +30,7 @@ _KEY_BYTES = 16
 _PIXEL_STEP = 4  # rows of the crop between those in the key
 # files whose values are in memory; a capture asks in the order in which they were written
 _LOADED = 2
-Values = NDArray[np.float64]
+Values = Float64Array
 
 
 class KeptEstimates:
@@ -54,7 +54,7 @@ class KeptEstimates:
             for path in sorted(folder.glob("*.npz")):
                 self._read_keys(path)
 
-    def key(self, network: str, crop_rgb: NDArray[np.uint8], region: Region) -> bytes | None:
+    def key(self, network: str, crop_rgb: Uint8Array, region: Region) -> bytes | None:
         """Return the key of an estimate; None if nothing is kept.
 
         :param crop_rgb: (H, W, 3), the network's input.

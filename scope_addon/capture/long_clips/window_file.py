@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ....solver.errors import InputError, ScopeError
 from ....solver.loaders.archive import read_members
+from ...arrays import Uint8Array
 from ...atomic_write import write_npz
 from ...capture_report import warnings_as_json
 from ...notices import Notice, notices_of
@@ -308,7 +309,7 @@ def _region(row: list[float]) -> Region:
     return Region((x, y), side_px, rotation)
 
 
-def _text(encoded: NDArray[np.uint8]) -> tuple[str, list[Notice]]:
+def _text(encoded: Uint8Array) -> tuple[str, list[Notice]]:
     """Return execution and warnings.
 
     :raises InputError: they are no text.

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ...notices import Notice
 from ..camera.background_record import BackgroundRecord
 from ..media.frame import (
@@ -90,7 +91,7 @@ class WindowRecord:
 
     window: Window
     indices: NDArray[np.int64]  # (N,) of the frames in the source
-    timestamps: NDArray[np.float64]  # (N,) seconds
+    timestamps: Float64Array  # (N,) seconds
     checksums: NDArray[np.uint32]  # (N,)
     first: int
     anchor: int

@@ -10,7 +10,8 @@ from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Uint8Array
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Frame:
 
     index: int
     timestamp_s: float
-    image_rgb: NDArray[np.uint8]
+    image_rgb: Uint8Array
 
 
 # of 255: highlights below DARK are raised to BRIGHT
@@ -42,7 +43,7 @@ class AutoExposure:
     def __init__(self) -> None:
         self._gain = 0.0
 
-    def brighten(self, image_rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def brighten(self, image_rgb: Uint8Array) -> Uint8Array:
         """Return the frame itself, or a brighter copy: each channel times BRIGHT / highlights, at
         most `MAX_GAIN`.
 
@@ -63,4 +64,4 @@ class AutoExposure:
         self._gain += SMOOTHING * (wanted - self._gain)
         if self._gain < 1.05:
             return image_rgb
-        return cast(NDArray[np.uint8], cv2.convertScaleAbs(image_rgb, alpha=self._gain))
+        return cast(Uint8Array, cv2.convertScaleAbs(image_rgb, alpha=self._gain))

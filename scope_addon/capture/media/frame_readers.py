@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
 from .deinterlace import (
@@ -86,11 +86,11 @@ def next_time(before: float | None, given: float | None, period: float) -> float
 
 def upright(
     path: Path,
-    image: NDArray[np.uint8],
+    image: Uint8Array,
     aspect: float,
     clockwise_deg: int,
     is_mirrored: bool = False,
-) -> NDArray[np.uint8]:
+) -> Uint8Array:
     """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before
     and rotate it after.
 
@@ -101,14 +101,14 @@ def upright(
     :raises VideoError: it is too large or too long (see `image_size`).
     """
     if is_mirrored:
-        image = cast(NDArray[np.uint8], cv2.flip(image, 0))
+        image = cast(Uint8Array, cv2.flip(image, 0))
     height, width = image.shape[:2]
     size = _size(width, height, aspect)
     check_size(path, *size)
     if size != (width, height):
-        image = cast(NDArray[np.uint8], cv2.resize(image, size, interpolation=cv2.INTER_LINEAR))
+        image = cast(Uint8Array, cv2.resize(image, size, interpolation=cv2.INTER_LINEAR))
     rotation = _ROTATIONS.get(clockwise_deg % 360)
-    return image if rotation is None else cast(NDArray[np.uint8], cv2.rotate(image, rotation))
+    return image if rotation is None else cast(Uint8Array, cv2.rotate(image, rotation))
 
 
 def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
@@ -162,7 +162,7 @@ def _undecodable(path: Path) -> VideoError:
     )
 
 
-def rgb(frame: av.VideoFrame, matrix: str | None = None) -> NDArray[np.uint8]:
+def rgb(frame: av.VideoFrame, matrix: str | None = None) -> Uint8Array:
     """Convert a frame to RGB (H, W, 3) of SDR.
 
     :param matrix: that of the YUV of SDR, as PyAV names it; None: the one that the frame states.
@@ -171,7 +171,7 @@ def rgb(frame: av.VideoFrame, matrix: str | None = None) -> NDArray[np.uint8]:
     if tone_mapped is not None:
         return tone_mapped
     image = frame.to_ndarray(format="rgb24", src_colorspace=matrix, dst_colorspace=matrix)
-    return cast(NDArray[np.uint8], image)
+    return cast(Uint8Array, image)
 
 
 def orientation(frame: av.VideoFrame) -> tuple[int, bool]:
@@ -190,9 +190,7 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
     return bool(a * d < b * c)
 
 
-def decode_items(
-    path: Path, numbers: Collection[int], max_pixels: int
-) -> dict[int, NDArray[np.uint8]]:
+def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[int, Uint8Array]:
     """Decode items of a HEIF file (see `heif`).
 
     PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item;
@@ -203,7 +201,7 @@ def decode_items(
         decoded.
     :raises VideoError: PyAV is not installed.
     """
-    pictures: dict[int, NDArray[np.uint8]] = {}
+    pictures: dict[int, Uint8Array] = {}
     pixels_left = max_pixels
     failure, container = _open_with_pyav(path)
     if container is None:
@@ -312,7 +310,7 @@ class PyavReader:
         milliseconds = (frame.pts - self._start) * (base.numerator / base.denominator) * 1000
         return milliseconds / 1000
 
-    def read(self) -> tuple[float | None, NDArray[np.uint8]] | None:
+    def read(self) -> tuple[float | None, Uint8Array] | None:
         """Decode the next frame.
 
         :return: time in seconds, None if the container has none, and the upright image (H, W, 3)

@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Float64Array, Uint8Array
 
 if TYPE_CHECKING:
     import av
@@ -55,7 +56,7 @@ _P3_D65_TO_709 = np.array(
 _TO_709 = {1: np.eye(3), 11: _DCI_P3_TO_709, 12: _P3_D65_TO_709}
 
 
-def hdr_rgb(frame: av.VideoFrame) -> NDArray[np.uint8] | None:
+def hdr_rgb(frame: av.VideoFrame) -> Uint8Array | None:
     """Convert a frame whose transfer characteristic is HLG or PQ to SDR; None for all other frames.
 
     :return: (H, W, 3) uint8 RGB.
@@ -66,24 +67,22 @@ def hdr_rgb(frame: av.VideoFrame) -> NDArray[np.uint8] | None:
     yuv = _YUV_MATRICES.get(int(frame.colorspace), "BT2020")
     coded = frame.to_ndarray(format="rgb24", src_colorspace=yuv, dst_colorspace=yuv)
     toned = cv2.LUT(coded, _table(transfer))
-    return cast(
-        NDArray[np.uint8], cv2.transform(toned, _matrix(transfer, int(frame.color_primaries)))
-    )
+    return cast(Uint8Array, cv2.transform(toned, _matrix(transfer, int(frame.color_primaries))))
 
 
 @cache
-def _table(transfer: int) -> NDArray[np.uint8]:
+def _table(transfer: int) -> Uint8Array:
     """Calculate the SDR codes (256,) for the codes of one channel."""
     codes = np.linspace(0.0, 1.0, 256)
     light = pq_light(codes) if transfer == _PQ else PEAK * hlg_light(codes) ** HLG_GAMMA
     return cast(
-        NDArray[np.uint8],
+        Uint8Array,
         np.rint(255 * (compress(light) / WHITE) ** (1 / SDR_GAMMA)).astype(np.uint8),
     )
 
 
 @cache
-def _matrix(transfer: int, primaries: int) -> NDArray[np.float64]:
+def _matrix(transfer: int, primaries: int) -> Float64Array:
     """Return the matrix (3, 3) for codes of the table; its rows add up to 1."""
     to_709 = _TO_709.get(primaries, _2020_TO_709)
     if transfer == _PQ:
@@ -91,10 +90,10 @@ def _matrix(transfer: int, primaries: int) -> NDArray[np.float64]:
     # The luminance's power of gamma - 1 acts on all channels alike; the table has given each
     # channel its own.
     system_gamma = (np.eye(3) + (HLG_GAMMA - 1) * np.tile(_LUMINANCE, (3, 1))) / HLG_GAMMA
-    return cast(NDArray[np.float64], to_709 @ system_gamma)
+    return cast(Float64Array, to_709 @ system_gamma)
 
 
-def hlg_light(code: NDArray[np.float64]) -> NDArray[np.float64]:
+def hlg_light(code: Float64Array) -> Float64Array:
     """Return the scene's light, 0 to 1, for HLG codes (...) from 0 to 1: the inverse OETF of ITU-R
     BT.2100.
     """
@@ -112,23 +111,21 @@ _C2 = 2413 / 128
 _C3 = 2392 / 128
 
 
-def pq_light(code: NDArray[np.float64]) -> NDArray[np.float64]:
+def pq_light(code: Float64Array) -> Float64Array:
     """Return the screen's light in cd/m² for PQ codes (...) from 0 to 1: the EOTF of SMPTE ST
     2084.
     """
     power = code ** (1 / _M2)
-    return cast(
-        NDArray[np.float64], 1e4 * (np.maximum(power - _C1, 0) / (_C2 - _C3 * power)) ** (1 / _M1)
-    )
+    return cast(Float64Array, 1e4 * (np.maximum(power - _C1, 0) / (_C2 - _C3 * power)) ** (1 / _M1))
 
 
-def pq_code(light: NDArray[np.float64]) -> NDArray[np.float64]:
+def pq_code(light: Float64Array) -> Float64Array:
     """Return the PQ code for light (...) in cd/m², the inverse of `pq_light`."""
     power = (light / 1e4) ** _M1
-    return cast(NDArray[np.float64], ((_C1 + _C2 * power) / (1 + _C3 * power)) ** _M2)
+    return cast(Float64Array, ((_C1 + _C2 * power) / (1 + _C3 * power)) ** _M2)
 
 
-def compress(light: NDArray[np.float64]) -> NDArray[np.float64]:
+def compress(light: Float64Array) -> Float64Array:
     """Compress light (...) of up to `PEAK` to at most `WHITE`, both in cd/m²: the EETF of ITU-R
     BT.2390.
 

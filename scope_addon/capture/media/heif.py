@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Uint8Array
 from ...footage import (
     MAX_PIXELS,
 )
@@ -56,7 +57,7 @@ def read_layout(data: bytes) -> Layout | None:
         return None
 
 
-def assemble(layout: Layout, pictures: Mapping[int, NDArray[np.uint8]]) -> NDArray[np.uint8] | None:
+def assemble(layout: Layout, pictures: Mapping[int, Uint8Array]) -> Uint8Array | None:
     """Assemble the primary picture and rotate it upright.
 
     :param pictures: the decoded items by number, (h, w, 3) uint8 RGB.

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...footage import (
     LAST_NUMBER,
@@ -105,7 +103,7 @@ class SequenceReader:
         self._fps = fps
         self._next = 0
 
-    def read(self) -> tuple[float, NDArray[np.uint8]] | None:
+    def read(self) -> tuple[float, Uint8Array] | None:
         """Read the next picture.
 
         :return: time in seconds and the upright image (H, W, 3) uint8 RGB; None after the last one,

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ....solver.loaders.regular_file import (
     check_regular,
 )
+from ...arrays import Float32Array, Uint8Array
 from ...errors import (
     VideoError,
 )
@@ -65,7 +66,7 @@ class Picture:
     for an animation.
     """
 
-    rgb: NDArray[np.uint8]
+    rgb: Uint8Array
     focal_35mm: float | None = None
     length: int = 1
 
@@ -161,7 +162,7 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
     return Picture(whole, read_exif(layout.exif).focal_35mm)
 
 
-def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
+def _as_rgb8(image: NDArray[Any]) -> Uint8Array:
     """Convert grey, BGR or BGRA of any depth to RGB uint8, on white where it is transparent.
 
     A few rows at a time: as numbers with a fraction, a whole image may take several gigabytes.
@@ -172,25 +173,25 @@ def _as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
     return rgb
 
 
-def _rows_as_rgb8(image: NDArray[Any]) -> NDArray[np.uint8]:
+def _rows_as_rgb8(image: NDArray[Any]) -> Uint8Array:
     if image.dtype == np.uint16:
         image = cv2.convertScaleAbs(image, alpha=1 / 257)
     elif image.dtype != np.uint8:
         image = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
     if image.ndim == 2:
-        return cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_GRAY2RGB))
+        return cast(Uint8Array, cv2.cvtColor(image, cv2.COLOR_GRAY2RGB))
     if image.shape[2] == 4:
         image = _on_white(image)
-    return cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
+    return cast(Uint8Array, cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
 
 
-def _on_white(bgra: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _on_white(bgra: Uint8Array) -> Uint8Array:
     alpha = bgra[..., 3:].astype(np.float32) / 255
-    blended: NDArray[np.float32] = bgra[..., :3] * alpha + 255 * (1 - alpha) + 0.5
+    blended: Float32Array = bgra[..., :3] * alpha + 255 * (1 - alpha) + 0.5
     return blended.astype(np.uint8)
 
 
-def _upright(image: NDArray[np.uint8], orientation: int) -> NDArray[np.uint8]:
+def _upright(image: Uint8Array, orientation: int) -> Uint8Array:
     """Undo an EXIF orientation (1..8)."""
     if orientation in (5, 6, 7, 8):
         image = image.transpose(1, 0, 2)

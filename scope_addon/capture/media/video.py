@@ -25,9 +25,8 @@ from pathlib import Path
 from typing import cast
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...notices import Notice, notice
 from .frame import (
@@ -71,7 +70,7 @@ class Video:
     wanted: VideoRange = field(default_factory=VideoRange)
     _source_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
-    _still: NDArray[np.uint8] | None = field(default=None, repr=False)
+    _still: Uint8Array | None = field(default=None, repr=False)
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
@@ -324,7 +323,7 @@ class _Decoder:
             if time > video.wanted.end_s + 1e-6:
                 break
             if image.shape[:2] != (video.height, video.width):
-                image = cast(NDArray[np.uint8], cv2.resize(image, (video.width, video.height)))
+                image = cast(Uint8Array, cv2.resize(image, (video.width, video.height)))
                 resized = True
             for frame in sampler.add(Frame(index, time, image)):
                 self._put(frame)

@@ -22,6 +22,7 @@ from ....solver.body import Body
 from ....solver.compiled.kernel import cached
 from ....solver.errors import ShapeError
 from ....solver.rotations import exp
+from ...arrays import Float64Array, FloatArray, Uint8Array
 from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, VideoError
 from ...motion import Motion
@@ -99,7 +100,7 @@ def painted_frames(
     indices: Collection[int],
     *,
     wanted: FootageRange | None = None,
-) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+) -> Iterator[tuple[int, Uint8Array]]:
     """Generate some frames of the overlay: source frame index and (H, W, 3) RGB, at most 1920
     pixels wide and high.
 
@@ -119,14 +120,14 @@ def painted_frames(
 
 
 def draw_overlay(
-    image_rgb: NDArray[np.uint8],
-    vertices_cam: NDArray[np.floating[Any]] | Sequence[NDArray[np.floating[Any]]],
+    image_rgb: Uint8Array,
+    vertices_cam: FloatArray | Sequence[FloatArray],
     faces: NDArray[np.integer[Any]],
-    intrinsics: NDArray[np.float64],
-    dist: NDArray[np.float64] | None = None,
+    intrinsics: Float64Array,
+    dist: Float64Array | None = None,
     colors: ArrayLike | Sequence[ArrayLike] | None = None,
     opacity: float | Sequence[float] = 0.6,
-) -> NDArray[np.uint8]:
+) -> Uint8Array:
     """Draw shaded bodies over one image, with occlusion between them.
 
     :param image_rgb: (H, W, 3) uint8.
@@ -163,10 +164,10 @@ def draw_overlay(
 
 def _draw_bodies(
     canvas: Canvas,
-    vertices_cam: Sequence[NDArray[np.floating[Any]]],
+    vertices_cam: Sequence[FloatArray],
     faces: NDArray[np.integer[Any]],
-    intrinsics: NDArray[np.float64],
-    dist: NDArray[np.float64] | None,
+    intrinsics: Float64Array,
+    dist: Float64Array | None,
     colors: Sequence[ArrayLike],
     opacities: Sequence[float],
 ) -> None:
@@ -183,20 +184,20 @@ def _draw_bodies(
         rasterize(canvas, vertices, triangles, per_face, intrinsics, dist, opacity)
 
 
-def blended(image_rgb: NDArray[np.uint8], canvas: Canvas) -> NDArray[np.uint8]:
+def blended(image_rgb: Uint8Array, canvas: Canvas) -> Uint8Array:
     """Return a copy of an (H, W, 3) uint8 image with the canvas over it."""
     out = np.ascontiguousarray(image_rgb).copy()
     _blend(out, canvas.rgba)
     return out
 
 
-def tint(person: int) -> NDArray[np.float64]:
+def tint(person: int) -> Float64Array:
     """Return the (3,) sRGB colour of the person with this index."""
-    color: NDArray[np.float64] = _TINTS[person % len(_TINTS)]
+    color: Float64Array = _TINTS[person % len(_TINTS)]
     return color
 
 
-def body_colors(body: Body, person: int) -> NDArray[np.float64]:
+def body_colors(body: Body, person: int) -> Float64Array:
     """Calculate the (F, 3) sRGB colours of the faces: the body's materials mixed with the person's
     tint.
     """
@@ -204,11 +205,11 @@ def body_colors(body: Body, person: int) -> NDArray[np.float64]:
         return np.tile(tint(person), (len(body.faces), 1))
     linear = np.clip(body.material_colors[:, :3], 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    colors: NDArray[np.float64] = (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
+    colors: Float64Array = (0.85 * tint(person) + 0.15 * srgb)[body.face_material]
     return colors
 
 
-def camera_vertices(motion: Motion, body: Body, row: int) -> NDArray[np.float64]:
+def camera_vertices(motion: Motion, body: Body, row: int) -> Float64Array:
     """Pose the mesh of one row of a motion: (V, 3) metres, in the axes of that row's camera."""
     betas = motion.betas.astype(float)
     rotations = exp(motion.poses[row].reshape(-1, 3).astype(float))
@@ -220,7 +221,7 @@ def camera_vertices(motion: Motion, body: Body, row: int) -> NDArray[np.float64]
 
 @cached
 @njit(nogil=True)
-def _blend(image: NDArray[np.uint8], rgba: NDArray[np.uint8]) -> None:
+def _blend(image: Uint8Array, rgba: Uint8Array) -> None:
     """Blend ``rgba`` over ``image`` in place; at outlines, opacity is scaled by the covered share
     of the neighbours.
     """
@@ -263,12 +264,10 @@ class _Painter:
         self.size = (width - width % 2, height - height % 2) if even else self._resized
         self._canvas = Canvas.blank(*self.size)
 
-    def paint(self, frame: Frame) -> NDArray[np.uint8]:
+    def paint(self, frame: Frame) -> Uint8Array:
         image = frame.image_rgb
         if image.shape[1::-1] != self._resized:
-            image = cast(
-                NDArray[np.uint8], cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA)
-            )
+            image = cast(Uint8Array, cv2.resize(image, self._resized, interpolation=cv2.INTER_AREA))
         width, height = self.size
         image = np.ascontiguousarray(image[:height, :width])
         shown = [(i, rows[frame.index]) for i, rows in enumerate(self._rows) if frame.index in rows]
@@ -295,9 +294,9 @@ class _Painter:
 
     def _draw_keypoints(
         self,
-        image: NDArray[np.uint8],
-        keypoints: NDArray[np.floating[Any]],
-        color: NDArray[np.float64],
+        image: Uint8Array,
+        keypoints: FloatArray,
+        color: Float64Array,
     ) -> None:
         """Draw the confident keypoints (n, 3) of one person into the image, in place."""
         radius = max(1, round(max(image.shape[:2]) / 500))
@@ -315,7 +314,7 @@ class _Painter:
                     cv2.LINE_AA,
                 )
 
-    def _draw_face(self, image: NDArray[np.uint8], face: dict[str, NDArray[Any]], row: int) -> None:
+    def _draw_face(self, image: Uint8Array, face: dict[str, NDArray[Any]], row: int) -> None:
         """Draw the points of one person's face into the image, in place, if it was seen."""
         if not face or face["expression_confidence"][row] <= 0:
             return

@@ -22,6 +22,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ....solver.compiled.kernel import cached
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array
 
 NEAR = 0.05  # metres; the near plane, at which triangles are clipped
 _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.63])
@@ -39,8 +40,8 @@ class Canvas:
     inf if empty.
     """
 
-    rgba: NDArray[np.uint8]
-    depth: NDArray[np.float32]
+    rgba: Uint8Array
+    depth: Float32Array
 
     @classmethod
     def blank(cls, width: int, height: int) -> Canvas:
@@ -50,7 +51,7 @@ class Canvas:
         )
 
     @property
-    def coverage(self) -> NDArray[np.bool_]:
+    def coverage(self) -> BoolArray:
         """(H, W) bool: True where something was drawn."""
         return np.isfinite(self.depth)
 
@@ -62,13 +63,13 @@ class Canvas:
 
 def rasterize(
     canvas: Canvas,
-    vertices_cam: NDArray[np.floating[Any]],
+    vertices_cam: FloatArray,
     triangles: NDArray[np.integer[Any]],
-    face_colors: NDArray[np.floating[Any]],
-    intrinsics: NDArray[np.float64],
-    dist: NDArray[np.float64] | None = None,
+    face_colors: FloatArray,
+    intrinsics: Float64Array,
+    dist: Float64Array | None = None,
     opacity: float = 1.0,
-    shading: NDArray[np.float64] | None = None,
+    shading: Float64Array | None = None,
 ) -> None:
     """Draw a mesh into the canvas, with depth test and back-face culling.
 
@@ -103,7 +104,7 @@ def rasterize(
 @cached
 @njit(nogil=True)
 def fill_silhouette(
-    coverage: NDArray[np.bool_], screen: NDArray[np.float64], triangles: NDArray[np.int32]
+    coverage: BoolArray, screen: Float64Array, triangles: NDArray[np.int32]
 ) -> None:
     """Set the pixels whose centres triangles cover that are seen from outside, as `rasterize` would
     draw them.
@@ -142,9 +143,7 @@ def fill_silhouette(
 
 @cached
 @njit(nogil=True)
-def vertex_normals(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int32]
-) -> NDArray[np.float64]:
+def vertex_normals(vertices: Float64Array, triangles: NDArray[np.int32]) -> Float64Array:
     """Calculate unit normals (V, 3), area-weighted means of the triangles around each vertex (zero
     without triangles).
 
@@ -177,7 +176,7 @@ def vertex_normals(
 
 @cached
 @njit(nogil=True)
-def shade(vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def shade(vertices: Float64Array, normals: Float64Array) -> Float64Array:
     """Calculate the shading (V, 2): factor on the surface's colour (ambient + Lambert), and white
     to add (rim).
 
@@ -195,7 +194,7 @@ def shade(vertices: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArra
     return out
 
 
-def _largest_radius2(lens: NDArray[np.float64]) -> float:
+def _largest_radius2(lens: Float64Array) -> float:
     """Calculate the squared normalized radius beyond which radial distortion is no longer
     monotonic.
     """
@@ -207,9 +206,7 @@ def _largest_radius2(lens: NDArray[np.float64]) -> float:
 
 @cached
 @njit(nogil=True)
-def _pixel(
-    x: float, y: float, K: NDArray[np.float64], lens: NDArray[np.float64]
-) -> tuple[float, float]:
+def _pixel(x: float, y: float, K: Float64Array, lens: Float64Array) -> tuple[float, float]:
     """Project the normalized image point (x, y) to a pixel."""
     r2 = x * x + y * y
     radial = 1 + r2 * (lens[0] + r2 * (lens[1] + r2 * lens[4]))
@@ -221,8 +218,8 @@ def _pixel(
 @cached
 @njit(nogil=True)
 def _project(
-    vertices: NDArray[np.float64], K: NDArray[np.float64], lens: NDArray[np.float64], largest: float
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    vertices: Float64Array, K: Float64Array, lens: Float64Array, largest: float
+) -> tuple[Float64Array, Uint8Array]:
     """Project the vertices: (V, 3) pixels and 1/z, and (V,) whether they are in front, behind or
     outside.
     """
@@ -243,16 +240,16 @@ def _project(
 @cached
 @njit(nogil=True)
 def _draw(
-    rgba: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    vertices: NDArray[np.float64],
-    screen: NDArray[np.float64],
-    where: NDArray[np.uint8],
-    shading: NDArray[np.float64],
+    rgba: Uint8Array,
+    depth: Float32Array,
+    vertices: Float64Array,
+    screen: Float64Array,
+    where: Uint8Array,
+    shading: Float64Array,
     triangles: NDArray[np.int32],
-    colors: NDArray[np.float32],
-    K: NDArray[np.float64],
-    lens: NDArray[np.float64],
+    colors: Float32Array,
+    K: Float64Array,
+    lens: Float64Array,
     alpha: np.uint8,
 ) -> None:
     cut = np.empty((4, 5))
@@ -286,12 +283,12 @@ def _draw(
 @cached
 @njit(nogil=True)
 def _clip_at_near(
-    cut: NDArray[np.float64],
-    vertices: NDArray[np.float64],
-    shading: NDArray[np.float64],
+    cut: Float64Array,
+    vertices: Float64Array,
+    shading: Float64Array,
     triangle: NDArray[np.int32],
-    K: NDArray[np.float64],
-    lens: NDArray[np.float64],
+    K: Float64Array,
+    lens: Float64Array,
 ) -> int:
     """Clip a triangle at the near plane to a fan of 3 or 4 corners (u, v, 1/z, shading); return
     their number.
@@ -323,15 +320,15 @@ def _clip_at_near(
 @cached
 @njit(nogil=True)
 def _fill(
-    rgba: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    c: NDArray[np.float64],
-    shade_a: NDArray[np.float64],
-    shade_b: NDArray[np.float64],
-    shade_c: NDArray[np.float64],
-    color: NDArray[np.float32],
+    rgba: Uint8Array,
+    depth: Float32Array,
+    a: Float64Array,
+    b: Float64Array,
+    c: Float64Array,
+    shade_a: Float64Array,
+    shade_b: Float64Array,
+    shade_c: Float64Array,
+    color: Float32Array,
     alpha: np.uint8,
 ) -> None:
     """Fill one triangle with corners (u, v, 1/z): the pixels whose centres it covers and that pass

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Uint8Array
 from ...errors import OutputError
 from ..media.file_names import utf8_name
 
@@ -87,7 +87,7 @@ class VideoWriter:
         else:
             self.abandon()
 
-    def write(self, image: NDArray[np.uint8], time_s: float | None = None) -> None:
+    def write(self, image: Uint8Array, time_s: float | None = None) -> None:
         """Append an image.
 
         :param image: (H, W, 3) uint8 RGB.

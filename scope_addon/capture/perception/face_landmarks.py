@@ -11,15 +11,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.names import (
     EXPRESSIONS,
 )
+from ...arrays import Float64Array, FloatArray, Uint8Array
 from .landmark_network import (
     KEYPOINT_NAMES,
 )
@@ -87,7 +86,7 @@ class FaceEstimate:
     ``eye_light``: see `eye_light`; of faces only.
     """
 
-    landmarks: NDArray[np.float64]
+    landmarks: Float64Array
     presence: float
     region: Region
     eye_light: float = 1.0
@@ -108,7 +107,7 @@ class FaceNetwork:
     def __init__(self, threads: int, execution: Execution | None = None) -> None:
         self._session = open_session(network_path("face_landmark"), threads, execution)
 
-    def estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> FaceEstimate:
+    def estimate(self, image_rgb: Uint8Array, region: Region) -> FaceEstimate:
         """Estimate the face in a region of an (H, W, 3) uint8 RGB image."""
         blob = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
         landmarks, presence = self._session.run(["landmarks", "presence"], {"input": blob})
@@ -122,7 +121,7 @@ class FaceNetwork:
         )
 
 
-def pixels_per_metre(keypoints_px: NDArray[np.float64]) -> float:
+def pixels_per_metre(keypoints_px: Float64Array) -> float:
     """Estimate the image scale at the head from the body's keypoints (33, 2)."""
     eyes = keypoints_px[_EYES]
     mouth = keypoints_px[_MOUTH].mean(axis=0)
@@ -133,7 +132,7 @@ def pixels_per_metre(keypoints_px: NDArray[np.float64]) -> float:
     )
 
 
-def region_from_body(keypoints_px: NDArray[np.float64]) -> Region:
+def region_from_body(keypoints_px: Float64Array) -> Region:
     """Predict the region of the face from the body's keypoints (33, 2), in pixels.
 
     Up is from the mouth to the eyes, and across the line of the eyes, each as far as it is not
@@ -152,7 +151,7 @@ def region_from_body(keypoints_px: NDArray[np.float64]) -> Region:
     )
 
 
-def facing(world_landmarks: NDArray[np.float64]) -> float:
+def facing(world_landmarks: Float64Array) -> float:
     """Return the cosine of the angle between where the body's head looks and the direction to the
     camera.
 
@@ -172,7 +171,7 @@ def facing(world_landmarks: NDArray[np.float64]) -> float:
     return -float(ahead[2]) / length if length > 0 else 1.0
 
 
-def region_from_landmarks(landmarks_px: NDArray[np.float64]) -> Region:
+def region_from_landmarks(landmarks_px: Float64Array) -> Region:
     """Calculate the region for the next frame from this one's landmarks (478, 2): their box along
     the line of the eyes.
 
@@ -195,7 +194,7 @@ class ExpressionNetwork:
         # It takes a millisecond, which further threads would make longer.
         self._session = open_session(network_path("face_expression"), 1)
 
-    def estimate(self, landmarks_px: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def estimate(self, landmarks_px: FloatArray) -> Float64Array:
         """Estimate the weights (52,) 0..1 of the expressions in the order of `EXPRESSIONS`; 0 of
         the tongue.
 
@@ -207,7 +206,7 @@ class ExpressionNetwork:
         return weights
 
 
-def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> float:
+def eye_light(image_rgb: Uint8Array, landmarks: Float64Array) -> float:
     """Return the median brightness of the square around an eye over that of the skin, for the
     brighter eye.
 
@@ -238,7 +237,7 @@ def eye_light(image_rgb: NDArray[np.uint8], landmarks: NDArray[np.float64]) -> f
     return max(found, default=1.0)
 
 
-def _brightness(image: NDArray[np.uint8], x: float, y: float, half: float) -> float:
+def _brightness(image: Uint8Array, x: float, y: float, half: float) -> float:
     """Return the median of green in a square around a point; NaN outside the image."""
     left = math.floor(x - half)
     top = math.floor(y - half)

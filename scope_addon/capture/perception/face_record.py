@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ....solver.names import (
     EXPRESSIONS,
 )
+from ...arrays import Float64Array, FloatArray
 from .face_landmarks import (
     EXPRESSION_POINTS,
     FACE_POINTS,
@@ -51,9 +52,7 @@ _RADIUS = 0.4  # of the eyeball, 12 mm, over the distance of the eye's corners, 
 _LARGEST_SINE = 0.9
 
 
-def record(
-    estimate: FaceEstimate | None, weights: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
+def record(estimate: FaceEstimate | None, weights: Float64Array | None = None) -> Float64Array:
     """Return the row (RECORD,) of a face; zeros if there is none.
 
     Its numbers: confidence, size in pixels, weights, gaze, landmarks, and the light around the
@@ -78,7 +77,7 @@ def record(
     return row
 
 
-def parts(rows: NDArray[np.floating[Any]]) -> tuple[NDArray[np.floating[Any]], ...]:
+def parts(rows: FloatArray) -> tuple[FloatArray, ...]:
     """Split rows (T, RECORD) into confidence (T,), size (T,), weights (T, 52), gaze (T, 2, 3),
     contours (T, n, 2).
     """
@@ -92,9 +91,7 @@ def parts(rows: NDArray[np.floating[Any]]) -> tuple[NDArray[np.floating[Any]], .
     )
 
 
-def landmarks_of(
-    rows: NDArray[np.floating[Any]], numbers: NDArray[np.int64]
-) -> NDArray[np.floating[Any]]:
+def landmarks_of(rows: FloatArray, numbers: NDArray[np.int64]) -> FloatArray:
     """Return landmarks (T, n, 3) of rows, in pixels, and depth in pixels.
 
     :param numbers: (n,) of the contours, or of those that the expression network takes.
@@ -102,7 +99,7 @@ def landmarks_of(
     return rows[:, _POINTS].reshape(len(rows), len(_KEPT), 3)[:, np.searchsorted(_KEPT, numbers)]
 
 
-def kept_landmarks(row: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def kept_landmarks(row: FloatArray) -> Float64Array:
     """Return the landmarks (478, 3) of a row (RECORD,), in pixels, and depth in pixels; 0 those
     that are not kept.
     """
@@ -111,23 +108,23 @@ def kept_landmarks(row: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     return landmarks
 
 
-def eye_light_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def eye_light_of(rows: FloatArray) -> FloatArray:
     """Return the light around the eyes (T,) of rows, see `eye_light`."""
     return rows[:, _LIGHT]
 
 
-def presence_of(rows: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def presence_of(rows: FloatArray) -> FloatArray:
     """Return (T,) the presence of the faces of rows, less where they are seen from the side, but
     not where small.
     """
     of_size = np.maximum(_ramp(rows[:, 1], *_FACE_PX), 1e-3)
-    found: NDArray[np.floating[Any]] = np.minimum(rows[:, 0] / of_size, 1.0)
+    found: FloatArray = np.minimum(rows[:, 0] / of_size, 1.0)
     return found
 
 
 def with_expression(
-    rows: NDArray[np.floating[Any]], weights: NDArray[np.float64], directions: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+    rows: FloatArray, weights: Float64Array, directions: Float64Array
+) -> FloatArray:
     """Return rows (T, RECORD) with other weights (T, 52) and directions of the eyes (T, 2, 3)."""
     out = rows.copy()
     out[:, _WEIGHTS] = weights
@@ -139,7 +136,7 @@ def _ramp(value: Any, low: float, high: float) -> Any:
     return np.clip((value - low) / (high - low), 0.0, 1.0)
 
 
-def head_axes(landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
+def head_axes(landmarks: Float64Array) -> Float64Array:
     """Calculate R_camera_head (3, 3), up to the camera's perspective, from landmarks (478, 3) in
     pixels.
 
@@ -153,7 +150,7 @@ def head_axes(landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-def gaze(landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
+def gaze(landmarks: Float64Array) -> Float64Array:
     """Estimate the unit directions (2, 3) in which the left and the right eye look, in the head's
     frame.
 

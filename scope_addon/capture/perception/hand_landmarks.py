@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array, Uint8Array
 from .landmark_network import KEYPOINT_NAMES, disagreement
 from .person_detector import decode, make_anchors, merge_overlapping
 from .region import Region, box_along
@@ -75,8 +75,8 @@ class HandEstimate:
     `HAND_NAMES`.
     """
 
-    keypoints_px: NDArray[np.float64]
-    world_landmarks: NDArray[np.float64]
+    keypoints_px: Float64Array
+    world_landmarks: Float64Array
     presence: float
     left: float
     region: Region
@@ -116,7 +116,7 @@ class HandNetwork:
     def __init__(self, threads: int, execution: Execution | None = None) -> None:
         self._session = open_session(network_path("hand_landmark"), threads, execution)
 
-    def estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> HandEstimate:
+    def estimate(self, image_rgb: Uint8Array, region: Region) -> HandEstimate:
         """Estimate the hand in a region of an (H, W, 3) uint8 RGB image."""
         blob = cv2.dnn.blobFromImage(region.cut(image_rgb, INPUT_SIZE), 1 / 255.0)
         landmarks, presence, handedness, world = self._session.run(_OUTPUTS, {"input": blob})
@@ -143,7 +143,7 @@ class PalmDetector:
         self._anchors = make_anchors(PALM_INPUT_SIZE, _LAYERS)
 
     def detect(
-        self, image_rgb: NDArray[np.uint8], square: Region, threshold: float = PALM_THRESHOLD
+        self, image_rgb: Uint8Array, square: Region, threshold: float = PALM_THRESHOLD
     ) -> list[Region]:
         """Return the hands' regions by all palms in a square of an (H, W, 3) uint8 RGB image, the
         best palm first.
@@ -154,7 +154,7 @@ class PalmDetector:
         return [_in_image(v, square) for v in values]
 
 
-def _in_image(values: NDArray[np.float64], square: Region) -> Region:
+def _in_image(values: Float64Array, square: Region) -> Region:
     """Calculate the hand's region in the image from a box and points (18,) in the network's input
     pixels.
     """
@@ -168,9 +168,7 @@ def _in_image(values: NDArray[np.float64], square: Region) -> Region:
     )
 
 
-def pixels_per_metre(
-    keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.float64]
-) -> float:
+def pixels_per_metre(keypoints_px: Float64Array, world_landmarks: Float64Array) -> float:
     """Estimate the image scale at the person's distance, in pixels per metre.
 
     s = ‖p − mean p‖ / ‖w_xy − mean w_xy‖ of all 33 keypoints p and world landmarks w, by scaled
@@ -190,7 +188,7 @@ def pixels_per_metre(
     return float(np.linalg.norm(image) / np.maximum(np.linalg.norm(space), 1e-9))
 
 
-def region_from_body(keypoints_px: NDArray[np.float64], scale: float, side: int) -> Region:
+def region_from_body(keypoints_px: Float64Array, scale: float, side: int) -> Region:
     """Predict the region of a hand from the body's keypoints.
 
     The centre lies beyond the wrist in the direction of the finger keypoints' mean m = (index +
@@ -212,7 +210,7 @@ def region_from_body(keypoints_px: NDArray[np.float64], scale: float, side: int)
     return Region((float(center[0]), float(center[1])), _BODY_SCALE * length, _rotation(up))
 
 
-def region_from_palm(box_px: NDArray[np.float64], points_px: NDArray[np.float64]) -> Region:
+def region_from_palm(box_px: Float64Array, points_px: Float64Array) -> Region:
     """Calculate the region of a hand from its detected palm.
 
     :param box_px: (4,) left, top, right, bottom of the palm's square box, in the axes of the
@@ -224,7 +222,7 @@ def region_from_palm(box_px: NDArray[np.float64], points_px: NDArray[np.float64]
     return _shifted((box_px[:2] + box_px[2:]) / 2, size, _rotation(up), _PALM_SCALE, _PALM_SHIFT)
 
 
-def region_from_landmarks(keypoints_px: NDArray[np.float64]) -> Region:
+def region_from_landmarks(keypoints_px: Float64Array) -> Region:
     """Calculate the region for the next frame from this one's keypoints (21, 2), in pixels.
 
     Up is from the wrist to the weighted mean of the base joints of index, middle and ring finger
@@ -238,7 +236,7 @@ def region_from_landmarks(keypoints_px: NDArray[np.float64]) -> Region:
 
 
 def _shifted(
-    center: NDArray[np.float64], size: float, rotation: float, scale: float, shift: float
+    center: Float64Array, size: float, rotation: float, scale: float, shift: float
 ) -> Region:
     """Build a region ``scale`` times ``size``, shifted up (in its own axes) by ``shift`` sizes."""
     up = np.array([math.sin(rotation), -math.cos(rotation)])
@@ -246,6 +244,6 @@ def _shifted(
     return Region((float(x), float(y)), scale * size, rotation)
 
 
-def _rotation(up: NDArray[np.float64]) -> float:
+def _rotation(up: Float64Array) -> float:
     """Calculate the rotation of a region in which the image direction ``up`` (2,) points up."""
     return math.atan2(float(up[0]), -float(up[1]))

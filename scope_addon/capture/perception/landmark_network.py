@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
+from ...arrays import Float32Array, Float64Array, Uint8Array
 from .region import MARGIN, Region, region_from_points
 from .sessions import (
     Execution,
@@ -53,9 +54,9 @@ class PoseEstimate:
     somebody.
     """
 
-    keypoints_px: NDArray[np.float64]
-    keypoints_confidence: NDArray[np.float64]
-    world_landmarks: NDArray[np.float64]
+    keypoints_px: Float64Array
+    keypoints_confidence: Float64Array
+    world_landmarks: Float64Array
     presence: float
     region: Region
     next_region: Region
@@ -88,7 +89,7 @@ class PoseEstimate:
         )
 
 
-def disagreement(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.float64]) -> float:
+def disagreement(keypoints_px: Float64Array, world_landmarks: Float64Array) -> float:
     """Calculate how inconsistent keypoints in the image and in space are, see
     `PoseEstimate.disagreement`.
 
@@ -105,16 +106,16 @@ def disagreement(keypoints_px: NDArray[np.float64], world_landmarks: NDArray[np.
 class EstimateMemory(Protocol):
     """Estimates by what the network was given, so that an earlier capture's are found again."""
 
-    def key(self, network: str, crop_rgb: NDArray[np.uint8], region: Region) -> bytes | None:
+    def key(self, network: str, crop_rgb: Uint8Array, region: Region) -> bytes | None:
         """Return the key of an estimate; None if it cannot be kept.
 
         :param crop_rgb: (H, W, 3), the network's input.
         """
 
-    def find(self, key: bytes | None) -> NDArray[np.float64] | None:
+    def find(self, key: bytes | None) -> Float64Array | None:
         """Return the values (m,) that were added with a key; None if there are none."""
 
-    def add(self, key: bytes | None, values: NDArray[np.float64]) -> None:
+    def add(self, key: bytes | None, values: Float64Array) -> None:
         """Keep the values (m,) of a key."""
 
 
@@ -155,7 +156,7 @@ class LandmarkNetwork:
         return self._sessions[threads]
 
     def estimate(
-        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], with_masks: bool = False
+        self, image_rgb: Uint8Array, regions: Sequence[Region], with_masks: bool = False
     ) -> list[PoseEstimate]:
         """Estimate one pose per region of an (H, W, 3) uint8 RGB image."""
         if len(regions) < 2 or self._threads == 1:
@@ -167,7 +168,7 @@ class LandmarkNetwork:
         ]
 
     def begin(
-        self, image_rgb: NDArray[np.uint8], region: Region, with_mask: bool = False
+        self, image_rgb: Uint8Array, region: Region, with_mask: bool = False
     ) -> Future[PoseEstimate]:
         """Start the estimate of one region in another thread; the image (H, W, 3) must not change
         until it is done.
@@ -175,7 +176,7 @@ class LandmarkNetwork:
         shared = self._session(max(1, self._threads // _WORKERS))
         return self._pool.submit(self._estimate, shared, image_rgb, region, with_mask)
 
-    def mask(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float32]:
+    def mask(self, image_rgb: Uint8Array, region: Region) -> Float32Array:
         """Return the probability (256, 256) that a pixel of the region of an (H, W, 3) image shows
         its person.
 
@@ -190,7 +191,7 @@ class LandmarkNetwork:
     def _estimate(
         self,
         session: onnxruntime.InferenceSession,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         region: Region,
         with_mask: bool,
     ) -> PoseEstimate:
@@ -216,18 +217,18 @@ class LandmarkNetwork:
         )
 
 
-def _probability(logits: NDArray[np.float32]) -> NDArray[np.float32]:
+def _probability(logits: Float32Array) -> Float32Array:
     """Return the mask (256, 256) of the network's output (1, 1, 256, 256)."""
-    probability: NDArray[np.float32] = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
+    probability: Float32Array = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
     return probability
 
 
-def _blob(crop_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _blob(crop_rgb: Uint8Array) -> Float32Array:
     """Return the network's input (1, 3, 256, 256) in [0, 1]."""
-    return cast(NDArray[np.float32], cv2.dnn.blobFromImage(crop_rgb, 1 / 255.0))
+    return cast(Float32Array, cv2.dnn.blobFromImage(crop_rgb, 1 / 255.0))
 
 
-def _packed(estimate: PoseEstimate) -> NDArray[np.float64]:
+def _packed(estimate: PoseEstimate) -> Float64Array:
     """Return all numbers of an estimate (_VALUES,) but those of its region and mask."""
     after = estimate.next_region
     return np.concatenate(
@@ -240,7 +241,7 @@ def _packed(estimate: PoseEstimate) -> NDArray[np.float64]:
     )
 
 
-def _unpacked(values: NDArray[np.float64], region: Region) -> PoseEstimate:
+def _unpacked(values: Float64Array, region: Region) -> PoseEstimate:
     """Return the estimate of which `_packed` made these values (_VALUES,)."""
     K = KEYPOINT_COUNT
     keypoints, confidence, world, others = np.split(values, np.cumsum([2 * K, K, 3 * K]))
@@ -252,10 +253,10 @@ def _unpacked(values: NDArray[np.float64], region: Region) -> PoseEstimate:
 
 
 def interpret(
-    landmarks: NDArray[np.float32],
+    landmarks: Float32Array,
     presence: float,
-    heatmaps: NDArray[np.float32],
-    world: NDArray[np.float32],
+    heatmaps: Float32Array,
+    world: Float32Array,
     region: Region,
 ) -> PoseEstimate:
     """Convert the network's raw outputs for one region to image and camera coordinates.
@@ -278,7 +279,7 @@ def interpret(
     )
 
 
-def refine(points: NDArray[np.float64], heatmaps: NDArray[np.float32]) -> NDArray[np.float64]:
+def refine(points: Float64Array, heatmaps: Float32Array) -> Float64Array:
     """Move each point to the centroid of its heatmap within 7 × 7 cells around it.
 
     Points without a cell of at least 0.5 in this window stay. The network was trained with cell c

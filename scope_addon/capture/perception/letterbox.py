@@ -8,7 +8,8 @@ from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Float64Array, Uint8Array
 
 _HALVING_FROM = 4.0  # ratio of the sizes
 
@@ -20,17 +21,17 @@ class Letterbox:
     ``picture_rgb`` (height, width, 3) uint8; ``scale``, ``offset`` (2,) in x and y.
     """
 
-    picture_rgb: NDArray[np.uint8]
-    scale: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    picture_rgb: Uint8Array
+    scale: Float64Array
+    offset: Float64Array
 
-    def to_image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_image(self, points: Float64Array) -> Float64Array:
         """Convert positions (..., 2) in the network's input to pixels (..., 2) of the image."""
         return (points - self.offset) / self.scale - 0.5
 
 
 def fit_in(
-    image_rgb: NDArray[np.uint8],
+    image_rgb: Uint8Array,
     width: int,
     height: int,
     *,
@@ -60,18 +61,16 @@ def fit_in(
     )
 
 
-def _resize(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+def _resize(image: Uint8Array, width: int, height: int) -> Uint8Array:
     """Resize without aliasing."""
     if width >= image.shape[1]:
-        return cast(
-            NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
-        )
+        return cast(Uint8Array, cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR))
     while min(image.shape[1] / width, image.shape[0] / height) >= _HALVING_FROM:
         image = halved(image)
-    return cast(NDArray[np.uint8], cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
+    return cast(Uint8Array, cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
 
 
-def halved(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def halved(image: Uint8Array) -> Uint8Array:
     """Halve an (H, W, 3) image by averaging 2 × 2 pixels, OpenCV's fast path of INTER_AREA."""
     size = image.shape[1] // 2, image.shape[0] // 2
-    return cast(NDArray[np.uint8], cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+    return cast(Uint8Array, cv2.resize(image, size, interpolation=cv2.INTER_AREA))

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError, ShapeError
+from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
 from .sessions import (
@@ -65,16 +66,16 @@ class Lifted:
     sight to the person.
     """
 
-    points: NDArray[np.floating[Any]]
-    sigma_across: NDArray[np.floating[Any]]
-    sigma_along: NDArray[np.floating[Any]]
+    points: FloatArray
+    sigma_across: FloatArray
+    sigma_along: FloatArray
 
     def scaled(self, scale: float) -> Lifted:
         """Return the same keypoints of a person who is ``scale`` times as large."""
         return Lifted(self.points * scale, self.sigma_across * scale, self.sigma_along * scale)
 
 
-def virtual_camera(rays: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def virtual_camera(rays: FloatArray) -> FloatArray:
     """Calculate the rotation that brings the person onto the z axis.
 
     :param rays: (T, 33, 2) normalized image coordinates.
@@ -83,7 +84,7 @@ def virtual_camera(rays: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]
     return camera_towards(rays[:, TORSO].mean(axis=1))
 
 
-def camera_towards(center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def camera_towards(center: FloatArray) -> FloatArray:
     """Calculate the rotations (T, 3, 3) that bring rays (T, 2), in normalized image coordinates,
     onto the z axis.
     """
@@ -94,20 +95,20 @@ def camera_towards(center: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-def person_size(image_points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def person_size(image_points: FloatArray) -> FloatArray:
     """Calculate s (T,) of the module's equation from points (T, 33, 2), in the points' unit."""
     limbs = image_points[:, LIMBS]
     square = np.square(limbs - limbs.mean(axis=1, keepdims=True)).sum(axis=-1).mean(axis=-1)
-    size: NDArray[np.floating[Any]] = np.maximum(np.sqrt(square), 1e-4)
+    size: FloatArray = np.maximum(np.sqrt(square), 1e-4)
     return size
 
 
 def network_input(
-    rays: NDArray[np.floating[Any]],
-    confidence: NDArray[np.floating[Any]],
-    world: NDArray[np.floating[Any]],
+    rays: FloatArray,
+    confidence: FloatArray,
+    world: FloatArray,
     known: NDArray[Any],
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+) -> tuple[FloatArray, FloatArray]:
     """Calculate the network's input for T frames, see the module's equation.
 
     :param rays: (T, 33, 2) normalized image coordinates.
@@ -132,9 +133,7 @@ def network_input(
     return np.concatenate(parts, axis=1), R
 
 
-def mixture(
-    estimates: list[Lifted], weights: list[float], R_virtual_camera: NDArray[np.floating[Any]]
-) -> Lifted:
+def mixture(estimates: list[Lifted], weights: list[float], R_virtual_camera: FloatArray) -> Lifted:
     """Calculate mean and standard deviation of a mixture of several estimates of the same T frames.
 
     P = Σ_i a_i P_i and σ² = Σ_i a_i (σ_i² + (P_i − P)²), the latter in the axes of the virtual
@@ -192,9 +191,9 @@ class Lifter:
 
     def lift(
         self,
-        rays: NDArray[np.floating[Any]],
-        confidence: NDArray[np.floating[Any]],
-        world: NDArray[np.floating[Any]] | None,
+        rays: FloatArray,
+        confidence: FloatArray,
+        world: FloatArray | None,
         windows: Windows | None = None,
     ) -> Lifted:
         """Lift T frames.
@@ -208,7 +207,7 @@ class Lifter:
         """
         around = _windows(rays, confidence, windows)
 
-        def lift(rows: NDArray[np.intp]) -> tuple[NDArray[np.floating[Any]], ...]:
+        def lift(rows: IndexArray) -> tuple[FloatArray, ...]:
             lifted = self._lift(*_window_input(rows, rays, confidence, world, around))
             return lifted.points, lifted.sigma_across, lifted.sigma_along
 
@@ -216,11 +215,11 @@ class Lifter:
 
     def lift_mixture(
         self,
-        rays: NDArray[np.floating[Any]],
-        confidence: NDArray[np.floating[Any]],
-        world: NDArray[np.floating[Any]],
+        rays: FloatArray,
+        confidence: FloatArray,
+        world: FloatArray,
         windows: Windows | None = None,
-        rows: NDArray[np.intp] | None = None,
+        rows: IndexArray | None = None,
     ) -> Lifted:
         """Mix the estimates with and without world landmarks, which is more accurate on real clips
         than either.
@@ -234,7 +233,7 @@ class Lifter:
         """
         around = _windows(rays, confidence, windows)
 
-        def lift(rows: NDArray[np.intp]) -> tuple[NDArray[np.floating[Any]], ...]:
+        def lift(rows: IndexArray) -> tuple[FloatArray, ...]:
             x, R = _window_input(rows, rays, confidence, world, around)
             with_world = self._lift(x, R)
             x[..., _WORLD_AND_KNOWN] = 0.0
@@ -243,15 +242,13 @@ class Lifter:
 
         return Lifted(*by_blocks(lift, np.arange(len(rays)) if rows is None else rows))
 
-    def _lift(self, x: NDArray[np.float32], R_virtual_camera: NDArray[np.floating[Any]]) -> Lifted:
+    def _lift(self, x: Float32Array, R_virtual_camera: FloatArray) -> Lifted:
         points, log_sigma = self.run(x)
         points = points - points[:, HIPS].mean(axis=1, keepdims=True)
         sigma = np.exp(log_sigma) * SIGMA_CALIBRATION
         return Lifted(points @ R_virtual_camera, sigma[..., 0], sigma[..., 1])
 
-    def run(
-        self, x: NDArray[np.float32]
-    ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    def run(self, x: Float32Array) -> tuple[FloatArray, FloatArray]:
         """Run the network.
 
         :param x: (T, 9, 200) float32, windows of `network_input`.
@@ -267,9 +264,7 @@ class Lifter:
         return points, log_sigma
 
 
-def _windows(
-    rays: NDArray[np.floating[Any]], confidence: NDArray[np.floating[Any]], windows: Windows | None
-) -> Windows:
+def _windows(rays: FloatArray, confidence: FloatArray, windows: Windows | None) -> Windows:
     """Check the shapes of the arrays; default to one still per frame."""
     T = len(rays)
     for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
@@ -279,12 +274,12 @@ def _windows(
 
 
 def _window_input(
-    rows: NDArray[np.intp],
-    rays: NDArray[np.floating[Any]],
-    confidence: NDArray[np.floating[Any]],
-    world: NDArray[np.floating[Any]] | None,
+    rows: IndexArray,
+    rays: FloatArray,
+    confidence: FloatArray,
+    world: FloatArray | None,
     around: Windows,
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+) -> tuple[FloatArray, FloatArray]:
     """Calculate the input (t, 9, 200) float32 of the frames ``rows`` (t,), and R_virtual_camera (t,
     3, 3).
     """
@@ -309,13 +304,11 @@ class Windows:
     ``before``, ``after`` (T, WINDOW) rows; ``share`` (T, WINDOW) float32, 0..1.
     """
 
-    before: NDArray[np.intp]
-    after: NDArray[np.intp]
-    share: NDArray[np.float32]
+    before: IndexArray
+    after: IndexArray
+    share: Float32Array
 
-    def gather(
-        self, x: NDArray[np.float32], rows: NDArray[np.intp], first: int
-    ) -> NDArray[np.float32]:
+    def gather(self, x: Float32Array, rows: IndexArray, first: int) -> Float32Array:
         """Interpolate the windows of some frames.
 
         :param x: (N, C) values, whose row 0 is that of frame ``first``.
@@ -323,18 +316,18 @@ class Windows:
         :return: (n, WINDOW, C).
         """
         share = self.share[rows].astype(x.dtype)[..., None]
-        out: NDArray[np.float32] = x[self.before[rows] - first] * (1 - share)
+        out: Float32Array = x[self.before[rows] - first] * (1 - share)
         out += x[self.after[rows] - first] * share
         out[:, MIDDLE] = x[rows - first]
         return out
 
-    def span(self, rows: NDArray[np.intp]) -> tuple[int, int]:
+    def span(self, rows: IndexArray) -> tuple[int, int]:
         """Calculate the first row that the frames ``rows`` (n,) need, and one past the last."""
         least = min(int(rows[0]), int(self.before[rows].min()))
         return least, max(int(rows[-1]), int(self.after[rows].max())) + 1
 
 
-def windows_around(times: NDArray[np.floating[Any]], seen: NDArray[np.bool_]) -> Windows:
+def windows_around(times: FloatArray, seen: BoolArray) -> Windows:
     """Calculate the windows of T frames, from those in which the person was seen.
 
     :param times: (T,) seconds, ascending.
@@ -357,7 +350,7 @@ def windows_around(times: NDArray[np.floating[Any]], seen: NDArray[np.bool_]) ->
     return Windows(rows[before], rows[after], share.astype(np.float32))
 
 
-def ends_of_runs(numbers: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def ends_of_runs(numbers: NDArray[Any]) -> tuple[IndexArray, IndexArray]:
     """Find the indices (n,) of the first and of the last number equal to each of the non-decreasing
     numbers (n,).
     """

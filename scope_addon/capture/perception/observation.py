@@ -5,14 +5,11 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...arrays import Float32Array, Float64Array, FloatArray
 from .region import Region
 
-PendingReference = Future[NDArray[np.float64] | None]
+PendingReference = Future[Float64Array | None]
 """Pending world landmarks (33, 3) of the reference network, or None if it finds nobody."""
 
 
@@ -26,7 +23,7 @@ class PersonMask:
     """
 
     region: Region
-    probability: NDArray[np.floating[Any]]
+    probability: FloatArray
     image_size: tuple[int, int]
 
 
@@ -47,14 +44,14 @@ class Observation:
     `face_record`. ``mask``: the person's outline, in few frames.
     """
 
-    keypoints_px: NDArray[np.float64]
-    keypoints_confidence: NDArray[np.float64]
-    world_landmarks: NDArray[np.float64]
+    keypoints_px: Float64Array
+    keypoints_confidence: Float64Array
+    world_landmarks: Float64Array
     presence: float
     region: Region
     acquired: bool
-    appearance: NDArray[np.float64] | None = None
+    appearance: Float64Array | None = None
     reference_landmarks: PendingReference | None = None
-    hands: NDArray[np.float32] | None = None
+    hands: Float32Array | None = None
     mask: PersonMask | None = None
-    face: NDArray[np.float64] | None = None
+    face: Float64Array | None = None

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float32Array, Float64Array, IndexArray, Uint8Array
 from .letterbox import fit_in
 from .region import Region, region_from_points
 from .sessions import (
@@ -47,8 +47,8 @@ class Detection:
     """
 
     score: float
-    box_px: NDArray[np.float64]
-    points_px: NDArray[np.float64]
+    box_px: Float64Array
+    points_px: Float64Array
 
     @property
     def region(self) -> Region:
@@ -69,7 +69,7 @@ class PersonDetector:
 
     def detect(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         threshold: float = SCORE_THRESHOLD,
         closely: bool = False,
     ) -> list[Detection]:
@@ -87,7 +87,7 @@ class PersonDetector:
             found = unique(found)
         return found
 
-    def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
+    def detect_small(self, image_rgb: Uint8Array) -> list[Detection]:
         """Detect people of about a tenth to a quarter of the shorter side, whom `detect` misses,
         best first.
 
@@ -96,7 +96,7 @@ class PersonDetector:
         """
         return self._detect_in_squares(image_rgb, small_squares(*image_rgb.shape[:2]))
 
-    def detect_in_parts(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
+    def detect_in_parts(self, image_rgb: Uint8Array) -> list[Detection]:
         """Detect people of about a fifth to two fifths of the shorter side, whom `detect` misses,
         best first.
 
@@ -107,7 +107,7 @@ class PersonDetector:
         return self._detect_in_squares(image_rgb, parts(*image_rgb.shape[:2]))
 
     def _detect_in_squares(
-        self, image_rgb: NDArray[np.uint8], within: list[tuple[int, int, int]]
+        self, image_rgb: Uint8Array, within: list[tuple[int, int, int]]
     ) -> list[Detection]:
         found: list[Detection] = []
         for left, top, side in within:
@@ -117,7 +117,7 @@ class PersonDetector:
         return unique(found)
 
     def _detect_in(
-        self, image_rgb: NDArray[np.uint8], threshold: float, corner: tuple[int, int]
+        self, image_rgb: Uint8Array, threshold: float, corner: tuple[int, int]
     ) -> list[Detection]:
         fitted = fit_in(image_rgb, INPUT_SIZE, INPUT_SIZE, border=0)
         scale = INPUT_SIZE / max(image_rgb.shape[:2])
@@ -184,7 +184,7 @@ def unique(detections: list[Detection]) -> list[Detection]:
 
 def make_anchors(
     size: int = INPUT_SIZE, strides: tuple[tuple[int, int], ...] = _LAYERS
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Calculate the anchor centres in the network's order: by layer, row, column, anchor of the
     cell.
 
@@ -201,11 +201,11 @@ def make_anchors(
 
 
 def decode(
-    boxes: NDArray[np.float32],
-    logits: NDArray[np.float32],
-    anchors: NDArray[np.float64],
+    boxes: Float32Array,
+    logits: Float32Array,
+    anchors: Float64Array,
     threshold: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Float64Array, Float64Array]:
     """Convert the network's raw outputs to boxes and points.
 
     :param boxes: (A, 4 + 2n): box centre relative to the anchor, box size, n points relative to the
@@ -227,8 +227,8 @@ def decode(
 
 
 def merge_overlapping(
-    score: NDArray[np.float64], values: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    score: Float64Array, values: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Merge each cluster of boxes to its score-weighted mean with its best score (weighted
     non-maximum suppression).
 
@@ -242,7 +242,7 @@ def merge_overlapping(
     return score[best], np.array(merged).reshape(-1, values.shape[1])
 
 
-def overlap_clusters(corners: NDArray[np.float64], threshold: float) -> list[NDArray[np.intp]]:
+def overlap_clusters(corners: Float64Array, threshold: float) -> list[IndexArray]:
     """Cluster boxes: the best remaining box and all whose intersection over union with it exceeds
     the threshold.
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array
 from .letterbox import halved
 
 MARGIN = 1.25  # side of the square over the body circle's diameter
@@ -33,25 +33,25 @@ class Region:
     rotation: float
 
     @property
-    def R_image_crop(self) -> NDArray[np.float64]:
+    def R_image_crop(self) -> Float64Array:
         """(2, 2) rotation from the square's axes to the image's: [[c, −s], [s, c]]."""
         c = math.cos(self.rotation)
         s = math.sin(self.rotation)
         return np.array([[c, -s], [s, c]])
 
-    def image_from_crop(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def image_from_crop(self, points: Float64Array) -> Float64Array:
         """Convert crop coordinates (..., 2) to pixels: p = center + side · R · (s − ½)."""
         offset = self.side_px * (np.asarray(points) - 0.5) @ self.R_image_crop.T
-        pixels: NDArray[np.float64] = np.asarray(self.center_px) + offset
+        pixels: Float64Array = np.asarray(self.center_px) + offset
         return pixels
 
-    def crop_from_image(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def crop_from_image(self, points: Float64Array) -> Float64Array:
         """Convert pixels (..., 2) to crop coordinates, the inverse of `image_from_crop`."""
         offset = np.asarray(points) - np.asarray(self.center_px)
-        cropped: NDArray[np.float64] = offset @ self.R_image_crop / self.side_px + 0.5
+        cropped: Float64Array = offset @ self.R_image_crop / self.side_px + 0.5
         return cropped
 
-    def cut(self, image_rgb: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+    def cut(self, image_rgb: Uint8Array, size: int) -> Uint8Array:
         """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels
         are repeated.
 
@@ -65,9 +65,9 @@ class Region:
             source, A = _shrink(image_rgb, A, size, int(self.side_px / size).bit_length() - 1)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         crop = cv2.warpAffine(source, A, (size, size), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        return cast(NDArray[np.uint8], crop)
+        return cast(Uint8Array, crop)
 
-    def rotate_to_camera(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rotate_to_camera(self, vectors: Float64Array) -> Float64Array:
         """Rotate 3D vectors (..., 3) from the square's axes (x right, y down, z forward) to the
         camera's axes.
         """
@@ -75,7 +75,7 @@ class Region:
         R_camera_crop[:2, :2] = self.R_image_crop
         return np.asarray(vectors) @ R_camera_crop.T
 
-    def moved(self, motion_px: NDArray[np.floating[Any]]) -> Region:
+    def moved(self, motion_px: FloatArray) -> Region:
         """Return the square moved by (2,) pixels."""
         x, y = np.asarray(self.center_px) + motion_px
         return replace(self, center_px=(float(x), float(y)))
@@ -104,8 +104,8 @@ class Region:
 
 
 def _shrink(
-    image: NDArray[np.uint8], A: NDArray[np.float64], size: int, halvings: int
-) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
+    image: Uint8Array, A: Float64Array, size: int, halvings: int
+) -> tuple[Uint8Array, Float64Array]:
     """Shrink the image under the square by powers of two, so that a large square is sampled without
     aliasing.
 
@@ -129,7 +129,7 @@ def _shrink(
     return small, B
 
 
-def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float64]) -> Region:
+def region_from_points(center_px: Float64Array, top_px: Float64Array) -> Region:
     """Calculate the region of a person, centred on the hips, with ``top_px`` straight above in the
     crop.
 
@@ -144,9 +144,7 @@ def region_from_points(center_px: NDArray[np.float64], top_px: NDArray[np.float6
     return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
 
 
-def box_along(
-    points: NDArray[np.floating[Any]], rotation: float
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+def box_along(points: FloatArray, rotation: float) -> tuple[FloatArray, FloatArray]:
     """Calculate the centre (2,) and the sides (2,) of the box around points (n, 2) in the axes of a
     rotated region.
     """
@@ -157,12 +155,12 @@ def box_along(
     return R_image_box @ ((low + high) / 2), high - low
 
 
-def bounds(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def bounds(points: FloatArray) -> FloatArray:
     """Calculate the bounding box (4,) x0, y0, x1, y1 of points (n, 2)."""
     return np.concatenate([points.min(axis=0), points.max(axis=0)])
 
 
-def surroundings(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def surroundings(points: FloatArray) -> FloatArray:
     """Calculate the bounding box (4,) of a person's points (n, 2), with a margin of a tenth of its
     longer side.
     """
@@ -171,9 +169,7 @@ def surroundings(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]
     return np.concatenate([low - margin, high + margin])
 
 
-def inside(
-    points: NDArray[np.floating[Any]], boxes: Sequence[NDArray[np.floating[Any]]]
-) -> NDArray[np.bool_]:
+def inside(points: FloatArray, boxes: Sequence[FloatArray]) -> BoolArray:
     """Check (n,) whether each point (n, 2) is in one of the boxes (4,) x0, y0, x1, y1."""
     found = np.zeros(len(points), bool)
     for box in boxes:

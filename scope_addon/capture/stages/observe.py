@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ...arrays import Float64Array, Uint8Array
 from ...errors import NoPersonError, VideoError
 from ...notices import (
     Notice,
@@ -108,7 +108,7 @@ class Listeners:
 class Footage:
     """What is known of the footage once all frames were observed, apart from its people."""
 
-    timestamps: NDArray[np.float64]  # (T,) seconds
+    timestamps: Float64Array  # (T,) seconds
     camera: Camera
     camera_motion: CameraMotion
     lines: Lines  # of the background, in the first frame's camera axes
@@ -243,7 +243,7 @@ class FrameObserver:
         self._cuts = SceneCuts()
         self._exposure = AutoExposure()
         # The next frame in the brightness that the networks are given.
-        self._upcoming_lit: NDArray[np.uint8] | None = None
+        self._upcoming_lit: Uint8Array | None = None
         self._following: Future[None] | None = None
 
     def add(
@@ -292,7 +292,7 @@ class FrameObserver:
                 call.result()
 
     def _track(
-        self, lit: NDArray[np.uint8], time_s: float, with_masks: bool
+        self, lit: Uint8Array, time_s: float, with_masks: bool
     ) -> list[tuple[int, Observation]]:
         """Return tracklet number and observation of each person in a frame (H, W, 3)."""
         trackers = self._trackers

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.names import BODY_JOINTS
+from ...arrays import Float64Array
 from ...capture_report import Report
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
 from ...motion import Motion
@@ -222,7 +222,7 @@ def floor_warnings(
 
 
 def _other_floors(
-    of_person: dict[str, Value], heights: NDArray[np.float64], motion: Motion, wrong_scale: str
+    of_person: dict[str, Value], heights: Float64Array, motion: Motion, wrong_scale: str
 ) -> list[Notice]:
     """List the other floors of a person.
 
@@ -269,7 +269,7 @@ def _steps(of_person: dict[str, Value], body: Body, motion: Motion) -> list[Noti
 
 
 def _under_floor(
-    of_person: dict[str, Value], heights: NDArray[np.float64], motion: Motion
+    of_person: dict[str, Value], heights: Float64Array, motion: Motion
 ) -> list[Notice]:
     lowest = heights.min(axis=1)
     for span in lower_floors(heights, motion.foot_contact, motion.timestamps):

@@ -10,9 +10,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.loaders.body_file import CHILD_BELOW_M
+from ...arrays import Float64Array
 from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
 from ..fitting.frame_sequence import FittedTrack
@@ -107,7 +107,7 @@ class Person:
         whole = self.fit.with_fingers_at_rest(self.prepared)
         return place_track(shot.body, self.track, whole, True, shot.path, shot.uneven_ground)
 
-    def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> None:
+    def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: Float64Array) -> None:
         """Add to the measurements the distance and lean that follow from floor, feet and balance.
 
         :param placed: see `fitted_places`.

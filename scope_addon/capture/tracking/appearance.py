@@ -5,12 +5,10 @@ do not.
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array, FloatArray, Uint8Array
 from ..perception.landmark_network import KEYPOINT_NAMES
 
 _INDEX = {name: i for i, name in enumerate(KEYPOINT_NAMES)}
@@ -27,9 +25,7 @@ _GREYS = 6
 SIZE = 2 * (_HUES + _GREYS)
 
 
-def appearance(
-    image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.floating[Any]]
-) -> NDArray[np.float64]:
+def appearance(image_rgb: Uint8Array, keypoints_px: FloatArray) -> Float64Array:
     """Sample the colours of the torso and the legs.
 
     A pixel is counted in the bin of its hue with the weight c = saturation · √value, and in the bin
@@ -55,7 +51,7 @@ def appearance(
     return np.sqrt(np.concatenate(histograms))
 
 
-def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def distance(a: Float64Array, b: Float64Array) -> float:
     """Compute the Hellinger distance of two appearances, or of sums of several, over the parts that
     both contain.
 
@@ -73,7 +69,7 @@ def distance(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(np.mean(values)) if values else 0.5
 
 
-def sample(image_rgb: NDArray[np.uint8], points: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+def sample(image_rgb: Uint8Array, points: FloatArray) -> Uint8Array:
     """Return the (N, 3) pixels at those of the points that are inside the image.
 
     :param image_rgb: (H, W, 3).
@@ -82,11 +78,11 @@ def sample(image_rgb: NDArray[np.uint8], points: NDArray[np.floating[Any]]) -> N
     height, width = image_rgb.shape[:2]
     x, y = np.round(points).astype(int).T
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    pixels: NDArray[np.uint8] = image_rgb[y[inside], x[inside]]
+    pixels: Uint8Array = image_rgb[y[inside], x[inside]]
     return pixels
 
 
-def _histogram(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:
+def _histogram(pixels: Uint8Array) -> Float64Array:
     if len(pixels) < _MIN_PIXELS:
         return np.zeros(_HUES + _GREYS)
     hue, saturation, value = cv2.cvtColor(pixels[None], cv2.COLOR_RGB2HSV)[0].astype(float).T
@@ -97,8 +93,8 @@ def _histogram(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 
 def _soft_histogram(
-    position: NDArray[np.float64], weight: NDArray[np.float64], count: int, *, wraps: bool
-) -> NDArray[np.float64]:
+    position: Float64Array, weight: Float64Array, count: int, *, wraps: bool
+) -> Float64Array:
     """Distribute each weight over the two nearest bins, so that a small change of light does not
     change the bin.
     """

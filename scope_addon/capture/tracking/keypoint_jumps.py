@@ -15,11 +15,10 @@ jumps, the smaller ones do where left and right are uncertain.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array, FloatArray
 from ..perception.lifter import person_size
 from .track import Track
 
@@ -53,9 +52,7 @@ def repair_keypoint_jumps(track: Track) -> Track:
     )
 
 
-def find_keypoint_jumps(
-    points: NDArray[np.floating[Any]], seen: NDArray[np.bool_], step_s: float
-) -> NDArray[np.bool_]:
+def find_keypoint_jumps(points: FloatArray, seen: BoolArray, step_s: float) -> BoolArray:
     """Find the points that jump.
 
     Only points that are seen without a gap from the frame before to the frame after count. They
@@ -85,7 +82,7 @@ def find_keypoint_jumps(
     return jumps
 
 
-def scale_px_per_m(track: Track) -> NDArray[np.float64]:
+def scale_px_per_m(track: Track) -> Float64Array:
     """Estimate the (T,) pixels per metre at the person's distance, roughly, from the size of the
     body.
     """
@@ -95,13 +92,11 @@ def scale_px_per_m(track: Track) -> NDArray[np.float64]:
     )
     padded = np.pad(size, reach, mode="edge")
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
-    scale: NDArray[np.float64] = np.maximum(largest / SPREAD_M, 1e-3)
+    scale: Float64Array = np.maximum(largest / SPREAD_M, 1e-3)
     return scale
 
 
-def _interpolated(
-    values: NDArray[np.floating[Any]], jumps: NDArray[np.bool_], seen: NDArray[np.bool_]
-) -> NDArray[np.floating[Any]]:
+def _interpolated(values: FloatArray, jumps: BoolArray, seen: BoolArray) -> FloatArray:
     """Return values (T, J, n) with those that jump interpolated between the frames before and
     after.
     """

@@ -11,9 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...arrays import Float64Array, Uint8Array
 from ...errors import (
     SetupError,
 )
@@ -71,7 +69,7 @@ class LandmarkEstimator:
         self._upcoming_with_masks = upcoming_with_masks
 
     def estimate(
-        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region], sure: bool = True
+        self, image_rgb: Uint8Array, regions: Sequence[Region], sure: bool = True
     ) -> list[PoseEstimate | None]:
         """Estimate the landmarks in each region in one batch.
 
@@ -92,8 +90,8 @@ class LandmarkEstimator:
 
     def estimate_live(
         self,
-        image_rgb: NDArray[np.uint8],
-        upcoming_rgb: NDArray[np.uint8] | None,
+        image_rgb: Uint8Array,
+        upcoming_rgb: Uint8Array | None,
         live: Sequence[TrackedTarget],
     ) -> list[PoseEstimate | None]:
         """Estimate everybody who is tracked in this frame, and start the estimates of the upcoming
@@ -132,7 +130,7 @@ class LandmarkEstimator:
         return [found[f.tracklet] for f in live]
 
     def begin_upcoming(
-        self, upcoming_rgb: NDArray[np.uint8] | None, live: Sequence[TrackedTarget]
+        self, upcoming_rgb: Uint8Array | None, live: Sequence[TrackedTarget]
     ) -> None:
         """Start the estimates of the next frame that are not pending yet; they run in parallel with
         this one's rest.
@@ -159,7 +157,7 @@ class ReferenceEstimator:
         self._pending: list[PendingReference] = []
         self._pool = ThreadPoolExecutor(1, "scope-reference")
 
-    def submit(self, image_rgb: NDArray[np.uint8], region: Region) -> PendingReference:
+    def submit(self, image_rgb: Uint8Array, region: Region) -> PendingReference:
         """Start an estimate; wait first if too many are pending.
 
         :param image_rgb: (H, W, 3), not to be changed until the result is there.
@@ -172,7 +170,7 @@ class ReferenceEstimator:
         self._pending.append(call)
         return call
 
-    def _estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> NDArray[np.float64] | None:
+    def _estimate(self, image_rgb: Uint8Array, region: Region) -> Float64Array | None:
         (estimate,) = self._network.estimate(image_rgb, [region])
         return estimate.world_landmarks if is_plausible(estimate) else None
 

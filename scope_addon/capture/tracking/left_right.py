@@ -18,11 +18,10 @@ swapped legs.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, IndexArray
 from ...kinematics.viterbi import least_cost_path
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
@@ -70,7 +69,7 @@ def repair_left_right(track: Track, camera: Camera) -> Track:
 
     :param camera: the intrinsics, for a track without depth.
     """
-    reference: NDArray[np.float32] | None = None
+    reference: Float32Array | None = None
     if len(track.reference_rows):
         reference = np.full(track.world_landmarks.shape, np.nan, np.float32)
         reference[track.reference_rows] = track.reference_landmarks
@@ -92,8 +91,8 @@ def repair_left_right(track: Track, camera: Camera) -> Track:
 
 def swap_keypoints(
     track: Track,
-    where: NDArray[np.bool_],
-    order: NDArray[np.intp] = MIRROR_PARTNER,
+    where: BoolArray,
+    order: IndexArray = MIRROR_PARTNER,
     *,
     with_hands: bool = True,
 ) -> Track:
@@ -114,9 +113,7 @@ def swap_keypoints(
     return replace(track, keypoints_px=keypoints_px, confidence=confidence, hands=hands)
 
 
-def reorder_keypoints(
-    values: NDArray[np.floating[Any]], where: NDArray[np.bool_], order: NDArray[np.intp]
-) -> NDArray[np.floating[Any]]:
+def reorder_keypoints(values: FloatArray, where: BoolArray, order: IndexArray) -> FloatArray:
     """Return values (T, 33, ...) with their keypoints in ``order`` (33,) in the frames ``where``
     (T,) is True.
     """
@@ -125,9 +122,7 @@ def reorder_keypoints(
     return out
 
 
-def apply_labels(
-    world_landmarks: NDArray[np.floating[Any]], labels: NDArray[np.intp]
-) -> NDArray[np.floating[Any]]:
+def apply_labels(world_landmarks: FloatArray, labels: IndexArray) -> FloatArray:
     """Return world landmarks (T, 33, 3) read as the labels (T,) of `find_labels` say."""
     out = reorder_keypoints(world_landmarks, labels != AS_DETECTED, MIRROR_PARTNER)
     out[labels == DEPTH_REVERSED] *= [1.0, 1.0, -1.0]
@@ -154,24 +149,22 @@ def swap_ratio(before: PoseEstimate, after: PoseEstimate) -> float:
     return float(_limb_distance(a[MIRROR_PARTNER], b)) / plain if plain else float("inf")
 
 
-def _centred_body(estimate: PoseEstimate) -> NDArray[np.floating[Any]]:
+def _centred_body(estimate: PoseEstimate) -> FloatArray:
     """Return the (33, n) body about its middle: in space, or in the image where depth is
     unknown.
     """
     if estimate.world_landmarks.any():
         return estimate.world_landmarks
-    centred: NDArray[np.floating[Any]] = estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(
-        axis=0
-    )
+    centred: FloatArray = estimate.keypoints_px - estimate.keypoints_px[LIMBS].mean(axis=0)
     return centred
 
 
 def find_labels(
-    world_landmarks: NDArray[np.floating[Any]],
-    starts: NDArray[np.bool_] | None = None,
-    reference: NDArray[np.floating[Any]] | None = None,
+    world_landmarks: FloatArray,
+    starts: BoolArray | None = None,
+    reference: FloatArray | None = None,
     frame_cost_m: float = FRAME_COST_M,
-) -> NDArray[np.intp]:
+) -> IndexArray:
     """Find how each frame's landmarks should be read.
 
     The labels x_t minimize
@@ -199,21 +192,19 @@ def find_labels(
     )
 
 
-def reading_costs(frame_cost_m: float = FRAME_COST_M) -> NDArray[np.float64]:
+def reading_costs(frame_cost_m: float = FRAME_COST_M) -> Float64Array:
     """Return the costs (3,) of the three ways to read a frame, metres; see `find_labels`."""
     return np.array([0.0, frame_cost_m, frame_cost_m + DEPTH_COST_M])
 
 
-def readings_of(world_landmarks: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def readings_of(world_landmarks: FloatArray) -> FloatArray:
     """Return the limbs (3, T, 12, 3) of landmarks (T, 33, 3), read in each of the three ways."""
     swapped = world_landmarks[:, MIRROR_PARTNER[LIMBS]]
     reversed_ = swapped * np.array([1, 1, -1], swapped.dtype)
     return np.stack([world_landmarks[:, LIMBS], swapped, reversed_])
 
 
-def _find_lifted_labels(
-    track: Track, camera: Camera, reference: NDArray[np.floating[Any]] | None
-) -> NDArray[np.intp]:
+def _find_lifted_labels(track: Track, camera: Camera, reference: FloatArray | None) -> IndexArray:
     """Find the labels (T,) AS_DETECTED or LEFT_RIGHT_SWAPPED of a track without depth from the
     lifted bodies.
 
@@ -237,13 +228,13 @@ def _find_lifted_labels(
 
 
 def _cheapest(
-    readings: NDArray[np.floating[Any]],
-    steps: NDArray[np.floating[Any]],
-    known: NDArray[np.bool_],
-    label_cost: NDArray[np.float64],
-    starts: NDArray[np.bool_] | None,
-    reference: NDArray[np.floating[Any]] | None,
-) -> NDArray[np.intp]:
+    readings: FloatArray,
+    steps: FloatArray,
+    known: BoolArray,
+    label_cost: Float64Array,
+    starts: BoolArray | None,
+    reference: FloatArray | None,
+) -> IndexArray:
     """Return the (T,) labels with the least cost, see `find_labels`; AS_DETECTED in frames that are
     not known.
 
@@ -265,7 +256,7 @@ def _cheapest(
     return labels
 
 
-def _steps(readings: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _steps(readings: FloatArray) -> FloatArray:
     """Return the (N−1, n, n) mean distances between the readings (n, N, 12, ...) of each frame and
     the next.
     """
@@ -275,7 +266,7 @@ def _steps(readings: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     return np.array(distances).transpose(2, 0, 1)
 
 
-def _correction(world: NDArray[np.floating[Any]], track: Track) -> NDArray[np.floating[Any]]:
+def _correction(world: FloatArray, track: Track) -> FloatArray:
     """Return the (T, 33, 3) offsets that take the landmarks to the reference's where the two differ
     much.
 
@@ -291,7 +282,7 @@ def _correction(world: NDArray[np.floating[Any]], track: Track) -> NDArray[np.fl
     if not references or len(track) < 2 or np.median(np.diff(track.times)) > CORRECTION_S:
         return np.zeros_like(world)
     knots: list[float] = []
-    values: list[NDArray[np.floating[Any]]] = []
+    values: list[FloatArray] = []
     zero = np.zeros(world.shape[1:])
     for row in sorted(references):
         time = track.times[row]
@@ -314,16 +305,12 @@ def _correction(world: NDArray[np.floating[Any]], track: Track) -> NDArray[np.fl
     return out
 
 
-def _limb_distance(
-    a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
+def _limb_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the mean distance of the limbs' landmarks of bodies (..., 33, n)."""
     return mean_distance(a[..., LIMBS, :], b[..., LIMBS, :])
 
 
-def mean_distance(
-    a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
+def mean_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the (...) mean distance of corresponding points a (..., n, m) and b (..., n, m)."""
-    distance: NDArray[np.floating[Any]] = np.linalg.norm(a - b, axis=-1).mean(axis=-1)
+    distance: FloatArray = np.linalg.norm(a - b, axis=-1).mean(axis=-1)
     return distance

@@ -27,11 +27,10 @@ them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...kinematics.viterbi import least_cost_path
 from ..perception.landmark_network import KEYPOINT_NAMES
 from .keypoint_jumps import scale_px_per_m
@@ -56,12 +55,12 @@ _PARTNER = np.array([1, 0, 3, 2])  # of the joints below
 class _Limbs:
     """A pair of limbs; left and right alternate in each array of keypoint indices."""
 
-    joints: NDArray[np.intp]  # (4,) that are compared
-    anchors: NDArray[np.intp]  # (2,) whose middle their positions are relative to
-    all_points: NDArray[np.intp]  # that are swapped with them
+    joints: IndexArray  # (4,) that are compared
+    anchors: IndexArray  # (2,) whose middle their positions are relative to
+    all_points: IndexArray  # that are swapped with them
 
 
-def _indices(*parts: str) -> NDArray[np.intp]:
+def _indices(*parts: str) -> IndexArray:
     """Return the indices of these keypoints, left and right alternating."""
     return np.array(
         [KEYPOINT_NAMES.index(f"{side}_{part}") for part in parts for side in ("left", "right")]
@@ -89,7 +88,7 @@ def repair_limb_swaps(track: Track) -> Track:
     return track
 
 
-def _swap(track: Track, limbs: _Limbs, where: NDArray[np.bool_]) -> Track:
+def _swap(track: Track, limbs: _Limbs, where: BoolArray) -> Track:
     order = np.arange(len(KEYPOINT_NAMES))
     order[limbs.all_points] = MIRROR_PARTNER[limbs.all_points]
     track = swap_keypoints(track, where, order, with_hands=limbs is ARMS)
@@ -98,7 +97,7 @@ def _swap(track: Track, limbs: _Limbs, where: NDArray[np.bool_]) -> Track:
     return replace(track, world_landmarks=reorder_keypoints(track.world_landmarks, where, order))
 
 
-def find_limb_swaps(track: Track, limbs: _Limbs) -> NDArray[np.bool_]:
+def find_limb_swaps(track: Track, limbs: _Limbs) -> BoolArray:
     """Find the frames in which left and right of these limbs are swapped, see the module's
     equation.
 
@@ -116,15 +115,15 @@ def find_limb_swaps(track: Track, limbs: _Limbs) -> NDArray[np.bool_]:
     return where
 
 
-def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], NDArray[np.float64]]:
+def _features(track: Track, limbs: _Limbs) -> tuple[FloatArray, Float64Array]:
     """Return f: (T, 4, 3 or 4) x, y, (z,) confidence; and the reference network's (T, 4, 2 or 3),
     NaN elsewhere.
     """
 
-    def from_anchor(points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        relative: NDArray[np.floating[Any]] = points[:, limbs.joints] - points[
-            :, limbs.anchors
-        ].mean(axis=1, keepdims=True)
+    def from_anchor(points: FloatArray) -> FloatArray:
+        relative: FloatArray = points[:, limbs.joints] - points[:, limbs.anchors].mean(
+            axis=1, keepdims=True
+        )
         return relative
 
     dimensions = 3 if track.has_depth else 2
@@ -136,22 +135,18 @@ def _features(track: Track, limbs: _Limbs) -> tuple[NDArray[np.floating[Any]], N
     return np.concatenate([in_image, depth, certainty], axis=-1), reference
 
 
-def _reference_cost(
-    f: NDArray[np.floating[Any]], reference: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def _reference_cost(f: FloatArray, reference: Float64Array) -> FloatArray:
     """Return j_t by label, (N, 2); 0 in frames without a reference."""
     residual = (
         np.linalg.norm(f[..., : reference.shape[-1]] - reference, axis=-1) / REFERENCE_SIGMA_M
     )
-    cost: NDArray[np.floating[Any]] = (
+    cost: FloatArray = (
         np.where(np.isfinite(residual), np.minimum(residual, LIMIT), 0.0).mean(axis=-1).T
     )
     return cost
 
 
-def _continuity_cost(
-    f: NDArray[np.floating[Any]], times: NDArray[np.float64], acquired: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def _continuity_cost(f: FloatArray, times: Float64Array, acquired: BoolArray) -> Float64Array:
     """Return r_t and the cost of a change, (N, 2, 2, 2) by the labels of the frames t − 2, t − 1
     and t.
 
@@ -176,9 +171,7 @@ def _continuity_cost(
     return cost
 
 
-def _cheapest(
-    cost: NDArray[np.float64], label_cost: NDArray[np.floating[Any]]
-) -> NDArray[np.bool_]:
+def _cheapest(cost: Float64Array, label_cost: FloatArray) -> BoolArray:
     """Return the (N,) labels with the least total cost.
 
     A state of the path is a pair of successive labels, so the first label of a state is the second
@@ -192,5 +185,5 @@ def _cheapest(
     # (N−2, a, b, b', c)
     switching = np.where(np.eye(2, dtype=bool)[:, :, None], cost[2:, :, :, None], np.inf)
     path = least_cost_path(pairs.reshape(-1, 4), switching.reshape(-1, 4, 4))
-    labels: NDArray[np.bool_] = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
+    labels: BoolArray = np.concatenate([path[:1] // 2, path % 2]).astype(bool)
     return labels

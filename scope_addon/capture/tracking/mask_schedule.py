@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Uint8Array
 from ..perception.landmark_network import (
     LandmarkNetwork,
 )
@@ -50,7 +50,7 @@ class MaskSchedule:
         return self._network is not None and (self._frames + 1) % self._stride == 0
 
     def add(
-        self, image_rgb: NDArray[np.uint8], observations: Sequence[tuple[int, Observation]]
+        self, image_rgb: Uint8Array, observations: Sequence[tuple[int, Observation]]
     ) -> list[tuple[int, Observation]]:
         """Return the observations of the next frame (H, W, 3) with masks, if they are due."""
         found = list(observations)
@@ -65,7 +65,7 @@ class MaskSchedule:
 
     @staticmethod
     def _with_mask(
-        network: LandmarkNetwork, image_rgb: NDArray[np.uint8], observation: Observation
+        network: LandmarkNetwork, image_rgb: Uint8Array, observation: Observation
     ) -> Observation:
         if observation.presence < MIN_PRESENCE:
             return replace(observation, mask=None)

@@ -21,8 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from .appearance import (
     distance,
 )
@@ -53,8 +53,8 @@ class End:
     """
 
     time: float
-    center_px: NDArray[np.float64]
-    velocity_px: NDArray[np.float64]
+    center_px: Float64Array
+    velocity_px: Float64Array
     side_px: float
 
 
@@ -110,7 +110,7 @@ def link_cost(end: End, start: End, appearance_distance: float) -> float:
     return position + APPEARANCE_WEIGHT * appearance_distance + size_change
 
 
-def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]:
+def cheapest_links(cost: Float64Array, max_cost: float) -> dict[int, int]:
     """Choose the links with the least sum of ``cost - max_cost``, among those cheaper than
     ``max_cost``.
 
@@ -144,7 +144,7 @@ def cheapest_links(cost: NDArray[np.float64], max_cost: float) -> dict[int, int]
     return links
 
 
-def assign(cost: NDArray[np.float64]) -> list[int]:
+def assign(cost: Float64Array) -> list[int]:
     """Solve the assignment problem by shortest augmenting paths, in O(N²M).
 
     :param cost: (N, M), N <= M.

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...arrays import Uint8Array
 from ..perception.landmark_network import (
     PoseEstimate,
 )
@@ -72,7 +70,7 @@ def share_within(a: PoseEstimate, b: PoseEstimate) -> float:
     return float(inside(a.keypoints_px, [bounds(b.keypoints_px)]).mean())
 
 
-def is_center_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> bool:
+def is_center_in_image(estimate: PoseEstimate, image_rgb: Uint8Array) -> bool:
     """Return whether the mean of the keypoints is inside the image (H, W, 3); a network may imagine
     a body outside.
     """
@@ -81,7 +79,7 @@ def is_center_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> 
     return bool(0 <= x < width and 0 <= y < height)
 
 
-def share_in_image(estimate: PoseEstimate, image_rgb: NDArray[np.uint8]) -> float:
+def share_in_image(estimate: PoseEstimate, image_rgb: Uint8Array) -> float:
     """Return the share of the keypoints that are inside the image (H, W, 3)."""
     height, width = image_rgb.shape[:2]
     return float(
@@ -101,7 +99,7 @@ def is_same_region(a: Region, b: Region) -> bool:
     )
 
 
-def is_in_image(region: Region, image_rgb: NDArray[np.uint8]) -> bool:
+def is_in_image(region: Region, image_rgb: Uint8Array) -> bool:
     """Return whether a region overlaps the image (H, W, 3) and has a usable size."""
     height, width = image_rgb.shape[:2]
     x, y = region.center_px

@@ -13,7 +13,8 @@ from collections import deque
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from ...arrays import Float32Array, Uint8Array
 
 _SIZE = (32, 32)  # of the thumbnails that are compared
 _STRIDE = 8  # pixels between samples of a large picture
@@ -29,11 +30,11 @@ class SceneCuts:
     """Detects cuts in frames that come in order."""
 
     def __init__(self) -> None:
-        self._before: NDArray[np.float32] | None = None
-        self._upcoming: NDArray[np.float32] | None = None
+        self._before: Float32Array | None = None
+        self._upcoming: Float32Array | None = None
         self._differences: deque[float] = deque(maxlen=HISTORY_FRAMES)
 
-    def is_cut(self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None) -> bool:
+    def is_cut(self, image_rgb: Uint8Array, upcoming_rgb: Uint8Array | None) -> bool:
         """Return whether this frame begins another scene; the first frame of a clip does not.
 
         :param image_rgb: (H, W, 3).
@@ -62,7 +63,7 @@ class SceneCuts:
         return is_cut
 
 
-def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _thumbnail(image_rgb: Uint8Array) -> Float32Array:
     height, width = image_rgb.shape[:2]
     is_large = min(height, width) >= _STRIDE * max(_SIZE)
     coarse = (width // _STRIDE, height // _STRIDE)
@@ -72,5 +73,5 @@ def _thumbnail(image_rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     return cv2.resize(source, _SIZE, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
-def _difference(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
+def _difference(a: Float32Array, b: Float32Array) -> float:
     return float(np.abs(a - b).mean())

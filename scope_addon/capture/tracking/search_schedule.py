@@ -8,9 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...arrays import Uint8Array
 from .frame_clock import FRAME_S, FrameClock
 from .tracked_target import TrackedTarget
 
@@ -55,7 +53,7 @@ class SearchSchedule:
 
     def is_due(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         live: Sequence[TrackedTarget],
         lost: Sequence[TrackedTarget],
     ) -> bool:
@@ -66,7 +64,7 @@ class SearchSchedule:
 
     def begin(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         live: Sequence[TrackedTarget],
         lost: Sequence[TrackedTarget],
     ) -> bool:
@@ -89,7 +87,7 @@ class SearchSchedule:
 
     def begin_small(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         live: Sequence[TrackedTarget],
         lost: Sequence[TrackedTarget],
     ) -> bool:
@@ -125,7 +123,7 @@ class SearchSchedule:
 
     def _interval_s(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         live: Sequence[TrackedTarget],
         lost: Sequence[TrackedTarget],
     ) -> float:
@@ -143,9 +141,7 @@ class SearchSchedule:
         )
         return SEARCH_LARGEST_S if complete else SEARCH_S
 
-    def _searches_for_rivals(
-        self, image_rgb: NDArray[np.uint8], live: Sequence[TrackedTarget]
-    ) -> bool:
+    def _searches_for_rivals(self, image_rgb: Uint8Array, live: Sequence[TrackedTarget]) -> bool:
         """Return whether somebody half as large as the most prominent person would be missed by a
         plain detection.
         """
@@ -155,7 +151,7 @@ class SearchSchedule:
         return bool(sides) and max(sides) < SMALL_SHARE * max(image_rgb.shape[:2])
 
 
-def _are_small(image_rgb: NDArray[np.uint8], people: Sequence[TrackedTarget]) -> bool:
+def _are_small(image_rgb: Uint8Array, people: Sequence[TrackedTarget]) -> bool:
     """Return whether nobody of these people is large enough to be found by a plain detection."""
     side_px = SMALL_SIDE * min(image_rgb.shape[:2])
     return all(person.estimate.region.side_px < side_px for person in people)

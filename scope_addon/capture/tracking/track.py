@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray
 from ..perception.face_record import (
     RECORD,
 )
@@ -39,20 +40,20 @@ class Track:
     """
 
     frames: NDArray[np.int64]  # (T,) source frame index
-    times: NDArray[np.float64]  # (T,) seconds
-    seen: NDArray[np.bool_]  # (T,)
-    keypoints_px: NDArray[np.floating[Any]]  # (T, 33, 2) pixels of the decoded, upright frame
-    confidence: NDArray[np.floating[Any]]  # (T, 33) 0..1
+    times: Float64Array  # (T,) seconds
+    seen: BoolArray  # (T,)
+    keypoints_px: FloatArray  # (T, 33, 2) pixels of the decoded, upright frame
+    confidence: FloatArray  # (T, 33) 0..1
     # (T, 33, 3) metres, hip-centred, camera axes; all 0: unknown
-    world_landmarks: NDArray[np.floating[Any]]
-    acquired: NDArray[np.bool_]  # (T,)
+    world_landmarks: FloatArray
+    acquired: BoolArray  # (T,)
     reference_rows: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))  # (A,)
-    reference_landmarks: NDArray[np.floating[Any]] = field(  # (A, 33, 3)
+    reference_landmarks: FloatArray = field(  # (A, 33, 3)
         default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3))
     )
-    hands: NDArray[np.floating[Any]] | None = None  # (T, 2, 21, 6)
+    hands: FloatArray | None = None  # (T, 2, 21, 6)
     masks: tuple[tuple[int, PersonMask], ...] = ()
-    face: NDArray[np.floating[Any]] | None = None  # (T, RECORD)
+    face: FloatArray | None = None  # (T, RECORD)
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -81,19 +82,19 @@ class Tracklet:
 
     rows: list[int] = field(default_factory=list)  # index of each frame in the clip
     # (33, 6) pixels, confidence, world landmarks
-    values: list[NDArray[np.float32]] = field(default_factory=list)
+    values: list[Float32Array] = field(default_factory=list)
     # (2,) middle of the trunk
-    centers_px: list[NDArray[np.floating[Any]]] = field(default_factory=list)
+    centers_px: list[FloatArray] = field(default_factory=list)
     sides_px: list[float] = field(default_factory=list)  # of the region
     # sum over the frames
-    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))
+    appearance: Float64Array = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))
     # each with its row
     references: list[tuple[int, PendingReference]] = field(default_factory=list)
     # (2, 21, 6), see `Observation`; empty if not wanted
-    hands: list[NDArray[np.float32]] = field(default_factory=list)
+    hands: list[Float32Array] = field(default_factory=list)
     masks: list[tuple[int, PersonMask]] = field(default_factory=list)  # each with its row
     # (RECORD,); empty if faces are not looked for
-    faces: list[NDArray[np.float32]] = field(default_factory=list)
+    faces: list[Float32Array] = field(default_factory=list)
 
     def add(self, row: int, observation: Observation) -> None:
         """Append the frame with index ``row``; an observation that is not finite counts as not
@@ -150,9 +151,9 @@ class Tracklet:
         self.appearance = self.appearance + later.appearance
 
 
-def trunk_px(keypoints_px: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def trunk_px(keypoints_px: FloatArray) -> FloatArray:
     """Return the middle (2,) of the trunk, of keypoints (33, 2) in the image."""
-    center: NDArray[np.floating[Any]] = keypoints_px[_TRUNK].mean(axis=0)
+    center: FloatArray = keypoints_px[_TRUNK].mean(axis=0)
     return center
 
 

@@ -12,8 +12,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array
 from ..perception.landmark_network import PoseEstimate
 from ..perception.region import Region
 from .left_right import mean_distance
@@ -40,7 +40,7 @@ class TrackedTarget:
 
     tracklet: int
     estimate: PoseEstimate
-    velocity_px: NDArray[np.float64]  # (2,) per frame, smoothed
+    velocity_px: Float64Array  # (2,) per frame, smoothed
     seen_s: float
     age: int = 0  # frames
     frames_lost: int = 0

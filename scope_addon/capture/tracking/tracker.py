@@ -16,9 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.errors import ShapeError
+from ...arrays import Uint8Array
 from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
@@ -161,8 +161,8 @@ class PeopleTracker:
 
     def step(
         self,
-        image_rgb: NDArray[np.uint8],
-        upcoming_rgb: NDArray[np.uint8] | None = None,
+        image_rgb: Uint8Array,
+        upcoming_rgb: Uint8Array | None = None,
         time_s: float | None = None,
         upcoming_with_masks: bool = False,
     ) -> list[tuple[int, Observation]]:
@@ -199,9 +199,7 @@ class PeopleTracker:
             for f in self._live
         ]
 
-    def _update_live(
-        self, image_rgb: NDArray[np.uint8], upcoming_rgb: NDArray[np.uint8] | None
-    ) -> None:
+    def _update_live(self, image_rgb: Uint8Array, upcoming_rgb: Uint8Array | None) -> None:
         """Track everybody from the frame before to this one; people who are not found are lost."""
         for lost in self._lost:
             lost.frames_lost += 1
@@ -236,7 +234,7 @@ class PeopleTracker:
                 self._lose(target)
         self._live = sorted(kept, key=lambda f: f.tracklet)
 
-    def _start_given(self, image_rgb: NDArray[np.uint8]) -> None:
+    def _start_given(self, image_rgb: Uint8Array) -> None:
         """Start a tracklet for everybody in the given regions, also for those who would lose
         against others.
         """
@@ -255,7 +253,7 @@ class PeopleTracker:
         return NOVELTY_INNOVATION * (1 - min(target.tracked_s / ESTABLISHED_S, 1.0))
 
     def _with_fallback(
-        self, image_rgb: NDArray[np.uint8], target: TrackedTarget, estimate: PoseEstimate | None
+        self, image_rgb: Uint8Array, target: TrackedTarget, estimate: PoseEstimate | None
     ) -> tuple[PoseEstimate | None, bool]:
         """Replace the estimate by the largest network's for a while after a smaller one lost the
         person or the sides.
@@ -278,7 +276,7 @@ class PeopleTracker:
             return estimate, swapped
         return stronger, looks_swapped(target.estimate, stronger)
 
-    def _redetect(self, image_rgb: NDArray[np.uint8]) -> None:
+    def _redetect(self, image_rgb: Uint8Array) -> None:
         """Look for everybody who was just lost, in rotated regions."""
         recent = [
             f
@@ -292,7 +290,7 @@ class PeopleTracker:
             if estimate is not None:
                 self._resume(lost, estimate)
 
-    def _search(self, image_rgb: NDArray[np.uint8]) -> None:
+    def _search(self, image_rgb: Uint8Array) -> None:
         """Start a tracklet for everybody who is detected and not tracked yet; small people only if
         nobody else is.
         """
@@ -310,7 +308,7 @@ class PeopleTracker:
             )
 
     def _start_detected(
-        self, image_rgb: NDArray[np.uint8], found: list[Detection], sure_score: float
+        self, image_rgb: Uint8Array, found: list[Detection], sure_score: float
     ) -> None:
         """Start a tracklet for every plausible body that is not tracked yet.
 
@@ -416,7 +414,7 @@ class PeopleTracker:
         target.pending = None
         self._lost.append(target)
 
-    def _begin_references(self, image_rgb: NDArray[np.uint8]) -> dict[int, PendingReference]:
+    def _begin_references(self, image_rgb: Uint8Array) -> dict[int, PendingReference]:
         """Ask the reference network about the people whose left and right are due or in doubt; by
         tracklet.
         """
@@ -433,7 +431,7 @@ class PeopleTracker:
 
     def _observe(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         target: TrackedTarget,
         reference: PendingReference | None,
     ) -> Observation:
@@ -460,7 +458,7 @@ class PeopleTracker:
 
 def redetect_rotated(
     landmarks: LandmarkNetwork | KeypointNetwork,
-    image_rgb: NDArray[np.uint8],
+    image_rgb: Uint8Array,
     lost: TrackedTarget,
     live: Sequence[TrackedTarget],
 ) -> PoseEstimate | None:

@@ -20,11 +20,10 @@ below the floor, as after a leap from a wall, the floor is another one and the m
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array, FloatArray
 from ...kinematics.contact_points import SOLES
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin, lower_floors
 from ...kinematics.frame_blocks import by_blocks
@@ -42,7 +41,7 @@ ROUNDS = 4  # of smoothing without going below what is needed
 
 
 def raise_feet(
-    placed: PlacedTrack, contact: NDArray[np.floating[Any]], T_floor_camera: NDArray[np.float64]
+    placed: PlacedTrack, contact: FloatArray, T_floor_camera: Float64Array
 ) -> PlacedTrack:
     """Raise the feet of a motion that go under the floor; a motion that has none is returned as it
     is.
@@ -69,10 +68,10 @@ def raise_feet(
     pelvis_at_rest = placed.body.rest_joints(placed.betas)[0]
 
     def bend(
-        rotations: NDArray[np.floating[Any]],
-        root: NDArray[np.floating[Any]],
-        shift: NDArray[np.floating[Any]],
-    ) -> tuple[NDArray[np.floating[Any]]]:
+        rotations: FloatArray,
+        root: FloatArray,
+        shift: FloatArray,
+    ) -> tuple[FloatArray]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, placed.betas)
         return (
             move_feet(body, rotations, poses, shift[..., None] * up).astype(
@@ -84,28 +83,24 @@ def raise_feet(
     return replace(placed, rotations=rotations, root=placed.root + rise[:, None] * up)
 
 
-def _heights(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+def _heights(placed: PlacedTrack, T_floor_camera: Float64Array) -> Float64Array:
     """Return the (T, 4) heights of the feet's parts above the floor."""
     body = placed.body
     betas = placed.betas
     skin = FootSkin(body, betas)
     pelvis_at_rest = body.rest_joints(betas)[0]
 
-    def heights(
-        rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float64]]:
+    def heights(rotations: FloatArray, root: FloatArray) -> tuple[Float64Array]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, betas)
         return (skin.heights(*poses, T_floor_camera[2, :3]),)
 
-    above: NDArray[np.float64] = (
+    above: Float64Array = (
         by_blocks(heights, placed.rotations, placed.root)[0] + T_floor_camera[2, 3]
     )
     return above
 
 
-def _foot_lifts(
-    heights: NDArray[np.float64], contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _foot_lifts(heights: Float64Array, contact: FloatArray, times: Float64Array) -> Float64Array:
     """Return by how much the left and the right foot have to rise, (T, 2), smooth in time and
     nowhere too little.
     """
@@ -128,11 +123,11 @@ def _foot_lifts(
 
 
 def _root_rise(
-    lifts: NDArray[np.float64],
-    seen: NDArray[np.floating[Any]],
-    supports: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    lifts: Float64Array,
+    seen: FloatArray,
+    supports: FloatArray,
+    times: Float64Array,
+) -> Float64Array:
     """Return by how much the whole body rises, (T,): what the deeper foot needs, unless something
     else rests.
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ....solver import rotations
 from ....solver.body import Body
+from ...arrays import Float32Array, Float64Array, FloatArray
 from ...kinematics.contact_points import SOLES
 from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
@@ -33,8 +34,8 @@ def assemble_motion(
     shot: Shot,
     person: FittedPerson,
     placed: PlacedTrack,
-    contact: NDArray[np.floating[Any]],
-    T_world_camera: NDArray[np.float64],
+    contact: FloatArray,
+    T_world_camera: Float64Array,
 ) -> Motion:
     """Transform a person's motion to the world, and add what else is known of each frame.
 
@@ -108,12 +109,12 @@ def assemble_motion(
 
 
 def _to_world(
-    T_world_camera: NDArray[np.float64],
-    J0: NDArray[np.float64],
-    R_root: NDArray[np.floating[Any]],
-    t_root: NDArray[np.floating[Any]],
-    joints: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    T_world_camera: Float64Array,
+    J0: Float64Array,
+    R_root: FloatArray,
+    t_root: FloatArray,
+    joints: Float32Array,
+) -> tuple[Float32Array, Float64Array]:
     """Return poses (T, 3 (K+1)) and trans (T, 3) of a root and the rotation vectors (T, K, 3) of
     its joints.
     """
@@ -131,9 +132,7 @@ def _to_world(
     return poses, trans
 
 
-def reprojection_error(
-    shot: Shot, person: FittedPerson, placed: PlacedTrack
-) -> NDArray[np.float64]:
+def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) -> Float64Array:
     """Return the (T,) median reprojection error of confident keypoints, in pixels; 0 where the
     person was not seen.
 
@@ -148,9 +147,7 @@ def reprojection_error(
     K = camera.intrinsics
     J0 = body.rest_joints(betas)[0]
 
-    def error(
-        rotation: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]], *rows: NDArray[Any]
-    ) -> tuple[NDArray[np.float64]]:
+    def error(rotation: FloatArray, root: FloatArray, *rows: NDArray[Any]) -> tuple[Float64Array]:
         keypoints_px, confidence, valid, R_first_camera, center = rows
         points = body.keypoints(*body.forward_kinematics(rotation, root - J0, betas), betas, order)
         points = CameraPath(R_first_camera, center).points_to_frames(points)

@@ -18,13 +18,11 @@ their centres).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ....solver.rotations import exp
+from ...arrays import BoolArray, FloatArray
 from ...kinematics.contact_points import SOLES
 from ...kinematics.smoothing import gaussian_smooth
 from ...kinematics.standing import line_of_sight
@@ -56,13 +54,11 @@ _TRUNK = 0.497
 RESTING_KNEE_COS, CARRYING_KNEE_COS = np.cos(np.radians([75.0, 60.0]))
 
 
-def center_of_mass(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def center_of_mass(body: Body, joints: FloatArray) -> FloatArray:
     """Return the (T, 3) centre of mass of a body with joints (T, K+1, 3), metres."""
     at = {name: i for i, name in enumerate(body.joint_names)}
     trunk = [at[f"{side}_{name}"] for side in ("left", "right") for name in ("hip", "shoulder")]
-    total: NDArray[np.floating[Any]] = _HEAD * joints[:, at["head"]] + _TRUNK * joints[
-        :, trunk
-    ].mean(axis=1)
+    total: FloatArray = _HEAD * joints[:, at["head"]] + _TRUNK * joints[:, trunk].mean(axis=1)
     for mass, start, end, share in _LIMBS:
         for side in ("left", "right"):
             a = joints[:, at[f"{side}_{start}"]]
@@ -71,7 +67,7 @@ def center_of_mass(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.
     return total / (_HEAD + _TRUNK + 2 * sum(mass for mass, *_ in _LIMBS))
 
 
-def leg_support(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def leg_support(body: Body, joints: FloatArray) -> FloatArray:
     """Return how far the legs may carry the body's weight: 1 if one is straight enough, 0 if both
     are bent.
 
@@ -83,15 +79,13 @@ def leg_support(body: Body, joints: NDArray[np.floating[Any]]) -> NDArray[np.flo
     straight = np.max(
         [(shank * thigh).sum(1) for shank, thigh in leg_directions(body, joints)], axis=0
     )
-    support: NDArray[np.floating[Any]] = np.clip(
+    support: FloatArray = np.clip(
         (straight - RESTING_KNEE_COS) / (CARRYING_KNEE_COS - RESTING_KNEE_COS), 0.0, 1.0
     )
     return support
 
 
-def leg_directions(
-    body: Body, joints: NDArray[np.floating[Any]]
-) -> list[tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]]:
+def leg_directions(body: Body, joints: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
     """Return, for the left and the right leg, the (T, 3) unit vectors along shank and thigh, from
     below upwards.
     """
@@ -104,18 +98,16 @@ def leg_directions(
     ]
 
 
-def direction(
-    body: Body, joints: NDArray[np.floating[Any]], a: str, b: str
-) -> NDArray[np.floating[Any]]:
+def direction(body: Body, joints: FloatArray, a: str, b: str) -> FloatArray:
     """Return the (T, 3) unit vectors from joint a to joint b, given the joints (T, K+1, 3)."""
     d = joints[:, body.joint_names.index(b)] - joints[:, body.joint_names.index(a)]
-    unit: NDArray[np.floating[Any]] = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
+    unit: FloatArray = d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
     return unit
 
 
 def balancing_rotations(
-    placed: PlacedTrack, contact: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    placed: PlacedTrack, contact: FloatArray, up: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Estimate the rotations that balance the body over its contact points.
 
     :param contact: (T, 6) probability that each sole point and palm rests on the floor.
@@ -146,11 +138,11 @@ def balancing_rotations(
 
 
 def _excess(
-    contact_points: NDArray[np.floating[Any]],
-    in_contact: NDArray[np.bool_],
-    zero_moment_point: NDArray[np.floating[Any]],
-    sight: NDArray[np.floating[Any]],
-) -> NDArray[np.floating[Any]]:
+    contact_points: FloatArray,
+    in_contact: BoolArray,
+    zero_moment_point: FloatArray,
+    sight: FloatArray,
+) -> FloatArray:
     """Return by how much the zero moment point lies beyond the contact points along the line of
     sight.
 
@@ -165,11 +157,11 @@ def _excess(
     any_contact = in_contact.any(axis=1)
     low = np.where(any_contact, np.where(in_contact, extent, np.inf).min(axis=1), -np.inf)
     high = np.where(any_contact, np.where(in_contact, extent, -np.inf).max(axis=1), np.inf)
-    excess: NDArray[np.floating[Any]] = np.maximum(at - high, 0) - np.maximum(low - at, 0)
+    excess: FloatArray = np.maximum(at - high, 0) - np.maximum(low - at, 0)
     return excess
 
 
-def _sole_ends(contact_points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _sole_ends(contact_points: FloatArray) -> FloatArray:
     """Move heel and toe points to the ends of the soles; palms stay. (T, 6, 3) in the order of the
     contact points.
     """

@@ -6,11 +6,10 @@ person's feet.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.smoothing import gaussian_smooth
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import Stance
@@ -34,11 +33,11 @@ class CameraPath:
     camera.
     """
 
-    R_first_camera: NDArray[np.float64]  # (T, 3, 3)
-    center: NDArray[np.float64]  # (T, 3) metres
+    R_first_camera: Float64Array  # (T, 3, 3)
+    center: Float64Array  # (T, 3) metres
 
     @classmethod
-    def rotating(cls, R_first_camera: NDArray[np.float64]) -> CameraPath:
+    def rotating(cls, R_first_camera: Float64Array) -> CameraPath:
         """Return the path of a camera that rotates (T, 3, 3) but does not travel."""
         return cls(R_first_camera, np.zeros((len(R_first_camera), 3)))
 
@@ -78,7 +77,7 @@ class CameraPath:
         root = self.points_to_frames(fit.t_camera_root[:, None])[:, 0]
         return replace(fit, rotations=rotations, t_camera_root=root)
 
-    def points_to_frames(self, points: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def points_to_frames(self, points: FloatArray) -> FloatArray:
         """Transform points from the first frame's axes to each frame's camera.
 
         :param points: (T, n, 3) metres.
@@ -86,7 +85,7 @@ class CameraPath:
         """
         if self.is_static:
             return points
-        local: NDArray[np.float64] = np.einsum(
+        local: Float64Array = np.einsum(
             "tji,tkj->tki", self.R_first_camera, points - self.center[:, None]
         )
         return local
@@ -106,7 +105,7 @@ class CameraPath:
             stance.resting,
         )
 
-    def world_from_frames(self, T_world_first: NDArray[np.float64]) -> NDArray[np.float64]:
+    def world_from_frames(self, T_world_first: Float64Array) -> Float64Array:
         """Return the (T, 4, 4) world_from_camera of all frames, given that of the first frame's
         axes (4, 4).
         """
@@ -117,12 +116,12 @@ class CameraPath:
 
 
 def camera_travel(
-    soles: NDArray[np.floating[Any]],
-    valid: NDArray[np.bool_],
-    up: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
+    soles: FloatArray,
+    valid: BoolArray,
+    up: FloatArray,
+    times: Float64Array,
     uneven_ground: bool = False,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return the (T, 3) displacement of the camera's centre since the first frame, metres; zeros if
     it is unknown.
 
@@ -152,7 +151,7 @@ def camera_travel(
     row = np.arange(T)
     v = velocity[row, lowest]
     h = height[row, lowest]
-    carries: NDArray[np.bool_] = valid & (np.abs(v @ up) < MAX_VERTICAL_M_S)
+    carries: BoolArray = valid & (np.abs(v @ up) < MAX_VERTICAL_M_S)
     if not uneven_ground:
         carries &= h < np.median(h[valid]) + MAX_HEIGHT_M
     v = v - (v @ up)[:, None] * up

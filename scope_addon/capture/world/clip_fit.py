@@ -16,10 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import (
     MotionFit,
@@ -29,6 +27,7 @@ from ....solver.rotations import (
     exp,
     log,
 )
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import (
     BodySurface,
 )
@@ -109,7 +108,7 @@ class _Clip:
         self._done = np.zeros(len(start.valid), bool)
         self._sigma = np.full((*first.rotations.shape[:2], 2), np.nan, np.float32)
 
-    def fit(self, frames: NDArray[np.intp]) -> None:
+    def fit(self, frames: IndexArray) -> None:
         """Fit one window; frames that an earlier one has fitted are blended from that one's motion
         to this one's.
         """
@@ -140,7 +139,7 @@ class _Clip:
             self._rotations[k, 0], self._root[k], self._rotations[k, 1:], self._start.betas
         )
 
-    def _keep(self, frames: NDArray[np.intp], found: MotionFit) -> None:
+    def _keep(self, frames: IndexArray, found: MotionFit) -> None:
         rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
         root = np.array([state.t_camera_root for state in found.states])
         both = int(self._done[frames].sum())
@@ -157,8 +156,8 @@ class _Clip:
         self._done[frames] = True
 
     def _blended_sigma(
-        self, frames: NDArray[np.intp], found: MotionFit, share: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+        self, frames: IndexArray, found: MotionFit, share: Float64Array
+    ) -> Float64Array:
         """Return the deviations of a window's frames, the first blended by `share` with those of an
         earlier window.
         """
@@ -173,7 +172,7 @@ class _Clip:
         return sigma
 
 
-def runs(valid: NDArray[np.bool_], times: NDArray[np.float64]) -> Iterator[NDArray[np.intp]]:
+def runs(valid: BoolArray, times: Float64Array) -> Iterator[IndexArray]:
     """Yield the valid frames between gaps in which too much can happen for acceleration to tell it.
 
     :param valid: (T,).
@@ -203,11 +202,11 @@ def _frames_of(prepared: PreparedTrack, unknowns: int) -> int:
 
 
 def joint_sigma(
-    pelvis: NDArray[np.float64],
-    from_pelvis: NDArray[np.float64],
-    joints: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    pelvis: Float64Array,
+    from_pelvis: Float64Array,
+    joints: FloatArray,
+    times: Float64Array,
+) -> Float64Array:
     """Return the (T, K+1, 2) standard deviations along the line of sight and across it, per axis,
     metres.
 
@@ -236,5 +235,5 @@ def joint_sigma(
     rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else _MIN_HZ
     inflation = (max(rate, _MIN_HZ) / _RATE_HZ) ** _EXPONENT
     variance = np.maximum(np.stack([along, across], axis=-1), 0.0)
-    sigma: NDArray[np.float64] = inflation * np.sqrt(variance) * [ALONG, ACROSS]
+    sigma: Float64Array = inflation * np.sqrt(variance) * [ALONG, ACROSS]
     return sigma

@@ -33,6 +33,7 @@ from ....solver.compiled.tree import (
     Tree,
     with_fixed_shape,
 )
+from ...arrays import Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import (
     BodySurface,
 )
@@ -68,8 +69,8 @@ class ClipWindow:
 
     prepared: PreparedTrack
     path: CameraPath
-    frames: NDArray[np.intp]
-    betas: NDArray[np.float64]
+    frames: IndexArray
+    betas: Float64Array
     measured: Sequence[Measurements]
 
     @classmethod
@@ -77,20 +78,20 @@ class ClipWindow:
         cls,
         prepared: PreparedTrack,
         path: CameraPath,
-        frames: NDArray[np.intp],
-        betas: NDArray[np.floating[Any]],
+        frames: IndexArray,
+        betas: FloatArray,
     ) -> ClipWindow:
         """Measure frames (n,) of a track for a shape (P,)."""
         measured = [prepared.measure_all(k) for k in frames]
         return cls(prepared, path, frames, np.asarray(betas, float), measured)
 
     @property
-    def center(self) -> NDArray[np.float64]:
+    def center(self) -> Float64Array:
         """The camera (n, 3) in each frame, metres."""
         return self.path.center[self.frames]
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Float64Array:
         """The frames' times (n,), seconds."""
         return self.prepared.track.times[self.frames]
 
@@ -196,9 +197,7 @@ class ClipWindow:
         return [[View(*seen)] for seen in zip(measured, R, t, strict=True)]
 
 
-def resting_places(
-    points: NDArray[np.floating[Any]], resting: NDArray[np.floating[Any]]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def resting_places(points: FloatArray, resting: FloatArray) -> tuple[Float64Array, Float64Array]:
     """Return the places (T, C, 3) of points while they rest, and the probability (T, C) that they
     are there.
 
@@ -224,9 +223,9 @@ def resting_places(
 
 def with_planes(
     floor: Floor | None,
-    indices: NDArray[np.intp],
-    normal: NDArray[np.float64],
-    offset: NDArray[np.float64],
+    indices: IndexArray,
+    normal: Float64Array,
+    offset: Float64Array,
 ) -> Floor | None:
     """Add points that may not be below a plane each, and are free to be above it.
 

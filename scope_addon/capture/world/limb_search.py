@@ -23,6 +23,7 @@ from ....solver import (
     MotionPrior,
     State,
 )
+from ...arrays import Float64Array
 from ...kinematics.mirrored_limbs import (
     LIMBS,
     bone_depths,
@@ -54,8 +55,8 @@ class _Motion:
     """A motion: states, and rotations (n, K+1, 3, 3) and joints (n, K+1, 3) of the parts."""
 
     states: list[State]
-    R: NDArray[np.float64]
-    joints: NDArray[np.float64]
+    R: Float64Array
+    joints: Float64Array
 
 
 def search_limbs(
@@ -86,7 +87,7 @@ def search_limbs(
 def _mirrored(
     body: Body,
     motion: _Motion,
-    center: NDArray[np.float64],
+    center: Float64Array,
     rows: slice,
     limb: tuple[int, int, int],
     upper: bool,
@@ -104,7 +105,7 @@ def _mirrored(
     return states
 
 
-def _some_deep(depths: NDArray[np.float64], rows: slice) -> list[int]:
+def _some_deep(depths: Float64Array, rows: slice) -> list[int]:
     """Return some frames of a run in which the bone is deep, the deepest first."""
     deep = rows.start + np.flatnonzero(np.abs(depths[rows]) > DEEP_M)
     some = np.linspace(0, len(deep) - 1, _SAMPLES).astype(int)

@@ -6,13 +6,12 @@ points.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....solver import rotations
 from ....solver.body import Body
+from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray
 from ...kinematics.contact_points import (
     FOOT_PARTS,
     SOLES,
@@ -42,26 +41,24 @@ class PlacedTrack:
     """T frames without gaps, smoothed on request, in the first frame's camera axes, metres."""
 
     body: Body  # with the contact points of these betas
-    betas: NDArray[np.floating[Any]]  # (P,)
-    times: NDArray[np.float64]  # (T,) seconds
-    valid: NDArray[np.bool_]  # (T,) measured, not filled in
+    betas: FloatArray  # (P,)
+    times: Float64Array  # (T,) seconds
+    valid: BoolArray  # (T,) measured, not filled in
     # (T, K+1, 3, 3); part 0 R_camera_root, the others relative to their parents
-    rotations: NDArray[np.floating[Any]]
-    root: NDArray[np.floating[Any]]  # (T, 3) the pelvis
-    joints: NDArray[np.floating[Any]]  # (T, K+1, 3)
-    contact_points: NDArray[np.floating[Any]]  # (T, 6, 3) sole points and palms
-    contact_points_visible: NDArray[np.floating[Any]]  # (T, 6) 0..1
-    center: NDArray[np.floating[Any]]  # (T, 3) of the camera
+    rotations: FloatArray
+    root: FloatArray  # (T, 3) the pelvis
+    joints: FloatArray  # (T, K+1, 3)
+    contact_points: FloatArray  # (T, 6, 3) sole points and palms
+    contact_points_visible: FloatArray  # (T, 6) 0..1
+    center: FloatArray  # (T, 3) of the camera
     uneven_ground: bool = False  # both feet may rest at any height
 
     @property
-    def soles(self) -> NDArray[np.floating[Any]]:
+    def soles(self) -> FloatArray:
         """The (T, 4, 3) contact points of the soles."""
         return self.contact_points[:, : len(SOLES)]
 
-    def place(
-        self, rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def place(self, rotations: FloatArray, root: FloatArray) -> tuple[Float32Array, Float32Array]:
         """Return joints (T, K+1, 3) and contact points (T, 6, 3) of another motion of this body,
         camera frame.
 
@@ -70,17 +67,17 @@ class PlacedTrack:
         """
         return _place(self.body, self.betas, rotations, root)
 
-    def contact_center(self, contact: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def contact_center(self, contact: FloatArray) -> FloatArray:
         """Return the (T, 3) mean of the contact points weighted by ``contact`` (T, 6); of the soles
         if all are 0.
         """
         weight = contact.copy()
         weight[:, : len(SOLES)] += MIN_SOLE_WEIGHT
         share = weight / weight.sum(axis=1, keepdims=True)
-        center: NDArray[np.floating[Any]] = (share[..., None] * self.contact_points).sum(axis=1)
+        center: FloatArray = (share[..., None] * self.contact_points).sum(axis=1)
         return center
 
-    def contact(self, up: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def contact(self, up: FloatArray) -> FloatArray:
         """Return the (T, 6) probability that each contact point rests on something, 0 for those
         that are not visible.
 
@@ -143,7 +140,7 @@ def place_track(
 
 def without_gaps(
     track: Track, fitted: FittedTrack, path: CameraPath
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+) -> tuple[FloatArray, FloatArray]:
     """Return rotations (T, K+1, 3, 3) and pelvis (T, 3) as fitted, without gaps, in the first
     frame's camera axes.
     """
@@ -154,15 +151,13 @@ def without_gaps(
 
 def _place(
     body_with_contacts: Body,
-    betas: NDArray[np.floating[Any]],
-    rotations: NDArray[np.floating[Any]],
-    root: NDArray[np.floating[Any]],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    betas: FloatArray,
+    rotations: FloatArray,
+    root: FloatArray,
+) -> tuple[Float32Array, Float32Array]:
     pelvis_at_rest = body_with_contacts.rest_joints(betas)[0]
 
-    def place(
-        rotations: NDArray[np.floating[Any]], root: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def place(rotations: FloatArray, root: FloatArray) -> tuple[Float32Array, Float32Array]:
         R, t = body_with_contacts.forward_kinematics(rotations, root - pelvis_at_rest, betas)
         return t.astype(np.float32), contact_point_positions(body_with_contacts, R, t).astype(
             np.float32
@@ -181,11 +176,11 @@ class RawMotion:
     the other joints have the rotation vectors of the motion file from the start.
     """
 
-    R_first_root: NDArray[np.floating[Any]]  # (T, 3, 3)
-    t_first_root: NDArray[np.floating[Any]]  # (T, 3) the pelvis
-    joints: NDArray[np.float32]  # (T, K, 3) rotation vectors relative to the parent
-    joint_confidence: NDArray[np.floating[Any]]  # (T, K+1) 0..1
-    joint_sigma_m: NDArray[np.floating[Any]] | None  # (T, K+1, 2), as in `FittedTrack`
+    R_first_root: FloatArray  # (T, 3, 3)
+    t_first_root: FloatArray  # (T, 3) the pelvis
+    joints: Float32Array  # (T, K, 3) rotation vectors relative to the parent
+    joint_confidence: FloatArray  # (T, K+1) 0..1
+    joint_sigma_m: FloatArray | None  # (T, K+1, 2), as in `FittedTrack`
     height_sigma_m: float
 
     @classmethod
@@ -202,7 +197,7 @@ class RawMotion:
         )
 
 
-def rotation_vectors_of_joints(matrices: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+def rotation_vectors_of_joints(matrices: FloatArray) -> Float32Array:
     """Return (T, K, 3) for rotations (T, K+1, 3, 3) without the root's, in single precision as in
     the motion file.
     """

@@ -16,11 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array, FloatArray
 from ...kinematics.contact_points import SOLES
 from .placement import PlacedTrack
 from .world_frame import floor_height
@@ -54,7 +53,7 @@ class Stander:
     is_known: bool  # the stature was given
 
 
-def relative_sizes(people: Sequence[Stander]) -> NDArray[np.float64]:
+def relative_sizes(people: Sequence[Stander]) -> Float64Array:
     """Return the (n,) factors r on the people's sizes; 1 without anybody of known stature, and on
     another floor.
 
@@ -87,7 +86,7 @@ def _noise(person: Stander) -> float:
     return float(np.hypot(HEIGHT_SIGMA, FLOOR_SIGMA_M / person.height_m))
 
 
-def _log_densities(person: Stander, log_r: NDArray[np.float64]) -> NDArray[np.float64]:
+def _log_densities(person: Stander, log_r: Float64Array) -> Float64Array:
     """Return (3, n): as estimated, small, on another floor."""
     sigma = np.hypot(0.0 if person.is_known else STATURE_SIGMA, _noise(person))
     adult = np.log(ADULTS / (sigma * np.sqrt(2 * np.pi))) - 0.5 * (log_r / sigma) ** 2
@@ -98,7 +97,7 @@ def _log_densities(person: Stander, log_r: NDArray[np.float64]) -> NDArray[np.fl
     return np.stack([adult, small, np.full(len(log_r), np.log(OTHER_FLOOR))])
 
 
-def stander(placed: PlacedTrack, up: NDArray[np.floating[Any]], is_known: bool) -> Stander:
+def stander(placed: PlacedTrack, up: FloatArray, is_known: bool) -> Stander:
     """Return what one person alone tells of the floor.
 
     :param placed: seen by a camera that does not travel, the first frame's centre at the origin.

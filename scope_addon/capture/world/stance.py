@@ -10,11 +10,9 @@ nearly 1 within the noise of depth, nearly 0 beyond.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Float64Array, FloatArray
 from ...kinematics.standing import LEVEL_M, line_of_sight, logistic
 from ..fitting.prepared_track import Stance
 from .balance import balancing_rotations
@@ -26,7 +24,7 @@ DEPTH_RATE_SIGMA_M_S = 0.3  # σ_r, rate of change of this error
 SLIDE_SIGMA_M_S = 0.1  # σ_s, horizontal speed of a foot in contact
 
 
-def stance_on_ground(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -> Stance:
+def stance_on_ground(placed: PlacedTrack, T_floor_camera: Float64Array) -> Stance:
     """Estimate the distance and lean of a body, in the first frame's camera axes.
 
     The lean puts the zero moment point between the contact points (`balance`). On uneven ground,
@@ -57,13 +55,13 @@ def stance_on_ground(placed: PlacedTrack, T_floor_camera: NDArray[np.float64]) -
 
 
 def correct_depth(
-    root_cam: NDArray[np.floating[Any]],
-    points_cam: NDArray[np.floating[Any]],
-    contact: NDArray[np.floating[Any]],
-    T_world_camera: NDArray[np.float64],
-    times: NDArray[np.float64],
+    root_cam: FloatArray,
+    points_cam: FloatArray,
+    contact: FloatArray,
+    T_world_camera: Float64Array,
+    times: Float64Array,
     one_floor: bool = True,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return the (T,) displacement of each frame's body along its root's line of sight, metres.
 
     With the upward and horizontal components g and d of the line of sight in the world, and heights
@@ -112,8 +110,8 @@ def correct_depth(
 
 
 def _solve_tridiagonal(
-    diagonal: NDArray[np.float64], off: NDArray[np.float64], right: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    diagonal: Float64Array, off: Float64Array, right: Float64Array
+) -> Float64Array:
     """Solve a symmetric positive definite tridiagonal system by Thomas's algorithm.
 
     :param diagonal, off, right: (T,) diagonal, (T−1,) off-diagonal and (T,) right-hand side.
@@ -132,7 +130,7 @@ def _solve_tridiagonal(
     return x
 
 
-def floor_probability(height: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def floor_probability(height: FloatArray) -> FloatArray:
     """Return the probability (...) that feet in contact at the heights (...), metres, stand on the
     floor.
     """

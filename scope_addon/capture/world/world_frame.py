@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.axes import transform_points, world_from_level_camera
 from ...kinematics.contact_points import SOLES
 from ..camera.line_segments import Lines
@@ -40,7 +39,7 @@ BODIES = "bodies"
 UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0)}
 
 
-def up_from_standing(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
+def up_from_standing(people: Sequence[PlacedTrack]) -> Float64Array:
     """Estimate the up direction from standing bodies: from ankles to neck.
 
     Frames are weighted by how straight legs and trunk are. People lying down or doing push-ups are
@@ -66,7 +65,7 @@ def up_from_standing(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
 
 def _straightness(
     person: PlacedTrack,
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return directions (n, 3) of trunk and body, and how straight the body is (n,), in the n
     frames it was seen in.
     """
@@ -83,7 +82,7 @@ def _straightness(
     return trunk[person.valid], body_up[person.valid], straightness[person.valid]
 
 
-def up_from_bodies(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
+def up_from_bodies(people: Sequence[PlacedTrack]) -> Float64Array:
     """Estimate the up direction from people who stand, walk or bend: their weight is above their
     feet.
 
@@ -123,9 +122,7 @@ def up_from_bodies(people: Sequence[PlacedTrack]) -> NDArray[np.float64]:
     return up
 
 
-def up_from_floor(
-    feet_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
-) -> NDArray[np.float64]:
+def up_from_floor(feet_cam: FloatArray, up: FloatArray) -> Float64Array:
     """Rotate ``up`` so that feet in contact lie in one horizontal plane, as far as they are spread
     over the floor.
 
@@ -146,10 +143,10 @@ def up_from_floor(
 
 
 def up_from_scene(
-    up_body: NDArray[np.floating[Any]],
-    feet_cam: NDArray[np.floating[Any]] | None,
+    up_body: FloatArray,
+    feet_cam: FloatArray | None,
     lines: Lines | None,
-) -> tuple[NDArray[np.floating[Any]], str]:
+) -> tuple[FloatArray, str]:
     """Correct the up direction of the bodies by the lines of the background or, failing that, by
     the feet.
 
@@ -171,9 +168,9 @@ def up_from_scene(
 
 
 def floor_height(
-    soles_cam: NDArray[np.floating[Any]],
-    contact: NDArray[np.floating[Any]],
-    up: NDArray[np.floating[Any]],
+    soles_cam: FloatArray,
+    contact: FloatArray,
+    up: FloatArray,
 ) -> float:
     """Estimate the height of a person's floor above the camera: the weighted median of each frame's
     lowest sole point.
@@ -201,16 +198,16 @@ class SharedWorld:
     ``up_source``: what the up direction follows from, `LINES` or `BODIES`.
     """
 
-    T_world_camera: NDArray[np.float64]
+    T_world_camera: Float64Array
     floors_m: list[float]
     up_source: str
 
     @property
-    def up(self) -> NDArray[np.float64]:
+    def up(self) -> Float64Array:
         """The (3,) unit vector in the first frame's camera axes."""
         return self.T_world_camera[2, :3]
 
-    def floor_from_camera(self, person: int) -> NDArray[np.float64]:
+    def floor_from_camera(self, person: int) -> Float64Array:
         """Return ``T_world_camera`` (4, 4) with the person's own floor at z = 0."""
         T = self.T_world_camera.copy()
         T[2, 3] -= self.floors_m[person]
@@ -251,26 +248,20 @@ def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedW
     )
 
 
-def _first_contact(
-    contact: NDArray[np.floating[Any]], times: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _first_contact(contact: FloatArray, times: Float64Array) -> BoolArray:
     """Return the frames (T,) until somebody has been on the ground for `FIRST_S` altogether."""
     if len(times) < 2:
         return np.ones(len(times), np.bool_)
     on_ground_s = contact.max(axis=1) * np.gradient(times)
-    first: NDArray[np.bool_] = np.cumsum(on_ground_s) - on_ground_s < FIRST_S
+    first: BoolArray = np.cumsum(on_ground_s) - on_ground_s < FIRST_S
     return first
 
 
-def _lowest(
-    soles_cam: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
+def _lowest(soles_cam: FloatArray, up: FloatArray) -> FloatArray:
     """Return the (T, 3) lowest sole point of each frame."""
-    lowest: NDArray[np.floating[Any]] = soles_cam[
-        np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)
-    ]
+    lowest: FloatArray = soles_cam[np.arange(len(soles_cam)), (soles_cam @ up).argmin(axis=1)]
     return lowest
 
 
-def _unit(vector: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def _unit(vector: FloatArray) -> Float64Array:
     return vector / np.linalg.norm(vector)

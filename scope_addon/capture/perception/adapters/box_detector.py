@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
+from ....arrays import Float64Array, Uint8Array
 from ..letterbox import fit_in
 from ..person_detector import Detection, overlap_clusters
 from ..sessions import (
@@ -39,8 +39,8 @@ class Boxes:
     ``scores`` (N,) 0..1.
     """
 
-    corners: NDArray[np.float64]
-    scores: NDArray[np.float64]
+    corners: Float64Array
+    scores: Float64Array
 
 
 class BoxFormat(NamedTuple):
@@ -57,7 +57,7 @@ class BoxFormat(NamedTuple):
     stretched: bool = False  # to the input, regardless of the image's aspect ratio
 
 
-def _corners_of(centers_and_sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _corners_of(centers_and_sizes: Float64Array) -> Float64Array:
     """Convert (N, 4) centre x, y, width, height to left, top, right, bottom."""
     center = centers_and_sizes[:, :2]
     half = centers_and_sizes[:, 2:4] / 2
@@ -108,7 +108,7 @@ def _yolox(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
     return Boxes(_corners_of(box), rows[:, 4] * rows[:, 5 + description.person_class])
 
 
-def cells(width: int, height: int) -> NDArray[np.float64]:
+def cells(width: int, height: int) -> Float64Array:
     """List column, row and side in pixels (N, 3) of every cell of YOLOX, in the order of the
     output's rows.
     """
@@ -118,7 +118,7 @@ def cells(width: int, height: int) -> NDArray[np.float64]:
             np.arange(height // side), np.arange(width // side), indexing="ij"
         )
         grids.append(np.stack([column, row, np.full(column.shape, side)], axis=-1).reshape(-1, 3))
-    table: NDArray[np.float64] = np.concatenate(grids).astype(np.float64)
+    table: Float64Array = np.concatenate(grids).astype(np.float64)
     return table
 
 
@@ -228,7 +228,7 @@ class BoxDetector:
         self._boxes(self._graph.trial_outputs)  # so that a missing class is reported now
 
     def detect(
-        self, image_rgb: NDArray[np.uint8], threshold: float | None = None, closely: bool = False
+        self, image_rgb: Uint8Array, threshold: float | None = None, closely: bool = False
     ) -> list[Detection]:
         """Detect all people in an (H, W, 3) uint8 RGB image, best first.
 
@@ -249,13 +249,13 @@ class BoxDetector:
         corners = fitted.to_image(kept.corners.reshape(-1, 2, 2)).reshape(-1, 4)
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
-    def detect_small(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
+    def detect_small(self, image_rgb: Uint8Array) -> list[Detection]:
         """Return nothing for any (H, W, 3) image: how small people may be is a property of the
         user's network.
         """
         return []
 
-    def detect_in_parts(self, image_rgb: NDArray[np.uint8]) -> list[Detection]:
+    def detect_in_parts(self, image_rgb: Uint8Array) -> list[Detection]:
         """Return nothing for any (H, W, 3) image, as `detect_small`."""
         return []
 
@@ -273,7 +273,7 @@ class BoxDetector:
             ) from error
 
 
-def box_detection(score: float, box_px: NDArray[np.float64]) -> Detection:
+def box_detection(score: float, box_px: Float64Array) -> Detection:
     """Convert a box (4,) in pixels to a `Detection`: its centre as hips, a body circle as wide as
     its longer side.
     """

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
 from .....solver.loaders.regular_file import check_regular
+from ....arrays import Float64Array, Uint8Array
 from ..sessions import (
     Execution,
     open_session,
@@ -103,7 +104,7 @@ class Graph:
         """Shapes of the outputs."""
         return [output.shape for output in self.trial_outputs]
 
-    def run(self, picture_rgb: NDArray[np.uint8], normalization: Normalization) -> Outputs:
+    def run(self, picture_rgb: Uint8Array, normalization: Normalization) -> Outputs:
         """Run the graph.
 
         :param picture_rgb: (H, W, 3) uint8, of the input's size.
@@ -177,7 +178,7 @@ class Graph:
         )
 
 
-def finite(values: NDArray[Any]) -> NDArray[np.float64]:
+def finite(values: NDArray[Any]) -> Float64Array:
     """Convert an array (...) to float64, with 0 in place of NaN and infinity: as a score, 0 means
     nothing was found.
     """

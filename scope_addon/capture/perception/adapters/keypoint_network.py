@@ -29,9 +29,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
+from ....arrays import BoolArray, Float64Array, Uint8Array
 from ..landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..region import Region, box_along
 from ..sessions import (
@@ -58,7 +58,7 @@ _LEGS = [
 _BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
 _MIN_HEAT = 1e-10
 
-Keypoints = tuple[NDArray[np.float64], NDArray[np.float64]]
+Keypoints = tuple[Float64Array, Float64Array]
 """(J, 2) pixels of the network's input, the top left pixel's centre at 0, and (J,) scores."""
 
 
@@ -85,20 +85,18 @@ def _heatmap(outputs: Outputs, graph: Graph, description: Description) -> Keypoi
     count, rows, columns = heatmaps.shape
     greatest = heatmaps.reshape(count, -1).argmax(axis=1)
     cells = np.stack([greatest % columns, greatest // columns], axis=1)
-    scores: NDArray[np.float64] = heatmaps.reshape(count, -1).max(axis=1)
+    scores: Float64Array = heatmaps.reshape(count, -1).max(axis=1)
     refine = _by_taylor if description.decode == "dark" else _by_quarter
-    refined: NDArray[np.float64] = np.array(
+    refined: Float64Array = np.array(
         [refine(h, x, y) for h, (x, y) in zip(heatmaps, cells.tolist(), strict=True)]
     )
     size = np.array([graph.width, graph.height])
     grid = np.array([columns, rows])
-    pixels_per_cell: NDArray[np.float64] = (
-        (size - 1) / (grid - 1) if description.udp else size / grid
-    )
+    pixels_per_cell: Float64Array = (size - 1) / (grid - 1) if description.udp else size / grid
     return refined * pixels_per_cell, scores
 
 
-def _by_quarter(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float]:
+def _by_quarter(heat: Float64Array, x: int, y: int) -> tuple[float, float]:
     """Move a quarter of a cell towards the greater neighbour, in x and in y."""
     rows, columns = heat.shape
     if not (0 < x < columns - 1 and 0 < y < rows - 1):
@@ -108,7 +106,7 @@ def _by_quarter(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float
     return x + 0.25 * float(np.sign(right)), y + 0.25 * float(np.sign(down))
 
 
-def _by_taylor(heat: NDArray[np.float64], x: int, y: int) -> tuple[float, float]:
+def _by_taylor(heat: Float64Array, x: int, y: int) -> tuple[float, float]:
     """Refine by DARK; keep the cell itself at the edge and where the expansion has no maximum."""
     rows, columns = heat.shape
     if not (1 < x < columns - 2 and 1 < y < rows - 2) or heat[y, x] <= 0:
@@ -184,9 +182,7 @@ class KeypointNetwork:
             [(self._side - self._graph.width) // 2, (self._side - self._graph.height) // 2]
         )
 
-    def estimate(
-        self, image_rgb: NDArray[np.uint8], regions: Sequence[Region]
-    ) -> list[PoseEstimate]:
+    def estimate(self, image_rgb: Uint8Array, regions: Sequence[Region]) -> list[PoseEstimate]:
         """Estimate one pose per region of an (H, W, 3) uint8 RGB image; world landmarks are all 0,
         that is, unknown.
 
@@ -194,7 +190,7 @@ class KeypointNetwork:
         """
         return [self._estimate(image_rgb, region) for region in regions]
 
-    def _estimate(self, image_rgb: NDArray[np.uint8], region: Region) -> PoseEstimate:
+    def _estimate(self, image_rgb: Uint8Array, region: Region) -> PoseEstimate:
         left, top = self._corner
         square = region.cut(image_rgb, self._side)
         picture = square[top : top + self._graph.height, left : left + self._graph.width]
@@ -214,7 +210,7 @@ class KeypointNetwork:
         )
 
     def _next_region(
-        self, points: NDArray[np.float64], confidence: NDArray[np.float64], region: Region
+        self, points: Float64Array, confidence: Float64Array, region: Region
     ) -> Region:
         """Calculate the box around the seen keypoints, upright along the trunk, in the network's
         aspect ratio.
@@ -232,7 +228,7 @@ class KeypointNetwork:
         return Region((float(x), float(y)), side, rotation)
 
 
-def _stature(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> float:
+def _stature(points: Float64Array, seen: BoolArray) -> float:
     """Add the lengths in pixels of trunk, thigh and lower leg, regardless of the pose; 0 for those
     not seen.
     """

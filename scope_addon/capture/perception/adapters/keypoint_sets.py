@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....arrays import Float64Array
 from ..landmark_network import KEYPOINT_NAMES
 
 COCO_17 = (
@@ -88,8 +88,8 @@ class KeypointSet:
     mixture: Mixture
 
     def to_blazepose(
-        self, points: NDArray[np.float64], scores: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self, points: Float64Array, scores: Float64Array
+    ) -> tuple[Float64Array, Float64Array]:
         """Convert to our keypoints; see the module for those that the set lacks.
 
         :param points: (count, 2) pixels.
@@ -111,7 +111,7 @@ class KeypointSet:
         return ours, confidence
 
 
-def _approximate(name: str, at: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def _approximate(name: str, at: dict[str, Float64Array]) -> Float64Array:
     """Estimate the rough position (2,) of a keypoint from those that every set has."""
     side = "left" if "left" in name else "right"
     if "eye" in name:
@@ -119,7 +119,7 @@ def _approximate(name: str, at: dict[str, NDArray[np.float64]]) -> NDArray[np.fl
     if "mouth" in name:
         neck = (at["left_shoulder"] + at["right_shoulder"]) / 2
         to_eye = (at[f"{side}_eye"] - at["nose"]) * np.array([1.0, 0.0])
-        mouth: NDArray[np.float64] = at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
+        mouth: Float64Array = at["nose"] + 0.2 * (neck - at["nose"]) + 0.3 * to_eye
         return mouth
     if "heel" in name or "foot" in name:
         lower_leg = at[f"{side}_ankle"] - at[f"{side}_knee"]

@@ -23,7 +23,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from .....solver.errors import ModelFileError
 from .....solver.loaders.npz import read_npz
 from .....solver.rotations import log
+from ....arrays import BoolArray, Float64Array, FloatArray
 from ...perception.face_landmarks import (
     EXPRESSION_POINTS,
     ExpressionNetwork,
@@ -70,18 +71,18 @@ class FaceResponse:
     """The response of the landmark network: U units of expression, n landmarks, D = 3 n."""
 
     landmarks: NDArray[np.int64]  # (n,) numbers in the mesh of 478
-    reference: NDArray[np.float64]  # (n, 3) to which faces are aligned
-    shares: NDArray[np.float64]  # (n,) of the landmarks in the alignment
-    mean: NDArray[np.float64]  # (D,) m
-    view: NDArray[np.float64]  # (VIEW_TERMS, D) V
-    response: NDArray[np.float64]  # (U, D) E
-    projection: NDArray[np.float64]  # (U, D) E Σ⁻¹
-    units: NDArray[np.float64]  # (U, 52) which expressions each unit moves: 0 or 1
-    gaze: NDArray[np.float64]  # (U, 2) tangents of the eyes' turn to the left and up at weight 1
-    noise: NDArray[np.float64]  # () q in rendered faces
+    reference: Float64Array  # (n, 3) to which faces are aligned
+    shares: Float64Array  # (n,) of the landmarks in the alignment
+    mean: Float64Array  # (D,) m
+    view: Float64Array  # (VIEW_TERMS, D) V
+    response: Float64Array  # (U, D) E
+    projection: Float64Array  # (U, D) E Σ⁻¹
+    units: Float64Array  # (U, 52) which expressions each unit moves: 0 or 1
+    gaze: Float64Array  # (U, 2) tangents of the eyes' turn to the left and up at weight 1
+    noise: Float64Array  # () q in rendered faces
 
     @property
-    def largest(self) -> NDArray[np.float64]:
+    def largest(self) -> Float64Array:
         """(U,) w_max."""
         return np.where(self.gaze.any(axis=1), LARGEST_GAZE, 1.0)
 
@@ -102,9 +103,7 @@ def load_response() -> FaceResponse:
         raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error
 
 
-def fitted(
-    rows: NDArray[np.floating[Any]], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def fitted(rows: FloatArray, times: Float64Array) -> FloatArray:
     """Return rows whose weights and gaze are fitted to the landmarks.
 
     :param rows: (T, RECORD) see `face_record`, for which `is_known`.
@@ -129,7 +128,7 @@ def fitted(
     return out
 
 
-def is_known(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> bool:
+def is_known(rows: FloatArray, times: Float64Array) -> bool:
     """Return whether a face was seen for long enough that the person's face at rest is known.
 
     :param rows: (T, RECORD) see `face_record`.
@@ -143,11 +142,11 @@ def is_known(rows: NDArray[np.floating[Any]], times: NDArray[np.float64]) -> boo
 
 def fit_units(
     response: FaceResponse,
-    points: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    noise: NDArray[np.float64],
-    sure: NDArray[np.bool_],
-) -> NDArray[np.float64]:
+    points: Float64Array,
+    turns: Float64Array,
+    noise: Float64Array,
+    sure: BoolArray,
+) -> Float64Array:
     """Return the weights (T, U) of the units of expression.
 
     :param points: (T, D) aligned landmarks.
@@ -178,7 +177,7 @@ def fit_units(
     return w
 
 
-def error_size(response: FaceResponse, errors: NDArray[np.float64]) -> float:
+def error_size(response: FaceResponse, errors: Float64Array) -> float:
     """Return q, see the module, of errors (T, D) of landmarks."""
     scores = errors @ response.projection.T
     return float(
@@ -189,10 +188,10 @@ def error_size(response: FaceResponse, errors: NDArray[np.float64]) -> float:
 
 
 def _descend(
-    w: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    target: NDArray[np.float64],
-    largest: NDArray[np.float64],
+    w: Float64Array,
+    normal: Float64Array,
+    target: Float64Array,
+    largest: Float64Array,
 ) -> None:
     """Minimize ½ wᵀ H w − gᵀ w in the box 0 ≤ w ≤ w_max, for all frames at once, in place.
 
@@ -218,7 +217,7 @@ def _descend(
     w[:] = weights.T
 
 
-def _directions(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
+def _directions(tangents: Float64Array) -> Float64Array:
     """Return unit vectors (T, 2, 3), the same of both eyes, from the tangents (T, 2) to the left
     and up.
     """
@@ -227,9 +226,7 @@ def _directions(tangents: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.repeat(ahead[:, None], 2, axis=1)
 
 
-def with_expressions(
-    rows: NDArray[np.floating[Any]], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def with_expressions(rows: FloatArray, times: Float64Array) -> FloatArray:
     """Return rows of one person with weights and gaze: fitted, or by the expression network of a
     face seen briefly.
 
@@ -262,13 +259,11 @@ class AlignedFaces(NamedTuple):
     reference's axes.
     """
 
-    points: NDArray[np.float64]
-    turns: NDArray[np.float64]
+    points: Float64Array
+    turns: Float64Array
 
 
-def aligned(
-    landmarks: NDArray[np.float64], reference: NDArray[np.float64], shares: NDArray[np.float64]
-) -> AlignedFaces:
+def aligned(landmarks: Float64Array, reference: Float64Array, shares: Float64Array) -> AlignedFaces:
     """Align faces by the similarity transform with least squared distance from the reference.
 
     With the weighted means removed, and the singular values of Σ_n a_n x_n y_nᵀ = U S Vᵀ: R = V
@@ -292,7 +287,7 @@ def aligned(
     return AlignedFaces(points, log(R.transpose(0, 2, 1)))
 
 
-def view_terms(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+def view_terms(turns: Float64Array) -> Float64Array:
     """Return the terms (T, VIEW_TERMS) of views (T, 3) in which the mean error of landmarks is
     expressed.
     """

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.names import EXPRESSIONS
+from ....arrays import BoolArray, Float64Array, FloatArray
 from ....kinematics.smoothing import gaussian_smooth
 from ....motion import FACE_KEYS
 from ...perception.face_record import (
@@ -41,7 +42,7 @@ _FORWARD = np.array([0.0, 0.0, 1.0])
 
 
 def expression_motion(
-    rows: NDArray[np.floating[Any]], times: NDArray[np.float64], smoothing: bool
+    rows: FloatArray, times: Float64Array, smoothing: bool
 ) -> dict[str, NDArray[Any]]:
     """Return a motion file's arrays about the face, named as `FACE_KEYS`.
 
@@ -79,9 +80,7 @@ def expression_motion(
     return dict(zip(FACE_KEYS, values, strict=True))
 
 
-def behind_glasses(
-    light: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def behind_glasses(light: FloatArray, seen: BoolArray, times: Float64Array) -> BoolArray:
     """Return (T,) where the eyes are behind dark glasses, by the median of the `eye_light` (T,)
     over `GLASSES_S`.
 
@@ -97,9 +96,7 @@ def behind_glasses(
     return out
 
 
-def with_open_eyes(
-    weights: NDArray[np.floating[Any]], seen: NDArray[np.bool_], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def with_open_eyes(weights: FloatArray, seen: BoolArray, times: Float64Array) -> FloatArray:
     """Take from the blinks what the network sees in this person's open eyes, as narrow ones, or
     those behind glasses.
 
@@ -122,11 +119,11 @@ def with_open_eyes(
 
 
 def released(
-    values: NDArray[np.floating[Any]],
-    seen: NDArray[np.bool_],
-    times: NDArray[np.float64],
-    rest: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    values: FloatArray,
+    seen: BoolArray,
+    times: Float64Array,
+    rest: Float64Array,
+) -> Float64Array:
     """Fill the frames without measurement: from the last value to rest and from rest to the next
     one.
 
@@ -156,9 +153,7 @@ def released(
     return out
 
 
-def calmed(
-    values: NDArray[np.floating[Any]], times: NDArray[np.float64], noise: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def calmed(values: FloatArray, times: Float64Array, noise: Float64Array) -> Float64Array:
     """Remove noise from values (T, n) without phase, and without rounding what moves quickly.
 
     With the calm motion c, a low-pass of x, and d = x − c: y = c + d · d² / (d² + noise²). What

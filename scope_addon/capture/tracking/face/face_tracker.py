@@ -11,8 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....arrays import Float64Array, Uint8Array
 from ...perception.face_landmarks import (
     HEAD,
     ExpressionNetwork,
@@ -54,7 +54,7 @@ class _Face:
     """
 
     region: Region | None
-    head_px: NDArray[np.float64]
+    head_px: Float64Array
     seen_s: float  # when it was last seen; if never, when it was first looked for
     searched_s: float  # when it was last looked for
 
@@ -83,7 +83,7 @@ class FaceTracker:
 
     def step(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         observations: Sequence[tuple[int, Observation]],
         time_s: float,
     ) -> list[tuple[int, Observation]]:
@@ -111,10 +111,10 @@ class FaceTracker:
 
     def _find(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         face: _Face,
         person: Observation,
-        head_px: NDArray[np.float64],
+        head_px: Float64Array,
         time_s: float,
     ) -> FaceEstimate | None:
         """Look for the face where it was a frame ago, moved with the head, otherwise where the body

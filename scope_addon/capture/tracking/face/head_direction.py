@@ -15,12 +15,10 @@ focal length is wrong.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from .....solver.rotations import exp
+from ....arrays import Float64Array, FloatArray
 from ...camera.intrinsics import Camera
 from ...perception.face_record import (
     landmarks_of,
@@ -40,7 +38,7 @@ _CONTRADICTED = np.cos(np.radians(60.0))
 _AGREED = np.cos(np.radians(30.0))
 
 
-def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.float64]:
+def across_head(face: FloatArray, camera: Camera) -> Float64Array:
     """Return the unit vectors d (T, 3) of the module's equation, in camera axes; zeros where no
     face was seen.
 
@@ -64,10 +62,10 @@ def across_head(face: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.f
 
 
 def certainty(
-    face: NDArray[np.floating[Any]],
-    directions: NDArray[np.float64],
-    ears: NDArray[np.floating[Any]],
-) -> NDArray[np.float64]:
+    face: FloatArray,
+    directions: Float64Array,
+    ears: FloatArray,
+) -> Float64Array:
     """Return how much each direction counts (T,), 1 of a large face that is surely there, 0 where
     there is none.
 
@@ -80,5 +78,5 @@ def certainty(
     """
     cosine = (ears * directions).sum(axis=1) / np.maximum(np.linalg.norm(ears, axis=1), 1e-9)
     agreed = np.clip((cosine - _CONTRADICTED) / (_AGREED - _CONTRADICTED), 0.0, 1.0)
-    out: NDArray[np.float64] = agreed * parts(face)[0] * presence_of(face) ** 2
+    out: Float64Array = agreed * parts(face)[0] * presence_of(face) ** 2
     return out

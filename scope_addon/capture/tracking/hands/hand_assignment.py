@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....arrays import BoolArray, Float64Array, FloatArray
 from ...perception.hand_landmarks import ELBOWS, HAND_LENGTH_M, WRISTS, HandEstimate
 from ...perception.observation import Observation
 
@@ -189,9 +189,7 @@ _TOLERANCE_S = 0.005
 _CONFIDENCE = 2  # column
 
 
-def confirmed(
-    hands: NDArray[np.floating[Any]], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def confirmed(hands: FloatArray, times: Float64Array) -> FloatArray:
     """Return hands (T, 2, 21, 6) in which tentative ones are either believed, with their low
     confidence, or zeros.
 
@@ -214,9 +212,7 @@ def confirmed(
     return out
 
 
-def _reached(
-    own: NDArray[np.floating[Any]], times: NDArray[np.float64], sure: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def _reached(own: FloatArray, times: Float64Array, sure: BoolArray) -> BoolArray:
     """Return (T,) which tentative hands (T, 21, 6) follow a sure one without interruption."""
     out = np.zeros(len(own), bool)
     # the hand that was believed last, and when the network was sure of it last
@@ -237,7 +233,7 @@ def _reached(
     return out
 
 
-def _continues(before: NDArray[np.floating[Any]], after: NDArray[np.floating[Any]]) -> bool:
+def _continues(before: FloatArray, after: FloatArray) -> bool:
     """Return whether two hands (21, 6) of successive frames may be one."""
     a, b = (hand[:, :2] - hand[0, :2] for hand in (before, after))
     sizes = [max(float(np.ptp(points, axis=0).max()), 1e-6) for points in (a, b)]

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....arrays import Float32Array, Float64Array, Uint8Array
 from ...perception.hand_landmarks import (
     HAND_LENGTH_M,
     HAND_POINTS,
@@ -50,10 +50,10 @@ class Found(NamedTuple):
 
     estimate: HandEstimate
     is_sure: bool
-    color: NDArray[np.float64] | None
+    color: Float64Array | None
 
     @property
-    def row(self) -> NDArray[np.float32]:
+    def row(self) -> Float32Array:
         """Pixels, confidence and world landmarks (21, 6), finite; the confidence of a tentative
         hand is negative.
         """
@@ -74,11 +74,11 @@ class Sight:
     and surely are of the other side.
     """
 
-    image_rgb: NDArray[np.uint8]
+    image_rgb: Uint8Array
     person: Observation
     side: int
     scale: float
-    color: NDArray[np.float64] | None
+    color: Float64Array | None
     offset_px: tuple[int, int] = (0, 0)
     others: list[HandEstimate] = field(default_factory=list)
     opposite: list[HandEstimate] = field(default_factory=list)
@@ -101,9 +101,9 @@ class Sight:
         return replace(self, image_rgb=self.image_rgb[y0:y1, x0:x1].copy(), offset_px=(x0, y0))
 
     @property
-    def wrist_px(self) -> NDArray[np.float64]:
+    def wrist_px(self) -> Float64Array:
         """The body's wrist (2,)."""
-        wrist: NDArray[np.float64] = self.person.keypoints_px[WRISTS[self.side]]
+        wrist: Float64Array = self.person.keypoints_px[WRISTS[self.side]]
         return wrist
 
     @property
@@ -142,7 +142,7 @@ class Sight:
 
 
 def followed_regions(
-    estimate: HandEstimate, motion_px: NDArray[np.float64], hand_px: float
+    estimate: HandEstimate, motion_px: Float64Array, hand_px: float
 ) -> list[Region]:
     """Return where a hand that was seen a frame ago may be: moved with the body's wrist, and at its
     place of then.
@@ -162,9 +162,7 @@ def better(a: Found | None, b: Found | None) -> Found | None:
     return max(both, key=lambda found: (found.is_sure, found.estimate.presence), default=None)
 
 
-def palm_color(
-    image_rgb: NDArray[np.uint8], keypoints_px: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def palm_color(image_rgb: Uint8Array, keypoints_px: Float64Array) -> Float64Array | None:
     """Return the median colour (3,) at places on palm and fingers; None if none of them is in the
     image.
 
@@ -182,7 +180,7 @@ def palm_color(
     return np.asarray(np.median(pixels.astype(float), axis=0)) if len(pixels) else None
 
 
-def is_like(color: NDArray[np.float64] | None, before: NDArray[np.float64] | None) -> bool:
+def is_like(color: Float64Array | None, before: Float64Array | None) -> bool:
     """Return whether a colour (3,) and an earlier one (3,) can be one hand's; also where one of
     them is not known.
 

@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ....arrays import Float32Array, Float64Array, Uint8Array
 from ...perception.hand_landmarks import (
     HAND_POINTS,
     PALM_THRESHOLD,
@@ -74,10 +74,10 @@ class _Hand:
     """
 
     found: Found | None
-    wrist_px: NDArray[np.float64]
+    wrist_px: Float64Array
     seen_s: float  # when it was last surely seen; if never, when it was first looked for
     searched_s: float  # when it was last looked for
-    color: NDArray[np.float64] | None = None  # of the palm, when it was last surely seen
+    color: Float64Array | None = None  # of the palm, when it was last surely seen
 
 
 @dataclass
@@ -89,7 +89,7 @@ class _Missed:
     time_s: float
     sight: Sight
     found: Found | None
-    row: NDArray[np.float32]
+    row: Float32Array
 
 
 class HandTracker:
@@ -127,7 +127,7 @@ class HandTracker:
 
     def step(
         self,
-        image_rgb: NDArray[np.uint8],
+        image_rgb: Uint8Array,
         observations: Sequence[tuple[int, Observation]],
         time_s: float | None = None,
     ) -> list[tuple[int, Observation]]:
@@ -250,7 +250,7 @@ class HandTracker:
             found, self._first_sure(sight, rough, SECOND_TENTATIVE, least_first=AGAIN_PRESENCE)
         )
 
-    def _sight(self, image_rgb: NDArray[np.uint8], person: Observation, key: Key) -> Sight:
+    def _sight(self, image_rgb: Uint8Array, person: Observation, key: Key) -> Sight:
         scale = pixels_per_metre(person.keypoints_px, person.world_landmarks)
         known = self._hands.get(key)
         return Sight(image_rgb, person, key[1], scale, known.color if known else None)
@@ -358,7 +358,7 @@ def _of_other_side(sight: Sight, seen: Sequence[HandEstimate]) -> Found | None:
     return found
 
 
-def _is_in_image(region: Region, image_rgb: NDArray[np.uint8]) -> bool:
+def _is_in_image(region: Region, image_rgb: Uint8Array) -> bool:
     height, width = image_rgb.shape[:2]
     x, y = region.center_px
     reach = _MARGIN * region.side_px
