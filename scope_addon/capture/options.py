@@ -13,8 +13,7 @@ from typing import Any
 from ...solver.body import Body
 from ..errors import UsageError
 from ..options import Place, option, options_at
-from ..options.capture import ALL, LARGEST, OFF, CaptureDeclaration
-from ..options.networks import NetworkDeclaration
+from ..options.capture import ALL, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.hand_measurements import require_fingers

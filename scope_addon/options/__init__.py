@@ -4,18 +4,16 @@ part of Scope.
 
 The arguments of the command line (`command_line.arguments`), the request to the worker
 (`job.request`), and the properties of the panel and of the preferences (`ui.declared_properties`)
-are made from these records. The dataclasses in `capture` and `networks` declare what the pipeline
-reads: `capture.options.CaptureOptions` has their fields. To add an option, add it to one of these,
-or a record to `output`, `motion_import` or `live`.
+are made from these records. The dataclasses in `capture` declare what the pipeline reads:
+`capture.options.CaptureOptions` has their fields. To add an option, add a field to one of these, or
+a record to `output` or `live`.
 """
 
 from __future__ import annotations
 
-from .capture import CAPTURE_OPTIONS
+from .capture import CAPTURE_OPTIONS, NETWORK_OPTIONS
 from .live import LIVE_OPTIONS
-from .motion_import import IMPORT_OPTIONS
-from .networks import NETWORK_OPTIONS
-from .output import OUTPUT_OPTIONS, REPORT_OPTIONS
+from .output import IMPORT_OPTIONS, OUTPUT_OPTIONS, REPORT_OPTIONS
 from .record import Argument, Choice, Option, Place, Property, Section
 
 # In the order of the command line's help.

@@ -35,6 +35,7 @@ from scope.scope_addon.edit.pins.corrections import (
     Upright,
 )
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, Motion
+from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.loaders.body_file import BUILT_IN
 from scope.solver.names import EXPRESSIONS
@@ -42,6 +43,7 @@ from scope.tools import solver_reference
 
 from ..made_motion import made_face, made_motion
 
+CHOSEN = [each for each in options_at(Place.COMMAND_LINE) if each.choices]
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
@@ -167,6 +169,19 @@ def test_every_option_is_defined_once_in_the_command_line_page():
         if re.match(r"`--?\w", row[0])
     ]
     assert elsewhere == []
+
+
+@pytest.mark.parametrize("declared", CHOSEN, ids=[each.name for each in CHOSEN])
+def test_the_command_line_page_states_the_choices_of_an_option_and_its_default(declared):
+    (meaning,) = [
+        row[1]
+        for first, rows in tables(DOCS / "command_line.md")
+        if first == "option"
+        for row in rows
+        if row[0].startswith(f"`{declared.flag} ")
+    ]
+    assert set(declared.values) <= set(re.findall(r"`([^`]+)`", meaning))
+    assert re.findall(r"`([^`]+)` \(default\)", meaning) == [declared.default]
 
 
 def test_every_key_of_the_motion_file_is_defined_once():
