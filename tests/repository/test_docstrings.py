@@ -25,7 +25,7 @@ EXTENT = (
     r"(?:\.\.\.|\d*\s?(?:[A-Z][A-Z_]*'?|[nmT]|count|None)(?:\s?[+-]\s?\w)*|\d+(?:\s?\+\s?[A-Z])*)"
 )
 SHAPE = re.compile(rf"\((?:|\.\.\.|{EXTENT},|{EXTENT}(?:, {EXTENT})+)\)")
-ARRAY = re.compile(r"\b(NDArray|ArrayLike|Array)\b")
+ARRAY = re.compile(r"\b(\w*Array|ArrayLike)\b")
 CONSTRUCTORS = ("__init__", "__post_init__")
 INTERNAL = {"AssertionError"}  # a mistake in the program, which no caller handles
 KERNELS = {
