@@ -36,27 +36,16 @@ from ..scope_addon.capture.perception.lifter import Lifted, default_lifter, wind
 from ..scope_addon.capture.perception.observation import PersonMask
 from ..scope_addon.capture.pipeline import shot_of
 from ..scope_addon.capture.stages import repair as repair_module
-from ..scope_addon.capture.stages import (
-    solve as solve_module,
-)
+from ..scope_addon.capture.stages import solve as solve_module
 from ..scope_addon.capture.stages.clock import StageClock
-from ..scope_addon.capture.stages.observe import (
-    Listeners,
-    observe,
-)
+from ..scope_addon.capture.stages.observe import Listeners, observe
 from ..scope_addon.capture.stages.repair import repair
-from ..scope_addon.capture.stages.solve import (
-    solve,
-)
+from ..scope_addon.capture.stages.solve import solve
 from ..scope_addon.capture.tracking.track import Track
-from ..scope_addon.capture.world import (
-    clip_fit,
-)
+from ..scope_addon.capture.world import clip_fit
 from ..scope_addon.capture.world import stance as stance_module
 from ..scope_addon.capture.world.assemble import Shot
-from ..scope_addon.capture.world.clip_window import (
-    ClipWindow,
-)
+from ..scope_addon.capture.world.clip_window import ClipWindow
 from ..scope_addon.capture.world.placement import PlacedTrack
 from ..scope_addon.errors import NoPersonError
 from ..scope_addon.motion import Motion

@@ -29,9 +29,7 @@ from ..scope_addon.capture.fitting.prepared_track import prepare_track
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.media.video_range import VideoRange
 from ..scope_addon.capture.tracking.left_right import repair_left_right
-from ..scope_addon.capture.tracking.people import (
-    build_tracks,
-)
+from ..scope_addon.capture.tracking.people import build_tracks
 from ..scope_addon.capture.tracking.track import Tracklet
 from ..scope_addon.capture.tracking.tracker import PeopleTracker
 from ..scope_addon.errors import NoPersonError

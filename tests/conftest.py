@@ -136,9 +136,7 @@ def blender_module() -> None:
 @pytest.fixture(scope="session")
 def networks() -> Path:
     """The folder of the built pose networks."""
-    from scope.scope_addon.capture.perception.sessions import (
-        NETWORKS_FOLDER,
-    )
+    from scope.scope_addon.capture.perception.sessions import NETWORKS_FOLDER
     from scope.tools.convert_networks.catalogue import NETWORKS
 
     absent = [
@@ -163,9 +161,7 @@ def sessions_are_opened_once() -> Iterator[None]:
     if importlib.util.find_spec("onnxruntime") is None:  # as where only the solver is tested
         yield
         return
-    from scope.scope_addon.capture.perception import (
-        sessions,
-    )
+    from scope.scope_addon.capture.perception import sessions
 
     open_on = sessions._open_on
     keep = cache(open_on)

@@ -22,9 +22,7 @@ from typing import Any, cast
 import numpy as np
 
 from ...scope_addon.capture.camera.intrinsics import choose_camera
-from ...scope_addon.capture.media.frame import (
-    Frame,
-)
+from ...scope_addon.capture.media.frame import Frame
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
 from ...scope_addon.cli import SAMPLE

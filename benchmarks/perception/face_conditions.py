@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.perception.face_record import (
-    parts,
-)
+from ...scope_addon.capture.perception.face_record import parts
 from ...scope_addon.capture.tracking.face.expression_fit import fitted
 from ...scope_addon.capture.tracking.face.expression_motion import expression_motion
 from ...tools.calibrate_face.observe import SeenFaces, seen_faces

@@ -18,13 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.perception.face_landmarks import (
-    FaceEstimate,
-)
-from ...scope_addon.capture.perception.face_record import (
-    parts,
-    record,
-)
+from ...scope_addon.capture.perception.face_landmarks import FaceEstimate
+from ...scope_addon.capture.perception.face_record import parts, record
 from ...scope_addon.capture.perception.region import Region
 from ...scope_addon.capture.tracking.face.expression_fit import fitted
 from ...scope_addon.capture.tracking.face.expression_motion import expression_motion

@@ -21,10 +21,7 @@ from .fitting.stature import require_stature
 from .media.video_range import FootageRange, VideoRange, parse_range
 from .perception.adapters.box_detector import BoxDetector
 from .perception.adapters.keypoint_network import KeypointNetwork
-from .perception.sessions import (
-    Execution,
-    landmark_network_name,
-)
+from .perception.sessions import Execution, landmark_network_name
 from .tracking.tracker import MAX_PEOPLE
 
 WINDOW_S = 120.0

@@ -15,19 +15,10 @@ from ..motion import Motion
 from .media.video import Video, open_video
 from .options import CaptureOptions, check_options
 from .stages.clock import Progress, StageClock
-from .stages.observe import (
-    Footage,
-    Listeners,
-    ObserveFrames,
-    Watch,
-    observe,
-)
+from .stages.observe import Footage, Listeners, ObserveFrames, Watch, observe
 from .stages.repair import repair
 from .stages.report import make_report
-from .stages.solve import (
-    return_freed_memory,
-    solve,
-)
+from .stages.solve import return_freed_memory, solve
 from .world.assemble import Shot
 from .world.camera_path import CameraPath
 

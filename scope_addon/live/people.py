@@ -21,19 +21,10 @@ from numpy.typing import NDArray
 
 from ...solver import Body
 from ..capture.camera.intrinsics import Camera
-from ..capture.media.frame import (
-    AutoExposure,
-    Frame,
-)
+from ..capture.media.frame import AutoExposure, Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.appearance import SIZE, distance
-from ..capture.tracking.people import (
-    LONG_GAP_S,
-    MAX_LINK_COST,
-    End,
-    cheapest_links,
-    link_cost,
-)
+from ..capture.tracking.people import LONG_GAP_S, MAX_LINK_COST, End, cheapest_links, link_cost
 from ..capture.tracking.track import trunk_px
 from ..capture.tracking.tracker import PeopleTracker
 from .pose import LivePose

@@ -18,16 +18,10 @@ from ...solver import Body
 from ..capture.camera.intrinsics import assumed_camera, choose_camera
 from ..capture.fitting.live_body import LiveBody
 from ..capture.fitting.stature import require_stature
-from ..capture.media.frame import (
-    Frame,
-)
+from ..capture.media.frame import Frame
 from ..capture.media.opencv_threads import opencv_in_one_thread
-from ..capture.perception.sessions import (
-    Execution,
-)
-from ..capture.stages.observe import (
-    network_threads,
-)
+from ..capture.perception.sessions import Execution
+from ..capture.stages.observe import network_threads
 from ..capture.tracking.tracker import PeopleTracker
 from .clock import Clock
 from .people import LivePeople

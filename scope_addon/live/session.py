@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from ...solver import Body, State
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_sequence import FittedTrack
-from ..capture.media.frame import (
-    Frame,
-)
+from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import track_of
 from .calibration import Calibration, Calibrator, GradualCalibration

@@ -14,9 +14,7 @@ from scope.scope_addon.capture.fitting.outline import fit_shape_to_outline, usab
 from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, prepare_track
 from scope.scope_addon.capture.fitting.track_fit import fit_track
 from scope.scope_addon.capture.fitting.weights import WEIGHTS
-from scope.scope_addon.capture.world import (
-    clip_fit,
-)
+from scope.scope_addon.capture.world import clip_fit
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.solver import Body
 

@@ -6,9 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scope.scope_addon.capture.perception.observation import Observation
-from scope.scope_addon.capture.tracking.people import (
-    build_tracks,
-)
+from scope.scope_addon.capture.tracking.people import build_tracks
 from scope.scope_addon.capture.tracking.track import Track, Tracklet
 
 

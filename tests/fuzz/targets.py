@@ -45,18 +45,13 @@ def _open_picture_or_video(path: Path) -> None:
 
 
 def _read_layout(path: Path) -> None:
-    from scope.scope_addon.capture.media.heif import (
-        read_layout,
-    )
+    from scope.scope_addon.capture.media.heif import read_layout
 
     read_layout(path.read_bytes())
 
 
 def _read_exif(path: Path) -> None:
-    from scope.scope_addon.capture.media.exif import (
-        animation_length,
-        read_exif,
-    )
+    from scope.scope_addon.capture.media.exif import animation_length, read_exif
 
     read_exif(path.read_bytes())
     animation_length(path.read_bytes())

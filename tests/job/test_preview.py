@@ -6,9 +6,7 @@ is.
 import threading
 
 import numpy as np
-from scope.scope_addon.capture.media.frame import (
-    Frame,
-)
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES

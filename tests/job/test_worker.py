@@ -14,10 +14,7 @@ from pathlib import Path
 import pytest
 from scope.scope_addon.capture import pipeline
 from scope.scope_addon.capture.perception.lifter import LIFTER_FILE
-from scope.scope_addon.capture.perception.sessions import (
-    LANDMARK_NETWORK_OF_QUALITY,
-    network_path,
-)
+from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY, network_path
 from scope.scope_addon.errors import SetupError, UsageError
 from scope.scope_addon.job.messages import WorkerFailedError
 from scope.scope_addon.job.process import START_SCRIPT, WorkerProcess

@@ -10,9 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.media.frame import (
-    Frame,
-)
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions

@@ -13,9 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.media.frame import (
-    Frame,
-)
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE

@@ -16,10 +16,7 @@ from typing import ClassVar
 import pytest
 from scope.scope_addon import options as declarations
 from scope.scope_addon.capture.options import CaptureOptions, capture_options, check_options
-from scope.scope_addon.capture.perception.sessions import (
-    CHOICES,
-    LANDMARK_NETWORK_OF_QUALITY,
-)
+from scope.scope_addon.capture.perception.sessions import CHOICES, LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.cli import build_parser, main
 from scope.scope_addon.command_line.arguments import (
     body_and_options,

@@ -4,10 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.perception.face_landmarks import (
-    EXPRESSION_POINTS,
-    FACE_POINTS,
-)
+from scope.scope_addon.capture.perception.face_landmarks import EXPRESSION_POINTS, FACE_POINTS
 from scope.scope_addon.capture.tracking.face.expression_fit import aligned, fit_units
 from scope.solver.names import EXPRESSIONS
 from scope.tools.calibrate_face.observe import SeenFaces

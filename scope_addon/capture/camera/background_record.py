@@ -171,10 +171,7 @@ def joined_backgrounds(
 
 
 def _faded(
-    R: Float64Array,
-    known: BoolArray,
-    R_after: Float64Array,
-    known_after: BoolArray,
+    R: Float64Array, known: BoolArray, R_after: Float64Array, known_after: BoolArray
 ) -> Float64Array:
     """Return rotations (T, 3, 3) whose last n frames go over to those of the next window.
 

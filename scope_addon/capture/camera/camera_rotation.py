@@ -237,10 +237,7 @@ class BackgroundTracker:
 
 
 def consensus_rotation(
-    a: Float64Array,
-    b: Float64Array,
-    tolerance: float,
-    random: np.random.Generator,
+    a: Float64Array, b: Float64Array, tolerance: float, random: np.random.Generator
 ) -> tuple[Float64Array, BoolArray]:
     """Find the rotation R with b = R a that most directions agree with.
 
@@ -276,10 +273,7 @@ def _kabsch(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def _flow(
-    before: Uint8Array,
-    after: Uint8Array,
-    points: Float32Array,
-    near: Float32Array | None = None,
+    before: Uint8Array, after: Uint8Array, points: Float32Array, near: Float32Array | None = None
 ) -> tuple[Float32Array, BoolArray]:
     """Follow corners (n, 2) from one working image to another.
 

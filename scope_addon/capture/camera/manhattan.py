@@ -90,10 +90,7 @@ class Edges:
         )
 
     def _best(
-        self,
-        candidates: Sequence[NDArray[Any]],
-        normals: NDArray[Any],
-        equations: Float32Array,
+        self, candidates: Sequence[NDArray[Any]], normals: NDArray[Any], equations: Float32Array
     ) -> tuple[float, Float64Array]:
         """Return what `axes` does, where one of the candidates is up."""
         ups = np.asarray(candidates).reshape(-1, 3)
@@ -187,10 +184,7 @@ def intersection_directions(normals: NDArray[Any], up: Float64Array) -> NDArray[
 
 
 def line_normal_equations(
-    lines: Lines,
-    directions: Float64Array,
-    sigma: float,
-    value: Float64Array | float = 1.0,
+    lines: Lines, directions: Float64Array, sigma: float, value: Float64Array | float = 1.0
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Compute the normal equations of a small rotation ω of three directions, each line assigned to
     the nearest one.

@@ -190,11 +190,7 @@ class Measurer:
         return out
 
 
-def place(
-    world: FloatArray,
-    rays: FloatArray,
-    weight: FloatArray,
-) -> Float64Array:
+def place(world: FloatArray, rays: FloatArray, weight: FloatArray) -> Float64Array:
     """Return the (3,) translation that moves hip-centred points onto their rays: t of the module's
     equation.
 

@@ -216,10 +216,7 @@ def with_finger_limits(priors: Priors, body: Body) -> Priors:
 
 
 def smooth_fingers(
-    rotations: FloatArray,
-    fingers: list[list[int]],
-    seen: BoolArray,
-    times: Float64Array,
+    rotations: FloatArray, fingers: list[list[int]], seen: BoolArray, times: Float64Array
 ) -> FloatArray:
     """Fill in the fingers of hands that are not seen with smooth motion.
 

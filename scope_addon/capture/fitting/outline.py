@@ -221,9 +221,7 @@ def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
 
 
 def fit_shape_to_outline(
-    prepared: PreparedTrack,
-    masks: list[tuple[int, PersonMask]],
-    root_cam: FloatArray | None,
+    prepared: PreparedTrack, masks: list[tuple[int, PersonMask]], root_cam: FloatArray | None
 ) -> ClipFit:
     """Estimate one shape from the frames of some masks, as `usable_masks` returns them.
 

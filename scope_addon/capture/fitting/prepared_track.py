@@ -151,11 +151,7 @@ class PreparedTrack:
 
 
 def prepare_track(
-    body: Body,
-    track: Track,
-    camera: Camera,
-    height_m: float | None = None,
-    fingers: bool = True,
+    body: Body, track: Track, camera: Camera, height_m: float | None = None, fingers: bool = True
 ) -> PreparedTrack:
     """Undistort and lift a track. The lifting network runs only here.
 

@@ -17,12 +17,8 @@ from ...notices import Notice
 from ..camera.background_record import BackgroundRecord, joined_backgrounds
 from ..perception.observation import Observation
 from ..perception.region import Region
-from ..stages.observe import (
-    Observed,
-)
-from ..tracking.people import (
-    cheapest_links,
-)
+from ..stages.observe import Observed
+from ..tracking.people import cheapest_links
 from ..tracking.track import Tracklet, trunk_px
 from .windows import WindowRecord
 

@@ -29,9 +29,7 @@ from ..camera.heading_drift import FrameEdges
 from ..camera.line_segments import Segments
 from ..options import CaptureOptions
 from ..perception.adapters.description import description_path
-from ..perception.face_record import (
-    RECORD,
-)
+from ..perception.face_record import RECORD
 from ..perception.landmark_network import KEYPOINT_COUNT
 from ..perception.observation import PersonMask
 from ..perception.region import Region

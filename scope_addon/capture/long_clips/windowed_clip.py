@@ -23,17 +23,13 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import UsageError
-from ..media.frame import (
-    Frame,
-)
+from ..media.frame import Frame
 from ..media.opencv_threads import opencv_in_one_thread
 from ..media.video import Video, open_video
 from ..options import CaptureOptions
 from ..perception.observation import Observation
 from ..perception.region import Region
-from ..perception.sessions import (
-    Execution,
-)
+from ..perception.sessions import Execution
 from ..stages.clock import FINDING, Progress, StageClock
 from ..stages.observe import (
     ObservationJob,
@@ -255,10 +251,7 @@ class WindowedClip:
             )
 
     def _single(
-        self,
-        window: Window,
-        regions: Sequence[Region] = (),
-        exact: bool = False,
+        self, window: Window, regions: Sequence[Region] = (), exact: bool = False
     ) -> WindowRecord:
         """Observe one window alone.
 

@@ -21,16 +21,11 @@ from numpy.typing import NDArray
 from ...arrays import Float64Array
 from ...notices import Notice
 from ..camera.background_record import BackgroundRecord
-from ..media.frame import (
-    Frame,
-)
+from ..media.frame import Frame
 from ..media.video import Video
 from ..perception.observation import Observation, PendingReference
 from ..perception.region import Region
-from ..stages.observe import (
-    FrameObserver,
-    largest_person,
-)
+from ..stages.observe import FrameObserver, largest_person
 from ..tracking.track import Tracklet
 
 WARM_UP_S = 1.5

@@ -20,14 +20,9 @@ import numpy as np
 from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
-from .deinterlace import (
-    FIELD_CODECS,
-    deinterlaced,
-)
+from .deinterlace import FIELD_CODECS, deinterlaced
 from .file_names import utf8_name
-from .hdr import (
-    hdr_rgb,
-)
+from .hdr import hdr_rgb
 from .image_size import check_size
 
 if TYPE_CHECKING:
@@ -85,11 +80,7 @@ def next_time(before: float | None, given: float | None, period: float) -> float
 
 
 def upright(
-    path: Path,
-    image: Uint8Array,
-    aspect: float,
-    clockwise_deg: int,
-    is_mirrored: bool = False,
+    path: Path, image: Uint8Array, aspect: float, clockwise_deg: int, is_mirrored: bool = False
 ) -> Uint8Array:
     """Stretch an image (H, W, 3) of a file or stream until its pixels are square; mirror it before
     and rotate it after.

@@ -76,8 +76,7 @@ def _table(transfer: int) -> Uint8Array:
     codes = np.linspace(0.0, 1.0, 256)
     light = pq_light(codes) if transfer == _PQ else PEAK * hlg_light(codes) ** HLG_GAMMA
     return cast(
-        Uint8Array,
-        np.rint(255 * (compress(light) / WHITE) ** (1 / SDR_GAMMA)).astype(np.uint8),
+        Uint8Array, np.rint(255 * (compress(light) / WHITE) ** (1 / SDR_GAMMA)).astype(np.uint8)
     )
 
 

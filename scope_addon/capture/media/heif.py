@@ -20,9 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Uint8Array
-from ...footage import (
-    MAX_PIXELS,
-)
+from ...footage import MAX_PIXELS
 
 CODED = (b"hvc1", b"av01")
 MAX_TILES = 1000  # ffmpeg's limit

@@ -22,9 +22,7 @@ from ...footage import (
     sequence_pattern,
 )
 from ...notices import Notice, notice
-from .still_images import (
-    read_picture,
-)
+from .still_images import read_picture
 
 
 @dataclass(frozen=True)

@@ -16,39 +16,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.loaders.regular_file import (
-    check_regular,
-)
+from ....solver.loaders.regular_file import check_regular
 from ...arrays import Float32Array, Uint8Array
-from ...errors import (
-    VideoError,
-)
-from ...footage import (
-    MAX_PIXELS,
-)
-from .exif import (
-    PNG,
-    TIFF,
-    animation_length,
-    png_chunks,
-    read_exif,
-    tiff_size,
-)
-from .file_names import (
-    utf8_name,
-)
-from .frame_readers import (
-    decode_items,
-)
-from .heif import (
-    assemble,
-    read_layout,
-)
-from .image_size import (
-    check_depth,
-    check_size,
-    too_large,
-)
+from ...errors import VideoError
+from ...footage import MAX_PIXELS
+from .exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
+from .file_names import utf8_name
+from .frame_readers import decode_items
+from .heif import assemble, read_layout
+from .image_size import check_depth, check_size, too_large
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF

@@ -29,16 +29,11 @@ import cv2
 from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...notices import Notice, notice
-from .frame import (
-    Frame,
-)
+from .frame import Frame
 from .frame_readers import DEFAULT_FPS, PyavReader, estimate_fps, exact_fps, next_time
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
-from .still_images import (
-    is_picture,
-    read_picture,
-)
+from .still_images import is_picture, read_picture
 from .video_range import FootageRange, FrameSampler, VideoRange
 
 cv2.setLogLevel(0)  # silent: failures are reported as exceptions

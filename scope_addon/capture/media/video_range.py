@@ -20,9 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ...errors import UsageError
-from .frame import (
-    Frame,
-)
+from .frame import Frame
 
 _MARGIN = Fraction(1, 4)  # of a frame, for containers that round the times of their frames
 _CLOCK = re.compile(r"(?:(?:(\d{1,4}):)?(\d{1,2}):)?(\d{1,9}(?:[.,]\d*)?|(?<!:)[.,]\d+)", re.A)

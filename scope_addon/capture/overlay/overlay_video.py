@@ -27,9 +27,7 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, VideoError
 from ...motion import Motion
 from ..camera.intrinsics import scaled_intrinsics
-from ..media.frame import (
-    Frame,
-)
+from ..media.frame import Frame
 from ..media.video import Video, open_video
 from ..media.video_range import FootageRange
 from ..perception.landmark_network import KEYPOINT_COUNT
@@ -293,10 +291,7 @@ class _Painter:
         return image
 
     def _draw_keypoints(
-        self,
-        image: Uint8Array,
-        keypoints: FloatArray,
-        color: Float64Array,
+        self, image: Uint8Array, keypoints: FloatArray, color: Float64Array
     ) -> None:
         """Draw the confident keypoints (n, 3) of one person into the image, in place."""
         radius = max(1, round(max(image.shape[:2]) / 500))

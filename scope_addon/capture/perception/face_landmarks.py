@@ -15,22 +15,11 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from ....solver.names import (
-    EXPRESSIONS,
-)
+from ....solver.names import EXPRESSIONS
 from ...arrays import Float64Array, FloatArray, Uint8Array
-from .landmark_network import (
-    KEYPOINT_NAMES,
-)
-from .region import (
-    Region,
-    box_along,
-)
-from .sessions import (
-    Execution,
-    network_path,
-    open_session,
-)
+from .landmark_network import KEYPOINT_NAMES
+from .region import Region, box_along
+from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 256
 FACE_POINTS = 478  # the mesh of 468 points, then the right and the left iris, five points each
@@ -115,9 +104,7 @@ class FaceNetwork:
         depth = region.side_px * points[:, 2:]
         placed = np.concatenate([region.image_from_crop(points[:, :2]), depth], axis=1)
         return FaceEstimate(
-            landmarks=placed,
-            presence=float(1.0 / (1.0 + np.exp(-presence.item()))),
-            region=region,
+            landmarks=placed, presence=float(1.0 / (1.0 + np.exp(-presence.item()))), region=region
         )
 
 

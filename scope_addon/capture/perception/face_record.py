@@ -10,15 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.names import (
-    EXPRESSIONS,
-)
+from ....solver.names import EXPRESSIONS
 from ...arrays import Float64Array, FloatArray
-from .face_landmarks import (
-    EXPRESSION_POINTS,
-    FACE_POINTS,
-    FaceEstimate,
-)
+from .face_landmarks import EXPRESSION_POINTS, FACE_POINTS, FaceEstimate
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.
 CONTOURS = (

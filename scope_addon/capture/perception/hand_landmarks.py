@@ -18,11 +18,7 @@ from ...arrays import Float64Array, Uint8Array
 from .landmark_network import KEYPOINT_NAMES, disagreement
 from .person_detector import decode, make_anchors, merge_overlapping
 from .region import Region, box_along
-from .sessions import (
-    Execution,
-    network_path,
-    open_session,
-)
+from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 224
 HAND_NAMES = (

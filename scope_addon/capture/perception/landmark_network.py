@@ -15,11 +15,7 @@ from numpy.typing import NDArray
 from ....solver.names import BLAZEPOSE
 from ...arrays import Float32Array, Float64Array, Uint8Array
 from .region import MARGIN, Region, region_from_points
-from .sessions import (
-    Execution,
-    network_path,
-    open_session,
-)
+from .sessions import Execution, network_path, open_session
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -132,12 +128,7 @@ class LandmarkNetwork:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(
-        self,
-        name: str,
-        threads: int,
-        execution: Execution | None = None,
-    ) -> None:
+    def __init__(self, name: str, threads: int, execution: Execution | None = None) -> None:
         self._path = network_path(name)
         self._threads = threads
         self._execution = execution

@@ -31,9 +31,7 @@ from ....solver.errors import ModelFileError, ShapeError
 from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
-from .sessions import (
-    open_session,
-)
+from .sessions import open_session
 
 LIFTER_FILE = Path(__file__).resolve().parents[3] / "assets" / "lifter" / "lifter.onnx"
 KEYPOINT_COUNT = 33
@@ -104,10 +102,7 @@ def person_size(image_points: FloatArray) -> FloatArray:
 
 
 def network_input(
-    rays: FloatArray,
-    confidence: FloatArray,
-    world: FloatArray,
-    known: NDArray[Any],
+    rays: FloatArray, confidence: FloatArray, world: FloatArray, known: NDArray[Any]
 ) -> tuple[FloatArray, FloatArray]:
     """Calculate the network's input for T frames, see the module's equation.
 

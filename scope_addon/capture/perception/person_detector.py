@@ -12,11 +12,7 @@ import numpy as np
 from ...arrays import Float32Array, Float64Array, IndexArray, Uint8Array
 from .letterbox import fit_in
 from .region import Region, region_from_points
-from .sessions import (
-    Execution,
-    network_path,
-    open_session,
-)
+from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 224
 SCORE_THRESHOLD = 0.5
@@ -68,10 +64,7 @@ class PersonDetector:
         self._anchors = make_anchors()
 
     def detect(
-        self,
-        image_rgb: Uint8Array,
-        threshold: float = SCORE_THRESHOLD,
-        closely: bool = False,
+        self, image_rgb: Uint8Array, threshold: float = SCORE_THRESHOLD, closely: bool = False
     ) -> list[Detection]:
         """Detect all people in an (H, W, 3) uint8 RGB image, best first.
 
@@ -201,10 +194,7 @@ def make_anchors(
 
 
 def decode(
-    boxes: Float32Array,
-    logits: Float32Array,
-    anchors: Float64Array,
-    threshold: float,
+    boxes: Float32Array, logits: Float32Array, anchors: Float64Array, threshold: float
 ) -> tuple[Float64Array, Float64Array]:
     """Convert the network's raw outputs to boxes and points.
 

@@ -14,15 +14,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ....solver.errors import ModelFileError, ScopeError
-from ...errors import (
-    SetupError,
-    UsageError,
-    lacks_memory,
-)
-from ...notices import (
-    Notice,
-    notice,
-)
+from ...errors import SetupError, UsageError, lacks_memory
+from ...notices import Notice, notice
 from .adapters.network_server import load_runtime, make_session
 
 if TYPE_CHECKING:

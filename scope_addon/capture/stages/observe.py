@@ -17,79 +17,31 @@ import numpy as np
 from ....solver.body import Body
 from ...arrays import Float64Array, Uint8Array
 from ...errors import NoPersonError, VideoError
-from ...notices import (
-    Notice,
-    notice,
-)
-from ...options.capture import (
-    AUTO,
-    LARGEST,
-    OFF,
-)
-from ..camera.background_record import (
-    BackgroundRecord,
-    CameraMotion,
-)
+from ...notices import Notice, notice
+from ...options.capture import AUTO, LARGEST, OFF
+from ..camera.background_record import BackgroundRecord, CameraMotion
 from ..camera.camera_rotation import BackgroundTracker
-from ..camera.intrinsics import (
-    Camera,
-    choose_camera,
-)
-from ..camera.line_segments import (
-    Lines,
-)
+from ..camera.intrinsics import Camera, choose_camera
+from ..camera.line_segments import Lines
 from ..fitting.background_estimators import KERNELS, BackgroundEstimators
 from ..fitting.focal_length import FocalFits
-from ..fitting.live_body import (
-    LiveBody,
-)
-from ..media.frame import (
-    AutoExposure,
-    Frame,
-)
+from ..fitting.live_body import LiveBody
+from ..media.frame import AutoExposure, Frame
 from ..media.opencv_threads import opencv_in_one_thread
-from ..media.video import (
-    Video,
-)
-from ..options import (
-    CaptureOptions,
-    most_people,
-)
+from ..media.video import Video
+from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
-from ..perception.landmark_network import (
-    EstimateMemory,
-)
-from ..perception.observation import (
-    Observation,
-)
-from ..perception.sessions import (
-    Execution,
-)
-from ..tracking.face.face_tracker import (
-    FaceTracker,
-)
-from ..tracking.hands.hand_tracker import (
-    LARGE_HAND_PX,
-    SMALLEST_HAND_PX,
-    HandTracker,
-)
-from ..tracking.mask_schedule import (
-    MaskSchedule,
-)
-from ..tracking.people import (
-    build_tracks,
-)
+from ..perception.landmark_network import EstimateMemory
+from ..perception.observation import Observation
+from ..perception.sessions import Execution
+from ..tracking.face.face_tracker import FaceTracker
+from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
+from ..tracking.mask_schedule import MaskSchedule
+from ..tracking.people import build_tracks
 from ..tracking.scene_cuts import SCENE_GAP_S, SceneCuts
 from ..tracking.track import Track, Tracklet
-from ..tracking.tracker import (
-    PeopleTracker,
-)
-from .clock import (
-    COMPILING,
-    FINDING,
-    Progress,
-    StageClock,
-)
+from ..tracking.tracker import PeopleTracker
+from .clock import COMPILING, FINDING, Progress, StageClock
 
 # Called with each decoded frame, its largest person, and the object that fits the body to such an
 # observation.
@@ -383,11 +335,7 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
 
 
 def new_observer(
-    video: Video,
-    trackers: Trackers,
-    camera: Camera,
-    pool: ThreadPoolExecutor,
-    clock: StageClock,
+    video: Video, trackers: Trackers, camera: Camera, pool: ThreadPoolExecutor, clock: StageClock
 ) -> FrameObserver:
     """Return an observer of a clip's frames, or of some of them, by trackers that have seen
     nothing.

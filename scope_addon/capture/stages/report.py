@@ -21,12 +21,8 @@ from ...options.capture import ON
 from ..media.video import Video
 from ..options import CaptureOptions
 from ..world.world_frame import LINES, UP_DEVIATIONS_DEG
-from .observe import (
-    Footage,
-)
-from .solve import (
-    Solved,
-)
+from .observe import Footage
+from .solve import Solved
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
@@ -98,11 +94,7 @@ def capture_warnings(
         if unseen:
             warnings.append(
                 notice(
-                    "unseen_frames",
-                    footage=name,
-                    person=person,
-                    unseen=unseen,
-                    total=len(motion),
+                    "unseen_frames", footage=name, person=person, unseen=unseen, total=len(motion)
                 )
             )
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:

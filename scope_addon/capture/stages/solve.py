@@ -22,9 +22,7 @@ from ..tracking.track import Track
 from ..world.above_floor import raise_feet
 from ..world.assemble import FittedPerson, Shot, assemble_motion
 from ..world.camera_path import CameraPath, camera_travel
-from ..world.clip_fit import (
-    fit_clip,
-)
+from ..world.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
 from ..world.stance import stance_on_ground

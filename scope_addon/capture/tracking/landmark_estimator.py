@@ -12,41 +12,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...arrays import Float64Array, Uint8Array
-from ...errors import (
-    SetupError,
-)
-from ..perception.adapters.box_detector import (
-    BoxDetector,
-)
-from ..perception.adapters.keypoint_network import (
-    KeypointNetwork,
-)
-from ..perception.landmark_network import (
-    LandmarkNetwork,
-    PoseEstimate,
-)
-from ..perception.observation import (
-    PendingReference,
-)
-from ..perception.person_detector import (
-    PersonDetector,
-)
-from ..perception.region import (
-    Region,
-)
-from ..perception.sessions import (
-    Execution,
-    landmark_network_name,
-)
-from .plausibility import (
-    is_in_image,
-    is_plausible,
-    is_same_region,
-)
-from .tracked_target import (
-    MIN_VELOCITY_FRAMES,
-    TrackedTarget,
-)
+from ...errors import SetupError
+from ..perception.adapters.box_detector import BoxDetector
+from ..perception.adapters.keypoint_network import KeypointNetwork
+from ..perception.landmark_network import LandmarkNetwork, PoseEstimate
+from ..perception.observation import PendingReference
+from ..perception.person_detector import PersonDetector
+from ..perception.region import Region
+from ..perception.sessions import Execution, landmark_network_name
+from .plausibility import is_in_image, is_plausible, is_same_region
+from .tracked_target import MIN_VELOCITY_FRAMES, TrackedTarget
 
 MAX_PENDING = 2  # calls that are not finished, each of which keeps its frame in memory
 
@@ -89,10 +64,7 @@ class LandmarkEstimator:
         return out
 
     def estimate_live(
-        self,
-        image_rgb: Uint8Array,
-        upcoming_rgb: Uint8Array | None,
-        live: Sequence[TrackedTarget],
+        self, image_rgb: Uint8Array, upcoming_rgb: Uint8Array | None, live: Sequence[TrackedTarget]
     ) -> list[PoseEstimate | None]:
         """Estimate everybody who is tracked in this frame, and start the estimates of the upcoming
         one.

@@ -90,11 +90,7 @@ def repair_left_right(track: Track, camera: Camera) -> Track:
 
 
 def swap_keypoints(
-    track: Track,
-    where: BoolArray,
-    order: IndexArray = MIRROR_PARTNER,
-    *,
-    with_hands: bool = True,
+    track: Track, where: BoolArray, order: IndexArray = MIRROR_PARTNER, *, with_hands: bool = True
 ) -> Track:
     """Return the track with its keypoints reordered, and the hands swapped, in some frames.
 

@@ -11,13 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...arrays import Uint8Array
-from ..perception.landmark_network import (
-    LandmarkNetwork,
-)
-from ..perception.observation import (
-    Observation,
-    PersonMask,
-)
+from ..perception.landmark_network import LandmarkNetwork
+from ..perception.observation import Observation, PersonMask
 
 MASKS = 16  # for a clip, about; 8 give the same shape on real clips
 MIN_STRIDE = 6  # frames between two masks in short clips

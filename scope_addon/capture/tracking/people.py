@@ -23,14 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Float64Array
-from .appearance import (
-    distance,
-)
-from .track import (
-    Track,
-    Tracklet,
-    make_track,
-)
+from .appearance import distance
+from .track import Track, Tracklet, make_track
 
 POSITION_SIGMA = 0.15  # sides of the region
 SPEED_SIGMA = 0.8  # sides per second: nobody keeps exactly the same velocity

@@ -8,17 +8,9 @@ from __future__ import annotations
 import math
 
 from ...arrays import Uint8Array
-from ..perception.landmark_network import (
-    PoseEstimate,
-)
-from ..perception.region import (
-    Region,
-    bounds,
-    inside,
-)
-from .left_right import (
-    mean_distance,
-)
+from ..perception.landmark_network import PoseEstimate
+from ..perception.region import Region, bounds, inside
+from .left_right import mean_distance
 
 PRESENCE_THRESHOLD = 0.5
 # See PoseEstimate.spread and .disagreement. Hands are detected as people with scores of up to 0.86,

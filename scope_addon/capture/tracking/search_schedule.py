@@ -52,10 +52,7 @@ class SearchSchedule:
         self._parts_interval_s = SEARCH_LOST_S
 
     def is_due(
-        self,
-        image_rgb: Uint8Array,
-        live: Sequence[TrackedTarget],
-        lost: Sequence[TrackedTarget],
+        self, image_rgb: Uint8Array, live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
         """Return whether to search this frame (H, W, 3)."""
         return self._clock.has_passed(
@@ -63,10 +60,7 @@ class SearchSchedule:
         )
 
     def begin(
-        self,
-        image_rgb: Uint8Array,
-        live: Sequence[TrackedTarget],
-        lost: Sequence[TrackedTarget],
+        self, image_rgb: Uint8Array, live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
         """Note a search in this frame (H, W, 3).
 
@@ -86,10 +80,7 @@ class SearchSchedule:
         return closely
 
     def begin_small(
-        self,
-        image_rgb: Uint8Array,
-        live: Sequence[TrackedTarget],
-        lost: Sequence[TrackedTarget],
+        self, image_rgb: Uint8Array, live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> bool:
         """Return whether to look for small people in this frame (H, W, 3), and if so, note it.
 
@@ -122,10 +113,7 @@ class SearchSchedule:
         return True
 
     def _interval_s(
-        self,
-        image_rgb: Uint8Array,
-        live: Sequence[TrackedTarget],
-        lost: Sequence[TrackedTarget],
+        self, image_rgb: Uint8Array, live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
     ) -> float:
         """Return the seconds between two searches at present; 0: in every frame."""
         if not live or any(self._clock.is_within(EAGER_S, f.seen_s) for f in lost):

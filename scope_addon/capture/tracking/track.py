@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray
-from ..perception.face_record import (
-    RECORD,
-)
+from ..perception.face_record import RECORD
 from ..perception.landmark_network import KEYPOINT_COUNT
 from ..perception.observation import Observation, PendingReference, PersonMask
 from .appearance import SIZE as APPEARANCE_SIZE

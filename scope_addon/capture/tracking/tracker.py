@@ -24,16 +24,10 @@ from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseE
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
 from ..perception.region import Region
-from ..perception.sessions import (
-    Execution,
-)
+from ..perception.sessions import Execution
 from .appearance import appearance
 from .frame_clock import FRAME_S, FrameClock
-from .landmark_estimator import (
-    LandmarkEstimator,
-    ReferenceEstimator,
-    open_networks,
-)
+from .landmark_estimator import LandmarkEstimator, ReferenceEstimator, open_networks
 from .left_right import looks_swapped, swap_ratio
 from .plausibility import (
     DISAGREEMENT_THRESHOLD,
@@ -430,10 +424,7 @@ class PeopleTracker:
         return calls
 
     def _observe(
-        self,
-        image_rgb: Uint8Array,
-        target: TrackedTarget,
-        reference: PendingReference | None,
+        self, image_rgb: Uint8Array, target: TrackedTarget, reference: PendingReference | None
     ) -> Observation:
         e = target.estimate
         samples_appearance = self._clock.has_passed(

@@ -67,11 +67,7 @@ def raise_feet(
     body = placed.body
     pelvis_at_rest = placed.body.rest_joints(placed.betas)[0]
 
-    def bend(
-        rotations: FloatArray,
-        root: FloatArray,
-        shift: FloatArray,
-    ) -> tuple[FloatArray]:
+    def bend(rotations: FloatArray, root: FloatArray, shift: FloatArray) -> tuple[FloatArray]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, placed.betas)
         return (
             move_feet(body, rotations, poses, shift[..., None] * up).astype(
@@ -123,10 +119,7 @@ def _foot_lifts(heights: Float64Array, contact: FloatArray, times: Float64Array)
 
 
 def _root_rise(
-    lifts: Float64Array,
-    seen: FloatArray,
-    supports: FloatArray,
-    times: Float64Array,
+    lifts: Float64Array, seen: FloatArray, supports: FloatArray, times: Float64Array
 ) -> Float64Array:
     """Return by how much the whole body rises, (T,): what the deeper foot needs, unless something
     else rests.

@@ -19,37 +19,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....solver import (
-    MotionFit,
-    State,
-)
-from ....solver.rotations import (
-    exp,
-    log,
-)
+from ....solver import MotionFit, State
+from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
-from ...kinematics.body_surface import (
-    BodySurface,
-)
-from ..fitting.frame_sequence import (
-    LONGEST_COAST_S,
-    FittedTrack,
-)
-from ..fitting.prepared_track import (
-    PreparedTrack,
-)
-from ..fitting.weights import (
-    motion_priors,
-)
-from .camera_path import (
-    CameraPath,
-)
-from .clip_window import (
-    ClipWindow,
-)
-from .limb_search import (
-    search_limbs,
-)
+from ...kinematics.body_surface import BodySurface
+from ..fitting.frame_sequence import LONGEST_COAST_S, FittedTrack
+from ..fitting.prepared_track import PreparedTrack
+from ..fitting.weights import motion_priors
+from .camera_path import CameraPath
+from .clip_window import ClipWindow
+from .limb_search import search_limbs
 
 # unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
 WINDOW_UNKNOWNS = 36_000
@@ -66,10 +45,7 @@ _MIN_HZ = 10.0  # acceleration hardly couples frames that are further apart
 
 
 def fit_clip(
-    prepared: PreparedTrack,
-    start: FittedTrack,
-    path: CameraPath,
-    progress: _Progress,
+    prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress
 ) -> FittedTrack:
     """Fit all frames of a track together, between longer gaps.
 
@@ -91,11 +67,7 @@ class _Clip:
     """A track on its way to its motion, in the first frame's axes."""
 
     def __init__(
-        self,
-        prepared: PreparedTrack,
-        start: FittedTrack,
-        path: CameraPath,
-        progress: _Progress,
+        self, prepared: PreparedTrack, start: FittedTrack, path: CameraPath, progress: _Progress
     ) -> None:
         self._prepared = prepared
         self._path = path
@@ -202,10 +174,7 @@ def _frames_of(prepared: PreparedTrack, unknowns: int) -> int:
 
 
 def joint_sigma(
-    pelvis: Float64Array,
-    from_pelvis: Float64Array,
-    joints: FloatArray,
-    times: Float64Array,
+    pelvis: Float64Array, from_pelvis: Float64Array, joints: FloatArray, times: Float64Array
 ) -> Float64Array:
     """Return the (T, K+1, 2) standard deviations along the line of sight and across it, per axis,
     metres.

@@ -29,31 +29,14 @@ from ....solver import (
     fit_tree,
     make_tree,
 )
-from ....solver.compiled.tree import (
-    Tree,
-    with_fixed_shape,
-)
+from ....solver.compiled.tree import Tree, with_fixed_shape
 from ...arrays import Float64Array, FloatArray, IndexArray
-from ...kinematics.body_surface import (
-    BodySurface,
-)
-from ...kinematics.contact_points import (
-    contact_point_positions,
-)
-from ...kinematics.runs import (
-    runs,
-)
-from ..fitting.prepared_track import (
-    PreparedTrack,
-)
-from ..fitting.weights import (
-    CLIP_STEPS,
-    ROBUST,
-    clip_stages,
-)
-from .camera_path import (
-    CameraPath,
-)
+from ...kinematics.body_surface import BodySurface
+from ...kinematics.contact_points import contact_point_positions
+from ...kinematics.runs import runs
+from ..fitting.prepared_track import PreparedTrack
+from ..fitting.weights import CLIP_STEPS, ROBUST, clip_stages
+from .camera_path import CameraPath
 
 # of a rest; see `resting_places`
 MIN_PROBABILITY = 0.5
@@ -75,11 +58,7 @@ class ClipWindow:
 
     @classmethod
     def of(
-        cls,
-        prepared: PreparedTrack,
-        path: CameraPath,
-        frames: IndexArray,
-        betas: FloatArray,
+        cls, prepared: PreparedTrack, path: CameraPath, frames: IndexArray, betas: FloatArray
     ) -> ClipWindow:
         """Measure frames (n,) of a track for a shape (P,)."""
         measured = [prepared.measure_all(k) for k in frames]
@@ -222,10 +201,7 @@ def resting_places(points: FloatArray, resting: FloatArray) -> tuple[Float64Arra
 
 
 def with_planes(
-    floor: Floor | None,
-    indices: IndexArray,
-    normal: Float64Array,
-    offset: Float64Array,
+    floor: Floor | None, indices: IndexArray, normal: Float64Array, offset: Float64Array
 ) -> Floor | None:
     """Add points that may not be below a plane each, and are free to be above it.
 

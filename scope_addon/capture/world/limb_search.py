@@ -17,22 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import (
-    Body,
-    MotionFit,
-    MotionPrior,
-    State,
-)
+from ....solver import Body, MotionFit, MotionPrior, State
 from ...arrays import Float64Array
-from ...kinematics.mirrored_limbs import (
-    LIMBS,
-    bone_depths,
-    mirrored_limb,
-    runs_of_one_sign,
-)
-from .clip_window import (
-    ClipWindow,
-)
+from ...kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
+from .clip_window import ClipWindow
 
 # a bone is mirrored while it is deeper, if it gets so deep
 SHALLOW_M = 0.03

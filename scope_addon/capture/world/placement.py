@@ -150,10 +150,7 @@ def without_gaps(
 
 
 def _place(
-    body_with_contacts: Body,
-    betas: FloatArray,
-    rotations: FloatArray,
-    root: FloatArray,
+    body_with_contacts: Body, betas: FloatArray, rotations: FloatArray, root: FloatArray
 ) -> tuple[Float32Array, Float32Array]:
     pelvis_at_rest = body_with_contacts.rest_joints(betas)[0]
 

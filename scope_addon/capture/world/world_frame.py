@@ -63,9 +63,7 @@ def up_from_standing(people: Sequence[PlacedTrack]) -> Float64Array:
     return _unit(total)
 
 
-def _straightness(
-    person: PlacedTrack,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _straightness(person: PlacedTrack) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return directions (n, 3) of trunk and body, and how straight the body is (n,), in the n
     frames it was seen in.
     """
@@ -143,9 +141,7 @@ def up_from_floor(feet_cam: FloatArray, up: FloatArray) -> Float64Array:
 
 
 def up_from_scene(
-    up_body: FloatArray,
-    feet_cam: FloatArray | None,
-    lines: Lines | None,
+    up_body: FloatArray, feet_cam: FloatArray | None, lines: Lines | None
 ) -> tuple[FloatArray, str]:
     """Correct the up direction of the bodies by the lines of the background or, failing that, by
     the feet.
@@ -167,11 +163,7 @@ def up_from_scene(
     return _unit(up), BODIES
 
 
-def floor_height(
-    soles_cam: FloatArray,
-    contact: FloatArray,
-    up: FloatArray,
-) -> float:
+def floor_height(soles_cam: FloatArray, contact: FloatArray, up: FloatArray) -> float:
     """Estimate the height of a person's floor above the camera: the weighted median of each frame's
     lowest sole point.
 

@@ -11,22 +11,15 @@ from scope.scope_addon.capture.fitting import track_fit
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import Stance, prepare_track
-from scope.scope_addon.capture.perception.face_landmarks import (
-    FACE_POINTS,
-    FaceEstimate,
-)
-from scope.scope_addon.capture.perception.face_record import (
-    record,
-)
+from scope.scope_addon.capture.perception.face_landmarks import FACE_POINTS, FaceEstimate
+from scope.scope_addon.capture.perception.face_record import record
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face.expression_fit import load_response
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.camera_path import CameraPath
-from scope.scope_addon.capture.world.clip_fit import (
-    fit_clip,
-)
+from scope.scope_addon.capture.world.clip_fit import fit_clip
 from scope.scope_addon.capture.world.placement import place_track
 from scope.solver import load_body
 from scope.solver.rotations import exp

@@ -18,9 +18,7 @@ from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.long_clips.window_file import load_window, save_window
 from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord, known_reference
-from scope.scope_addon.capture.perception.face_record import (
-    RECORD,
-)
+from scope.scope_addon.capture.perception.face_record import RECORD
 from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.track import Tracklet

@@ -13,9 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.long_clips import window_file
-from scope.scope_addon.capture.media.frame import (
-    Frame,
-)
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.tracking.track import Track

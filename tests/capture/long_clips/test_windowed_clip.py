@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.long_clips import joined_windows
 from scope.scope_addon.capture.long_clips.windowed_clip import count_windows, observe_windows
-from scope.scope_addon.capture.media.frame import (
-    Frame,
-)
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking.track import Track
 

@@ -10,9 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.frame import (
-    AutoExposure,
-)
+from scope.scope_addon.capture.media.frame import AutoExposure
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.solver import Body

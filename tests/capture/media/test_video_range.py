@@ -11,9 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.frame import (
-    Frame,
-)
+from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import (
     FrameSampler,

@@ -9,9 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from scope.scope_addon.capture.perception import (
-    sessions,
-)
+from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.sessions import (
     CHOICES,
     CPU,

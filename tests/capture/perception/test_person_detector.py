@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception import (
-    sessions,
-)
+from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.letterbox import fit_in
 from scope.scope_addon.capture.perception.person_detector import (
     PersonDetector,
@@ -21,10 +19,7 @@ from scope.scope_addon.capture.perception.person_detector import (
     small_squares,
     squares,
 )
-from scope.scope_addon.capture.perception.sessions import (
-    network_path,
-    open_session,
-)
+from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import SetupError, UsageError
 from scope.solver.errors import ModelFileError
 

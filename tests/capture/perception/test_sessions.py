@@ -13,9 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.capture.perception import (
-    sessions,
-)
+from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.errors import SetupError
 
 PROGRAM = """

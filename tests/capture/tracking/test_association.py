@@ -8,11 +8,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.tracking.appearance import SIZE
-from scope.scope_addon.capture.tracking.people import (
-    assign,
-    cheapest_links,
-    link,
-)
+from scope.scope_addon.capture.tracking.people import assign, cheapest_links, link
 from scope.scope_addon.capture.tracking.track import Tracklet
 
 RATE = 30.0

@@ -14,9 +14,7 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking import (
-    landmark_estimator,
-)
+from scope.scope_addon.capture.tracking import landmark_estimator
 from scope.scope_addon.capture.tracking.people import (
     build_tracks,
     frames_before_flicker,

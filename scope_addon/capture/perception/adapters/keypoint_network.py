@@ -34,9 +34,7 @@ from .....solver.errors import ModelFileError
 from ....arrays import BoolArray, Float64Array, Uint8Array
 from ..landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..region import Region, box_along
-from ..sessions import (
-    Execution,
-)
+from ..sessions import Execution
 from .description import Description, description_path, read_description
 from .graph import IMAGENET, Graph, Outputs, finite
 from .keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet

@@ -23,9 +23,7 @@ from typing import Any
 
 from .....solver.errors import ModelFileError
 from ....errors import SetupError
-from ..sessions import (
-    session_options_of,
-)
+from ..sessions import session_options_of
 from .network_server import LARGEST_ARRAYS, OUT_OF_MEMORY, receive, send
 
 SERVER = Path(__file__).with_name("network_server.py")

@@ -32,17 +32,8 @@ from .....solver.errors import ModelFileError
 from .....solver.loaders.npz import read_npz
 from .....solver.rotations import log
 from ....arrays import BoolArray, Float64Array, FloatArray
-from ...perception.face_landmarks import (
-    EXPRESSION_POINTS,
-    ExpressionNetwork,
-)
-from ...perception.face_record import (
-    gaze,
-    kept_landmarks,
-    landmarks_of,
-    parts,
-    with_expression,
-)
+from ...perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
+from ...perception.face_record import gaze, kept_landmarks, landmarks_of, parts, with_expression
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
 # of a face, from which a person's face at rest is known
@@ -188,10 +179,7 @@ def error_size(response: FaceResponse, errors: Float64Array) -> float:
 
 
 def _descend(
-    w: Float64Array,
-    normal: Float64Array,
-    target: Float64Array,
-    largest: Float64Array,
+    w: Float64Array, normal: Float64Array, target: Float64Array, largest: Float64Array
 ) -> None:
     """Minimize ½ wᵀ H w − gᵀ w in the box 0 ≤ w ≤ w_max, for all frames at once, in place.
 

@@ -14,11 +14,7 @@ from .....solver.names import EXPRESSIONS
 from ....arrays import BoolArray, Float64Array, FloatArray
 from ....kinematics.smoothing import gaussian_smooth
 from ....motion import FACE_KEYS
-from ...perception.face_record import (
-    CONTOURS,
-    eye_light_of,
-    parts,
-)
+from ...perception.face_record import CONTOURS, eye_light_of, parts
 
 CALM_HZ = 2.0  # cut-off frequency at rest
 NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face
@@ -119,10 +115,7 @@ def with_open_eyes(weights: FloatArray, seen: BoolArray, times: Float64Array) ->
 
 
 def released(
-    values: FloatArray,
-    seen: BoolArray,
-    times: Float64Array,
-    rest: Float64Array,
+    values: FloatArray, seen: BoolArray, times: Float64Array, rest: Float64Array
 ) -> Float64Array:
     """Fill the frames without measurement: from the last value to rest and from rest to the next
     one.

@@ -22,14 +22,10 @@ from ...perception.face_landmarks import (
     facing,
     region_from_body,
 )
-from ...perception.face_record import (
-    record,
-)
+from ...perception.face_record import record
 from ...perception.observation import Observation
 from ...perception.region import Region
-from ...perception.sessions import (
-    Execution,
-)
+from ...perception.sessions import Execution
 from ..frame_clock import PATIENCE_S, is_search_due
 
 PRESENCE_THRESHOLD = 0.5
@@ -82,10 +78,7 @@ class FaceTracker:
         return tracker
 
     def step(
-        self,
-        image_rgb: Uint8Array,
-        observations: Sequence[tuple[int, Observation]],
-        time_s: float,
+        self, image_rgb: Uint8Array, observations: Sequence[tuple[int, Observation]], time_s: float
     ) -> list[tuple[int, Observation]]:
         """Add ``face`` to the observations of one frame: its landmarks, from which
         `with_expressions` finds the rest.

@@ -20,11 +20,7 @@ import numpy as np
 from .....solver.rotations import exp
 from ....arrays import Float64Array, FloatArray
 from ...camera.intrinsics import Camera
-from ...perception.face_record import (
-    landmarks_of,
-    parts,
-    presence_of,
-)
+from ...perception.face_record import landmarks_of, parts, presence_of
 from ...perception.lifter import camera_towards
 from .expression_fit import aligned, load_response
 
@@ -61,11 +57,7 @@ def across_head(face: FloatArray, camera: Camera) -> Float64Array:
     return directions
 
 
-def certainty(
-    face: FloatArray,
-    directions: Float64Array,
-    ears: FloatArray,
-) -> Float64Array:
+def certainty(face: FloatArray, directions: Float64Array, ears: FloatArray) -> Float64Array:
     """Return how much each direction counts (T,), 1 of a large face that is surely there, 0 where
     there is none.
 

@@ -21,14 +21,7 @@ from ...perception.hand_landmarks import (
 from ...perception.observation import Observation
 from ...perception.region import Region
 from ..appearance import sample
-from .hand_assignment import (
-    CERTAIN_PRESENCE,
-    SAME_WRIST,
-    Least,
-    assigned,
-    is_same_hand,
-    side_of,
-)
+from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
 
 # of the wrist in a frame, in hand lengths, from which the region that does not move is tried as
 # well

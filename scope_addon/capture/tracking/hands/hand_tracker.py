@@ -25,9 +25,7 @@ from ...perception.hand_landmarks import (
 )
 from ...perception.observation import Observation
 from ...perception.region import Region
-from ...perception.sessions import (
-    Execution,
-)
+from ...perception.sessions import Execution
 from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
 from .hand_assignment import (
     DETECTED,
@@ -104,10 +102,7 @@ class HandTracker:
     """
 
     def __init__(
-        self,
-        threads: int,
-        execution: Execution | None = None,
-        least_px: float = SMALLEST_HAND_PX,
+        self, threads: int, execution: Execution | None = None, least_px: float = SMALLEST_HAND_PX
     ) -> None:
         self._least_px = least_px
         self._network = HandNetwork(1, execution)

@@ -10,13 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media.deinterlace import (
-    deinterlaced,
-)
+from scope.scope_addon.capture.media.deinterlace import deinterlaced
 from scope.scope_addon.capture.media.frame_readers import PyavReader
-from scope.scope_addon.capture.media.hdr import (
-    hdr_rgb,
-)
+from scope.scope_addon.capture.media.hdr import hdr_rgb
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 

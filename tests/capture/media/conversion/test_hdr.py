@@ -9,13 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame_readers import rgb
-from scope.scope_addon.capture.media.hdr import (
-    compress,
-    hdr_rgb,
-    hlg_light,
-    pq_code,
-    pq_light,
-)
+from scope.scope_addon.capture.media.hdr import compress, hdr_rgb, hlg_light, pq_code, pq_light
 from scope.scope_addon.capture.media.video import open_video
 
 from ....required import need_encoder

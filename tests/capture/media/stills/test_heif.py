@@ -13,13 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame_readers import decode_items
-from scope.scope_addon.capture.media.heif import (
-    assemble,
-    read_layout,
-)
-from scope.scope_addon.capture.media.still_images import (
-    read_picture,
-)
+from scope.scope_addon.capture.media.heif import assemble, read_layout
+from scope.scope_addon.capture.media.still_images import read_picture
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError

@@ -8,10 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face_landmarks import (
-    FaceEstimate,
-    FaceNetwork,
-)
+from scope.scope_addon.capture.perception.face_landmarks import FaceEstimate, FaceNetwork
 from scope.scope_addon.capture.perception.region import Region
 
 

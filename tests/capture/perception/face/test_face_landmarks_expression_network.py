@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face_landmarks import (
-    EXPRESSION_POINTS,
-    ExpressionNetwork,
-)
+from scope.scope_addon.capture.perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
 from scope.solver.names import EXPRESSIONS
 
 # Upper lid, lower lid and corners of the person's left and right eye, in the mesh of 478 points.

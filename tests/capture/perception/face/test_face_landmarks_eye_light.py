@@ -5,10 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face_landmarks import (
-    FACE_POINTS,
-    eye_light,
-)
+from scope.scope_addon.capture.perception.face_landmarks import FACE_POINTS, eye_light
 
 CORNERS = {33: (30, 40), 133: (50, 40), 362: (70, 40), 263: (90, 40)}
 CHEEKS = {

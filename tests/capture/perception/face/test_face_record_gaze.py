@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.face_record import (
-    gaze,
-    head_axes,
-)
+from scope.scope_addon.capture.perception.face_record import gaze, head_axes
 from scope.solver.rotations import exp
 
 # Metres in the head's axes: x to the person's left, y up, z out of the face.

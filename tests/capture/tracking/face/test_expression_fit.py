@@ -13,10 +13,7 @@ from scope.scope_addon.capture.perception.face_landmarks import (
     FaceEstimate,
     FaceNetwork,
 )
-from scope.scope_addon.capture.perception.face_record import (
-    parts,
-    record,
-)
+from scope.scope_addon.capture.perception.face_record import parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
 from scope.scope_addon.capture.tracking.face.expression_fit import fitted, load_response, view_terms

@@ -12,12 +12,7 @@ from scope.scope_addon.capture.perception.face_landmarks import (
     ExpressionNetwork,
     FaceNetwork,
 )
-from scope.scope_addon.capture.perception.face_record import (
-    RECORD,
-    gaze,
-    parts,
-    record,
-)
+from scope.scope_addon.capture.perception.face_record import RECORD, gaze, parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
 from scope.scope_addon.capture.tracking.face.expression_fit import fitted, with_expressions

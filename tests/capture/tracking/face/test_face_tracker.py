@@ -15,10 +15,7 @@ from scope.scope_addon.capture.perception.face_landmarks import (
     eye_light,
     region_from_body,
 )
-from scope.scope_addon.capture.perception.face_record import (
-    eye_light_of,
-    parts,
-)
+from scope.scope_addon.capture.perception.face_record import eye_light_of, parts
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region

@@ -11,15 +11,8 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera
-from scope.scope_addon.capture.perception.face_landmarks import (
-    FaceEstimate,
-    FaceNetwork,
-)
-from scope.scope_addon.capture.perception.face_record import (
-    RECORD,
-    presence_of,
-    record,
-)
+from scope.scope_addon.capture.perception.face_landmarks import FaceEstimate, FaceNetwork
+from scope.scope_addon.capture.perception.face_record import RECORD, presence_of, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face.head_direction import across_head, certainty
 from scope.solver.loaders.body_file import load_body

@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.tracking.hands.hand_assignment import (
-    SUPPORT_S,
-    confirmed,
-)
+from scope.scope_addon.capture.tracking.hands.hand_assignment import SUPPORT_S, confirmed
 
 FPS = 30
 LEFT = 0

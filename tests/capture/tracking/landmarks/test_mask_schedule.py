@@ -10,11 +10,7 @@ import pytest
 from scope.scope_addon.capture.perception.landmark_network import LandmarkNetwork
 from scope.scope_addon.capture.perception.observation import Observation, PersonMask
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.mask_schedule import (
-    MASKS,
-    MIN_STRIDE,
-    MaskSchedule,
-)
+from scope.scope_addon.capture.tracking.mask_schedule import MASKS, MIN_STRIDE, MaskSchedule
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track, single_frame_track
 
 IMAGE = np.zeros((48, 64, 3), np.uint8)

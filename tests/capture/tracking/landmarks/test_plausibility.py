@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.region import MARGIN, Region
-from scope.scope_addon.capture.tracking import (
-    plausibility,
-)
+from scope.scope_addon.capture.tracking import plausibility
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
 REGION = Region((320.0, 240.0), 250.0, 0.0)

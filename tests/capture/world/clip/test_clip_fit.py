@@ -10,9 +10,7 @@ import pytest
 from scope.benchmarks.ablation import ROWS, replaced
 from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
-from scope.scope_addon.capture.world import (
-    clip_fit,
-)
+from scope.scope_addon.capture.world import clip_fit
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.placement import place_track
 from scope.scope_addon.kinematics.body_surface import BodySurface, with_arm_points

@@ -5,11 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world.clip_fit import (
-    ACROSS,
-    ALONG,
-    joint_sigma,
-)
+from scope.scope_addon.capture.world.clip_fit import ACROSS, ALONG, joint_sigma
 
 
 def _covariances(sights, along_m, across_m):

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world.clip_window import (
-    with_planes,
-)
+from scope.scope_addon.capture.world.clip_window import with_planes
 from scope.solver import Floor
 
 UP = np.array([0.0, -1.0, 0.0])

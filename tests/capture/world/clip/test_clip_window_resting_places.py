@@ -4,9 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.capture.world.clip_window import (
-    resting_places,
-)
+from scope.scope_addon.capture.world.clip_window import resting_places
 
 T = 30
 # metres; the point rests in frames 0 to 11 and 18 to 29

@@ -14,9 +14,7 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.camera_path import CameraPath
-from scope.scope_addon.capture.world.clip_fit import (
-    fit_clip,
-)
+from scope.scope_addon.capture.world.clip_fit import fit_clip
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
