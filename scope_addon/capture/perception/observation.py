@@ -39,7 +39,7 @@ class Observation:
     pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
     `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of
     the left and right hand, see `hand_tracker`; zeros where not seen, the confidence negative where
-    `tentative_hands` decides later. The tracker fills a hand in up to a third of a second later, if
+    `confirmed` decides later. The tracker fills a hand in up to a third of a second later, if
     it is found again, so the array has to be kept itself. ``face``, if requested: see
     `face_record`. ``mask``: the person's outline, in few frames.
     """

@@ -65,7 +65,7 @@ class Least(NamedTuple):
 # of a hand whose palm was detected, or that was seen in the frame before
 DETECTED = Least(0.5, 0.5)
 PREDICTED = Least(0.6, 0.8)  # of one that is only predicted from the body
-TENTATIVE = Least(0.2, 0.2)  # of one that may be believed later, see `tentative_hands`
+TENTATIVE = Least(0.2, 0.2)  # of one that may be believed later, see `confirmed`
 # the same of a hand that is followed back from where it was found again
 FOLLOWED_BACK = Least(0.2, 0.2, 0.42)
 # The same of hands in a second look, which finds small ones in the skin of a forearm.

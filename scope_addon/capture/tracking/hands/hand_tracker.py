@@ -126,7 +126,7 @@ class HandTracker:
         observations: Sequence[tuple[int, Observation]],
         time_s: float | None = None,
     ) -> list[tuple[int, Observation]]:
-        """Add ``hands`` to the observations of one frame; tentative ones as in `tentative_hands`.
+        """Add ``hands`` to the observations of one frame; tentative ones as in `confirmed`.
 
         A hand that is surely found after frames in which it was not is followed back through the
         last third of a second, and written into the arrays of these frames.
