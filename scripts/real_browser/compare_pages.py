@@ -24,8 +24,10 @@ from scope.benchmarks.page.commands import Command, Outcome
 from scope.benchmarks.page.recorded import Run, write_run
 from scope.benchmarks.report import experiment_lines, table
 from scope.scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
+from scope.scope_addon.capture_report import Report
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.notices import notice
 from scope.scope_addon.report.capture_page import CapturedClip, write_capture_page
 from scope.solver.body import Body
 from scope.solver.loaders.body_file import load_body
@@ -134,12 +136,9 @@ def expect(folder: Path) -> None:
     body = load_body("scope")
     of_page = people_of(folder)
     report: dict[str, Any] = json.loads((folder / "captured.json").read_text("utf-8"))
-    warnings = [
-        "made.mp4 cuts to another scene at 2.0 s and at 3.5 s: </script><script>alert(1)</script>"
-    ]
-    clip = CapturedClip(
-        SAMPLE, of_page[MADE], body, report | {"people": 2, "warnings": warnings}, "made & 'two'"
-    )
+    warnings = [notice("cuts", footage="</script><script>alert(1)</script>", times=[2.0, 3.5])]
+    of_two = replace(Report.from_json(report), people=2, warnings=warnings)
+    clip = CapturedClip(SAMPLE, of_page[MADE], body, of_two, "made & 'two'")
     write_capture_page(folder / MADE, clip)
     (folder / "run").mkdir(exist_ok=True)
     shutil.copyfile(folder / "captured.npz", folder / "run" / "sample.npz")

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from scope.scope_addon import cli
 from scope.scope_addon.capture import pipeline
+from scope.scope_addon.capture_report import Report
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
 from scope.solver.body import Body
@@ -106,14 +107,7 @@ def test_an_export_is_the_old_or_the_new_one(tmp_path, temporary, small, motion,
 
 def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatch, motion, capfd):
     cv2.imwrite(str(tmp_path / "walk.png"), np.full((480, 640, 3), 90, np.uint8))
-    report = {
-        "people": 1,
-        "frames": 2,
-        "fps": {"total": 1.0},
-        "reprojection_px": 1.0,
-        "execution": "CPU",
-        "warnings": [],
-    }
+    report = Report(people=1, frames=2, fps={"total": 1.0}, reprojection_px=1.0, execution="CPU")
     monkeypatch.setattr(
         pipeline, "capture", lambda *_, **__: SimpleNamespace(motions=[motion], report=report)
     )
