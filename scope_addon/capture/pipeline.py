@@ -18,7 +18,7 @@ from .stages.clock import Progress, StageClock
 from .stages.observe import Footage, Listeners, ObserveFrames, Watch, observe
 from .stages.repair import repair
 from .stages.report import make_report
-from .stages.solve import return_freed_memory, solve
+from .stages.solve import solve
 from .world.assemble import Shot
 from .world.camera_path import CameraPath
 
@@ -55,7 +55,6 @@ def capture(
         footage, tracks = observe(
             video, body, options, clock, Listeners(progress, watch), observe_frames
         )
-    return_freed_memory()  # of the networks
     with clock.stage("solver"):
         tracks = [repair(track, footage.camera) for track in tracks]
         shot = shot_of(video, body, options, footage)
@@ -70,20 +69,17 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
     rotation.
     """
     frames = len(footage.timestamps)
-    motion = footage.camera_motion
-    path = (
-        CameraPath.static(frames)
-        if motion.is_static
-        else CameraPath.rotating(motion.R_first_camera)
-    )
+    path = CameraPath.static(frames)
+    if not footage.camera_motion.is_static:
+        path = CameraPath.rotating(footage.camera_motion.R_first_camera)
     return Shot(
-        body,
-        footage.camera,
-        path,
-        footage.lines,
-        video.fps,
-        (video.width, video.height),
-        display_text(Path(video.path).name),
-        options.smoothing and frames > 1,
-        options.uneven_ground,
+        body=body,
+        camera=footage.camera,
+        path=path,
+        lines=footage.lines,
+        fps=video.fps,
+        image_size=(video.width, video.height),
+        source=display_text(Path(video.path).name),
+        smoothing=options.smoothing and frames > 1,
+        uneven_ground=options.uneven_ground,
     )

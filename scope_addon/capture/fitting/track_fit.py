@@ -5,7 +5,8 @@
     (``fit_clip``).
 2. Every frame is fitted with this shape, from the previous frame; after a gap from a cold start
     (`frame_sequence`).
-3. Once floor, feet and balance are known (`ground`), all frames are fitted together (`world/clip_fit`).
+3. Once floor, feet and balance are known (`ground`), all frames are fitted together
+    (`world/clip_fit`).
 4. From there, every frame is fitted alone once more: the raw motion.
 """
 

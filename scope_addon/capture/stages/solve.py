@@ -29,16 +29,6 @@ from ..world.stance import stance_on_ground
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 
-
-def return_freed_memory() -> None:
-    """Have glibc return what it keeps for later; nothing with other C libraries, which return it
-    themselves.
-    """
-    if sys.platform.startswith("linux"):
-        with suppress(OSError, AttributeError):  # musl has no such function
-            ctypes.CDLL(None).malloc_trim(0)
-
-
 # Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults
 # best, less suits children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).
 FLOOR_STATURE_SIGMA = 0.02
@@ -117,6 +107,7 @@ class Person:
 
     def refine(self, shot: Shot) -> None:
         """Fit all frames together, and from there each alone once more, which is the raw motion."""
+        return_freed_memory()
         is_smoothed = shot.smoothing and not shot.is_still
         if is_smoothed:
             self.fit = fit_clip(self.prepared, self.fit, shot.path, self._progress)
@@ -138,6 +129,7 @@ class Person:
         self.placed = place_track(
             shot.body, self.track, whole, False, shot.path, shot.uneven_ground
         )
+        return_freed_memory()
 
     def finish(self, shot: Shot, world: SharedWorld, number: int) -> Motion:
         """Raise the feet out of the floor, and assemble the motion of the ``number``-th person of
@@ -149,6 +141,7 @@ class Person:
         contact = placed.contact(world.up)
         if not shot.uneven_ground and (shot.smoothing or shot.is_still):
             placed = raise_feet(placed, contact, world.floor_from_camera(number))
+        return_freed_memory()
         return assemble_motion(shot, fitted, placed, contact, world.T_world_camera)
 
 
@@ -161,7 +154,6 @@ def solve(
     :param heights_m: known statures of the first people, metres.
     """
     people = prepare(shot, tracks, progress, heights_m)
-    return_freed_memory()
     for person in people:
         person.fit_alone()
     resize_people(shot, people, len(heights_m))
@@ -170,15 +162,10 @@ def solve(
     if not shot.is_still:
         ground_all(shot, people)
     for person in people:
-        return_freed_memory()
         person.refine(shot)
         person.settle(shot)
-    return_freed_memory()
     world = find_world([person.placed for person in people], shot.lines)
-    motions = []
-    for number, person in enumerate(people):
-        return_freed_memory()
-        motions.append(person.finish(shot, world, number))
+    motions = [person.finish(shot, world, number) for number, person in enumerate(people)]
     return Solved(motions, shot.path, iterations, world.up_source)
 
 
@@ -186,12 +173,15 @@ def prepare(
     shot: Shot, tracks: Sequence[Track], progress: Progress, heights_m: Sequence[float]
 ) -> list[Person]:
     """Return the people of tracks, lifted to 3D."""
+    return_freed_memory()  # Of the networks.
     count = len(tracks)
     heights = [*heights_m, *[None] * count]
-    return [
+    people = [
         Person(shot, track, heights[k], progress_of_person(progress, k, count))
         for k, track in enumerate(tracks)
     ]
+    return_freed_memory()
+    return people
 
 
 def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
@@ -249,3 +239,12 @@ def ground_all(shot: Shot, people: Sequence[Person]) -> None:
     return_freed_memory()
     for number, person in enumerate(people):
         person.ground(shot, placed[number], world.floor_from_camera(number))
+
+
+def return_freed_memory() -> None:
+    """Have glibc return what it keeps for later; nothing with other C libraries, which return it
+    themselves.
+    """
+    if sys.platform.startswith("linux"):
+        with suppress(OSError, AttributeError):  # musl has no such function
+            ctypes.CDLL(None).malloc_trim(0)
