@@ -36,7 +36,7 @@ class CaptureOptions(CaptureDeclaration, NetworkDeclaration):
     """
 
     wanted: FootageRange = VideoRange()  # range of frames
-    # of which clips at least twice as long are observed one after another
+    # The length of the windows in which clips at least twice as long are observed.
     window_s: float = WINDOW_S
 
 

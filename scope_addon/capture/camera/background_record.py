@@ -91,7 +91,7 @@ class BackgroundRecord:
         filled = fill_rotation_gaps(R[:, None], known, times)[:, 0]
         a, b = np.flatnonzero(known)[-2:]
         after = np.arange(b + 1, len(R))
-        # extrapolate at constant angular velocity
+        # Extrapolate at constant angular velocity.
         if len(after) and times[-1] - times[b] < 1.5 / SAMPLES_HZ:
             rate = log(R[a].T @ R[b]) / (times[b] - times[a])
             filled[after] = R[b] @ exp((times[after] - times[b])[:, None] * rate)

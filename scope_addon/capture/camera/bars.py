@@ -22,7 +22,8 @@ MIN_WIDTH = 0.03  # of the side
 MAX_DIFFERENCE = 0.01  # of the side, between the widths of opposite bars
 DARK = 24  # of 255, in every channel: black, after compression
 MAX_BRIGHT_SHARE = 0.01  # of a line of a black bar
-# of bright pixels in the picture's outermost lines; less is a dark scene that fades out
+# The least share of bright pixels in the picture's outermost lines; with less, a dark scene fades
+# out.
 MIN_EDGE_SHARE = 0.25
 EDGE_PX = 6  # width of a black bar's edge
 # Any other bar ends in a step along one line of pixels, and has little detail.
@@ -114,7 +115,7 @@ def _other_bars(grey: NDArray[Any]) -> tuple[int, int] | None:
     def mean(first: int, end: int) -> float:
         return float(detail[end] - detail[first]) / (end - first)
 
-    # each edge is two lines wide, which belong to neither side
+    # Each edge is two lines wide, which belong to neither side.
     for begin, end in sorted(pairs, reverse=True):
         outside = max(mean(0, begin - 2), mean(n - end + 2, n))
         if outside <= MAX_DETAIL * mean(begin + 2, n - end - 2):

@@ -41,10 +41,10 @@ _LENS_KEY = re.compile(
 )
 _OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)
 _BROWN_COUNT = 5  # k1, k2, p1, p2, k3, as in a motion file
-# in longer sides of the picture: fields of view of 178 and 0.6 degrees
+# Focal lengths in longer sides of the picture: fields of view of 178 and 0.6 degrees.
 _FOCAL_RANGE = (0.01, 100.0)
 _LARGEST_PIXEL_ASPECT = 4.0
-# tangent of the angle, 84 degrees, between the picture's middle and the optical axis
+# Tangent of the angle, 84 degrees, between the picture's middle and the optical axis.
 _LARGEST_OFFSET = 10.0
 _LARGEST_TANGENTIAL = 0.5
 _LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
@@ -190,7 +190,7 @@ def _distortion(path: Path, value: Any) -> Float64Array:
     if value is None:
         return np.zeros(_BROWN_COUNT)
     dist = _numbers(value)
-    # a row or a column, as OpenCV writes it
+    # A row or a column, as OpenCV writes it.
     if dist is None or max(dist.shape, default=0) != dist.size:
         raise InputError(f"{path}: dist must be a list of numbers, OpenCV's k1, k2, p1, p2, k3")
     dist = dist.ravel()

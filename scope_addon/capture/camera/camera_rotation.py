@@ -71,7 +71,7 @@ class BackgroundTracker:
         self._R_first_key = np.eye(3)
         self._R_key_last = np.eye(3)
         self._inlier_shares: list[float] = []
-        # the first one is the first frame in which somebody is seen
+        # The first one is the first frame in which somebody is seen.
         self.edge_frames: list[FrameEdges] = []
         self._hidden = HiddenBackground((width, height))
         self.bars: list[Float64Array] = []  # in that frame
@@ -115,7 +115,7 @@ class BackgroundTracker:
             self._rotations.append(np.eye(3))
             return
         R_camera_key = None if is_cut else self._follow(image, boxes)
-        # a cut, or too few corners: start again at the last known rotation
+        # A cut, or too few corners: start again at the last known rotation.
         if R_camera_key is None:
             if self.edge_frames:  # what is seen from now on may be something else
                 self._hidden.reveal([])

@@ -29,14 +29,16 @@ from .line_segments import Lines, Segments
 from .manhattan import Edges, line_normal_equations
 
 EDGE_INTERVAL_S = 0.5  # between two frames in which edges are detected
-# the longer side of the image after the first of these frames: half the time, equally accurate
+# The longer side of the images whose edges are found after the first one: half the time, as
+# accurate.
 EDGE_SIDE_PX = 640
 KERNEL_WIDTHS = np.radians([4.0, 3.0, 2.0, 1.2, 1.0, 1.0])  # of ρ, one per step
 MIN_SUPPORT = 1.5  # sides of the picture that the three directions must explain in the first frame
-# of the edges' length, likewise: three directions explain a third by chance
+# The least share of the edges' length that is explained: three directions explain a third by
+# chance.
 MIN_SUPPORT_SHARE = 0.5
 KEPT_SUPPORT = 0.4  # of that, in a later frame
-# sides along the second best direction: one alone leaves the rotation about itself open
+# The least support of the second best direction: one alone leaves the rotation about itself open.
 MIN_SECOND_SUPPORT = 0.25
 MIN_FRAMES = 3
 DRIFT_CUTOFF_HZ = 1.0

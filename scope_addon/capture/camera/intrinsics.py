@@ -38,7 +38,7 @@ class Camera:
     intrinsics: Float64Array  # (3, 3)
     dist: Float64Array  # (5,)
     source: str  # as the report gives it
-    # relative error of the focal length, one standard deviation; 0: given
+    # Relative error of the focal length, one standard deviation; 0: given.
     focal_deviation: float = 0.0
 
     def undistort(self, points_px: FloatArray) -> FloatArray:

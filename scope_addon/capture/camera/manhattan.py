@@ -36,7 +36,7 @@ UP_CANDIDATES = 16  # directions that may be up, those with most support
 MIN_CANDIDATE_ANGLE = np.radians(0.7)  # between two of them
 _BLOCK = 64  # directions that are tried at once
 _TILTS = np.arange(-MAX_TILT, MAX_TILT + 1e-9, np.radians(1.0))
-# up, for a camera without roll
+# Directions of up for a camera without roll.
 _TILTED = np.stack([np.zeros_like(_TILTS), -np.cos(_TILTS), np.sin(_TILTS)], axis=1)
 
 
@@ -94,7 +94,7 @@ class Edges:
     ) -> tuple[float, Float64Array]:
         """Return what `axes` does, where one of the candidates is up."""
         ups = np.asarray(candidates).reshape(-1, 3)
-        # along the edges, if they are horizontal
+        # Directions along the edges, if these are horizontal.
         level = np.cross(normals[None, :HORIZONTAL_CANDIDATES], ups[:, None])
         size = np.linalg.norm(level, axis=2)
         which, _ = np.nonzero(size > 0.1)

@@ -46,14 +46,14 @@ GRID_STEP = np.radians(3.0)
 GRID_SIGMA = np.radians(2.2)  # s on the grid; PLANE_SIGMA in the refinement
 MAX_REFINED = 16
 REFINEMENT_STEPS = 8
-# of the lines, explained by chance; standard deviations above it
+# The share of the lines that chance explains; a solution explains more by so many deviations.
 CHANCE_SHARE = 0.25
 CHANCE_SIGMAS = 1.5
 MIN_VERTICAL = 0.25  # sides of the picture, all vertical lines together
 MIN_HORIZONTAL = 1.0  # likewise, along each horizontal direction, where less is vertical
 MIN_MARGIN = 3.0  # in score, to any other solution
 MIN_ANGLE_TO_OTHER = np.radians(4.0)  # of that solution's up direction
-# of horizontal edges against the body's up direction: steeper ones may be stairs
+# The largest slope of horizontal edges against the body's up direction: steeper ones may be stairs.
 MAX_SLOPE = np.radians(15.0)
 
 

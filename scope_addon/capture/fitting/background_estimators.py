@@ -28,7 +28,8 @@ from .live_body import LiveBody
 
 KERNELS = 85  # that fitting a clip compiles
 _POLLING_INTERVAL_S = 0.2
-# background and edges; the solver has its own thread, because compiling it must not delay either
+# For the background and the edges; the solver has a thread of its own, as compiling must not delay
+# them.
 _THREADS = 2
 
 
@@ -47,7 +48,7 @@ class BackgroundEstimators:
         self._fits = fits
         self.pool = ThreadPoolExecutor(_THREADS, "scope-background")
         self._solver = ThreadPoolExecutor(1, "scope-solver")
-        # time and largest person of the last frame
+        # Time and largest person of the last frame.
         self._largest: tuple[float, Observation] | None = None
         self._longer_px = float(max(width, height))
         self._assumed = assumed_camera(width, height, self._longer_px)

@@ -43,18 +43,19 @@ from .stature import with_population
 from .track_fit import fit_single_frame
 
 KAPPA = 4.0
-# of log(f / f_0)
+# The range and the steps of log(f / f_0).
 LOG_RANGE = 0.7
 COARSE_STEP = 0.05
 FINE_STEP = 0.0125
 FITTED_STEP = 0.0025  # finer, since evaluating the fits' likelihood costs nothing
 MAX_DEVIATION = 0.1  # of log f; a less certain estimate is no better than the assumption
-# logarithms of the tried focal lengths, relative to the camera's
+# Logarithms of the tried focal lengths, relative to the camera's.
 LOG_RATIOS = np.array([-0.7, -0.35, 0.0, 0.35, 0.7])
 SHARE = 0.2  # a; of 0 to 1.2, 0.2 to 0.3 is best for preset best, and 0.1 to 0.2 for fast
-# a body that follows keypoints further than that imitates the perspective of another focal length
+# The shape's weight: with less, a body imitates the perspective of another focal length.
 SHAPE_WEIGHT = 10.0
-# between fitted frames; each further gap is twice as long: an hour has some fifteen frames
+# The first gap between fitted frames; each further one is twice as long, so an hour has some
+# fifteen.
 FIRST_GAP_S = 0.2
 
 

@@ -205,7 +205,7 @@ def place(world: FloatArray, rays: FloatArray, weight: FloatArray) -> Float64Arr
     x = rays - x_mean
     b = b - b_mean
     spread = float(w @ (x * x).sum(axis=1))
-    # fewer than two points do not tell it
+    # Fewer than two points do not tell it.
     z = -float(w @ (x * b).sum(axis=1)) / spread if spread > 1e-12 else 0.0
     return np.array([*(b_mean + x_mean * z), z])
 

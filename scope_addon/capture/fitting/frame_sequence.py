@@ -184,7 +184,7 @@ class FrameSequence:
             k -= 1
             found = self._solve(self._prepared.measure_all(k), later, self._warm)
             is_worth_it = is_usable(found) and found.cost - self._cost[k] <= gain
-            # of what is between the poses
+            # The traces of the rotations between the poses.
             traces = np.einsum("kij,kij->k", found.state.Omega, self._rotations[k, 1:])
             if not is_worth_it or (traces > 1 + 2 * np.cos(_SAME_POSE_RAD)).all():
                 return

@@ -29,14 +29,14 @@ HAND_KEYPOINT_NAMES = tuple(f"hand/{side}_{name}" for side in SIDES for name in 
 # The hand network places the wrist further into the palm than the body has its joint.
 PIXEL_WEIGHT = 0.3
 WRIST_PIXEL_WEIGHT = 0.05
-# of a bone in a hand of presence 1: twice the standard deviation of a bone of the body
+# The weight of a bone in a hand of presence 1: twice the deviation of a bone of the body.
 DIRECTION_WEIGHT = 0.25
 # The smaller a hand is in the image, the less is seen of which way its palm faces, and the weight
 # falls with the square of the distance from wrist to middle knuckle. In hands of 15 pixels, wrong
 # palms turned the whole arm.
 FULL_SIZE_PX = 100.0
-# presence below which directions count by its cube: of a blurred hand, the place is right, not the
-# pose
+# Below this presence, directions count by its cube: the place of a blurred hand is right, not its
+# pose.
 RELIABLE = 0.8
 # Flexion of a finger joint towards the palm, at least and at most, and largest deviation from this
 # axis; radians.
@@ -57,7 +57,7 @@ _BONES = np.array(
 _PIXEL_WEIGHTS = np.array([WRIST_PIXEL_WEIGHT, *[PIXEL_WEIGHT] * (HAND_POINTS - 1)])
 _TIP = {f: f"{f}_tip" if f in ("pinky", "thumb") else f"{f}_finger_tip" for f in FINGERS}
 _MIDDLE_KNUCKLE = HAND_NAMES.index("middle_finger_mcp")
-# unseen fingers begin to return to rest after the first, and rest after the second
+# Unseen fingers begin to return to rest after the first time, and rest after the second.
 SHORT_GAP_S = 0.3
 LONG_GAP_S = 1.0
 
@@ -258,7 +258,7 @@ def without_fingers(body: Body) -> Body:
     kept = [k for k, name in enumerate(body.joint_names) if name not in fingers]
     if len(kept) == len(body.joint_names):
         return body
-    # of the body without fingers that carries each part
+    # For each part, the part of the body without fingers that carries it.
     part = np.zeros(len(body.joint_names), np.intp)
     for k, parent in enumerate(body.parents):
         part[k] = kept.index(k) if k in kept else part[parent]

@@ -50,7 +50,7 @@ OUTSIDE_SIGMA_M = 0.05
 SIZE = 256  # of the mask
 _NO_MAP = np.zeros(0, np.float32)  # the places are all in the first map
 _NOTHING = np.zeros((0, INTS), np.int64), np.zeros((0, FLOATS))
-# fewer, such as that of a still image, can mislead, and more add little
+# Fewer masks, such as that of a still image, can mislead, and more add little.
 MIN_MASKS = 4
 MAX_MASKS = 32
 ROUNDS = 3

@@ -76,7 +76,7 @@ class PreparedTrack:
     head: FloatArray | None = None
     camera: Camera | None = None  # of the masks; None where the track has none
     is_stature_given: bool = False  # by the user
-    # in each frame's camera; the body's last keypoints are then its contact points
+    # In each frame's camera; the body's last keypoints are then its contact points.
     stance: Stance | None = None
 
     def measure(self, k: int, root_cam: FloatArray | None = None) -> Measurements:

@@ -15,15 +15,15 @@ from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
 
 SIGMA_M = 0.005
-# statures outside are input errors
+# Statures outside are input errors.
 SHORTEST_M = 0.5
 TALLEST_M = 2.6
-# standard deviations of the population up to which the shapes of a body are realistic
+# Standard deviations of the population up to which the shapes of a body are realistic.
 MAX_DEVIATIONS = 4.5
-# one year of age; below, growth extrapolated from that of six-year-olds makes legs too long
+# One year of age; below, growth extrapolated from that of six-year-olds makes legs too long.
 SHORTEST_CHILD_M = 0.8
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
-# s of `stature_sigma`, about the deviation of adults (benchmarks/notebook/shape.md)
+# The s of `stature_sigma`, about the deviation of adults (benchmarks/notebook/shape.md).
 UNKNOWN_M = 0.1
 FIXED = 1e6  # information of a coefficient that does not vary
 _ROUNDS = 3

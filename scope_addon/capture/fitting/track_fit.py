@@ -131,7 +131,7 @@ def _fit_shape(prepared: PreparedTrack, root_cam: FloatArray | None = None) -> C
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
     priors = prepared.priors
-    # distance determines an unknown stature, proportions do not
+    # Distance determines an unknown stature, proportions do not.
     if root_cam is not None and priors.shape_mean is None:
         priors = with_population(priors, prepared.body)
     return fit_clip(prepared.body, measurements, priors=priors, options=options)

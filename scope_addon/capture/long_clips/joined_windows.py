@@ -23,10 +23,10 @@ from ..tracking.track import Tracklet, trunk_px
 from .windows import WindowRecord
 
 _NOWHERE = Region((0.0, 0.0), 1.0, 0.0)
-# mean distance of the keypoints in sides of the region, below which two tracklets are one person
+# Two tracklets whose keypoints are closer in the mean, in sides of the region, are one person.
 SAME_PERSON = 0.15
 COMPARED_FRAMES = 10
-# the same, below which the tracklets are faded into each other; else left and right may be swapped
+# Closer ones are faded into each other; in others, left and right may be swapped.
 SAME_POSE = 0.04
 
 

@@ -28,7 +28,7 @@ INTERVAL_S = 20.0  # between two files: the work that a kill can cost
 LARGEST = 1 << 30  # bytes of one capture's files; some five hours
 _KEY_BYTES = 16
 _PIXEL_STEP = 4  # rows of the crop between those in the key
-# files whose values are in memory; a capture asks in the order in which they were written
+# Files whose values are in memory; a capture asks in the order in which they were written.
 _LOADED = 2
 Values = Float64Array
 
@@ -92,7 +92,7 @@ class KeptEstimates:
         """Write what is new; after a failure, or when there is too much, nothing any more."""
         assert self._folder is not None
         self._written_s = time.monotonic()
-        # sorted by time, and no other process's
+        # The name sorts by time, and is no other process's.
         path = self._folder / f"{time.time_ns():020d}-{os.getpid()}.npz"
         try:
             if not self._wrote:

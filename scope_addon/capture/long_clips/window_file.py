@@ -43,7 +43,7 @@ MAX_TEXT = 100_000
 # (N), tracklets (M), their rows (R), references (Q), masks (K), regions (S), edge frames (E), edges
 # (L).
 _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
-    # number, anchor, begin and end of the window, width and height of the image
+    # Number, anchor, begin and end of the window, width and height of the image.
     "geometry": (np.float64, "6", ()),
     "rows": (np.int64, "2", ()),  # first, anchor
     "indices": (np.int64, "N", ()),

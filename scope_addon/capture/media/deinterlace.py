@@ -58,7 +58,7 @@ class _Bwdif:
 
         self._failures = (FFmpegError, OSError, ValueError)
         self._kind = _kind(first)
-        # given to the filter, which has not returned them yet
+        # Frames that the filter was given and has not returned yet.
         self._waiting: deque[av.VideoFrame] = deque()
         self._not_shown = 0  # frames that come first and are not part of the result
         self._graph: Graph | None = Graph()

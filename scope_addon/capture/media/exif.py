@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
 TIFF = (b"II*\0", b"MM\0*")  # one of these does; a TIFF of more than 4 GB would begin otherwise
-# tag numbers of TIFF 6.0
+# Tag numbers of TIFF 6.0.
 _WIDTH = 0x0100
 _HEIGHT = 0x0101
 _BITS = 0x0102
 _DEEPEST = 64  # bits of one channel
-# tag numbers of the EXIF 2.3 standard
+# Tag numbers of the EXIF 2.3 standard.
 _ORIENTATION = 0x0112
 _EXIF_DIRECTORY = 0x8769
 _FOCAL_35MM = 0xA405

@@ -25,12 +25,12 @@ class Frame:
     image_rgb: Uint8Array
 
 
-# of 255: highlights below DARK are raised to BRIGHT
+# Highlights below DARK, of 255, are raised to BRIGHT.
 DARK = 110.0
 BRIGHT = 200.0
 BLACK = 4.0  # highlights below which a frame shows nothing
 MAX_GAIN = 16.0
-# share of the change of gain that is applied per frame, so that brightness does not flicker
+# The share of a change of gain that is applied per frame, so that brightness does not flicker.
 SMOOTHING = 0.1
 LIGHT_CHANGE = 2.0  # factor from which the light was switched and the gain changes at once
 _STEP = 16  # pixels and lines between samples

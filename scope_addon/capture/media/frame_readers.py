@@ -204,7 +204,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
             if stream.id in numbers
         }
         for stream in streams.values():
-            # there may be hundreds of streams, each with its own threads
+            # There may be hundreds of streams, each with its own threads.
             stream.codec_context.thread_count = 1
         try:
             for packet in container.demux(list(streams.values())) if streams else ():
@@ -250,7 +250,7 @@ class PyavReader:
         self._start = self._stream.start_time or 0  # in units of the stream
         self.is_mirrored = False
         self.clockwise_deg = 0
-        # width of a pixel over its height
+        # Width of a pixel over its height.
         self._aspect = float(self._stream.sample_aspect_ratio or 1)
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
         duration_s = (container.duration or 0) / 1e6
@@ -311,7 +311,7 @@ class PyavReader:
         if frame is None:
             return None
         self.clockwise_deg, self.is_mirrored = shown = orientation(frame)
-        # also where it states another matrix, so that a tag alone changes no result
+        # This holds also where it states another matrix, so that a tag alone changes no result.
         image = rgb(frame, "ITU601")
         return self._time(frame), upright(self._path, image, self._aspect, *shown)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import av
 
 
-# cd/m² of the reference white (ITU-R BT.2408), which becomes the brightest light of SDR
+# The reference white in cd/m² (ITU-R BT.2408), which becomes the brightest light of SDR.
 WHITE = 203.0
 PEAK = 1000.0  # cd/m² from which on everything is white
 SDR_GAMMA = 2.4  # of the screen (ITU-R BT.1886)
@@ -37,7 +37,7 @@ HLG_GAMMA = 1.2  # system gamma of HLG for a screen of `PEAK` (ITU-R BT.2100)
 # transfer characteristics
 _PQ = 16
 _HLG = 18
-# matrix coefficients; others are taken for BT.2020's
+# The matrix coefficients; others are taken for BT.2020's.
 _YUV_MATRICES = {1: "ITU709", 5: "ITU601", 6: "ITU601"}
 _LUMINANCE = np.array([0.2627, 0.6780, 0.0593])  # of the primaries of BT.2020
 # BT.2087
@@ -52,7 +52,7 @@ _DCI_P3_TO_709 = np.array(
 _P3_D65_TO_709 = np.array(
     [[1.2249, -0.2249, 0.0], [-0.0421, 1.0421, 0.0], [-0.0196, -0.0786, 1.0982]]
 )
-# primaries; others are taken for BT.2020's
+# Primaries; others are taken for BT.2020's.
 _TO_709 = {1: np.eye(3), 11: _DCI_P3_TO_709, 12: _P3_D65_TO_709}
 
 
@@ -102,7 +102,7 @@ def hlg_light(code: Float64Array) -> Float64Array:
     return np.where(code <= 0.5, code**2 / 3, (np.exp((code - c) / a) + b) / 12)
 
 
-# constants of PQ
+# Constants of PQ.
 _M1 = 2610 / 16384
 _M2 = 2523 / 32
 _C1 = 3424 / 4096

@@ -10,7 +10,7 @@ from pathlib import Path
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
 
-# of the longer side to the shorter: the search for people takes time in proportion to it
+# The largest ratio of the sides: the search for people takes time in proportion to it.
 MAX_RATIO = 20.0
 
 
@@ -38,7 +38,7 @@ def check_depth(path: Path, width: int, height: int, bits: int) -> None:
 
     :raises VideoError: it does.
     """
-    # to decode the deeper ones, OpenCV takes three times their size, not twice
+    # To decode the deeper ones, OpenCV takes three times their size, not twice.
     cost = 2 * bits if bits > 16 else 16
     if width * height * cost > 16 * MAX_PIXELS:
         raise too_large(path, f"{width} × {height} pixels of {bits} bits")

@@ -83,7 +83,7 @@ def _value(meta: bytes) -> float | None:
     if meta[:4] == b"\0\0\0\0":  # MP4 has a version here, QuickTime has none
         meta = meta[4:]
     parts = dict(_boxes(meta))
-    # after version and count; each "mdta", name
+    # The names follow version and count, each after "mdta".
     names = [name for _, name in _boxes(parts.get(b"keys", b"")[8:])]
     for number, item in _boxes(parts.get(b"ilst", b"")):
         index = struct.unpack(">I", number)[0] - 1

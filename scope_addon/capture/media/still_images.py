@@ -31,7 +31,7 @@ _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 
 _OPENEXR = b"v/1\x01"
 _GIF = b"GIF8"
 _READ = (PNG, *TIFF, b"\xff\xd8\xff", b"BM")  # how files begin that OpenCV is given; and WebP
-# of a file: as many as its image may take, with four channels of 16 bits
+# The size of a file is limited to what its image may take, with four channels of 16 bits.
 _MAX_BYTES = 8 * MAX_PIXELS
 _ROWS = 256  # that are converted at a time
 

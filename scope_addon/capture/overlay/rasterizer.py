@@ -29,7 +29,7 @@ _TO_LIGHT = np.array([-0.40, -0.66, -0.63]) / np.linalg.norm([-0.40, -0.66, -0.6
 _AMBIENT = 0.42
 _DIFFUSE = 0.58
 _RIM = 0.30
-# of a vertex: behind the near plane, beyond the distortion model; 0: visible
+# Where a vertex is: behind the near plane, or beyond the distortion model; 0: visible.
 _BEHIND = 1
 _OUTSIDE = 2
 
@@ -86,7 +86,7 @@ def rasterize(
     corners = np.ascontiguousarray(triangles, np.int32)
     if shading is None:
         shading = shade(vertices, vertex_normals(vertices, corners))
-    # a broadcast view would be another type, and compiled again
+    # A broadcast view would be another type, and compiled again.
     colors = np.empty((len(corners), 3), np.float32)
     colors[:] = face_colors
     lens = np.zeros(5)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # showing, by seconds at a variable rate.
 _CODECS = (("libx264", {"preset": "veryfast", "crf": "20", "bf": "0"}), ("mpeg4", {"qscale": "4"}))
 _LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
-# per second, about as many as MPEG-4's clock can have, for images whose times are given
+# Ticks per second, about as many as MPEG-4's clock can have, for images whose times are given.
 _TICKS = 60000
 
 
@@ -49,7 +49,7 @@ class VideoWriter:
         self._av = av
         self._path = path
         self._failures = (av.error.FFmpegError, OSError, ValueError)
-        # a name that is not UTF-8 is opened by a link to the file, with the first image
+        # A name that is not UTF-8 is opened by a link to the file, with the first image.
         temporary.touch()
         self._name = ExitStack()
         try:
@@ -59,7 +59,7 @@ class VideoWriter:
             self._name.close()
             raise self._refused() from error
         rate = _rate(fps)
-        # has every time of the rate
+        # A clock that has every time of the rate.
         self._clock = Fraction(1, rate.numerator * max(1, _TICKS // rate.numerator))
         self._last = -1
         self._stream = self._add_stream(rate, width, height)

@@ -23,7 +23,7 @@ from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 256
 FACE_POINTS = 478  # the mesh of 468 points, then the right and the left iris, five points each
-# keypoints of the body: nose, eyes, ears, mouth
+# Keypoints of the body: nose, eyes, ears, mouth.
 HEAD = tuple(range(KEYPOINT_NAMES.index("mouth_right") + 1))
 _EYES = [KEYPOINT_NAMES.index(f"{side}_eye") for side in ("left", "right")]
 _EARS = [KEYPOINT_NAMES.index(f"{side}_ear") for side in ("left", "right")]
@@ -32,7 +32,7 @@ _MOUTH = [KEYPOINT_NAMES.index(f"mouth_{side}") for side in ("left", "right")]
 _EYES_M = 0.063
 _EYES_TO_MOUTH_M = 0.068
 _EARS_M = 0.150
-# longer side of the box of the landmarks, which reaches from the hairline to the chin
+# Longer side of the box of the landmarks, which reaches from the hairline to the chin.
 FACE_M = 0.185
 _MIDDLE = 0.3  # of the face, from the eyes towards the mouth, in their distance
 _SCALE = 1.5  # side of a region in longer sides of the box
@@ -128,7 +128,7 @@ def region_from_body(keypoints_px: Float64Array) -> Region:
     eyes = keypoints_px[_EYES]
     mouth = keypoints_px[_MOUTH].mean(axis=0)
     middle = eyes.mean(axis=0)
-    # from the right eye to the left one, to the right in an image of a front view
+    # The vector from the right eye to the left one points right in an image of a front view.
     dx, dy = eyes[0] - eyes[1]
     up = (middle - mouth) + np.array([dy, -dx])
     center = middle + _MIDDLE * (mouth - middle)

@@ -37,7 +37,7 @@ RECORD = _LIGHT + 1  # numbers in a row
 _FACE_PX = (16.0, 64.0)
 _FACING = (0.2, 0.6)  # cosine of the angle between the face's direction and the one to the camera
 _SCALE = 1.5  # side of a region over the face's
-# landmarks
+# Indices of landmarks.
 _FOREHEAD = 10
 _CHIN = 152
 # Inner corner, outer corner and iris of the left and of the right eye.

@@ -49,15 +49,15 @@ _STATURE = [
 ]
 _STATURE_M = 1.35  # shoulder to ankle along the bones
 _MIDDLE = 0.45  # distance from the wrist to the hand's centre, in hand lengths
-# side of the region in hand lengths; large, because the body gives only a rough position
+# Side of the region in hand lengths; large, because the body gives only a rough position.
 _BODY_SCALE = 1.5
 # MediaPipe's: side, and shift towards the fingers, in sides of the palm's box
 _PALM_SCALE = 2.6
 _PALM_SHIFT = 0.5
-# the same in sides of the box of the keypoints below
+# The side of the region in sides of the box of the keypoints below.
 _TRACK_SCALE = 2.0
 _TRACK_SHIFT = 0.1
-# keypoints of the palm and of the finger bases
+# Keypoints of the palm and of the finger bases.
 _RIGID = np.array([0, 1, 2, 3, 5, 6, 9, 10, 13, 14, 17, 18])
 
 

@@ -24,7 +24,7 @@ INPUT_SIZE = 256
 KEYPOINT_NAMES = BLAZEPOSE  # the network's order
 KEYPOINT_COUNT = 33
 _POINTS = 39  # the keypoints, two auxiliary points and four unused ones
-# auxiliary points: hip centre; a point on the body circle around it
+# Auxiliary points: hip centre; a point on the body circle around it.
 _HIP_CENTER = 33
 _BODY_CIRCLE = 34
 _HIPS = (23, 24)
@@ -138,7 +138,7 @@ class LandmarkNetwork:
         self._threads_alone = threads if name in _WORTH_ALL_THREADS else max(1, threads // _WORKERS)
         self._pool = ThreadPoolExecutor(min(_WORKERS, threads), "scope-landmarks")
         self._sessions: dict[int, onnxruntime.InferenceSession] = {}
-        # opened now, so that a damaged file is reported before the first frame
+        # It is opened now, so that a damaged file is reported before the first frame.
         self._session(self._threads_alone)
 
     def _session(self, threads: int) -> onnxruntime.InferenceSession:

@@ -39,7 +39,7 @@ INPUT_SIZE = KEYPOINT_COUNT * 6 + 2
 WORLD_UNIT_M = 0.5
 TORSO = np.array([11, 12, 23, 24])  # shoulders and hips
 HIPS = np.array([23, 24])
-# nose, arms, legs: they determine the size in the image
+# Nose, arms and legs determine the size in the image.
 LIMBS = np.array([0, *range(11, 17), *range(23, 29)])
 # Calibration of the network's standard deviations across and along the line of sight. They are
 # right for the simulated detections of the training, but too small for real images, whose poses,
@@ -334,7 +334,7 @@ def windows_around(times: FloatArray, seen: BoolArray) -> Windows:
         rows = np.arange(len(times))
     known = times[rows]
     run = np.concatenate([[0], np.cumsum(np.diff(known) > LONGEST_GAP_S)])
-    # the last seen frame
+    # The last seen frame.
     own = np.maximum(np.searchsorted(rows, np.arange(len(times)), side="right") - 1, 0)
     low, high = (ends[own, None] for ends in ends_of_runs(run))
     samples = times[:, None] + OFFSETS_S

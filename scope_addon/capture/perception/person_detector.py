@@ -17,18 +17,19 @@ from .sessions import Execution, network_path, open_session
 INPUT_SIZE = 224
 SCORE_THRESHOLD = 0.5
 OVERLAP_THRESHOLD = 0.3
-# stride, anchors per cell; the three stride-32 layers are combined
+# Stride and anchors per cell; the three layers of stride 32 are combined.
 _LAYERS = ((8, 2), (16, 2), (32, 6))
 _SCORE_LIMIT = 100.0
-# from which the squares are not searched: such a person fills a good part of the image
+# From this score on the squares are not searched: such a person fills a good part of the image.
 _SURE_SCORE = 0.8
 _SQUARES_FROM = 1.2  # aspect ratio from which squares show people larger
 _SMALL_SCORE = 0.8  # least score of a small person: more squares hold more that resembles a person
-# of the squares in which small people are looked for, in shorter sides of the image
+# The side of the squares in which small people are looked for, in shorter sides of the image.
 _SMALL_SIDE = 1 / 3
-# from one of them to the next at most, in their sides; the rest holds such a person's height
+# The largest step from one square to the next, in sides; the rest holds such a person's height.
 _SMALL_STEP = 0.6
-# of the squares in which people are looked for beside larger ones, in shorter sides of the image
+# The side of those in which people are looked for beside larger ones, in shorter sides of the
+# image.
 _PART_SIDE = 0.6
 _PART_STEP = 2 / 3  # the same for these
 

@@ -123,7 +123,7 @@ def _shrink(
     small = part
     for _ in range(halvings):
         small = halved(small)
-    # the centre of small pixel i covers the pixels low + step·i … low + step·i + step − 1
+    # The centre of small pixel i covers the pixels low + step·i … low + step·i + step − 1.
     B = A / step
     B[:, 2] = (A[:, 2] - low - (step - 1) / 2) / step
     return small, B

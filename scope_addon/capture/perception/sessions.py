@@ -225,7 +225,7 @@ def _cannot_load(path: Path, error: Exception) -> str:
 def _runtime() -> ModuleType:
     try:
         runtime = load_runtime()
-        # it swallows the reason why its library was not loaded
+        # The package swallows the reason why its library was not loaded.
         if not hasattr(runtime, "InferenceSession"):
             raise ImportError("its library cannot be loaded")
     except ImportError as error:

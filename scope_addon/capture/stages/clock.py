@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 FINDING = "finding the person"  # a stage, in which the footage is decoded and observed
-# a stage of the first capture on a computer for which no machine code is shipped
+# A stage of the first capture on a computer for which no machine code is shipped.
 COMPILING = "compiling the solver"
 # Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]

@@ -16,7 +16,7 @@ _TORSO = [_INDEX[name] for name in ("left_shoulder", "right_shoulder", "left_hip
 _LEGS = [
     [_INDEX[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle")] for side in ("left", "right")
 ]
-# the outline of the torso is background as often as not
+# The outline of the torso is background as often as not.
 _TORSO_FRACTIONS = np.linspace(0.15, 0.85, 9)
 _LEG_FRACTIONS = np.linspace(0.1, 0.9, 12)
 _MIN_PIXELS = 6  # of a part; fewer give no histogram

@@ -189,7 +189,7 @@ def open_networks(
     reference: LandmarkNetwork | None = None
     if keypoints:
         own = KeypointNetwork(keypoints, threads, execution)
-        # without the reference, left and right follow from continuity alone
+        # Without the reference, left and right follow from continuity alone.
         with suppress(SetupError):
             reference = LandmarkNetwork(largest, 1, execution)
         return TrackingNetworks(people, own, None, False, reference, None)

@@ -274,7 +274,7 @@ def _correction(world: FloatArray, track: Track) -> FloatArray:
         for row, landmarks in zip(track.reference_rows, track.reference_landmarks, strict=True)
         if track.seen[row]
     }
-    # at a low frame rate only the reference's own frame would move
+    # At a low frame rate only the reference's own frame would move.
     if not references or len(track) < 2 or np.median(np.diff(track.times)) > CORRECTION_S:
         return np.zeros_like(world)
     knots: list[float] = []

@@ -41,7 +41,7 @@ from .track import Track
 SIGMA_M = 0.02
 SIGMA_M_S = 0.35
 VELOCITY_S = 0.2  # τ
-# from one frame to the next: after that a walking leg may be where the other one was
+# The longest time between two frames: after it, a walking leg may be where the other one was.
 MAX_STEP_S = 0.15
 LIMIT = 6.0  # of one joint's residual
 CHANGE_COST = 3.0

@@ -30,7 +30,7 @@ POSITION_SIGMA = 0.15  # sides of the region
 SPEED_SIGMA = 0.8  # sides per second: nobody keeps exactly the same velocity
 APPEARANCE_WEIGHT = 3.0
 MAX_LINK_COST = 3.0
-# after a longer gap the position carries no information, so the appearance has to match closely
+# After a longer gap the position carries no information, so the appearance has to match closely.
 LONG_GAP_S = 2.0
 LONG_GAP_MAX_APPEARANCE = 0.35
 LONG_GAP_COST = 2.0
@@ -130,7 +130,7 @@ def cheapest_links(cost: Float64Array, max_cost: float) -> dict[int, int]:
         remaining -= rows
         r = np.array(sorted(rows))
         c = np.flatnonzero(columns)
-        # an extra column for each row that stays without a link
+        # An extra column for each row that stays without a link.
         padded = np.concatenate([cost[np.ix_(r, c)] - max_cost, np.zeros((len(r), len(r)))], axis=1)
         for i, j in enumerate(assign(padded)):
             if j < len(c) and is_open[r[i], c[j]]:
@@ -195,10 +195,10 @@ def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
 MIN_SHARE = 0.02  # of the frames; a person who was seen in fewer is a mistake of the detector
 MIN_INTERVAL_S = 0.3  # the same for the longest time without interruption
 MIN_PROMINENCE = 0.05  # of the most prominent person's
-# mean distance of the keypoints, in sides of the region, while a target drifts onto another
+# The mean distance of the keypoints, in sides of the region, while a target drifts onto another.
 MERGER_DISTANCE = 0.25
 MAX_MERGER_S = 0.38
-# a lost person who is found for a shorter time, and lost again, was something else
+# A lost person who is found for a shorter time, and lost again, was something else.
 MIN_REAPPEARANCE_S = 0.1
 
 

@@ -20,12 +20,12 @@ SPREAD_THRESHOLD = 0.38
 DISAGREEMENT_THRESHOLD = 0.25
 UNSURE_SPREAD_THRESHOLD = 0.47
 UNSURE_DISAGREEMENT_THRESHOLD = 0.18
-# keypoints above this confidence; a person who has left shows fewer
+# The least number of confident keypoints; a person who has left shows fewer.
 MIN_CONFIDENT = 4
 CONFIDENT = 0.3
 SMALLEST_SIDE_PX = 24.0
 LARGEST_SIDE = 6.0  # in longer sides of the image
-# mean distance of the keypoints, in sides of the region, below which two bodies are one
+# Two bodies whose keypoints are closer in the mean, in sides of the region, are one.
 SAME_BODY = 0.1
 # How far a predicted region may be from the one that the frame before gives: centre and size in
 # sides, rotation in radians. The networks were trained on regions with larger errors.

@@ -14,16 +14,16 @@ from .tracked_target import TrackedTarget
 
 SEARCH_S = 8 * FRAME_S  # between two searches for people who have entered the picture
 SEARCH_LARGEST_S = 20 * FRAME_S
-# the same while a lost person is remembered, and for rivals in the opening
+# The time between two searches while a lost person is remembered, and for rivals in the opening.
 SEARCH_LOST_S = 4 * FRAME_S
-# of the clip: a person who is visible from the start may be the most prominent one over the clip
+# The clip's opening: who is visible from the start may be the most prominent one of the clip.
 OPENING_S = 2.0
 SMALL_SHARE = 0.39  # of the picture's longer side
-# between two searches for small people, each of which takes as long as some twenty plain ones
+# The time between two searches for small people, each as long as some twenty plain ones.
 SMALL_SEARCH_S = 1.0
-# at most, between two searches beside people, each of which takes six or more plain ones
+# The longest time between two searches beside people, each as long as six or more plain ones.
 PARTS_SEARCH_S = 64 * FRAME_S
-# of the picture's shorter side: a smaller region holds somebody whom a plain detection may miss
+# A plain detection may miss a person in a smaller region, in shorter sides of the picture.
 SMALL_SIDE = 0.4
 EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
 
@@ -47,7 +47,7 @@ class SearchSchedule:
         self._search_s = self._close_search_s = self._small_search_s = (
             self._parts_search_s
         ) = -math.inf
-        # see `begin_parts`
+        # See `begin_parts`.
         self._parts_beside = 0
         self._parts_interval_s = SEARCH_LOST_S
 
@@ -120,7 +120,7 @@ class SearchSchedule:
             return 0.0
         if lost or self._searches_for_rivals(image_rgb, live):
             return SEARCH_LOST_S
-        # a small person may be somebody in the background, before the most prominent one comes
+        # A small person may be somebody in the background, before the most prominent one comes.
         if self._largest_only:
             return SEARCH_LOST_S if _are_small(image_rgb, live) else SEARCH_LARGEST_S
         # As many as are wanted are tracked: a newcomer counts only if they become more prominent.

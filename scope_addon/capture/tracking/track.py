@@ -84,9 +84,9 @@ class Tracklet:
     # (2,) middle of the trunk
     centers_px: list[FloatArray] = field(default_factory=list)
     sides_px: list[float] = field(default_factory=list)  # of the region
-    # sum over the frames
+    # The sum over the frames.
     appearance: Float64Array = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))
-    # each with its row
+    # Each with its row.
     references: list[tuple[int, PendingReference]] = field(default_factory=list)
     # (2, 21, 6), see `Observation`; empty if not wanted
     hands: list[Float32Array] = field(default_factory=list)

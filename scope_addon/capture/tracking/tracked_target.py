@@ -20,10 +20,10 @@ from .left_right import mean_distance
 
 OCCLUSION_INNOVATION = 0.08  # see `TrackedTarget.innovation`
 CONFIDENCE_DROP = 0.8  # share of the recent confidence below which it has dropped
-# over which confidence is remembered, and the least number of frames
+# The time for which confidence is remembered, and the least number of frames.
 RECENT_S = 0.5
 RECENT_FRAMES = 5
-# from where the person is predicted, or was last seen, in sides of the region
+# The distance from where the person is predicted, or was last seen, in sides of the region.
 OCCLUSION_DISTANCE = 0.5
 MIN_VELOCITY_FRAMES = 2  # after which the velocity is meaningful
 _VELOCITY_MEMORY = 0.7
@@ -47,12 +47,12 @@ class TrackedTarget:
     tracked_s: float = 0.0
     reference_s: float = -math.inf
     appearance_s: float = -math.inf
-    # whether left and right were swapped since the reference network was asked
+    # Whether left and right were swapped since the reference network was asked.
     swapped: bool = False
     fallback_s: float = -math.inf  # time since which the fallback network is in use
-    # the estimate in the next frame, at the predicted region
+    # The estimate in the next frame, at the predicted region.
     pending: Future[PoseEstimate] | None = None
-    # recent ones, each with its time
+    # Recent confidences, each with its time.
     confidences: list[tuple[float, float]] = field(default_factory=list)
     is_occluded: bool = False  # lost, and apparently behind something
 

@@ -42,29 +42,30 @@ from .plausibility import (
 from .search_schedule import EAGER_S, SearchSchedule
 from .tracked_target import TrackedTarget
 
-# of a detection; one with a lower score has to pass stricter limits, see `plausibility`
+# A detection with a lower score has to pass stricter limits, see `plausibility`.
 SURE_SCORE = 0.9
-# of the keypoints of such a detection, in the bounding box of somebody who is tracked
+# The largest share of its keypoints in the bounding box of somebody who is tracked.
 MAX_SHARE_WITHIN = 0.5
 MAX_INNOVATION = 0.25  # see `TrackedTarget.innovation`: more in one frame may be another person
 ESTABLISHED_S = 10 * FRAME_S
 NOVELTY_INNOVATION = 0.05  # what being new counts as, see MAX_INNOVATION
-# for which a lost person is looked for, and preferred to a more prominent one
+# The time for which a lost person is looked for, and preferred to a more prominent one.
 MEMORY_S = 60 * FRAME_S
-# a person with a smaller share of the largest side will not become the most prominent one
+# A person with a smaller share of the largest side will not become the most prominent one.
 RIVAL_SIDE = 0.5
-# a person this much larger takes the place of the smallest one, when all places are taken
+# A person this much larger takes the place of the smallest one, when all places are taken.
 REPLACING_SIDE = 1.5
 MAX_PEOPLE = 12
 REFERENCE_S = 30 * FRAME_S  # between two calls of the reference network
 REFERENCE_SWAPPED_S = 8 * FRAME_S  # the same where left and right seem to be swapped
-# for which the largest network replaces a smaller one that lost the person, or swapped sides
+# The time for which the largest network replaces a smaller one that lost the person or swapped
+# sides.
 FALLBACK_S = 15 * FRAME_S
 HALF_SWAPPED = 2.0  # `swap_ratio` below which a network may be about to confuse the sides
 APPEARANCE_S = 4 * FRAME_S  # between two samples of the appearance
 _MIN_REDETECTION_AGE = 6  # frames for which somebody was tracked
 _JUST_LOST_FRAMES = 2  # within which a detected body at the prediction continues the tracklet
-# distances of regions in sides, see `Region.resembles`
+# Distances of regions in sides, see `Region.resembles`.
 _SAME_TARGET = 0.12
 _LOST_TARGET = 0.5
 _REPLACED_TARGET = 0.35

@@ -35,7 +35,7 @@ from .placement import PlacedTrack
 SOFTNESS_M = 0.007  # τ
 LIFT_CUTOFF_HZ = 6.0
 ROOT_CUTOFF_HZ = 4.0
-# contact probability from which on a foot or a palm carries weight and stays where it is
+# From this contact probability on, a foot or a palm carries weight and stays where it is.
 RESTING = 0.9
 ROUNDS = 4  # of smoothing without going below what is needed
 

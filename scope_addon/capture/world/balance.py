@@ -28,7 +28,7 @@ from ...kinematics.smoothing import gaussian_smooth
 from ...kinematics.standing import line_of_sight
 from .placement import PlacedTrack
 
-# speed of the centre of mass at which the weight of the correction has fallen to 1/e
+# The speed of the centre of mass at which the weight of the correction has fallen to 1/e.
 STANDING_M_S = 0.5
 CUTOFF_HZ = 1.0
 # How far a sole extends behind its heel point and beyond its toe point, in units of the distance

@@ -17,7 +17,7 @@ from ..tracking.scene_cuts import SCENE_GAP_S
 
 # Of the travel, see `camera_travel`.
 MIN_SPEED_M_S = 0.25  # slower sliding is explained by depth errors
-# median deviation of the feet's velocities from their median, relative to the median
+# The largest median deviation of the feet's velocities from their median, relative to it.
 MAX_SPREAD = 0.8
 MIN_SAMPLES = 12
 MAX_VERTICAL_M_S = 0.6  # vertical speed of a sole that carries the body

@@ -30,13 +30,13 @@ from .camera_path import CameraPath
 from .clip_window import ClipWindow
 from .limb_search import search_limbs
 
-# unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts
+# The unknowns of a window, whose equations take some 120 MB: 480 frames of a body of 24 parts.
 WINDOW_UNKNOWNS = 36_000
-# unknowns; two windows differ by 2 to 4 mm where one of them has 1 s more to its end
+# The unknowns that two windows share: they differ by 2 to 4 mm where one has 1 s more to its end.
 OVERLAP = 4_800
 LONGEST_STEP = 2.5  # between two frames that are fitted together, in units of the median step
 _Progress = Callable[[str, int, int], None]
-# of the standard deviations, see `joint_sigma`
+# Factors of the standard deviations, see `joint_sigma`.
 ALONG = 15.5
 ACROSS = 11.5
 _RATE_HZ = 60.0

@@ -38,11 +38,11 @@ from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import CLIP_STEPS, ROBUST, clip_stages
 from .camera_path import CameraPath
 
-# of a rest; see `resting_places`
+# The least probability and the largest spread of a rest; see `resting_places`.
 MIN_PROBABILITY = 0.5
 SPREAD_M = 0.02
 ENTERS_M = 0.01  # depth from which on an arm counts as inside the body
-# of a point inside the body, against one of a sole under the floor that is surely in contact
+# The weight of a point inside the body, against that of a sole under the floor in sure contact.
 _INSIDE_WEIGHT = 1.0
 
 

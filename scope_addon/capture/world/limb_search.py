@@ -22,11 +22,11 @@ from ...arrays import Float64Array
 from ...kinematics.mirrored_limbs import LIMBS, bone_depths, mirrored_limb, runs_of_one_sign
 from .clip_window import ClipWindow
 
-# a bone is mirrored while it is deeper, if it gets so deep
+# A bone is mirrored while it is deeper, if it gets so deep.
 SHALLOW_M = 0.03
 DEEP_M = 0.1
 _MIN_CHANGE_M = 0.1  # by which a limb that has a minimum of its own differs
-# that the mirrored limb may add to frames alone, in the mean and to one
+# The cost that the mirrored limb may add to frames alone, in the mean and to one.
 _MAX_COST = 5.0
 _MAX_COST_OF_ONE = 30.0
 _MIN_GAIN = 10.0  # of cost, over the frames that are fitted together
@@ -34,7 +34,7 @@ _LONGEST_S = 2.0  # of a bone on one side; longer trials cost much, and none has
 _SAMPLES = 5  # further frames of a run that are tried alone
 _MARGIN = 8  # frames before and after
 _STEPS = 8  # of a trial, after which a better pose costs less already
-# whether the upper and the lower bone of a limb are mirrored
+# Whether the upper and the lower bone of a limb are mirrored.
 _BONES = (True, False), (False, True), (True, True)
 
 

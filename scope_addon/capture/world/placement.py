@@ -31,7 +31,7 @@ from .camera_path import CameraPath
 # the image less than 0.01.
 VISIBLE_CONFIDENCE = 0.1
 MIN_SOLE_WEIGHT = 1e-9
-# between two frames of one scene; the second in units of the median step
+# The longest time between two frames of one scene; the second in units of the median step.
 MAX_STEP_S = 1.0
 MAX_STEP = 1.5
 

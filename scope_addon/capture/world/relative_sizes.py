@@ -25,7 +25,7 @@ from .placement import PlacedTrack
 from .world_frame import floor_height
 
 STATURE_SIGMA = 0.06  # σ, of adults: 10 cm
-# n_k = hypot of the first and of the second over h_k
+# The noise n_k is the hypotenuse of the first and of the second over h_k.
 HEIGHT_SIGMA = 0.03
 FLOOR_SIGMA_M = 0.05
 # Densities per unit of log r: a tenth of all people is small, anywhere between adults and S_min;
@@ -37,7 +37,7 @@ SHORTEST_M = 0.8  # S_min
 MIN_CAMERA_M = 0.4  # of a camera nearer to the floor, errors of depth are as large as h_k
 MIN_CONTACT_S = 0.2
 _STEPS = np.arange(-0.8, 0.8, 0.004)  # of log C
-# rows of `_log_densities`, after those who are as estimated
+# Rows of `_log_densities`, after those who are as estimated.
 _SMALL = 1
 _ELSEWHERE = 2
 

@@ -18,14 +18,14 @@ from ..camera.verticals import estimate_up_from_lines
 from .balance import center_of_mass, direction, leg_directions, leg_support
 from .placement import PlacedTrack
 
-# the straightness of a leg whose knee is bent by 30 degrees is 0
+# The straightness of a leg whose knee is bent by 30 degrees is 0.
 STANDING_KNEE_COS = np.cos(np.radians(30.0))
 FLOOR_NOISE_M = 0.05  # σ_floor, scatter of a foot's height on the floor, which depends on its depth
 STANCE_M = 0.2  # a, weight of u_0 relative to the displacement of the centre of mass from the feet
 ROUNDS = 2
 MOMENT_S = 0.1  # length of a clip in which the weight b is halved
 MIN_CONTACT = 1e-3  # added to the contact probability of a frame
-# the feet of people on one floor may differ so much in height, as their distances are uncertain
+# The feet of people on one floor may differ so much in height, as their distances are uncertain.
 SAME_FLOOR_M = 0.4
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
 FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
@@ -134,7 +134,7 @@ def up_from_floor(feet_cam: FloatArray, up: FloatArray) -> Float64Array:
     lowest = _lowest(feet_cam, up)
     p = lowest - np.median(lowest, axis=0)
     off = np.abs(p @ up)
-    # without jumps and outliers, in which nothing is in contact
+    # Jumps and outliers, in which nothing is in contact, do not count.
     p = p[off <= max(3 * np.median(off), 1e-3)]
     kappa = len(p) * (FLOOR_NOISE_M / UP_NOISE_RAD) ** 2
     return _unit(np.linalg.solve(p.T @ p + kappa * np.eye(3), kappa * up))

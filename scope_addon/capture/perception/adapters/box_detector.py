@@ -50,7 +50,7 @@ class BoxFormat(NamedTuple):
     normalization: Normalization
     matches: Callable[[Graph], bool]
     decode: Callable[[Outputs, Graph, Description], Boxes]
-    # the image lies in the middle of the input rather than in its top left corner
+    # The image lies in the middle of the input rather than in its top left corner.
     centered: bool = False
     stretched: bool = False  # to the input, regardless of the image's aspect ratio
 

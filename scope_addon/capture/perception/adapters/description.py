@@ -105,5 +105,5 @@ def _violated(key: str, value: Any, types: tuple[str, ...]) -> str | None:
 
 
 def _is_number(value: Any) -> bool:
-    # no NaN
+    # The comparison excludes NaN.
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _LARGEST

@@ -41,7 +41,7 @@ from .keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet
 
 SCORE_THRESHOLD = 0.3  # from which a keypoint counts as seen
 UNSURE = 0.25  # share of this threshold from which a keypoint widens the next region
-# the keypoints' box lacks crown, feet and the border that these networks are trained with
+# The box of the keypoints lacks crown, feet and the border that these networks are trained with.
 MARGIN = 1.4
 MIN_STATURE = 1.6  # least side in lengths of trunk and leg: a person who crouches will stand up
 MAX_SHRINK = 0.97  # from one frame to the next: legs that are briefly occluded must stay inside
@@ -113,7 +113,7 @@ def _by_taylor(heat: Float64Array, x: int, y: int) -> tuple[float, float]:
     left = max(0, x - reach)
     top = max(0, y - reach)
     part = heat[top : y + reach + 1, left : x + reach + 1]
-    # zero padding: there is no heat beyond the heatmap
+    # Zero padding: there is no heat beyond the heatmap.
     blurred = cv2.GaussianBlur(part, (_BLUR, _BLUR), 0, borderType=cv2.BORDER_CONSTANT)
     h = np.log(np.maximum(blurred, _MIN_HEAT))
     x0 = x - left

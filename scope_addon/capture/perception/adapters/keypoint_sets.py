@@ -24,7 +24,7 @@ COCO_17 = (
     ),
 )
 _SIDES = ("left", "right")
-# weights of BlazePose's foot tip; see solver/loaders/keypoints.py
+# Weights of BlazePose's foot tip; see solver/loaders/keypoints.py.
 _TOES = {"big_toe": 0.85, "small_toe": 0.15}
 
 # Our name: {index in the set: weight}.
@@ -71,7 +71,7 @@ def _wholebody() -> Mixture:
         "left_eye_outer": 45,
     }
     face |= {"mouth_right": 48, "mouth_left": 54}
-    # hands of 21: wrist, then thumb, index, middle, ring, pinky, each from the base to the tip
+    # Hands of 21: wrist, then thumb, index, middle, ring, pinky, each from the base to the tip.
     hand = {"thumb": 3, "index": 5, "pinky": 17}
     fingers = {
         f"{s}_{f}": {91 + 21 * i + n: 1.0} for i, s in enumerate(_SIDES) for f, n in hand.items()

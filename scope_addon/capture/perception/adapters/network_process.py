@@ -30,7 +30,7 @@ SERVER = Path(__file__).with_name("network_server.py")
 OPENING_S = {"tensorrt": 1800.0}  # TensorRT compiles the network
 DEFAULT_OPENING_S = 120.0
 RUN_S = 60.0
-# of memory; onnxruntime copies weights while it rearranges them
+# Memory beside the weights, which onnxruntime copies while it rearranges them.
 BASE_BYTES = 4 << 30
 WEIGHT_COPIES = 4
 _FLAGS = getattr(subprocess, "CREATE_NO_WINDOW", 0)

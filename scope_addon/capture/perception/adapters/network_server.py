@@ -92,7 +92,7 @@ def receive(stream: IO[bytes], largest_arrays: int) -> dict[str, Any]:
     text = _read(stream, size)
     try:
         return _with_arrays(text, stream, largest_arrays)
-    # the last one of np.dtype
+    # The last of these errors is np.dtype's.
     except (KeyError, TypeError, OverflowError, RecursionError, SyntaxError) as error:
         raise ValueError(str(error)) from error
 

@@ -36,15 +36,15 @@ from ...perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
 from ...perception.face_record import gaze, kept_landmarks, landmarks_of, parts, with_expression
 
 FILE = Path(__file__).resolve().parents[4] / "assets" / "face" / "response.npz"
-# of a face, from which a person's face at rest is known
+# The time, and the number of frames, that tell a person's face at rest.
 MIN_S = 2.0
 MIN_FRAMES = 10
 SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
-# size of a face below which errors grow, with the area's inverse; most growth of λ
+# Below this size of a face, errors grow with the inverse of its area; λ grows by this at most.
 SURE_PX = 64.0
 MAX_NOISE = 8.0
-# w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1
+# The w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1.
 LARGEST_GAZE = 2.0
 _TIME_TOLERANCE_S = 0.005  # of their sum
 _ROUNDS = 4
@@ -187,7 +187,7 @@ def _descend(
     :param normal: (U, U) H.
     :param target: (T, U) g.
     """
-    # a unit's numbers lie together
+    # A unit's numbers lie together.
     weights = np.ascontiguousarray(w.T)
     g = np.ascontiguousarray(target.T)
     before = np.empty_like(weights)
@@ -232,7 +232,7 @@ def with_expressions(rows: FloatArray, times: Float64Array) -> FloatArray:
         return fitted(rows, times)
     if not len(seen):
         return rows
-    # on the CPU, whatever the other networks run on: it takes a millisecond
+    # It runs on the CPU, whatever the other networks run on: it takes a millisecond.
     network = ExpressionNetwork()
     landmarks = landmarks_of(rows[seen], np.array(EXPRESSION_POINTS))[..., :2]
     weights = np.array([network.estimate(face) for face in landmarks])

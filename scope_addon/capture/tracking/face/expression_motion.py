@@ -21,13 +21,13 @@ NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise,
 MAX_NOISE = 8.0  # times as much for a small one, by the inverse of its area
 GAZE_NOISE = 0.06
 SURE_PX = 64.0  # size of a face from which it is large
-# in which an expression goes to rest after the face was last seen, and comes back before it is
-# again
+# The time in which an expression goes to rest after the face was last seen, and comes back before it
+# is seen again.
 RELEASE_S = 0.5
 CLOSED = 0.5  # weight of a blink above which the iris is not seen
-# light around the eyes below which they are not seen; small ones in thick frames have 0.45
+# With less light around the eyes, they are not seen; small eyes in thick frames have 0.45.
 DARK_GLASSES = 0.4
-# time over which the median of that is taken: a hand or a shadow that passes is none
+# The time over which the median of that light is taken: a passing hand or shadow is no glasses.
 GLASSES_S = 1.0
 SURE_OF_MOUTH = 0.5  # times the confidence of a face whose eyes are not seen
 MIN_S = 2.0  # of a face, from which it is known how the network sees its open eyes

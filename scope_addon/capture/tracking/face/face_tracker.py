@@ -29,9 +29,9 @@ from ...perception.sessions import Execution
 from ..frame_clock import PATIENCE_S, is_search_due
 
 PRESENCE_THRESHOLD = 0.5
-# between the face and where the body's head predicts it, in sides of the predicted region
+# The largest distance of a face from where the body's head predicts it, in sides of that region.
 MAX_DISTANCE = 0.35
-# side of the face's region over that of the predicted one
+# The least and largest side of the face's region over that of the predicted one.
 MIN_SIZE = 0.5
 MAX_SIZE = 1.6
 SMALLEST_REGION_PX = 24.0
@@ -39,7 +39,7 @@ SMALLEST_REGION_PX = 24.0
 # for. Of heads that look farther away, the network imagines the half that nobody sees, or a face at
 # the back.
 MIN_FACING = 0.1
-# in the region by the body, below which it is not looked for by the landmarks there
+# Below this presence in the region by the body, the face is not looked for by its landmarks.
 FIRST_PRESENCE = 0.001
 
 

@@ -30,17 +30,18 @@ FOLLOWED_DISTANCE = 2.0
 FOLLOWED_PRESENCE = 0.8
 SURE_WRIST = 0.5
 MAX_SIZE = 2.0  # of the hand, in the hand lengths of the body
-# mean distance of the keypoints, in sizes of the hand, below which two hands are one
+# Two hands whose keypoints are closer in the mean, in sizes of the hand, are one.
 SAME_HAND = 0.35
 # The same where the network is sure that one is a left hand and the other a right one: hands that
 # touch are so near.
 SAME_PLACE = 0.15
-# probability; of a hand behind the other one, which the network imagines, it says up to 0.83
+# The least probability of a side; for a hand that the network imagines behind the other, it has up
+# to 0.83.
 SURE_SIDE = 0.9
 DISAGREEMENT_THRESHOLD = 0.3
 CERTAIN_PRESENCE = 0.95  # from which a hand is none that the network imagines
 MIN_SIDE_PROBABILITY = 0.15  # of the right side
-# distances of the body's two wrists from a hand of the wrong side, in hand lengths
+# Distances of the body's two wrists from a hand of the wrong side, in hand lengths.
 SAME_WRIST = 0.3
 OTHER_WRIST = 1.0
 FOLLOWED_WRIST = 0.5  # the first of them for a hand that was this one in the frame before or after
@@ -62,11 +63,11 @@ class Least(NamedTuple):
     size: float = 0.25
 
 
-# of a hand whose palm was detected, or that was seen in the frame before
+# What a hand requires whose palm was detected, or that was seen in the frame before.
 DETECTED = Least(0.5, 0.5)
 PREDICTED = Least(0.6, 0.8)  # of one that is only predicted from the body
 TENTATIVE = Least(0.2, 0.2)  # of one that may be believed later, see `confirmed`
-# the same of a hand that is followed back from where it was found again
+# What a hand requires that is followed back from where it was found again.
 FOLLOWED_BACK = Least(0.2, 0.2, 0.42)
 # The same of hands in a second look, which finds small ones in the skin of a forearm.
 SECOND = Least(0.6, np.inf, 0.42)
@@ -215,7 +216,7 @@ def confirmed(hands: FloatArray, times: Float64Array) -> FloatArray:
 def _reached(own: FloatArray, times: Float64Array, sure: BoolArray) -> BoolArray:
     """Return (T,) which tentative hands (T, 21, 6) follow a sure one without interruption."""
     out = np.zeros(len(own), bool)
-    # the hand that was believed last, and when the network was sure of it last
+    # The hand that was believed last, and when the network was sure of it last.
     last = -1
     since = -np.inf
     for k in np.flatnonzero(own[:, 0, _CONFIDENCE]):

@@ -23,11 +23,10 @@ from ...perception.region import Region
 from ..appearance import sample
 from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
 
-# of the wrist in a frame, in hand lengths, from which the region that does not move is tried as
-# well
+# From this motion of the wrist on, in hand lengths per frame, the region at rest is tried as well.
 FAR_MOTION = 0.35
 KEPT_REACH = 2.0  # of the part of a frame that is kept around the wrist, in hand lengths
-# keypoints of a hand: bases and middle joints of the fingers
+# Keypoints of a hand: bases and middle joints of the fingers.
 _KNUCKLES = [5, 9, 13, 17]
 _MIDDLES = [6, 10, 14, 18]
 _ALONG = (1 / 3, 2 / 3)  # places on the palm, from the wrist to the knuckles

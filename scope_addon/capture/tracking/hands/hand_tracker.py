@@ -46,9 +46,9 @@ from .hand_sight import Found, Sight, better, followed_regions
 
 AGAIN_PRESENCE = 0.03  # the same where a hand is looked for that was found in the frame after
 FIRST_PRESENCE = 0.1  # in a rough region, from which the better one of the landmarks is looked at
-# side of the square in which a palm is searched, in sides of the predicted region
+# Side of the square in which a palm is searched, in sides of the predicted region.
 SEARCH_SCALE = 2.3
-# of the square and the region of a second look, likewise
+# The sides of the square and the region of a second look, in sides of the predicted region.
 CLOSER_SCALE = 1.5
 SMALLER_SCALE = 0.7
 UNSURE_SCORE = 0.2  # of a palm in a second look
