@@ -21,8 +21,8 @@ NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise,
 MAX_NOISE = 8.0  # times as much for a small one, by the inverse of its area
 GAZE_NOISE = 0.06
 SURE_PX = 64.0  # size of a face from which it is large
-# The time in which an expression goes to rest after the face was last seen, and comes back before it
-# is seen again.
+# The time in which an expression goes to rest after the face was last seen, and comes back before
+# it is seen again.
 RELEASE_S = 0.5
 CLOSED = 0.5  # weight of a blink above which the iris is not seen
 # With less light around the eyes, they are not seen; small eyes in thick frames have 0.45.
