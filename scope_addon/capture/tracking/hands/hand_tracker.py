@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -135,38 +136,19 @@ class HandTracker:
         :param observations: tracklet number and observation of each person.
         :param time_s: when the frame is shown; None: a thirtieth of a second after the one before.
         """
-        self._time_s = now = self._time_s + FRAME_S if time_s is None else time_s
+        now = self._time_s + FRAME_S if time_s is None else time_s
+        self._time_s = now
+        people = dict(observations)
         sights = {
-            (n, side): self._sight(image_rgb, o, (n, side))
-            for n, o in observations
+            (number, side): self._sight(image_rgb, person, (number, side))
+            for number, person in people.items()
             for side in range(len(SIDES))
         }
         self._hands = {
             key: self._hands.get(key) or _Hand(None, sight.wrist_px, now, now - PATIENCE_S)
             for key, sight in sights.items()
         }
-        # Each changes its own hand and sight alone, so that the results do not depend on the
-        # threads' timing.
-        found = dict(
-            zip(
-                sights,
-                self._pool.map(self._find, sights.values(), self._hands.values()),
-                strict=True,
-            )
-        )
-        for (number, side), sight in sights.items():
-            if found[number, side] is None:
-                found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
-        kept = without_duplicates(
-            {key: hand and hand.estimate for key, hand in found.items()}, dict(observations)
-        )
-        for key, sight in sights.items():
-            if found[key] is not None and kept[key] is None:
-                # Another one was found there: look beside all of them, which this one may touch.
-                others = [other for other in kept.values() if other is not None]
-                beside = self._search(replace(sight, others=others), look_again=False)
-                found[key] = beside
-                kept[key] = beside and beside.estimate
+        found = self._find_all(sights, people)
         for key, hand in found.items():
             state = self._hands[key]
             state.found = hand
@@ -174,35 +156,63 @@ class HandTracker:
             if hand is not None and hand.is_sure:
                 state.seen_s = now
                 state.color = hand.color
-        nothing = np.zeros((HAND_POINTS, 6), np.float32)
-        rows = {
-            n: np.array(
-                [hand.row if (hand := found[n, side]) else nothing for side in range(len(SIDES))]
-            )
-            for n, _ in observations
-        }
+        rows = {number: np.zeros((len(SIDES), HAND_POINTS, 6), np.float32) for number in people}
+        for (number, side), hand in found.items():
+            if hand is not None:
+                rows[number][side] = hand.row
+        self._complete_earlier_frames(sights, found, rows)
+        return [(number, replace(o, hands=rows[number])) for number, o in observations]
+
+    def _find_all(
+        self, sights: dict[Key, Sight], people: dict[int, Observation]
+    ) -> dict[Key, Found | None]:
+        """Look for every hand; one that was found twice is looked for again beside all others."""
+        # Each changes its own hand and sight alone, so that the results do not depend on the
+        # threads' timing.
+        in_order = self._pool.map(self._find, sights.values(), self._hands.values())
+        found = dict(zip(sights, in_order, strict=True))
+        for (number, side), sight in sights.items():
+            if found[number, side] is None:
+                found[number, side] = _of_other_side(sight, sights[number, 1 - side].opposite)
+        estimates = {key: hand and hand.estimate for key, hand in found.items()}
+        kept = without_duplicates(estimates, people)
+        for key, sight in sights.items():
+            if found[key] is not None and kept[key] is None:
+                # The hand may touch the others.
+                others = [other for other in kept.values() if other is not None]
+                beside = self._search(replace(sight, others=others), look_again=False)
+                found[key] = beside
+                kept[key] = beside and beside.estimate
+        return found
+
+    def _complete_earlier_frames(
+        self,
+        sights: dict[Key, Sight],
+        found: dict[Key, Found | None],
+        rows: dict[int, Float32Array],
+    ) -> None:
+        """Follow hands that are surely found back through the frames in which they were missed, and
+        note those that are missed now.
+
+        :param rows: (2, 21, 6) of each person, which the observations of this frame have.
+        """
+        now = self._time_s
         before = self._missed
         self._missed = {}
         for key, sight in sights.items():
             hand = found[key]
             missed = [m for m in before.get(key, []) if now - m.time_s <= SUPPORT_S + 0.005]
             if hand is not None and hand.is_sure:
-                elsewhere = [
-                    m
-                    for other, those in (before | self._missed).items()
-                    if other != key
-                    for m in those
+                of_others = [
+                    those for other, those in (before | self._missed).items() if other != key
                 ]
-                self._look_back(missed, hand, sight, elsewhere)
+                self._look_back(missed, hand, sight, list(chain.from_iterable(of_others)))
             elif sight.hand_px >= self._least_px:
-                others = [
-                    h.estimate for other, h in found.items() if other != key and h is not None
-                ]
+                others = [h.estimate for k, h in found.items() if k != key and h is not None]
                 seen = replace(sight.around_wrist(), others=others, opposite=[])
-                self._missed[key] = [*missed, _Missed(now, seen, hand, rows[key[0]][key[1]])][
-                    -MAX_MISSED:
-                ]
-        return [(n, replace(o, hands=rows[n])) for n, o in observations]
+                number, side = key
+                missed.append(_Missed(now, seen, hand, rows[number][side]))
+                self._missed[key] = missed[-MAX_MISSED:]
 
     def _look_back(
         self, missed: Sequence[_Missed], hand: Found, sight: Sight, elsewhere: Sequence[_Missed]
