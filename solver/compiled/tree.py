@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import as_array, as_integers
 from ..errors import ShapeError
 from ..validation import as_indices, check_finite, check_switch, warn_of_units
-from .rows import padded
 
 
 class BodyArrays(Protocol):
@@ -34,6 +33,14 @@ class BodyArrays(Protocol):
     def v_bar(self) -> NDArray[np.floating[Any]]: ...  # noqa: D102
     @property
     def V(self) -> NDArray[np.floating[Any]]: ...  # noqa: D102
+
+
+WIDTH = 4  # numbers to which rows of shape columns are padded: whole vectors of most processors
+
+
+def padded(n: int) -> int:
+    """Return `n` rounded up to a multiple of `WIDTH`."""
+    return -(-n // WIDTH) * WIDTH
 
 
 class Tree(NamedTuple):

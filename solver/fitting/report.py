@@ -82,7 +82,7 @@ def cost_by_term(
     Kinds whose weight is zero are left out.
 
     :param stage: (2, C) a row of weights and a row of 1/sigma, in the registry's order.
-    :param scratch: (2 QUEUE, W) of `make_scratch`. :param blocks: overwritten. Others as of
+    :param scratch: (12, W) of `make_scratch`. :param blocks: overwritten. Others as of
         `linearize`.
     """
     found = {}

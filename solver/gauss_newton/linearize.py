@@ -8,22 +8,20 @@ the gradients,
     C += V'ᵀ (W + W_d) V'
 with V' = R_i V. The derivative D of the part's origin by shape is added once per part, and the
 part's sums, taken about its own origin, are then shifted to the pelvis, the origin of all twists.
-Products that go into C are gathered as pairs of rows and multiplied many at a time. The arithmetic
-of one point is in point_terms.py, of one part in part_sums.py; both are expanded here before LLVM
-sees them.
-"""
 
-from typing import Any
+In the order in which they are called from the end of this file: `linearize`, `place_parts`, and for
+each part `_add_points` with `_point_terms` for each of its points, then `_add_part`. Vectors are
+tuples of 3 numbers, 3 x 3 matrices of 9 by rows, symmetric ones of the 6 of their upper triangle by
+rows; the loops over the shape's columns are in plain_rows.py.
+"""
 
 import numpy as np
 
 from ..compiled.kernel import expanded_kernel, kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.rows import add3 as add_rows
-from ..compiled.rows import clear
 from ..compiled.tree import Tree
 from ..custom_residuals.external import accumulate_external
-from ..residuals import shape_prior
+from ..residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
 from ..residuals.registry import (
     KEYPOINT2D,
     KEYPOINT3D,
@@ -31,78 +29,13 @@ from ..residuals.registry import (
     SHAPE_PRIOR,
     accumulate_tables,
 )
-from .gram import add_gram
-from .part_sums import (
-    add3,
-    add6,
-    add9,
-    add_cross,
-    cross_both,
-    rotate,
-    shift_angular,
-    shift_corner,
-    write_part,
-)
-from .point_terms import point_at_rest, point_terms
-from .row_pass import row_pass
-from .terms import HAS_2D, HAS_SHAPE, Terms
-
-QUEUE = 48  # pairs of rows (X, Z) of C += XᵀZ that are gathered before they are multiplied
+from .rows import add_origin, add_point, place_origin
+from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
 
 
 def make_scratch(tree: Tree) -> Array:
-    """Return the working memory of `linearize`: a queue of pairs of rows, each row X followed by
-    its Z.
-    """
-    return np.zeros((2 * QUEUE, tree.S.shape[2]))
-
-
-def _dot(a: Any, b: Any) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _place_formula(s, D_parent, S, D):  # type: ignore[no-untyped-def]
-    """D = D_par + R_par S."""
-    return [], [], [D_parent[r] + _dot(s[3 * r : 3 * r + 3], S) for r in range(3)]
-
-
-def _point_formula(s, N, V, pairs):  # type: ignore[no-untyped-def]
-    """V' = R V;  N += [[e]x W_all; W] V';  pairs (V', W_all V'). s: R (9), [e]x W_all (9), W (6),
-    W_all (6).
-    """
-    moved = [_dot(s[3 * r : 3 * r + 3], V) for r in range(3)]
-    W, W_all = (
-        [[a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]]] for a in (s[18:24], s[24:30])
-    )
-    angular = [N[r] + _dot(s[9 + 3 * r : 12 + 3 * r], moved) for r in range(3)]
-    linear = [N[3 + r] + _dot(W[r], moved) for r in range(3)]
-    weighted = [_dot(W_all[r], moved) for r in range(3)]
-    return angular + linear, [], [row for pair in zip(moved, weighted, strict=True) for row in pair]
-
-
-def _part_formula(s, N, D, pairs):  # type: ignore[no-untyped-def]
-    """Add the origin's motion D to N and shift it to the pelvis. s: A (6), Z (9), the origin s (3),
-    one half.
-
-    With H = N_lin + A D / 2:  C += HᵀD + DᵀH,  N_ang += [s]x N_lin + Z D,  N_lin += A D.
-    """
-    a = s[:6]
-    Z = s[6:15]
-    (x, y, z) = s[15:18]
-    half = s[18]
-    AD = [_dot(row, D) for row in ([a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]])]
-    H = [N[3 + r] + AD[r] * half for r in range(3)]
-    turned = [y * N[5] - z * N[4], z * N[3] - x * N[5], x * N[4] - y * N[3]]
-    angular = [N[r] + turned[r] + _dot(Z[3 * r : 3 * r + 3], D) for r in range(3)]
-    pairs = [row for r in range(3) for row in (H[r], D[r])] + [
-        row for r in range(3) for row in (D[r], H[r])
-    ]
-    return angular + [N[3 + r] + AD[r] for r in range(3)], [], pairs
-
-
-_place = row_pass(_place_formula, (3, 3, 0))
-_point = row_pass(_point_formula, (6, 3, 0))
-_part = row_pass(_part_formula, (6, 3, 0))
+    """Return the working memory of `linearize`: the rows (12, W) of one point or part."""
+    return np.zeros((12, tree.S.shape[2]))
 
 
 def make_pose(tree: Tree) -> Pose:
@@ -130,11 +63,8 @@ def make_blocks(tree: Tree) -> Blocks:
 @kernel
 def place_parts(tree: Tree, pose: Pose) -> None:
     """Fill R, t and D of parts 1..K from Omega, beta and the root's R and t; D_0 = 0."""
-    W = tree.S.shape[2]
     R = pose.R
     t = pose.t
-    D = pose.D
-    beta = pose.beta
     for i in range(1, tree.parents.shape[0]):
         j = tree.parents[i]
         Q = R[j]
@@ -143,12 +73,12 @@ def place_parts(tree: Tree, pose: Pose) -> None:
         y = tree.l[i, 1]
         z = tree.l[i, 2]
         for a in range(tree.shape):
-            b = beta[a]
+            b = pose.beta[a]
             x += tree.S[i, 0, a] * b
             y += tree.S[i, 1, a] * b
             z += tree.S[i, 2, a] * b
         turn = (Q[0, 0], Q[0, 1], Q[0, 2], Q[1, 0], Q[1, 1], Q[1, 2], Q[2, 0], Q[2, 1], Q[2, 2])
-        _place(turn, W, D, 3 * j * W, W, tree.S, 3 * i * W, W, D, 3 * i * W, W)
+        place_origin(pose.D[j], turn, tree.S[i], pose.D[i])
         for r in range(3):
             q0 = Q[r, 0]
             q1 = Q[r, 1]
@@ -161,45 +91,267 @@ def place_parts(tree: Tree, pose: Pose) -> None:
 @kernel
 def clear_blocks(blocks: Blocks) -> None:
     """Set everything but A to zero."""
-    n = blocks.H_u.shape[0]
-    W = blocks.c.shape[0]
     if blocks.cross[0]:
-        clear(blocks.H_u, 0, 3 * n * (SHAPE + W))
+        blocks.H_u[:] = 0.0
         blocks.cross[0] = 0
-    for i in range(n):
+    for i in range(blocks.H_u.shape[0]):
         for r in range(3):
             blocks.H_u[i, r, GRADIENT] = 0.0
             for k in range(3):
                 blocks.H_uu[i, r, k] = 0.0
-    clear(blocks.C, 0, W * W)
-    clear(blocks.c, 0, W)
+    blocks.C[:] = 0.0
+    blocks.c[:] = 0.0
 
 
 @expanded_kernel
-def _make_room(C, W, scratch, waiting, more):  # type: ignore[no-untyped-def]
-    """Multiply the queue out if it cannot take `more` pairs; return how many are waiting."""
-    if waiting + more > QUEUE:
-        add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
-        waiting = 0
-    return waiting
+def _add3(a, b):  # type: ignore[no-untyped-def]
+    """Return a + b, three numbers each."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @expanded_kernel
-def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cost):  # type: ignore[no-untyped-def]
+def _add6(a, b):  # type: ignore[no-untyped-def]
+    """Return a + b, six numbers each."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+@expanded_kernel
+def _add9(a, b):  # type: ignore[no-untyped-def]
+    """Return a + b, nine numbers each."""
+    return (
+        a[0] + b[0],
+        a[1] + b[1],
+        a[2] + b[2],
+        a[3] + b[3],
+        a[4] + b[4],
+        a[5] + b[5],
+        a[6] + b[6],
+        a[7] + b[7],
+        a[8] + b[8],
+    )
+
+
+@expanded_kernel
+def _rotate(r, v):  # type: ignore[no-untyped-def]
+    """Return R v; r: R by rows (9), v (3)."""
+    x, y, z = v
+    return (
+        r[0] * x + r[1] * y + r[2] * z,
+        r[3] * x + r[4] * y + r[5] * z,
+        r[6] * x + r[7] * y + r[8] * z,
+    )
+
+
+@expanded_kernel
+def _add_cross(m, a, b):  # type: ignore[no-untyped-def]
+    """Return m + a x b."""
+    return (
+        m[0] + a[1] * b[2] - a[2] * b[1],
+        m[1] + a[2] * b[0] - a[0] * b[2],
+        m[2] + a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@expanded_kernel
+def _cross_symmetric(a, w):  # type: ignore[no-untyped-def]
+    """Return [a]x W by rows (9); w: the upper triangle of a symmetric W by rows (6)."""
+    x, y, z = a
+    w00, w01, w02, w11, w12, w22 = w
+    return (
+        y * w02 - z * w01, y * w12 - z * w11, y * w22 - z * w12,
+        z * w00 - x * w02, z * w01 - x * w12, z * w02 - x * w22,
+        x * w01 - y * w00, x * w11 - y * w01, x * w12 - y * w02,
+    )  # fmt: skip
+
+
+@expanded_kernel
+def _cross_both(a, b):  # type: ignore[no-untyped-def]
+    """Return the upper triangle by rows (6) of [a]x W [a]xᵀ; b: [a]x W by rows (9)."""
+    x, y, z = a
+    return (
+        y * b[2] - z * b[1], z * b[0] - x * b[2], x * b[1] - y * b[0],
+        z * b[3] - x * b[5], x * b[4] - y * b[3], x * b[7] - y * b[6],
+    )  # fmt: skip
+
+
+@expanded_kernel
+def _shift_corner(s, x, a):  # type: ignore[no-untyped-def]
+    """Return Z = X + [s]x A, the corner of M about the pelvis; s: the part's origin from there."""
+    sx, sy, sz = s
+    a00, a01, a02, a11, a12, a22 = a
+    return (
+        x[0] + sy * a02 - sz * a01, x[1] + sy * a12 - sz * a11, x[2] + sy * a22 - sz * a12,
+        x[3] + sz * a00 - sx * a02, x[4] + sz * a01 - sx * a12, x[5] + sz * a02 - sx * a22,
+        x[6] + sx * a01 - sy * a00, x[7] + sx * a11 - sy * a01, x[8] + sx * a12 - sy * a02,
+    )  # fmt: skip
+
+
+@expanded_kernel
+def _shift_angular(s, y, x, z):  # type: ignore[no-untyped-def]
+    """Return Y + X [s]xᵀ + [s]x Zᵀ, the angular block of M about the pelvis: its upper triangle by
+    rows (6).
+    """
+    sx, sy, sz = s
+    y00, y01, y02, y11, y12, y22 = y
+    y00 += sy * x[2] - sz * x[1] + sy * z[2] - sz * z[1]
+    y01 += sz * x[0] - sx * x[2] + sy * z[5] - sz * z[4]
+    y02 += sx * x[1] - sy * x[0] + sy * z[8] - sz * z[7]
+    y11 += sz * x[3] - sx * x[5] + sz * z[3] - sx * z[5]
+    y12 += sx * x[4] - sy * x[3] + sz * z[6] - sx * z[8]
+    y22 += sx * x[7] - sy * x[6] + sx * z[7] - sy * z[6]
+    return y00, y01, y02, y11, y12, y22
+
+
+@expanded_kernel
+def _write_part(B, y, z, a, s, f, m):  # type: ignore[no-untyped-def]
+    """Write M = [[Y, Z], [Zᵀ, A]], the force f and its moment m + s x f to a part's block B (6,
+    8+W).
+    """
+    B[0, 0] = y[0]
+    B[0, 1] = y[1]
+    B[0, 2] = y[2]
+    B[0, 3] = z[0]
+    B[0, 4] = z[1]
+    B[0, 5] = z[2]
+    B[1, 0] = y[1]
+    B[1, 1] = y[3]
+    B[1, 2] = y[4]
+    B[1, 3] = z[3]
+    B[1, 4] = z[4]
+    B[1, 5] = z[5]
+    B[2, 0] = y[2]
+    B[2, 1] = y[4]
+    B[2, 2] = y[5]
+    B[2, 3] = z[6]
+    B[2, 4] = z[7]
+    B[2, 5] = z[8]
+    B[3, 0] = z[0]
+    B[3, 1] = z[3]
+    B[3, 2] = z[6]
+    B[3, 3] = a[0]
+    B[3, 4] = a[1]
+    B[3, 5] = a[2]
+    B[4, 0] = z[1]
+    B[4, 1] = z[4]
+    B[4, 2] = z[7]
+    B[4, 3] = a[1]
+    B[4, 4] = a[3]
+    B[4, 5] = a[4]
+    B[5, 0] = z[2]
+    B[5, 1] = z[5]
+    B[5, 2] = z[8]
+    B[5, 3] = a[2]
+    B[5, 4] = a[4]
+    B[5, 5] = a[5]
+    B[0, GRADIENT], B[1, GRADIENT], B[2, GRADIENT] = _add_cross(m, s, f)
+    B[3, GRADIENT], B[4, GRADIENT], B[5, GRADIENT] = f
+
+
+@expanded_kernel
+def _point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
+    """Return V_j beta + v_bar_j of slot j, in its part's axes."""
+    x = terms.rest[j, 0]
+    y = terms.rest[j, 1]
+    z = terms.rest[j, 2]
+    if terms.flags[j] & HAS_SHAPE:
+        for a in range(P):
+            b = beta[a]
+            x += terms.V[j, 0, a] * b
+            y += terms.V[j, 1, a] * b
+            z += terms.V[j, 2, a] * b
+    return x, y, z
+
+
+@expanded_kernel
+def _add_keypoint3d(q, p, weight, inv_sigma, triggs, cost, w, g):  # type: ignore[no-untyped-def]
+    """Add the term of a point p (3) measured at q (4) to the cost, W = GᵀG (6) and Gᵀr (3)."""
+    more, w3d, k, x, y, z = keypoint3d.term(
+        p[0], p[1], p[2], q[0], q[1], q[2], weight * q[3], inv_sigma, triggs
+    )
+    w = (
+        w[0] + w3d - k * x * x, w[1] - k * x * y, w[2] - k * x * z,
+        w[3] + w3d - k * y * y, w[4] - k * y * z, w[5] + w3d - k * z * z,
+    )  # fmt: skip
+    return cost + more, w, _add3(g, (x, y, z))
+
+
+@expanded_kernel
+def _add_direction(q, e, weight, inv_sigma, triggs, cost, w, g):  # type: ignore[no-untyped-def]
+    """Add the term of a lever e (3) measured along q (4) to the cost, W = GᵀG (6) and Gᵀr (3)."""
+    more, d00, d01, d02, d11, d12, d22, x, y, z = orientation_field.term(
+        e[0], e[1], e[2], q[0], q[1], q[2], weight * q[3], inv_sigma, triggs
+    )
+    return cost + more, _add6(w, (d00, d01, d02, d11, d12, d22)), _add3(g, (x, y, z))
+
+
+@expanded_kernel
+def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
+    """Evaluate what was measured of slot j, at e (3) from the origin t (3) of its part.
+
+    settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
+    Return the cost so far; W = GᵀG (6), [e]x W (9) and Gᵀr (3) of the position terms; with the
+    direction, W, [e]x W and Gᵀr of all; and Gᵀg (3), gᵀg and gᵀr of the focal length, g = dr/dlog
+    f.
+    """
+    # Scalars rather than tuples wherever a branch sets them: LLVM would sum in another order, with
+    # other roundings.
+    w2, k2, w3, k3, wd, kd, focal, triggs = settings
+    flags = terms.flags[j]
+    ex, ey, ez = e
+    tx, ty, tz = t
+    w00 = 0.0
+    w01 = 0.0
+    w02 = 0.0
+    w11 = 0.0
+    w12 = 0.0
+    w22 = 0.0
+    gx = 0.0
+    gy = 0.0
+    gz = 0.0
+    hx = 0.0
+    hy = 0.0
+    hz = 0.0
+    ff = 0.0
+    fr = 0.0
+    if flags & HAS_2D:
+        q = terms.image[j]
+        more, w00, w01, w02, w11, w12, w22, gx, gy, gz, hx, hy, hz, ff, fr = keypoint2d.term(
+            ex + tx, ey + ty, ez + tz, q[0], q[1], focal, w2 * q[2], k2, triggs
+        )
+        cost += more
+    if flags & HAS_3D:
+        q = terms.point[j]
+        p = (ex + tx, ey + ty, ez + tz)
+        w = (w00, w01, w02, w11, w12, w22)
+        cost, w, (gx, gy, gz) = _add_keypoint3d(q, p, w3, k3, triggs, cost, w, (gx, gy, gz))
+        w00, w01, w02, w11, w12, w22 = w
+    position = (w00, w01, w02, w11, w12, w22)
+    b00, b01, b02, b10, b11, b12, b20, b21, b22 = _cross_symmetric(e, position)
+    moments = (b00, b01, b02, b10, b11, b12, b20, b21, b22)
+    force = (gx, gy, gz)
+    if flags & HAS_DIRECTION:
+        w = (w00, w01, w02, w11, w12, w22)
+        cost, w, (gx, gy, gz) = _add_direction(
+            terms.direction[j], e, wd, kd, triggs, cost, w, (gx, gy, gz)
+        )
+        w00, w01, w02, w11, w12, w22 = w
+        b00, b01, b02, b10, b11, b12, b20, b21, b22 = _cross_symmetric(e, w)
+    w = (w00, w01, w02, w11, w12, w22)
+    b = (b00, b01, b02, b10, b11, b12, b20, b21, b22)
+    return cost, position, moments, force, w, b, (gx, gy, gz), (hx, hy, hz), ff, fr
+
+
+@expanded_kernel
+def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, cost):  # type: ignore[no-untyped-def]
     """Add the terms of part i's points to the cost, N, C and c.
 
     settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
-    Return the cost, how many pairs are waiting, and sums over the points about the part's origin: W
-    (6), [e]x W (9), [e]x W_all [e]xᵀ (6), the force (3) and its moment (3), and those of the focal
-    length's column.
+    Return the cost and sums over the points about the part's origin: W (6), [e]x W (9), [e]x W_all
+    [e]xᵀ (6), the force (3) and its moment (3), and those of the focal length's column.
     """
-    A = blocks.A
     C = blocks.C
     c = blocks.c
-    V = terms.V
-    W = C.shape[0]
     P = tree.shape
-    row = SHAPE + W
     fit_focal = tree.globals > P
     R = pose.R[i]
     r = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
@@ -230,7 +382,6 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
     mx = 0.0
     my = 0.0
     mz = 0.0
-    # scalars, as in point_terms.py
     hx = 0.0
     hy = 0.0
     hz = 0.0
@@ -241,90 +392,46 @@ def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, waiting, cos
         flags = terms.flags[j]
         if flags <= HAS_SHAPE:
             continue
-        e = rotate(r, point_at_rest(terms, pose.beta, j, P))
-        cost, w, b, f, w_all, b_all, g, h, ff, fr = point_terms(terms, j, e, t, settings, cost)
+        e = _rotate(r, _point_at_rest(terms, pose.beta, j, P))
+        cost, w, b, f, w_all, b_all, g, h, ff, fr = _point_terms(terms, j, e, t, settings, cost)
         if fit_focal and flags & HAS_2D:
             C[P, P] += ff
             c[P] += fr
-            hx, hy, hz = add3((hx, hy, hz), h)
-            nx, ny, nz = add_cross((nx, ny, nz), e, h)
-        a00, a01, a02, a11, a12, a22 = add6((a00, a01, a02, a11, a12, a22), w)
-        x00, x01, x02, x10, x11, x12, x20, x21, x22 = add9(
+            hx, hy, hz = _add3((hx, hy, hz), h)
+            nx, ny, nz = _add_cross((nx, ny, nz), e, h)
+        a00, a01, a02, a11, a12, a22 = _add6((a00, a01, a02, a11, a12, a22), w)
+        x00, x01, x02, x10, x11, x12, x20, x21, x22 = _add9(
             (x00, x01, x02, x10, x11, x12, x20, x21, x22), b
         )
-        fx, fy, fz = add3((fx, fy, fz), f)
-        y00, y01, y02, y11, y12, y22 = add6((y00, y01, y02, y11, y12, y22), cross_both(e, b_all))
-        mx, my, mz = add_cross((mx, my, mz), e, g)
+        fx, fy, fz = _add3((fx, fy, fz), f)
+        y00, y01, y02, y11, y12, y22 = _add6((y00, y01, y02, y11, y12, y22), _cross_both(e, b_all))
+        mx, my, mz = _add_cross((mx, my, mz), e, g)
         if flags & HAS_SHAPE:
-            waiting = _make_room(C, W, scratch, waiting, 3)
-            at = 2 * waiting * W
-            _point(
-                r + b_all + w + w_all,
-                W,
-                A,
-                6 * i * row + SHAPE,
-                row,
-                V,
-                3 * j * W,
-                W,
-                scratch,
-                at,
-                W,
-            )
-            add_rows(c, 0, g[0], g[1], g[2], scratch, at, at + 2 * W, at + 4 * W, W)
+            add_point(terms.V[j], r, w, w_all, b_all, g, blocks.A[i], C, c, scratch)
             if fit_focal and flags & HAS_2D:
-                k = 2 * waiting
                 for n in range(P):
-                    C[n, P] += (
-                        scratch[k, n] * h[0] + scratch[k + 2, n] * h[1] + scratch[k + 4, n] * h[2]
-                    )
-            waiting += 3
+                    C[n, P] += scratch[0, n] * h[0] + scratch[1, n] * h[1] + scratch[2, n] * h[2]
     a = (a00, a01, a02, a11, a12, a22)
     x = (x00, x01, x02, x10, x11, x12, x20, x21, x22)
     y = (y00, y01, y02, y11, y12, y22)
     f = (fx, fy, fz)
     m = (mx, my, mz)
-    return cost, waiting, (a, x, y, f, m, (hx, hy, hz), (nx, ny, nz))
+    return cost, (a, x, y, f, m, (hx, hy, hz), (nx, ny, nz))
 
 
 @expanded_kernel
-def _add_part(tree, i, s, sums, pose, blocks, scratch, waiting):  # type: ignore[no-untyped-def]
-    """Shift part i's sums from its origin to the pelvis and write its block; return how many pairs
-    are waiting.
-    """
+def _add_part(tree, i, s, sums, pose, blocks, scratch):  # type: ignore[no-untyped-def]
+    """Shift part i's sums from its origin to the pelvis and write its block."""
     a, x, y, f, m, h, n = sums
-    A = blocks.A
-    C = blocks.C
-    c = blocks.c
-    D = pose.D
-    W = C.shape[0]
+    B = blocks.A[i]
     P = tree.shape
-    B = A[i]
-    row = SHAPE + W
-    at = 3 * i * W
     if tree.globals > P:
         B[0, SHAPE + P], B[1, SHAPE + P], B[2, SHAPE + P] = n
         B[3, SHAPE + P], B[4, SHAPE + P], B[5, SHAPE + P] = h
-    z = shift_corner(s, x, a)
-    if i > 0 and W > 0:
-        waiting = _make_room(C, W, scratch, waiting, 6)
-        _part(
-            a + z + s + (0.5,),
-            W,
-            A,
-            6 * i * row + SHAPE,
-            row,
-            D,
-            at,
-            W,
-            scratch,
-            2 * waiting * W,
-            W,
-        )
-        waiting += 6
-        add_rows(c, 0, f[0], f[1], f[2], D, at, at + W, at + 2 * W, W)
-    write_part(B, shift_angular(s, y, x, z), z, a, s, f, m)
-    return waiting
+    z = _shift_corner(s, x, a)
+    if i > 0 and tree.S.shape[2] > 0:
+        add_origin(pose.D[i], a, z, s, f, B, blocks.C, blocks.c, scratch)
+    _write_part(B, _shift_angular(s, y, x, z), z, a, s, f, m)
 
 
 @kernel
@@ -349,29 +456,25 @@ def linearize(
         weights[KEYPOINT2D], inv_sigma[KEYPOINT2D], weights[KEYPOINT3D], inv_sigma[KEYPOINT3D],
         weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD], np.exp(pose.log_focal[0]), triggs,
     )  # fmt: skip
-    A = blocks.A
-    C = blocks.C
-    W = blocks.C.shape[0]
     clear_blocks(blocks)
-    waiting = 0  # pairs in the queue
     ox = pose.t[0, 0]
     oy = pose.t[0, 1]
     oz = pose.t[0, 2]
     cost: float = 0.0
     for i in range(tree.parents.shape[0]):
-        clear(A, 6 * i * (SHAPE + W), 6 * (SHAPE + W))
+        B = blocks.A[i]
+        for r in range(6):
+            for k in range(B.shape[1]):
+                B[r, k] = 0.0
         if terms.starts[i] == terms.starts[i + 1]:
             continue
         tx = pose.t[i, 0]
         ty = pose.t[i, 1]
         tz = pose.t[i, 2]
-        cost, waiting, sums = _add_points(
-            tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, waiting, cost
+        cost, sums = _add_points(
+            tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, cost
         )
-        waiting = _add_part(
-            tree, i, (tx - ox, ty - oy, tz - oz), sums, pose, blocks, scratch, waiting
-        )
-    add_gram(C, W, scratch, 0, 2 * W, scratch, W, 2 * W, waiting)
+        _add_part(tree, i, (tx - ox, ty - oy, tz - oz), sums, pose, blocks, scratch)
     cost += accumulate_tables(
         tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks
     )

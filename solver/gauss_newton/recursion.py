@@ -22,12 +22,10 @@ import numpy as np
 
 from ..compiled.kernel import expanded_kernel, kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.rows import add1, add3, copy
 from ..compiled.tree import Tree
 from ..rotations import exp3
-from .gram import subtract_gram
 from .linearize import make_scratch
-from .row_pass import row_pass
+from .rows import add_to_parent, scale_rows, subtract_eliminated, take_moment
 
 # a pivot below this share of its diagonal is no information: that direction stays where it is
 TINY = 1e-13
@@ -69,35 +67,17 @@ def make_workspace(tree: Tree) -> Workspace:
     return Workspace(*[np.zeros(shape) for shape in shapes] + [make_scratch(tree)])
 
 
-def _moment_formula(s, A, Y, _):  # type: ignore[no-untyped-def]
-    """Y = UᵀA: the moment about the joint, A_ang - s x A_lin. s: the joint's origin."""
-    x, y, z = s
-    turned = [y * A[5] - z * A[4], z * A[3] - x * A[5], x * A[4] - y * A[3]]
-    return [], [A[r] - turned[r] for r in range(3)], []
-
-
-def _scale_formula(s, Y, _, __):  # type: ignore[no-untyped-def]
-    """Y~ = L^-1 Y. s: L^-1 by rows of its lower triangle."""
-    return [Y[0] * s[0], Y[0] * s[1] + Y[1] * s[2], Y[0] * s[3] + Y[1] * s[4] + Y[2] * s[5]], [], []
-
-
-def _parent_formula(s, A_parent, A, Y):  # type: ignore[no-untyped-def]
-    """A_par += A - Y~ᵀY~. s: the first six columns of Y~ (18)."""
-    out = []
-    for r in range(6):
-        out.append(A_parent[r] + A[r] - Y[0] * s[3 * r] - Y[1] * s[3 * r + 1] - Y[2] * s[3 * r + 2])
-    return out, [], []
-
-
-_moment = row_pass(_moment_formula, (6, 0, 0))
-_scale = row_pass(_scale_formula, (3, 0, 0))
-_to_parent = row_pass(_parent_formula, (6, 6, 3))
+@kernel
+def copy_rows(source, target) -> None:  # type: ignore[no-untyped-def]
+    """Write rows (m, n) to others; an assignment of slices would allocate memory."""
+    for r in range(source.shape[0]):
+        for k in range(source.shape[1]):
+            target[r, k] = source[r, k]
 
 
 @kernel
-def factorize(H, row: int, n: int, diagonal) -> None:  # type: ignore[no-untyped-def]
-    """Replace [H | rest], rows of length `row` whose first n columns are symmetric, by L^-1 [H |
-    rest], H = L Lᵀ.
+def factorize(H, n: int, diagonal) -> None:  # type: ignore[no-untyped-def]
+    """Replace the rows [H | rest] (n, .), H (n, n) symmetric, by L^-1 [H | rest], H = L Lᵀ.
 
     Only the upper triangle is read, and L_ii^-1 is put on the diagonal. A pivot that is not
     positive to rounding gets 0 for its inverse, so that its unknown becomes 0. diagonal (n,) is
@@ -108,11 +88,11 @@ def factorize(H, row: int, n: int, diagonal) -> None:  # type: ignore[no-untyped
     for j in range(n):
         d = H[j, j]
         inverse = 1.0 / math.sqrt(d) if d > TINY * abs(diagonal[j]) and d > 1e-290 else 0.0
-        square = -inverse * inverse
         for i in range(j + 1, n):
-            first = i & ~3
-            add1(H, i * row + first, H[j, i] * square, H, j * row + first, row - first)
-        for k in range(row):
+            share = H[j, i] * inverse * inverse
+            for k in range(i, H.shape[1]):
+                H[i, k] -= share * H[j, k]
+        for k in range(j, H.shape[1]):
             H[j, k] *= inverse
         H[j, j] = inverse
 
@@ -128,18 +108,14 @@ def eliminate(
     eliminated. `root_scale` is s, in radians per metre. The blocks are kept, to be eliminated again
     with another damping.
     """
-    A = work.A
-    Y = work.Y
-    L = work.L
     C = work.C
     c = work.c
-    W = c.shape[0]
-    row = SHAPE + W
     n = tree.parents.shape[0]
-    P = tree.globals
-    copy(A, 0, blocks.A, 0, 6 * n * row)
-    copy(c, 0, blocks.c, 0, W)
-    copy(C, 0, blocks.C, 0, W * W)
+    for i in range(n):
+        copy_rows(blocks.A[i], work.A[i])
+    copy_rows(blocks.C, C)
+    for a in range(c.shape[0]):
+        c[a] = blocks.c[a]
     ox = pose.t[0, 0]
     oy = pose.t[0, 1]
     oz = pose.t[0, 2]
@@ -148,16 +124,18 @@ def eliminate(
         sx = pose.t[i, 0] - ox
         sy = pose.t[i, 1] - oy
         sz = pose.t[i, 2] - oz
-        base = 6 * i * row
-        y = 3 * i * row
-        _moment((sx, sy, sz), row, A, base, row, Y, y, row, Y, y, row)
+        s = (sx, sy, sz)
+        A = work.A[i]
+        T = work.Y[i]
+        H = blocks.H_uu[i]
+        take_moment(A, s, T)
         if blocks.cross[0]:
-            add1(Y, y, 1.0, blocks.H_u, y, 3 * row)
+            for r in range(3):
+                for k in range(T.shape[1]):
+                    T[r, k] += blocks.H_u[i, r, k]
         else:
             for r in range(3):
-                Y[i, r, GRADIENT] += blocks.H_u[i, r, GRADIENT]
-        T = Y[i]
-        H = blocks.H_uu[i]
+                T[r, GRADIENT] += blocks.H_u[i, r, GRADIENT]
         # Q = Y U + H_uu + lambda I (+ UT H_uxT)
         q00 = T[0, 0] + T[0, 5] * -sy + T[0, 4] * sz + H[0, 0] + damping
         q10 = T[1, 0] + T[1, 4] * sz - T[1, 5] * sy + H[1, 0]
@@ -184,40 +162,22 @@ def eliminate(
         i10 = -l10 * i00 * i11
         i21 = -l21 * i11 * i22
         i20 = -(l20 * i00 + l21 * i10) * i22
-        F = L[i]
-        F[0] = i00
-        F[1] = i10
-        F[2] = i11
-        F[3] = i20
-        F[4] = i21
-        F[5] = i22
-        _scale((i00, i10, i11, i20, i21, i22), row, Y, y, row, Y, y, row, Y, y, row)
-        g0 = T[0, GRADIENT]
-        g1 = T[1, GRADIENT]
-        g2 = T[2, GRADIENT]
-        squares += g0 * g0 + g1 * g1 + g2 * g2
-        to = 6 * tree.parents[i] * row
-        columns = (
-            T[0, 0], T[1, 0], T[2, 0], T[0, 1], T[1, 1], T[2, 1], T[0, 2], T[1, 2], T[2, 2],
-            T[0, 3], T[1, 3], T[2, 3], T[0, 4], T[1, 4], T[2, 4], T[0, 5], T[1, 5], T[2, 5],
-        )  # fmt: skip
-        _to_parent(columns, row, A, to, row, A, base, row, Y, y, row)
-        e = y + SHAPE
-        add3(c, 0, -g0, -g1, -g2, Y, e, e + row, e + 2 * row, W)
-    if W > 0:
-        subtract_gram(C, W, Y, 3 * row + SHAPE, row, 3 * (n - 1))
+        F = (i00, i10, i11, i20, i21, i22)
+        for k in range(6):
+            work.L[i, k] = F[k]
+        scale_rows(F, T)
+        squares += T[0, GRADIENT] ** 2 + T[1, GRADIENT] ** 2 + T[2, GRADIENT] ** 2
+        add_to_parent(A, T, work.A[tree.parents[i]])
+        subtract_eliminated(T, C, c)
     root = work.root
-    copy(root, 0, A, 0, 6 * row)
+    copy_rows(work.A[0], root)
     for r in range(6):
         root[r, r] += damping if r < 3 else damping * root_scale * root_scale
-    factorize(root, row, 6, work.x[0])
+    factorize(root, 6, work.x[0])
     for r in range(6):
-        g = root[r, GRADIENT]
-        squares += g * g
-        add1(c, 0, -g, root, r * row + SHAPE, W)
-    if W > 0:
-        subtract_gram(C, W, root, SHAPE, row, 6)
-    for a in range(P):
+        squares += root[r, GRADIENT] ** 2
+    subtract_eliminated(root, C, c)
+    for a in range(tree.globals):
         for b in range(a):
             C[a, b] = C[b, a]
     return squares
@@ -229,8 +189,7 @@ def solve_globals(tree: Tree, C, c, dbeta) -> float:  # type: ignore[no-untyped-
     c|^2.
     """
     P = tree.globals
-    W = C.shape[0]
-    factorize(C, W, P, dbeta)
+    factorize(C, P, dbeta)
     for a in range(P):
         dbeta[a] = -c[a]
     squares = 0.0

@@ -12,7 +12,6 @@ the global columns.
 The factorization from both ends of a banded matrix is known as the twisted one.
 """
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -20,10 +19,8 @@ import numpy as np
 
 from ..compiled.kernel import kernel
 from ..compiled.part import Array
-from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
-from ..gauss_newton.gram import subtract_gram_below, subtract_gram_rows
-from ..gauss_newton.recursion import TINY, solve_globals
+from ..gauss_newton.recursion import factorize, solve_globals
 from .system import GLOBALS, ClipSystem
 
 
@@ -57,42 +54,27 @@ def make_factor(system: ClipSystem) -> Factor:
 
 
 @kernel
-def far_width(first: int, n: int) -> int:
-    """Return how many columns of E_2, a multiple of four, are not zero in the rows first..first+3
-    of L^-1 E_2.
+def subtract_products(Z, n: int, trail) -> None:  # type: ignore[no-untyped-def]
+    """Subtract ZᵀZ of the columns from n on of Z (n, n + m) from the upper triangle of `trail`
+    (m, m).
 
-    Only the same unknown of two frames that are not neighbours is coupled, by 3 x 3 blocks, and
-    L^-1 is triangular.
+    n is a multiple of four: four rows at a time, so that each entry is loaded and stored once for
+    them.
     """
-    return min(n, (3 * ((first + 3) // 3) + 3 + 3) & ~3)
-
-
-@kernel
-def factorize_rows(Z, n: int, row: int, diagonal) -> None:  # type: ignore[no-untyped-def]
-    """Replace [S | E_1 | E_2 | rest], n rows of length `row`, by L^-1 times it: see
-    `recursion.factorize`.
-
-    n is a multiple of four: four rows at a time take what the rows above them leave, in registers.
-    """
-    for j in range(n):
-        diagonal[j] = Z[j, j]
-    end = 3 * n
-    for first in range(0, n, 4):
-        near = 2 * n + far_width(first, n) - first
-        subtract_gram_rows(Z, first * row + first, row, Z, first, row, Z, first, row, first, near)
-        subtract_gram_rows(Z, first * row + end, row, Z, first, row, Z, end, row, first, row - end)
-        for j in range(first, first + 4):
-            d = Z[j, j]
-            inverse = 1.0 / math.sqrt(d) if d > TINY * abs(diagonal[j]) and d > 1e-290 else 0.0
-            for i in range(j + 1, first + 4):
-                scale = -Z[j, i] * inverse * inverse
-                add1(Z, i * row + first, scale, Z, j * row + first, near)
-                add1(Z, i * row + end, scale, Z, j * row + end, row - end)
-            for k in range(first, first + near):
-                Z[j, k] *= inverse
-            for k in range(end, row):
-                Z[j, k] *= inverse
-            Z[j, j] = inverse
+    m = trail.shape[0]
+    for r in range(0, n, 4):
+        for a in range(m):
+            z0 = Z[r, n + a]
+            z1 = Z[r + 1, n + a]
+            z2 = Z[r + 2, n + a]
+            z3 = Z[r + 3, n + a]
+            for b in range(a, m):
+                trail[a, b] -= (
+                    z0 * Z[r, n + b]
+                    + z1 * Z[r + 1, n + b]
+                    + z2 * Z[r + 2, n + b]
+                    + z3 * Z[r + 3, n + b]
+                )
 
 
 @kernel
@@ -112,7 +94,7 @@ def _load(system, f, step, damping, root_scale, trail, Z) -> None:  # type: igno
             Z[a, a] += damping * (root_scale * root_scale if 3 <= a < 6 else 1.0)
         for b in range(n):
             Z[a, n + b] = trail[a, n + b]
-        for b in range(far_width(a & ~3, n)):
+        for b in range(n):
             Z[a, 2 * n + b] = 0.0
         for b in range(q):
             Z[a, 3 * n + b] = trail[a, 2 * n + b] + N[a, b]
@@ -157,14 +139,15 @@ def _advance(trail, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
     """Move what is left by one frame: the second of the two becomes the first, and the next is
     still untouched.
     """
-    size = 2 * n + q
     for a in range(n):
         for b in range(a, n):
             trail[a, b] = trail[n + a, n + b]
         for b in range(q):
             trail[a, 2 * n + b] = trail[n + a, 2 * n + b]
-        clear(trail, a * size + n, n)
-        clear(trail, (n + a) * size + n, n + q)
+        for b in range(n):
+            trail[a, n + b] = 0.0
+        for b in range(n + q):
+            trail[n + a, n + b] = 0.0
 
 
 @kernel
@@ -177,13 +160,13 @@ def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) 
     n = system.N.shape[1]
     q = system.N.shape[2]
     size = 2 * n + q
-    row = 3 * n + q
     for k in range(count):
         f = first + step * k
         _load(system, f, step, damping, root_scale, trail, Z[f])
         _advance(trail, n, q)
-        factorize_rows(Z[f], n, row, trail[size - 1])
-        subtract_gram_below(trail, size, Z[f], n, row, n, n)
+        # Of the last row, only the end belongs to the upper triangle.
+        factorize(Z[f], n, trail[size - 1])
+        subtract_products(Z[f], n, trail)
 
 
 @kernel
@@ -203,7 +186,7 @@ def substitute_frames(Z, first, count, step, dg, d) -> None:  # type: ignore[no-
             for hop in range(1, 3):
                 other = f + hop * step
                 if 0 <= other < Z.shape[0]:
-                    for b in range(n if hop == 1 else far_width(r & ~3, n)):
+                    for b in range(n):
                         s -= Z[f, r, hop * n + b] * d[other, b]
             for b in range(r + 1, n):
                 s -= Z[f, r, b] * d[f, b]

@@ -20,11 +20,9 @@ import numpy as np
 
 from ..compiled.kernel import kernel
 from ..compiled.part import Array, Pose
-from ..compiled.rows import add1, clear
 from ..compiled.tree import Tree
-from ..gauss_newton.gram import subtract_gram_rows
 from ..gauss_newton.optimizer import MIN_DAMPING
-from .band import Factor, eliminate_clip, far_width, run_both
+from .band import Factor, eliminate_clip, run_both
 from .system import GLOBALS, ClipSystem
 
 
@@ -40,7 +38,6 @@ class _Memory(NamedTuple):
     """What one thread works in."""
 
     S: Array  # (3 n + W, 3 n + W): the frame, the two eliminated after it, the global columns
-    X: Array  # (3 n + W, 4)
     J: Array  # (2, 3, 6 + 3K + W)
     columns: Array  # (6 + 3K + W,) integers
 
@@ -100,7 +97,6 @@ def _make_memory(n: int, W: int, parts: int) -> _Memory:
     columns = 3 + 3 * parts + W
     return _Memory(
         np.zeros((size, size)),
-        np.zeros((size, 4)),
         np.zeros((2, 3, columns)),
         np.zeros(columns, dtype=np.int64),
     )
@@ -114,71 +110,33 @@ def _select(tree, poses, Z, first, count, step, memory, joints, from_root) -> No
     n = Z.shape[1]
     for k in range(count):
         f = first + step * k
-        _invert_frame(Z[f], n, memory.S, memory.X)
+        _invert_frame(Z[f], n, memory.S)
         _write_joints(tree, poses, f, memory, joints[f], from_root[f])
         _advance(n, memory.S)
 
 
 @kernel
-def _invert_frame(Z, n: int, S, X) -> None:  # type: ignore[no-untyped-def]
+def _invert_frame(Z, n: int, S) -> None:  # type: ignore[no-untyped-def]
     """Fill the rows and columns of S (3 n + W, 3 n + W) of a frame, from those of what was
     eliminated after it.
 
-    Four rows at a time: first their sums over the columns after these four, in registers. X (3 n +
-    W, 4) is overwritten. An unknown without a pivot, of which Z holds the inverse 0, does not move.
-    Of the second frame after it, only the columns that the rows reach (`far_width`) are read, here
-    and before, and so only they are filled.
+    An unknown without a pivot, of which Z holds the inverse 0, does not move.
     """
     size = S.shape[0]
-    shared = 3 * n
-    for first in range(n - 4, -1, -4):
-        after = first + 4
-        end = 2 * n + far_width(first, n)
-        width = end - after
-        W = size - shared
-        at = first * size + after
-        to = first * size + shared
-        for r in range(4):
-            clear(S, (first + r) * size + after, width)
-            clear(S, (first + r) * size + shared, W)
-            for k in range(after, end):
-                X[k, r] = Z[first + r, k]
-            for k in range(shared, size):
-                X[k, r] = Z[first + r, k + GLOBALS]
-        subtract_gram_rows(
-            S, at, size, X, after * 4, 4, S, after * size + after, size, width, width
-        )
-        subtract_gram_rows(S, at, size, X, shared * 4, 4, S, shared * size + after, size, W, width)
-        subtract_gram_rows(S, to, size, X, after * 4, 4, S, after * size + shared, size, width, W)
-        subtract_gram_rows(S, to, size, X, shared * 4, 4, S, shared * size + shared, size, W, W)
-        for r in range(3, -1, -1):
-            i = first + r
-            for q in range(r + 1, 4):
-                z = -Z[i, first + q]
-                row = (first + q) * size
-                add1(S, i * size + after, z, S, row + after, width)
-                add1(S, i * size + shared, z, S, row + shared, W)
-            u = Z[i, i]
-            for k in range(after, end):
-                S[i, k] *= u
-            for k in range(shared, size):
-                S[i, k] *= u
-            for q in range(3, r - 1, -1):
-                j = first + q
-                s = 0.0
-                for k in range(after, end):
-                    s += X[k, r] * S[j, k]
-                for k in range(shared, size):
-                    s += X[k, r] * S[j, k]
-                for p in range(r + 1, 4):
-                    s += Z[i, first + p] * S[j, first + p]
-                S[i, j] = (u if q == r else 0.0) * u - u * s
-                S[j, i] = S[i, j]
-        for r in range(4):
-            for k in range(after, end):
-                S[k, first + r] = S[first + r, k]
-            for k in range(shared, size):
-                S[k, first + r] = S[first + r, k]
+    for i in range(n - 1, -1, -1):
+        u = Z[i, i]  # the inverse of the pivot
+        for j in range(i + 1, size):
+            S[i, j] = 0.0
+        for k in range(i + 1, size):
+            share = u * (Z[i, k] if k < 3 * n else Z[i, k + GLOBALS])
+            for j in range(i + 1, size):
+                S[i, j] -= share * S[k, j]
+        variance = u * u
+        for k in range(i + 1, size):
+            share = u * (Z[i, k] if k < 3 * n else Z[i, k + GLOBALS])
+            variance -= share * S[i, k]
+            S[k, i] = S[i, k]
+        S[i, i] = variance
 
 
 @kernel

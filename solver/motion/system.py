@@ -21,8 +21,7 @@ from numba.extending import register_jitable
 
 from ..compiled.kernel import kernel
 from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.rows import padded
-from ..compiled.tree import Tree
+from ..compiled.tree import Tree, padded
 
 GLOBALS = 4  # first global column of `ClipSystem.N`; its column 0 is the gradient
 

@@ -24,14 +24,14 @@ of the paper, which leaves the kind of flow open; this one is ours. Training: to
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from ..compiled.kernel import allocating_kernel, kernel
 from ..compiled.part import Array, Linearization, Part
-from ..compiled.simd import WIDTH, sqrt, vectorized
+from ..gauss_newton.plain_rows import LANES, STATE
+from ..gauss_newton.rows import in_lanes
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .accumulation import add_to_joint
 
@@ -53,176 +53,255 @@ CONSTANT = LAST + 12
 BOUND = LAST + 13
 SIZE = LAST + 14  # of a joint's parameters
 
-INTS = WIDTH  # joints, 0 for none: one row holds several
-FLOATS = WIDTH * (SIZE + 2)  # their parameters, then w and h, each as WIDTH values
+INTS = LANES  # joints, 0 for none: one row holds several
+FLOATS = LANES * (SIZE + 2)  # their parameters, then w and h, each as LANES values
 INDEXES = "parts"
 _W = SIZE
 NEAREST = 1e-4  # radians to pi
 _MIN_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)
 _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 
-# A state of the formulas: x (3), dx/de (9) by rows, |det dx/dmu| without constants, gradient of its
-# logarithm by e (3).
-STATE = 16
+# A state of the formulas has STATE entries: x (3), dx/de (9) by rows, |det dx/dmu| without
+# constants, and the gradient of its logarithm by e (3). Formulas take it as a tuple, and find their
+# parameter k at q[at + k n]. Their numbers may be numpy arrays, or whatever `in_lanes` passes.
 
 
-def chart(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """Return the state y from Omega (9) by rows; parameters M."""
-    m = [q(MEAN + k) for k in range(9)]
-
-    def entry(i: int, j: int) -> Any:  # of MᵀOmega
-        return m[i] * s[j] + m[3 + i] * s[3 + j] + m[6 + i] * s[6 + j]
-
-    four_ww = 1.0 + entry(0, 0) + entry(1, 1) + entry(2, 2)
-    w = 0.5 * sqrt(four_ww)
-    root = sqrt(w)
+@register_jitable
+def chart(q, at, n, s):  # type: ignore[no-untyped-def]
+    """Return the state y from Omega, the first 9 of s, by rows; parameters M."""
+    m00, m01, m02, m10, m11, m12, m20, m21, m22 = _matrix(q, at, n)
+    # L = MᵀOmega
+    l00 = m00 * s[0] + m10 * s[3] + m20 * s[6]
+    l01 = m00 * s[1] + m10 * s[4] + m20 * s[7]
+    l02 = m00 * s[2] + m10 * s[5] + m20 * s[8]
+    l10 = m01 * s[0] + m11 * s[3] + m21 * s[6]
+    l11 = m01 * s[1] + m11 * s[4] + m21 * s[7]
+    l12 = m01 * s[2] + m11 * s[5] + m21 * s[8]
+    l20 = m02 * s[0] + m12 * s[3] + m22 * s[6]
+    l21 = m02 * s[1] + m12 * s[4] + m22 * s[7]
+    l22 = m02 * s[2] + m12 * s[5] + m22 * s[8]
+    four_ww = 1.0 + l00 + l11 + l22
+    w = 0.5 * np.sqrt(four_ww)
+    root = np.sqrt(w)
     k = root / four_ww
-    y = [
-        k * (entry(2, 1) - entry(1, 2)),
-        k * (entry(0, 2) - entry(2, 0)),
-        k * (entry(1, 0) - entry(0, 1)),
-    ]
+    x = k * (l21 - l12)
+    y = k * (l02 - l20)
+    z = k * (l10 - l01)
     f = 0.5 * root
-    n = 0.25 / root
-    a = n * y[0]
-    b = n * y[1]
-    c = n * y[2]
-    hx = 0.5 * y[0]
-    hy = 0.5 * y[1]
-    hz = 0.5 * y[2]
-    J = [f + a * y[0], a * y[1] + hz, a * y[2] - hy,
-         a * y[1] - hz, f + b * y[1], b * y[2] + hx,
-         a * y[2] + hy, b * y[2] - hx, f + c * y[2]]  # fmt: skip
+    quarter = 0.25 / root
+    a = quarter * x
+    b = quarter * y
+    c = quarter * z
+    hx = 0.5 * x
+    hy = 0.5 * y
+    hz = 0.5 * z
     ww1 = 1.0 + w * w
     g = f * (2.5 / w - 2.0 * w / ww1)  # dw/de = -v/2
-    return [*y, *J, ww1 / (w * w * root), g * y[0], g * y[1], g * y[2]]
+    return (
+        x, y, z,
+        f + a * x, a * y + hz, a * z - hy,
+        a * y - hz, f + b * y, b * z + hx,
+        a * z + hy, b * z - hx, f + c * z,
+        ww1 / (w * w * root), g * x, g * y, g * z,
+    )  # fmt: skip
 
 
-def _linear(
-    q: Callable[[int], Any], at: int, x: list[Any], J: list[Any]
-) -> tuple[list[Any], list[Any]]:
-    """Return A x + b and A J, with A and b from parameter `at` on."""
-    A = [q(at + k) for k in range(9)]
-    out = [
-        q(at + 9 + r) + A[3 * r] * x[0] + A[3 * r + 1] * x[1] + A[3 * r + 2] * x[2]
-        for r in range(3)
-    ]
-    entries = [(r, c) for r in range(3) for c in range(3)]
-    return out, [
-        A[3 * r] * J[c] + A[3 * r + 1] * J[3 + c] + A[3 * r + 2] * J[6 + c] for r, c in entries
-    ]
+@register_jitable
+def _matrix(q, at, n):  # type: ignore[no-untyped-def]
+    """Return nine parameters."""
+    return (
+        q[at], q[at + n], q[at + 2 * n], q[at + 3 * n], q[at + 4 * n],
+        q[at + 5 * n], q[at + 6 * n], q[at + 7 * n], q[at + 8 * n],
+    )  # fmt: skip
 
 
-def _hidden(q: Callable[[int], Any], at: int, x: list[Any]) -> list[Any]:
-    """Return (s, ds/dx.., t, dt/dx..) of the small network whose parameters start at `at`, of one
-    or two inputs x.
-    """
-    n = len(x)
-    H = HIDDEN
-    out = at + (n + 1) * H
-    bias = at + (n + 3) * H
-    sums = [[q(bias + r)] + [None] * n for r in range(2)]
-    for k in range(H):
-        W = [q(at + n * k + i) for i in range(n)]
-        u = q(at + n * H + k) + sum(W[i] * x[i] for i in range(n))
+@register_jitable
+def _linear(q, at, n, s):  # type: ignore[no-untyped-def]
+    """Return A x + b and A J, with A and b from parameter `at` on, and the rest of the state."""
+    a00, a01, a02, a10, a11, a12, a20, a21, a22 = _matrix(q, at, n)
+    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = s
+    return (
+        q[at + 9 * n] + a00 * x + a01 * y + a02 * z,
+        q[at + 10 * n] + a10 * x + a11 * y + a12 * z,
+        q[at + 11 * n] + a20 * x + a21 * y + a22 * z,
+        a00 * j00 + a01 * j10 + a02 * j20,
+        a00 * j01 + a01 * j11 + a02 * j21,
+        a00 * j02 + a01 * j12 + a02 * j22,
+        a10 * j00 + a11 * j10 + a12 * j20,
+        a10 * j01 + a11 * j11 + a12 * j21,
+        a10 * j02 + a11 * j12 + a12 * j22,
+        a20 * j00 + a21 * j10 + a22 * j20,
+        a20 * j01 + a21 * j11 + a22 * j21,
+        a20 * j02 + a21 * j12 + a22 * j22,
+        det, g0, g1, g2,
+    )  # fmt: skip
+
+
+@register_jitable
+def _hidden1(q, at, n, x):  # type: ignore[no-untyped-def]
+    """Return (s, ds/dx, t, dt/dx) of the small network of x whose parameters start at `at`."""
+    out = at + 2 * HIDDEN * n
+    bias = at + 4 * HIDDEN * n
+    s = q[bias]
+    t = q[bias + n]
+    sx = 0.0
+    tx = 0.0
+    for k in range(HIDDEN):
+        w = q[at + k * n]
+        u = q[at + (HIDDEN + k) * n] + w * x
+        r = 1.0 / (1.0 + u * u)
+        tau = u * r
+        slope = r * (2.0 * r - 1.0) * w
+        s = s + q[out + k * n] * tau
+        t = t + q[out + (HIDDEN + k) * n] * tau
+        sx = sx + q[out + k * n] * slope
+        tx = tx + q[out + (HIDDEN + k) * n] * slope
+    return s, sx, t, tx
+
+
+@register_jitable
+def _hidden2(q, at, n, x, y):  # type: ignore[no-untyped-def]
+    """Return (s, ds/dx, ds/dy, t, dt/dx, dt/dy) of the small network of x and y."""
+    out = at + 3 * HIDDEN * n
+    bias = at + 5 * HIDDEN * n
+    s = q[bias]
+    t = q[bias + n]
+    sx = 0.0
+    sy = 0.0
+    tx = 0.0
+    ty = 0.0
+    for k in range(HIDDEN):
+        wx = q[at + 2 * k * n]
+        wy = q[at + (2 * k + 1) * n]
+        u = q[at + (2 * HIDDEN + k) * n] + wx * x + wy * y
         r = 1.0 / (1.0 + u * u)
         tau = u * r
         slope = r * (2.0 * r - 1.0)
-        for total, o in zip(sums, (q(out + k), q(out + H + k)), strict=True):
-            total[0] = total[0] + o * tau
-            d = o * slope
-            for i in range(n):
-                total[i + 1] = d * W[i] if total[i + 1] is None else total[i + 1] + d * W[i]
-    return sums
+        s = s + q[out + k * n] * tau
+        t = t + q[out + (HIDDEN + k) * n] * tau
+        s_slope = q[out + k * n] * slope
+        t_slope = q[out + (HIDDEN + k) * n] * slope
+        sx = sx + s_slope * wx
+        sy = sy + s_slope * wy
+        tx = tx + t_slope * wx
+        ty = ty + t_slope * wy
+    return s, sx, sy, t, tx, ty
 
 
-def layer(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """Return the state after one layer, whose parameters are q(0..LAYER_SIZE - 1)."""
-    x, J = _linear(q, 0, s[:3], s[3:12])
-    J1 = J[:3]
-    J2 = J[3:6]
-    J3 = J[6:]
-    det = s[12]
-    G = s[13:16]
-    H = HIDDEN
-    (a, a1), (t, t1) = _hidden(q, 12, x[:1])
-    root = sqrt(1.0 + a * a)
-    # rate: d log S / dx_1
-    S = a + root
-    rate = a1 / root
-    x2 = S * x[1] + t
-    k1 = S * rate * x[1] + t1
-    det = det * S
-    G = [G[c] + rate * J1[c] for c in range(3)]
-    old2 = J2
-    J2 = [S * J2[c] + k1 * J1[c] for c in range(3)]
-    (a, a1, a2), (t, t1, t2) = _hidden(q, 14 + 4 * H, x[:2])
-    root = sqrt(1.0 + a * a)
-    S = a + root
+@register_jitable
+def _bend(beta, x):  # type: ignore[no-untyped-def]
+    """Return x + beta sqrt(1 + x^2), its derivative, and that of the derivative's logarithm."""
+    root = np.sqrt(1.0 + x * x)
     inverse = 1.0 / root
-    rate1 = a1 * inverse
-    rate2 = a2 * inverse
-    x3 = S * x[2] + t
-    k1 = S * rate1 * x[2] + t1
-    k2 = S * rate2 * x[2] + t2
-    det = det * S
-    G = [G[c] + rate1 * J1[c] + rate2 * old2[c] for c in range(3)]
-    J3 = [S * J3[c] + k1 * J1[c] + k2 * old2[c] for c in range(3)]
-    out = []
-    rows = []
-    for k, (value, row) in enumerate(((x[0], J1), (x2, J2), (x3, J3))):
-        beta = q(LAYER_SIZE - 3 + k)
-        root = sqrt(1.0 + value * value)
-        inverse = 1.0 / root
-        slope = 1.0 + beta * value * inverse
-        out.append(value + beta * root)
-        bend = beta * inverse * inverse * inverse / slope
-        det = det * slope
-        G = [G[c] + bend * row[c] for c in range(3)]
-        rows += [slope * row[c] for c in range(3)]
-    return [*out, *rows, det, *G]
+    slope = 1.0 + beta * x * inverse
+    return x + beta * root, slope, beta * inverse * inverse * inverse / slope
 
 
-def finish(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
+@register_jitable
+def layer(q, at, n, s):  # type: ignore[no-untyped-def]
+    """Return the state after one layer, whose parameters start at `at`."""
+    x1, x2, x3, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = _linear(q, at, n, s)
+    a, a1, t, t1 = _hidden1(q, at + 12 * n, n, x1)
+    root = np.sqrt(1.0 + a * a)
+    scale2 = a + root
+    rate = a1 / root  # d log S / dx_1
+    k1 = scale2 * rate * x2 + t1
+    g0 = g0 + rate * j00
+    g1 = g1 + rate * j01
+    g2 = g2 + rate * j02
+    i10 = scale2 * j10 + k1 * j00
+    i11 = scale2 * j11 + k1 * j01
+    i12 = scale2 * j12 + k1 * j02
+    moved2 = scale2 * x2 + t
+    a, a1, a2, t, t1, t2 = _hidden2(q, at + (14 + 4 * HIDDEN) * n, n, x1, x2)
+    root = np.sqrt(1.0 + a * a)
+    scale3 = a + root
+    rate1 = a1 / root
+    rate2 = a2 / root
+    k1 = scale3 * rate1 * x3 + t1
+    k2 = scale3 * rate2 * x3 + t2
+    g0 = g0 + rate1 * j00 + rate2 * j10
+    g1 = g1 + rate1 * j01 + rate2 * j11
+    g2 = g2 + rate1 * j02 + rate2 * j12
+    i20 = scale3 * j20 + k1 * j00 + k2 * j10
+    i21 = scale3 * j21 + k1 * j01 + k2 * j11
+    i22 = scale3 * j22 + k1 * j02 + k2 * j12
+    moved3 = scale3 * x3 + t
+    y1, slope1, bend1 = _bend(q[at + (LAYER_SIZE - 3) * n], x1)
+    y2, slope2, bend2 = _bend(q[at + (LAYER_SIZE - 2) * n], moved2)
+    y3, slope3, bend3 = _bend(q[at + (LAYER_SIZE - 1) * n], moved3)
+    return (
+        y1, y2, y3,
+        slope1 * j00, slope1 * j01, slope1 * j02,
+        slope2 * i10, slope2 * i11, slope2 * i12,
+        slope3 * i20, slope3 * i21, slope3 * i22,
+        det * scale2 * scale3 * slope1 * slope2 * slope3,
+        g0 + bend1 * j00 + bend2 * i10 + bend3 * i20,
+        g1 + bend1 * j01 + bend2 * i11 + bend3 * i21,
+        g2 + bend1 * j02 + bend2 * i12 + bend3 * i22,
+    )  # fmt: skip
+
+
+@register_jitable
+def finish(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state z with derivatives in the parent's axes in place of M's."""
-    z, J = _linear(q, LAST, s[:3], s[3:12])
-    m = [q(MEAN + k) for k in range(9)]
+    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = _linear(
+        q, at + LAST * n, n, s
+    )
+    m00, m01, m02, m10, m11, m12, m20, m21, m22 = _matrix(q, at, n)
+    # (M row) of each row of derivatives
+    return (
+        x, y, z,
+        m00 * j00 + m01 * j01 + m02 * j02,
+        m10 * j00 + m11 * j01 + m12 * j02,
+        m20 * j00 + m21 * j01 + m22 * j02,
+        m00 * j10 + m01 * j11 + m02 * j12,
+        m10 * j10 + m11 * j11 + m12 * j12,
+        m20 * j10 + m21 * j11 + m22 * j12,
+        m00 * j20 + m01 * j21 + m02 * j22,
+        m10 * j20 + m11 * j21 + m12 * j22,
+        m20 * j20 + m21 * j21 + m22 * j22,
+        det,
+        m00 * g0 + m01 * g1 + m02 * g2,
+        m10 * g0 + m11 * g1 + m12 * g2,
+        m20 * g0 + m21 * g1 + m22 * g2,
+    )  # fmt: skip
 
-    def turned(row: list[Any]) -> list[Any]:  # (M row) for a row of derivatives in M's axes
-        return [m[3 * r] * row[0] + m[3 * r + 1] * row[1] + m[3 * r + 2] * row[2] for r in range(3)]
 
-    return [*z, *turned(J[:3]), *turned(J[3:6]), *turned(J[6:]), s[12], *turned(s[13:16])]
+@register_jitable
+def normal(q, at, n, s):  # type: ignore[no-untyped-def]
+    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, and from entry 12 on what `finish` left."""
+    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = s
+    return (
+        j00 * j00 + j10 * j10 + j20 * j20,
+        j00 * j01 + j10 * j11 + j20 * j21,
+        j00 * j02 + j10 * j12 + j20 * j22,
+        j01 * j01 + j11 * j11 + j21 * j21,
+        j01 * j02 + j11 * j12 + j21 * j22,
+        j02 * j02 + j12 * j12 + j22 * j22,
+        j00 * x + j10 * y + j20 * z,
+        j01 * x + j11 * y + j21 * z,
+        j02 * x + j12 * y + j22 * z,
+        x * x + y * y + z * z,
+        x, y, det, g0, g1, g2,
+    )  # fmt: skip
 
 
-def normal(q: Callable[[int], Any], s: list[Any]) -> list[Any]:
-    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, then what `finish` left from entry 10 on: state[12:16]
-    stays.
-    """
-    J = [s[3:6], s[6:9], s[9:12]]
-
-    def dot(a: int, b: int) -> Any:
-        return J[0][a] * J[0][b] + J[1][a] * J[1][b] + J[2][a] * J[2][b]
-
-    H = [dot(0, 0), dot(0, 1), dot(0, 2), dot(1, 1), dot(1, 2), dot(2, 2)]
-    g = [J[0][a] * s[0] + J[1][a] * s[1] + J[2][a] * s[2] for a in range(3)]
-    return [*H, *g, s[0] * s[0] + s[1] * s[1] + s[2] * s[2]]
-
-
-_chart, _layer, _finish, _normal = (
-    vectorized(formula, reads)
-    for formula, reads in ((chart, 9), (layer, STATE), (finish, STATE), (normal, 12))
-)
+_chart = in_lanes(chart)
+_layer = in_lanes(layer)
+_finish = in_lanes(finish)
+_normal = in_lanes(normal)
 
 
 @kernel
 def _gather(pose, ints, k, state):  # type: ignore[no-untyped-def]
     """Write the states of the joints of row k side by side."""
-    for lane in range(WIDTH):
+    for lane in range(LANES):
         Om = pose.Omega[ints[k, lane]]
         for r in range(3):
-            state[3 * r * WIDTH + lane] = Om[r, 0]
-            state[(3 * r + 1) * WIDTH + lane] = Om[r, 1]
-            state[(3 * r + 2) * WIDTH + lane] = Om[r, 2]
+            state[3 * r * LANES + lane] = Om[r, 0]
+            state[(3 * r + 1) * LANES + lane] = Om[r, 1]
+            state[(3 * r + 2) * LANES + lane] = Om[r, 2]
 
 
 @allocating_kernel
@@ -232,15 +311,15 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
     """
     M = np.empty((3, 3))
     R = np.empty((3, 3))
-    for lane in range(WIDTH):
+    for lane in range(LANES):
         for e in range(9):
-            M[e // 3, e % 3] = floats[k, (MEAN + e) * WIDTH + lane]
+            M[e // 3, e % 3] = floats[k, (MEAN + e) * LANES + lane]
         trace = 0.0
         for r in range(3):
             for c in range(3):
                 R[r, c] = 0.0
                 for i in range(3):
-                    R[r, c] += M[i, r] * state[(3 * i + c) * WIDTH + lane]
+                    R[r, c] += M[i, r] * state[(3 * i + c) * LANES + lane]
             trace += R[r, r]
         if 1.0 + trace > _MIN_TRACE:
             continue
@@ -251,42 +330,42 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
         E = exp3(scale * x, scale * y, scale * z)
         for r in range(3):
             for c in range(3):
-                state[(3 * r + c) * WIDTH + lane] = (
+                state[(3 * r + c) * LANES + lane] = (
                     M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
                 )
 
 
 @allocating_kernel
 def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
-    """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, WIDTH), floats (n,
+    """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, LANES), floats (n,
     FLOATS).
     """
     cost = 0.0
     if ints.shape[0] == 0 or weight <= 0.0:
         return cost
-    state = np.empty(STATE * WIDTH)
+    state = np.empty(STATE * LANES)
     for k in range(ints.shape[0]):
-        at = k * FLOATS
+        parameters = floats[k]
         _gather(pose, ints, k, state)
-        _chart(floats, at, state)
+        _chart(parameters, 0, state)
         near = False
-        for lane in range(WIDTH):
-            near = near or not state[12 * WIDTH + lane] < _FARTHEST  # or not a number
+        for lane in range(LANES):
+            near = near or not state[12 * LANES + lane] < _FARTHEST  # or not a number
         if near:
             _gather(pose, ints, k, state)
             _keep_off_half_turns(floats, k, state)
-            _chart(floats, at, state)
+            _chart(parameters, 0, state)
         for number in range(LAYERS):
-            _layer(floats, at + (FIRST_LAYER + number * LAYER_SIZE) * WIDTH, state)
-        _finish(floats, at, state)
-        _normal(floats, at, state)
-        for lane in range(WIDTH):
+            _layer(parameters, (FIRST_LAYER + number * LAYER_SIZE) * LANES, state)
+        _finish(parameters, 0, state)
+        _normal(parameters, 0, state)
+        for lane in range(LANES):
             i = ints[k, lane]
-            w = weight * floats[k, _W * WIDTH + lane]
-            h = floats[k, (_W + 1) * WIDTH + lane]
+            w = weight * floats[k, _W * LANES + lane]
+            h = floats[k, (_W + 1) * LANES + lane]
             if i == 0 or w <= 0.0:
                 continue
-            e = state[lane::WIDTH]
+            e = state[lane::LANES]
             cost += 0.5 * w * e[9]
             h00 = w * e[0]
             h01 = w * e[1]
@@ -299,8 +378,8 @@ def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # 
             g2 = w * e[8]
             if h > 0.0:
                 a = (
-                    floats[k, BOUND * WIDTH + lane]
-                    - floats[k, CONSTANT * WIDTH + lane]
+                    floats[k, BOUND * LANES + lane]
+                    - floats[k, CONSTANT * LANES + lane]
                     - math.log(e[12])
                 )
                 root = math.sqrt(a * a + 1.0)
@@ -331,16 +410,16 @@ def pack(
     (n,), and h.
     """
     n = len(joints)
-    rows = -(-n // WIDTH)
-    ints = np.zeros((rows * WIDTH, 1), np.int64)
-    floats = np.zeros((rows * WIDTH, SIZE + 2))
+    rows = -(-n // LANES)
+    ints = np.zeros((rows * LANES, 1), np.int64)
+    floats = np.zeros((rows * LANES, SIZE + 2))
     floats[:, MEAN : MEAN + 9] = np.eye(3).ravel()
     ints[:n, 0] = joints
     floats[:n] = np.hstack(
         [np.reshape(parameters, (n, SIZE)), np.c_[weights], np.full((n, 1), log_det)]
     )
-    width_last = floats.reshape(rows, WIDTH, SIZE + 2).transpose(0, 2, 1)
-    return ints.reshape(rows, WIDTH), np.ascontiguousarray(width_last).reshape(rows, FLOATS)
+    width_last = floats.reshape(rows, LANES, SIZE + 2).transpose(0, 2, 1)
+    return ints.reshape(rows, LANES), np.ascontiguousarray(width_last).reshape(rows, FLOATS)
 
 
 def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Array]:
@@ -360,10 +439,10 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
         )
         local = np.where(near[..., None, None], kept, local)
     s = list(np.moveaxis((M @ local).reshape(*local.shape[:-2], 9), -1, 0))
-    s = chart(p.__getitem__, s)
+    s = chart(p, 0, 1, s)
     for k in range(LAYERS):
-        s = layer(p[FIRST_LAYER + k * LAYER_SIZE :].__getitem__, s)
-    s = [np.asarray(v) for v in finish(p.__getitem__, s)]
+        s = layer(p, FIRST_LAYER + k * LAYER_SIZE, 1, s)
+    s = [np.asarray(v) for v in finish(p, 0, 1, s)]
     J = np.stack(s[3:12], -1).reshape(*s[0].shape, 3, 3)
     return np.stack(s[:3], -1), J, np.log(s[12]) + p[CONSTANT], np.stack(s[13:], -1)
 
@@ -394,12 +473,11 @@ def invert(parameters: Array, z: Array) -> Array:
     x = unmap(LAST, np.asarray(z, float))
     for k in reversed(range(LAYERS)):
         at = FIRST_LAYER + k * LAYER_SIZE
-        q = p[at:].__getitem__
         beta = p[at + LAYER_SIZE - 3 : at + LAYER_SIZE]
         x = (x - beta * np.sqrt(x * x + 1.0 - beta * beta)) / (1.0 - beta * beta)
-        (a, _), (t, _) = _hidden(q, 12, [x[..., 0]])
+        a, _, t, _ = _hidden1(p, at + 12, 1, x[..., 0])
         x2 = (x[..., 1] - t) * (np.sqrt(1.0 + a * a) - a)  # 1 / S(a) = S(-a)
-        (a, _, _), (t, _, _) = _hidden(q, 14 + 4 * HIDDEN, [x[..., 0], x2])
+        a, _, _, t, _, _ = _hidden2(p, at + 14 + 4 * HIDDEN, 1, x[..., 0], x2)
         x3 = (x[..., 2] - t) * (np.sqrt(1.0 + a * a) - a)
         x = unmap(at, np.stack([x[..., 0], x2, x3], -1))
     squared = np.sum(x * x, axis=-1, keepdims=True)

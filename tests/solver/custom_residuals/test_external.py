@@ -350,6 +350,7 @@ def test_the_solvers_machine_code_on_disk_stays_good():
     it.
     """
     code = """
+import scope.scope_addon
 from scope.solver.examples import own_residual
 from scope.solver.gauss_newton.optimizer import optimize
 own_residual.main()

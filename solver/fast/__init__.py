@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The same as gauss_newton/plain_rows.py in SIMD instructions, which gauss_newton/rows.py chooses.
+
+The number of shape columns is known only at run time, and a compiler leaves a run-time loop of ten
+turns scalar. These rows are padded with zeros to whole vectors of four numbers.
+"""

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The functions of gauss_newton/plain_rows.py, four columns at a time; see there what they compute.
+
+Each formula below is run once for every four columns, with all of their rows in registers. Products
+such as C += XᵀZ are computed in tiles of four rows by one to three vectors, which stay in registers
+over all rows of X and Z; only tiles on and above the diagonal are touched.
+"""
+
+from typing import Any
+
+from ..compiled.kernel import kernel
+from ..compiled.part import GRADIENT, SHAPE
+from .vectors import in_lanes, row_pass, tile_of
+
+__all__ = [
+    "add_origin",
+    "add_point",
+    "add_to_parent",
+    "in_lanes",
+    "place_origin",
+    "scale_rows",
+    "subtract_eliminated",
+    "take_moment",
+]
+
+
+def _dot(a: Any, b: Any) -> Any:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _times(a: Any, b: Any) -> Any:
+    """Return A b of a symmetric A, given by rows of its upper triangle."""
+    return [_dot(row, b) for row in ([a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]])]
+
+
+def _place_formula(s, D_parent, S, D):  # type: ignore[no-untyped-def]
+    """s: R_par (9)."""
+    return [], [], [D_parent[r] + _dot(s[3 * r : 3 * r + 3], S) for r in range(3)]
+
+
+def _point_formula(s, N, V, moved):  # type: ignore[no-untyped-def]
+    """s: R (9), [e]x W_all (9), W (6), W_all (6)."""
+    turned = [_dot(s[3 * r : 3 * r + 3], V) for r in range(3)]
+    angular = [N[r] + _dot(s[9 + 3 * r : 12 + 3 * r], turned) for r in range(3)]
+    linear = [N[3 + r] + more for r, more in enumerate(_times(s[18:24], turned))]
+    return angular + linear, [], turned + _times(s[24:30], turned)
+
+
+def _origin_formula(s, N, D, moved):  # type: ignore[no-untyped-def]
+    """s: A (6), Z (9), the origin (3), one half; moved: H and D, then D and H."""
+    (x, y, z) = s[15:18]
+    half = s[18]
+    AD = _times(s[:6], D)
+    H = [N[3 + r] + AD[r] * half for r in range(3)]
+    turned = [y * N[5] - z * N[4], z * N[3] - x * N[5], x * N[4] - y * N[3]]
+    angular = [N[r] + turned[r] + _dot(s[6 + 3 * r : 9 + 3 * r], D) for r in range(3)]
+    return angular + [N[3 + r] + AD[r] for r in range(3)], [], [*H, *D, *D, *H]
+
+
+def _add_formula(s, c, X, _):  # type: ignore[no-untyped-def]
+    """Return c + Xᵀ s."""
+    return [c[0] + _dot(s, X)], [], []
+
+
+def _moment_formula(s, A, Y, _):  # type: ignore[no-untyped-def]
+    """s: the joint (3)."""
+    x, y, z = s
+    turned = [y * A[5] - z * A[4], z * A[3] - x * A[5], x * A[4] - y * A[3]]
+    return [], [A[r] - turned[r] for r in range(3)], []
+
+
+def _scale_formula(s, Y, _, __):  # type: ignore[no-untyped-def]
+    """s: L^-1 by rows of its lower triangle (6)."""
+    return [Y[0] * s[0], Y[0] * s[1] + Y[1] * s[2], Y[0] * s[3] + Y[1] * s[4] + Y[2] * s[5]], [], []
+
+
+def _parent_formula(s, A_parent, A, Y):  # type: ignore[no-untyped-def]
+    """s: the first six columns of Y~ (18), three numbers each."""
+    out = []
+    for r in range(6):
+        out.append(A_parent[r] + A[r] - Y[0] * s[3 * r] - Y[1] * s[3 * r + 1] - Y[2] * s[3 * r + 2])
+    return out, [], []
+
+
+_place = row_pass(_place_formula, (3, 3, 0))
+_point = row_pass(_point_formula, (6, 3, 0))
+_origin = row_pass(_origin_formula, (6, 3, 0))
+_add = row_pass(_add_formula, (1, 3, 0))
+_moment = row_pass(_moment_formula, (6, 0, 0))
+_scale = row_pass(_scale_formula, (3, 0, 0))
+_parent = row_pass(_parent_formula, (6, 6, 3))
+_plus1 = tile_of(1, 1)
+_plus2 = tile_of(2, 1)
+_plus3 = tile_of(3, 1)
+_minus1 = tile_of(1, -1)
+_minus2 = tile_of(2, -1)
+_minus3 = tile_of(3, -1)
+
+
+@kernel
+def _add_product(C, X, Z, z, count) -> None:  # type: ignore[no-untyped-def]
+    """C += XᵀZ in the upper triangle of C (W, W), at least; the rows of X, and of Z from z on."""
+    W = C.shape[0]
+    for a in range(0, W, 4):
+        b = a
+        while b + 12 <= W:
+            _plus3(C, a * W + b, W, X, a, W, Z, z * W + b, W, count)
+            b += 12
+        if b + 8 == W:
+            _plus2(C, a * W + b, W, X, a, W, Z, z * W + b, W, count)
+        elif b + 4 == W:
+            _plus1(C, a * W + b, W, X, a, W, Z, z * W + b, W, count)
+
+
+@kernel
+def _subtract_square(C, Y) -> None:  # type: ignore[no-untyped-def]
+    """C -= EᵀE in the upper triangle of C (W, W), at least; E: the rows of Y from `SHAPE` on."""
+    W = C.shape[0]
+    row = Y.shape[1]
+    count = Y.shape[0]
+    for a in range(0, W, 4):
+        b = a
+        while b + 12 <= W:
+            _minus3(C, a * W + b, W, Y, SHAPE + a, row, Y, SHAPE + b, row, count)
+            b += 12
+        if b + 8 == W:
+            _minus2(C, a * W + b, W, Y, SHAPE + a, row, Y, SHAPE + b, row, count)
+        elif b + 4 == W:
+            _minus1(C, a * W + b, W, Y, SHAPE + a, row, Y, SHAPE + b, row, count)
+
+
+@kernel
+def place_origin(D_parent, R_parent, S, D) -> None:  # type: ignore[no-untyped-def]
+    """D = D_par + R_par S."""
+    W = S.shape[1]
+    _place(R_parent, W, D_parent, 0, W, S, 0, W, D, 0, W)
+
+
+@kernel
+def add_point(V, R, W, W_all, eW_all, g, B, C, c, moved) -> None:  # type: ignore[no-untyped-def]
+    """N += [[e]x W_all; W] V',   C += V'ᵀ W_all V',   c += V'ᵀ g."""
+    n = V.shape[1]
+    _point(R + eW_all + W + W_all, n, B, SHAPE, B.shape[1], V, 0, n, moved, 0, n)
+    _add(g, n, c, 0, n, moved, 0, n, moved, 0, n)
+    _add_product(C, moved, moved, 3, 3)
+
+
+@kernel
+def add_origin(D, A, Z, s, f, B, C, c, moved) -> None:  # type: ignore[no-untyped-def]
+    """C += HᵀD + DᵀH,   N_ang += [s]x N_lin + Z D,   N_lin += A D,   c += Dᵀ f."""
+    n = D.shape[1]
+    _origin(A + Z + s + (0.5,), n, B, SHAPE, B.shape[1], D, 0, n, moved, 0, n)
+    _add(f, n, c, 0, n, D, 0, n, D, 0, n)
+    _add_product(C, moved, moved, 6, 6)
+
+
+@kernel
+def take_moment(A, s, Y) -> None:  # type: ignore[no-untyped-def]
+    """Y = A_ang - s x A_lin."""
+    n = A.shape[1]
+    _moment(s, n, A, 0, n, Y, 0, n, Y, 0, n)
+
+
+@kernel
+def scale_rows(F, Y) -> None:  # type: ignore[no-untyped-def]
+    """Y <- L^-1 Y."""
+    n = Y.shape[1]
+    _scale(F, n, Y, 0, n, Y, 0, n, Y, 0, n)
+
+
+@kernel
+def add_to_parent(A, Y, A_parent) -> None:  # type: ignore[no-untyped-def]
+    """A_par += A - Y~ᵀY~."""
+    n = A.shape[1]
+    columns = (
+        Y[0, 0], Y[1, 0], Y[2, 0], Y[0, 1], Y[1, 1], Y[2, 1], Y[0, 2], Y[1, 2], Y[2, 2],
+        Y[0, 3], Y[1, 3], Y[2, 3], Y[0, 4], Y[1, 4], Y[2, 4], Y[0, 5], Y[1, 5], Y[2, 5],
+    )  # fmt: skip
+    _parent(columns, n, A_parent, 0, n, A, 0, n, Y, 0, n)
+
+
+@kernel
+def subtract_eliminated(Y, C, c) -> None:  # type: ignore[no-untyped-def]
+    """C -= E~ᵀE~,   c -= E~ᵀq~."""
+    W = C.shape[0]
+    n = Y.shape[1]
+    for r in range(0, Y.shape[0], 3):
+        q = (-Y[r, GRADIENT], -Y[r + 1, GRADIENT], -Y[r + 2, GRADIENT])
+        _add(q, W, c, 0, W, Y, r * n + SHAPE, n, Y, 0, n)
+    _subtract_square(C, Y)
