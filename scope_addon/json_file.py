@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..solver.errors import InputError
-from ..solver.loaders.regular_file import check_regular
+from ..solver.loaders.files import check_regular
 from .atomic_write import atomic_path, reason
 from .errors import OutputError
 

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solver.loaders.npz import read_npz
-from ..solver.loaders.regular_file import in_one_line
+from ..solver.loaders.files import in_one_line, read_npz
 from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
 

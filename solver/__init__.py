@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import rotations as rotations
     from .body import Body
-    from .compiled.tree import BodyArrays, Tree, make_tree
     from .errors import (
         InputError,
         InvalidValueError,
@@ -46,6 +45,7 @@ if TYPE_CHECKING:
     from .residuals.registry import register_residual
     from .state import ClipFit, Fit, State, Status
     from .temporal import Temporal, with_previous
+    from .tree import BodyArrays, Tree, make_tree
 
 
 __all__ = [
@@ -103,7 +103,7 @@ __all__ = [
 # a test these.
 _HOMES = {
     "body": "Body",
-    "compiled.tree": "BodyArrays Tree make_tree",
+    "tree": "BodyArrays Tree make_tree",
     "errors": "InputError InvalidValueError ModelFileError ScopeError ScopeWarning ShapeError "
     "UnitsWarning",
     "fitting.batch": "fit_batch fit_clips",

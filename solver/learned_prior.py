@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from .arrays import as_array, as_arrays, described
-from .compiled.part import Array
 from .errors import InvalidValueError, ModelFileError
-from .loaders.npz import read_npz
-from .loaders.regular_file import as_path
+from .loaders.files import as_path, read_npz
+from .part import Array
 from .residuals import joint_flow
 from .validation import check_count, check_list, check_type, check_weight
 

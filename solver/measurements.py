@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import as_array, as_integers
-from .compiled.kernel import kernel
-from .compiled.part import Array
 from .errors import InvalidValueError, ShapeError
+from .kernel import kernel
+from .part import Array
 from .residuals import floor, foot_contact, pose_prior
 from .validation import (
     as_indices,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import as_array
-from .compiled.part import Array
 from .errors import InvalidValueError
 from .learned_prior import load_joint_prior
+from .part import Array
 from .residuals import joint_limits, joint_prior
 from .residuals.registry import COLUMNS, FIRST_EXTERNAL, RESIDUALS, column_of, registered
 from .validation import (

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import as_arrays
-from .compiled.kernel import kernel
+from .kernel import kernel
 
 Array = NDArray[Any]
 

@@ -9,11 +9,11 @@ from enum import Enum
 import numpy as np
 
 from .arrays import as_array
-from .compiled.part import Array, Pose
-from .compiled.tree import Tree
 from .errors import InvalidValueError, ShapeError
 from .gauss_newton.linearize import make_pose, place_parts
+from .part import Array, Pose
 from .rotations import nearest_rotation
+from .tree import Tree
 from .validation import as_number, check_count, check_list, check_rotations, check_type
 
 

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import as_integers, described
-from .compiled.kernel import allocating_kernel, kernel
-from .compiled.part import Array
 from .errors import InvalidValueError, ShapeError, UnitsWarning
+from .kernel import allocating_kernel, kernel
+from .part import Array
 
 # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
 ROTATION_TOLERANCE = 0.01

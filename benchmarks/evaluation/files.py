@@ -22,10 +22,8 @@ from numpy.typing import NDArray
 from ...scope_addon.errors import SetupError
 from ...scope_addon.footage import pictures_in
 from ...solver.errors import InputError, ModelFileError
-from ...solver.loaders.npz import read_npz
-from ...solver.loaders.pickled_values import to_array
-from ...solver.loaders.regular_file import check_regular
-from ...solver.loaders.restricted_pickle import read_pickle
+from ...solver.loaders.files import check_regular, read_npz
+from ...solver.loaders.pickles import read_pickle, to_array
 
 LARGEST_BYTES = 1 << 30  # of a file, and of one array in it
 LARGEST_SMALL = 64 << 20  # of a regressor or an .xml file

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from ...scope_addon.kinematics.smoothing import smooth_root, smooth_rotations
 from ...solver import Options, Priors, Stage, State, Weights, fit_motion
-from ...solver.compiled.tree import make_tree, with_fixed_shape
 from ...solver.fitting.frame_solver import fit_tree
 from ...solver.measurements import Measurements
 from ...solver.motion.band import make_factor, solve_clip
 from ...solver.motion.system import GLOBALS, ClipSystem
-from ...solver.residuals.image.outline import pack
+from ...solver.residuals.outline import pack
+from ...solver.tree import make_tree, with_fixed_shape
 from .clip_steps import MOTION, RATE, in_turns, make_clip
 from .dense import solve_cholesky
 from .problem import Problem, make_problem

@@ -13,14 +13,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.compiled.kernel import kernel
-from ...solver.compiled.part import Pose
 from ...solver.gauss_newton.linearize import linearize, make_blocks
 from ...solver.gauss_newton.recursion import eliminate, make_workspace
+from ...solver.kernel import kernel
 from ...solver.motion import acceleration
 from ...solver.motion.problem import ClipProblem
 from ...solver.motion.system import make_system, pose_of
 from ...solver.motion.views import terms_of
+from ...solver.part import Pose
 
 
 @kernel

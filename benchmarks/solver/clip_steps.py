@@ -23,15 +23,14 @@ from ...solver import (
     Weights,
     rotations,
 )
-from ...solver.compiled.part import Pose
-from ...solver.compiled.tree import make_tree, with_fixed_shape
-from ...solver.gauss_newton.optimizer import make_settings
-from ...solver.gauss_newton.several_frames import SharedPriors
+from ...solver.gauss_newton.optimizer import SharedPriors, make_settings
 from ...solver.gauss_newton.terms import pack_priors
 from ...solver.motion.band import make_factor, solve_clip
 from ...solver.motion.problem import ClipProblem, MotionTerms
 from ...solver.motion.system import make_poses
 from ...solver.motion.views import pack_frames
+from ...solver.part import Pose
+from ...solver.tree import make_tree, with_fixed_shape
 from .clip_gradients import ConjugateGradients
 from .problem import make_problem
 

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.compiled.kernel import kernel
-from ...solver.compiled.part import GRADIENT
 from ...solver.gauss_newton.linearize import clear_blocks, make_blocks, make_pose, place_parts
 from ...solver.gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION
+from ...solver.kernel import kernel
+from ...solver.part import GRADIENT
 from ...solver.residuals import joint_flow, keypoint2d
+from ...solver.residuals.accumulation import geman_mcclure
 from ...solver.residuals.registry import (
     KEYPOINT2D,
     KEYPOINT3D,
@@ -29,7 +30,6 @@ from ...solver.residuals.registry import (
     SHAPE_PRIOR,
     column_of,
 )
-from ...solver.residuals.robust import geman_mcclure
 from .loops import put
 from .problem import Problem
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiled loops around the timed code, so that no call from Python is part of the measurement."""
 
-from ...solver.compiled.kernel import kernel
 from ...solver.gauss_newton.curvature import apply_correction, set_current, update
 from ...solver.gauss_newton.linearize import linearize
 from ...solver.gauss_newton.recursion import retract, step
+from ...solver.kernel import kernel
 from ...solver.residuals.registry import accumulate_tables
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...solver.errors import InputError
-from ...solver.loaders.regular_file import check_regular
+from ...solver.loaders.files import check_regular
 from ..errors import UsageError
 from .bone_map import BoneMap, load_bone_map
 from .expression_map import ExpressionMap, load_expression_map

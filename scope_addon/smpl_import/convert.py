@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ...solver.loaders.archive import npz_keys
 from ...solver.loaders.body_file import BUILT_IN, load_body
+from ...solver.loaders.files import npz_keys
 from ...solver.rotations import exp, log
 from ..edit.clip import Clip
 from ..errors import MotionFileError, UsageError

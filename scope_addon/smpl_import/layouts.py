@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...solver.loaders.files import read_npz
+from ...solver.loaders.keypoints import FACE_JOINTS, HAND_ORDER, SKELETONS
 from ...solver.loaders.model_file import read_gender
-from ...solver.loaders.npz import read_npz
-from ...solver.loaders.skeletons import FACE_JOINTS, HAND_ORDER, SKELETONS
 from ...solver.names import BODY_JOINTS
 from ...solver.rotations import log
 from ..errors import MotionFileError

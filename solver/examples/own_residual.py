@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body, register_residual
-from ..compiled.part import Part
+from ..part import Part
 from ..residuals.accumulation import add_to_point
 from . import person
 

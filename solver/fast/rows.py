@@ -8,8 +8,8 @@ over all rows of X and Z; only tiles on and above the diagonal are touched.
 
 from typing import Any
 
-from ..compiled.kernel import kernel
-from ..compiled.part import GRADIENT, SHAPE
+from ..kernel import kernel
+from ..part import GRADIENT, SHAPE
 from .vectors import in_lanes, row_pass, tile_of
 
 __all__ = [

@@ -16,8 +16,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic as _intrinsic
 
-from ..compiled.tree import WIDTH
 from ..gauss_newton.plain_rows import LANES, STATE
+from ..tree import WIDTH
 
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _INT32 = ir.IntType(32)

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-from ..compiled.tree import BodyArrays, make_tree
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..state import ClipFit, Fit, State, check_states
 from ..temporal import Temporal
+from ..tree import BodyArrays, make_tree
 from ..validation import check_count, check_list, check_type
 from .clip import fit_clip
 from .frame_solver import FrameSolver

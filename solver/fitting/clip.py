@@ -17,12 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import as_array
-from ..compiled.part import Blocks, Pose
-from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
-from ..custom_residuals.external import raise_failure
 from ..errors import ShapeError
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
-from ..gauss_newton.optimizer import MIN_DAMPING, make_settings
+from ..gauss_newton.optimizer import MIN_DAMPING, SeveralFrames, SharedPriors, make_settings
 from ..gauss_newton.recursion import (
     Workspace,
     eliminate,
@@ -31,13 +28,15 @@ from ..gauss_newton.recursion import (
     solve_globals,
     substitute,
 )
-from ..gauss_newton.several_frames import SeveralFrames, SharedPriors
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
+from ..part import Blocks, Pose
+from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import ClipFit, Fit, State, Status, check_states
 from ..temporal import Temporal, with_previous
+from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_list, check_switch, check_type, check_weight
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit

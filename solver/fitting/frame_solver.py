@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import as_array
-from ..compiled.kernel import announce_compilation, kernel
-from ..compiled.tree import BodyArrays, Tree, make_tree
-from ..custom_residuals.external import raise_failure
 from ..gauss_newton.curvature import make_curvature
 from ..gauss_newton.linearize import make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
 from ..gauss_newton.recursion import make_workspace
 from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors
+from ..kernel import announce_compilation, kernel
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
+from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
 from ..state import Fit, State, Status, check_state_rotations
+from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type
 from .initialize import initial_state
 from .report import Outcome, cost_by_term, make_fit

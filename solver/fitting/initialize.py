@@ -11,11 +11,11 @@ squares of
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.kernel import kernel
-from ..compiled.tree import Tree
 from ..gauss_newton.linearize import make_pose, place_parts
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
+from ..kernel import kernel
 from ..state import State
+from ..tree import Tree
 
 # metres, of the first guess
 NEAREST = 0.3

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.part import Blocks, Pose
-from ..compiled.tree import Tree
-from ..custom_residuals.external import external_residuals
 from ..gauss_newton.linearize import linearize
 from ..gauss_newton.terms import Terms
+from ..part import Blocks, Pose
+from ..residuals.external import external_residuals
 from ..residuals.registry import (
     KEYPOINT2D,
     KEYPOINT3D,
@@ -24,6 +23,7 @@ from ..residuals.registry import (
     column_of,
 )
 from ..state import Fit, State, Status
+from ..tree import Tree
 
 # Columns of a stage's weights by name, in their order.
 COLUMNS = {

@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled.part import GRADIENT, SHAPE, Array
-from ..compiled.tree import BodyArrays, Tree, make_tree
-from ..custom_residuals.external import raise_failure
 from ..errors import InvalidValueError
 from ..gauss_newton.linearize import linearize, make_blocks
 from ..gauss_newton.recursion import make_workspace
 from ..gauss_newton.terms import make_terms
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, Weights
+from ..part import GRADIENT, SHAPE, Array
+from ..residuals.external import raise_failure
 from ..rotations import exp, hat
 from ..state import State
+from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_count, check_type
 
 _STEP = 1e-5  # of the differences, radians and metres

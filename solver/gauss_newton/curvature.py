@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import GRADIENT, Array, Blocks, Pose
-from ..compiled.tree import Tree
+from ..kernel import kernel
+from ..part import GRADIENT, Array, Blocks, Pose
+from ..tree import Tree
 
 MIN_SHARE = 0.2  # of JᵀJ that H + t S keeps
 MIN_COSINE = 0.1  # between d and w: below, dᵀw is uncertain and the update would be large

@@ -17,11 +17,10 @@ rows; the loops over the shape's columns are in plain_rows.py.
 
 import numpy as np
 
-from ..compiled.kernel import expanded_kernel, kernel
-from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.tree import Tree
-from ..custom_residuals.external import accumulate_external
+from ..kernel import expanded_kernel, kernel
+from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..residuals import keypoint2d, keypoint3d, orientation_field, shape_prior
+from ..residuals.external import accumulate_external
 from ..residuals.registry import (
     KEYPOINT2D,
     KEYPOINT3D,
@@ -29,6 +28,7 @@ from ..residuals.registry import (
     SHAPE_PRIOR,
     accumulate_tables,
 )
+from ..tree import Tree
 from .rows import add_origin, add_point, place_origin
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
 

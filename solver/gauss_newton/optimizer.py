@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levenberg-Marquardt: the control that every fit shares, and the compiled optimizer of one frame.
+"""Levenberg-Marquardt: the control that every fit shares, the compiled optimizer of one frame, and
+the loop over several frames.
 
 A trial point is accepted if it lowers the cost. The damping follows the gain ratio, the actual
 decrease over the predicted one (`judge_trial`), and a stage ends when the decrease, predicted or
@@ -11,15 +12,16 @@ Source: damping by the gain ratio after Nielsen, Damping Parameter in Marquardt'
 IMM-REP-1999-05.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.kernel import inlined_kernel, kernel
-from ..compiled.part import Blocks, Pose
+from ..kernel import inlined_kernel, kernel
 from ..options import Options, Stage
+from ..part import Array, Blocks, Pose
 from .curvature import Curvature, apply_correction, reset, set_current, update
 from .linearize import linearize
 from .recursion import Workspace, eliminate, retract, step
@@ -91,7 +93,7 @@ def judge_trial(
     return False, damping, 2.0 * growth, STALLED if damping > MAX_DAMPING else RUNNING
 
 
-# for `optimize`; several_frames.py, whose loop is not compiled, calls it as it is
+# For `optimize`; `SeveralFrames`, whose loop is not compiled, calls it as it is.
 _judge_trial = kernel(judge_trial)
 
 
@@ -193,3 +195,103 @@ def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untype
         )
     eliminate(tree, memory.poses[at], memory.blocks[at], MIN_DAMPING, settings.root_scale, work)
     return cost, status, iterations, rejected, at
+
+
+class SharedPriors(NamedTuple):
+    """Priors of the shape and of the logarithm of the focal length, which count once for all
+    frames.
+    """
+
+    shape_mean: Array  # (P,)
+    shape_information: Array  # (P, P), over the shape's weight
+    focal_weight: float
+
+    def costs(self, weight: float, beta: Array, log_focal: float, focal: bool) -> dict[str, float]:
+        """Return the cost of each at beta (W,), with a weight of the shape's prior; `focal`: the
+        length is unknown.
+        """
+        offset = beta[: len(self.shape_mean)] - self.shape_mean
+        shape = {"shape_prior": float(0.5 * weight * (offset @ self.shape_information @ offset))}
+        return shape | {"focal_prior": 0.5 * self.focal_weight * log_focal**2} if focal else shape
+
+    def add(
+        self, weight: float, beta: Array, log_focal: float, focal: bool, system: tuple[Array, Array]
+    ) -> None:
+        """Add their Hessian and gradient to C (W, W) and c (W,) of `system`."""
+        (C, c) = system
+        P = len(self.shape_mean)
+        C[:P, :P] += weight * self.shape_information
+        c[:P] += weight * (self.shape_information @ (beta[:P] - self.shape_mean))
+        if focal:
+            C[P, P] += self.focal_weight
+            c[P] += self.focal_weight * log_focal
+
+
+class SeveralFrames(ABC):
+    """Levenberg-Marquardt over several frames, with the control of a single frame's fit."""
+
+    settings: Settings
+
+    def __init__(self) -> None:
+        self.cost = 0.0
+        self.iterations = 0
+        self.rejected = 0
+
+    def run(self) -> int:
+        """Optimize through all stages and return the last one's status."""
+        status = CONVERGED
+        for s in range(len(self.settings.stages)):
+            status = self._run_stage(s)
+            if status == NON_FINITE:
+                break
+        return status
+
+    def _run_stage(self, s: int) -> int:
+        settings = self.settings
+        damping = settings.damping
+        growth = FIRST_GROWTH
+        status = MAX_ITERATIONS
+        self.cost = self._begin(s)
+        if not np.isfinite(self.cost):
+            return NON_FINITE
+        for _ in range(settings.limits[s]):
+            predicted = self._step(s, damping)
+            if predicted <= MIN_DECREASE * self.cost:
+                status = CONVERGED
+                break
+            self.iterations += 1
+            cost = self._try(s) if np.isfinite(predicted) else np.inf
+            accepted, damping, growth, verdict = judge_trial(
+                self.cost, cost, predicted, damping, growth, settings.tolerances[s]
+            )
+            self._conclude(s, cost, accepted)
+            if accepted:
+                self.cost = cost
+            else:
+                self.rejected += 1
+            if verdict != RUNNING:
+                status = verdict
+                break
+        self._end()
+        return status
+
+    @abstractmethod
+    def _begin(self, s: int) -> float:
+        """Linearize with the weights of stage s where it begins, and return the cost."""
+
+    @abstractmethod
+    def _step(self, s: int, damping: float) -> float:
+        """Solve for a step, and return the decrease that it predicts."""
+
+    @abstractmethod
+    def _try(self, s: int) -> float:
+        """Linearize at the trial point of the last step, and return the cost."""
+
+    @abstractmethod
+    def _conclude(self, s: int, cost: float, accepted: bool) -> None:
+        """Make the trial point, whose cost this is, the current one if it was accepted, and else
+        stay.
+        """
+
+    def _end(self) -> None:  # noqa: B027 - not all have something to do
+        """Finish a stage that has begun."""

@@ -10,8 +10,8 @@ rows, come in as tuples.
 from collections.abc import Callable
 from typing import Any
 
-from ..compiled.kernel import inlined_kernel, kernel
-from ..compiled.part import GRADIENT, SHAPE
+from ..kernel import inlined_kernel, kernel
+from ..part import GRADIENT, SHAPE
 
 LANES = 8  # joints side by side in a row of joint_flow's tables
 STATE = 16  # numbers of a joint's state there

@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import expanded_kernel, kernel
-from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.tree import Tree
+from ..kernel import expanded_kernel, kernel
+from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..rotations import exp3
+from ..tree import Tree
 from .linearize import make_scratch
 from .rows import add_to_parent, scale_rows, subtract_eliminated, take_moment
 

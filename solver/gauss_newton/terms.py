@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..arrays import as_table
-from ..compiled.kernel import allocating_kernel, kernel
-from ..compiled.part import Array
-from ..compiled.tree import Tree
-from ..custom_residuals.external import NONE, External, pack_external
 from ..errors import ShapeError
+from ..kernel import allocating_kernel, kernel
 from ..measurements import LARGEST, Measurements
+from ..part import Array
+from ..residuals.external import NONE, External, pack_external
 from ..residuals.registry import FIRST_EXTERNAL, RESIDUALS, empty_tables, registered
+from ..tree import Tree
 from ..validation import all_within
 
 if TYPE_CHECKING:

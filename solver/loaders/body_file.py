@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ..body import Body
 from ..errors import ModelFileError
 from .arrays import OPTIONAL, REQUIRED, check_arrays, check_body, check_extent
+from .files import as_path, read_npz
 from .model_file import is_motion, is_user_model, load_model
-from .npz import read_npz
-from .regular_file import as_path
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 # The built-in bodies whose last shape coefficient leads from adult to child -> those they add it

@@ -25,12 +25,10 @@ from numpy.typing import NDArray
 
 from ..body import Body
 from ..errors import ModelFileError
-from .archive import npz_keys, read_members
 from .arrays import Form, check_arrays, check_body, check_extent
-from .keypoints import derive_keypoints
-from .pickled_values import to_array
-from .restricted_pickle import read_pickle
-from .skeletons import recognise_skeleton
+from .files import npz_keys, read_members
+from .keypoints import derive_keypoints, recognise_skeleton
+from .pickles import read_pickle, to_array
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
 # how a full SMPL-X file divides shapedirs; older ones have 10 and 10

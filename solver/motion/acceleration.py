@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array
-from ..compiled.tree import Tree
-from ..residuals.robust import geman_mcclure
+from ..kernel import kernel
+from ..part import Array
+from ..residuals.accumulation import geman_mcclure
 from ..rotations import left_jacobian_inverse3, log3
+from ..tree import Tree
 
 
 @kernel

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array
-from ..compiled.tree import Tree
 from ..gauss_newton.recursion import factorize, solve_globals
+from ..kernel import kernel
+from ..part import Array
+from ..tree import Tree
 from .system import GLOBALS, ClipSystem
 
 

@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Pose
-from ..compiled.tree import Tree
 from ..gauss_newton.optimizer import MIN_DAMPING
+from ..kernel import kernel
+from ..part import Array, Pose
+from ..tree import Tree
 from .band import Factor, eliminate_clip, run_both
 from .system import GLOBALS, ClipSystem
 

@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array
-from ..compiled.part import Array, Pose
-from ..compiled.tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..errors import InvalidValueError, ShapeError
 from ..fitting.clip import shape_information
-from ..gauss_newton.optimizer import make_settings
-from ..gauss_newton.several_frames import SharedPriors
+from ..gauss_newton.optimizer import SharedPriors, make_settings
 from ..gauss_newton.terms import pack_priors
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
+from ..part import Array, Pose
 from ..rotations import nearest_rotation
 from ..state import State, Status, check_state_rotations, check_states
+from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import (
     as_number,
     check_finite,

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..compiled.part import Array
-from ..compiled.tree import Tree
 from ..fitting.clip import Camera, fit_in_order
 from ..measurements import Keypoints3D, Measurements
 from ..options import Options, Priors
+from ..part import Array
 from ..state import State
+from ..tree import Tree
 from .views import View
 
 # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array
-from ..compiled.part import Array
+from ..part import Array
 from ..validation import (
     as_indices,
     as_number,

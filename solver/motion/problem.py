@@ -9,10 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernel import inlined_kernel, kernel
-from ..compiled.part import GRADIENT, Array, Blocks, Pose
-from ..compiled.tree import Tree
-from ..custom_residuals.external import raise_failure
 from ..gauss_newton.linearize import (
     clear_blocks,
     linearize,
@@ -21,9 +17,12 @@ from ..gauss_newton.linearize import (
     make_scratch,
     place_parts,
 )
-from ..gauss_newton.optimizer import Settings
-from ..gauss_newton.several_frames import SharedPriors
+from ..gauss_newton.optimizer import Settings, SharedPriors
+from ..kernel import inlined_kernel, kernel
+from ..part import GRADIENT, Array, Blocks, Pose
+from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
+from ..tree import Tree
 from . import acceleration, standing
 from .band import run_both
 from .prior import MotionPrior, StandingPoints

@@ -9,7 +9,7 @@ move, unlike in residuals/foot_contact.py, where the earlier position is a const
 docs/solver_mathematics.md, "A whole clip", has the objective.
 """
 
-from ..compiled.kernel import kernel
+from ..kernel import kernel
 from ..residuals.accumulation import lever
 from .system import GLOBALS, pose_of
 

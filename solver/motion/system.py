@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from ..compiled.kernel import kernel
-from ..compiled.part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..compiled.tree import Tree, padded
+from ..kernel import kernel
+from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
+from ..tree import Tree, padded
 
 GLOBALS = 4  # first global column of `ClipSystem.N`; its column 0 is the gradient
 

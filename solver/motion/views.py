@@ -16,15 +16,15 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array, described
-from ..compiled.kernel import kernel
-from ..compiled.part import Array
-from ..compiled.tree import Tree
-from ..custom_residuals.external import External
 from ..errors import InvalidValueError
 from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms
+from ..kernel import kernel
 from ..measurements import Measurements
+from ..part import Array
+from ..residuals.external import External
 from ..residuals.registry import RESIDUALS, empty_tables
 from ..rotations import nearest_rotation
+from ..tree import Tree
 from ..validation import check_finite, check_rotations, check_type
 
 

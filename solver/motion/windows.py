@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.part import Array
+from ..part import Array
 
 
 class Window(NamedTuple):

@@ -12,8 +12,8 @@ are. Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of th
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part, point_jacobian
+from ..kernel import kernel
+from ..part import Array, Linearization, Part, point_jacobian
 from .accumulation import add_to_point, lever
 
 INTS = 1  # point, numbered as in the measurements

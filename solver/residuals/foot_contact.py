@@ -11,8 +11,8 @@ r_i(T_i, beta) of section 3 of the paper.
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part, point_jacobian
+from ..kernel import kernel
+from ..part import Array, Linearization, Part, point_jacobian
 from .accumulation import add_to_point, lever
 
 INTS = 1  # point, numbered as in the measurements

@@ -24,14 +24,15 @@ of the paper, which leaves the kind of flow open; this one is ours. Training: to
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 
-from ..compiled.kernel import allocating_kernel, kernel
-from ..compiled.part import Array, Linearization, Part
 from ..gauss_newton.plain_rows import LANES, STATE
 from ..gauss_newton.rows import in_lanes
+from ..kernel import allocating_kernel, kernel
+from ..part import Array, Linearization, Part
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .accumulation import add_to_joint
 
@@ -61,12 +62,14 @@ NEAREST = 1e-4  # radians to pi
 _MIN_TRACE = 4.0 * math.sin(0.5 * NEAREST) ** 2  # of 1 + tr MᵀOmega = 4 cos^2(angle / 2)
 _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 
+formula: Any = register_jitable  # Python runs such a function as it is; kernels may call it
+
 # A state of the formulas has STATE entries: x (3), dx/de (9) by rows, |det dx/dmu| without
 # constants, and the gradient of its logarithm by e (3). Formulas take it as a tuple, and find their
 # parameter k at q[at + k n]. Their numbers may be numpy arrays, or whatever `in_lanes` passes.
 
 
-@register_jitable
+@formula
 def chart(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state y from Omega, the first 9 of s, by rows; parameters M."""
     m00, m01, m02, m10, m11, m12, m20, m21, m22 = _matrix(q, at, n)
@@ -106,7 +109,7 @@ def chart(q, at, n, s):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@register_jitable
+@formula
 def _matrix(q, at, n):  # type: ignore[no-untyped-def]
     """Return nine parameters."""
     return (
@@ -115,7 +118,7 @@ def _matrix(q, at, n):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@register_jitable
+@formula
 def _linear(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return A x + b and A J, with A and b from parameter `at` on, and the rest of the state."""
     a00, a01, a02, a10, a11, a12, a20, a21, a22 = _matrix(q, at, n)
@@ -137,7 +140,7 @@ def _linear(q, at, n, s):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@register_jitable
+@formula
 def _hidden1(q, at, n, x):  # type: ignore[no-untyped-def]
     """Return (s, ds/dx, t, dt/dx) of the small network of x whose parameters start at `at`."""
     out = at + 2 * HIDDEN * n
@@ -159,7 +162,7 @@ def _hidden1(q, at, n, x):  # type: ignore[no-untyped-def]
     return s, sx, t, tx
 
 
-@register_jitable
+@formula
 def _hidden2(q, at, n, x, y):  # type: ignore[no-untyped-def]
     """Return (s, ds/dx, ds/dy, t, dt/dx, dt/dy) of the small network of x and y."""
     out = at + 3 * HIDDEN * n
@@ -188,7 +191,7 @@ def _hidden2(q, at, n, x, y):  # type: ignore[no-untyped-def]
     return s, sx, sy, t, tx, ty
 
 
-@register_jitable
+@formula
 def _bend(beta, x):  # type: ignore[no-untyped-def]
     """Return x + beta sqrt(1 + x^2), its derivative, and that of the derivative's logarithm."""
     root = np.sqrt(1.0 + x * x)
@@ -197,7 +200,7 @@ def _bend(beta, x):  # type: ignore[no-untyped-def]
     return x + beta * root, slope, beta * inverse * inverse * inverse / slope
 
 
-@register_jitable
+@formula
 def layer(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state after one layer, whose parameters start at `at`."""
     x1, x2, x3, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = _linear(q, at, n, s)
@@ -242,7 +245,7 @@ def layer(q, at, n, s):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@register_jitable
+@formula
 def finish(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state z with derivatives in the parent's axes in place of M's."""
     x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = _linear(
@@ -268,7 +271,7 @@ def finish(q, at, n, s):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@register_jitable
+@formula
 def normal(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, and from entry 12 on what `finish` left."""
     x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = s

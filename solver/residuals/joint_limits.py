@@ -17,8 +17,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part
+from ..kernel import kernel
+from ..part import Array, Linearization, Part
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
 from .accumulation import add_to_joint
 

@@ -10,8 +10,8 @@ The gradient is w Omega_mean phi in the parent's axes, because J^-T(phi) phi = p
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part
+from ..kernel import kernel
+from ..part import Array, Linearization, Part
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
 from .accumulation import add_to_joint, relative_log
 

@@ -9,9 +9,9 @@ Source: section 3 of the paper.
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part, point_jacobian
-from .robust import geman_mcclure, triggs_share
+from ..kernel import kernel
+from ..part import Array, Linearization, Part, point_jacobian
+from .accumulation import geman_mcclure, triggs_share
 
 
 @kernel

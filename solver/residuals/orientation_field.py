@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part, hat_identity
-from .robust import geman_mcclure, triggs_share
+from ..kernel import kernel
+from ..part import Array, Linearization, Part, hat_identity
+from .accumulation import geman_mcclure, triggs_share
 
 SHORTEST = 1e-4  # metres
 

@@ -10,8 +10,8 @@ camera. Source: section 3 of the paper (pose prior on T_i).
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import GRADIENT, Array, Linearization, Part, hat_identity
+from ..kernel import kernel
+from ..part import GRADIENT, Array, Linearization, Part, hat_identity
 from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
 from .accumulation import add_to_point, relative_log
 

@@ -28,13 +28,12 @@ from typing import Any
 import numpy as np
 
 from ..arrays import described
-from ..compiled.kernel import inlined_kernel
-from ..compiled.part import Array
-from ..custom_residuals.external import INDEXES, MAX_EXTERNAL, Registered, external_residuals
 from ..errors import InvalidValueError
+from ..kernel import inlined_kernel
+from ..part import Array
 from ..validation import check_count
-from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, pose_prior
-from .image import outline
+from . import floor, foot_contact, joint_flow, joint_limits, joint_prior, outline, pose_prior
+from .external import INDEXES, MAX_EXTERNAL, Registered, external_residuals
 
 RESIDUALS = {
     "pose_prior": pose_prior,
@@ -130,7 +129,7 @@ def register_residual(
         cost``, as this module describes it: a plain function, which is compiled here, or one that
         `numba.njit` has compiled. Its speed is that of Scope's own.
     :param function: ``function(part, ints, floats) -> r (n,)`` of one row (ints,), (floats,) in
-        plain Python, with R (3, 3), t (3,) of `compiled.part.Part` the pose of part i in the camera
+        plain Python, with R (3, 3), t (3,) of `part.Part` the pose of part i in the camera
         frame, metres, Omega (3, 3) the state of its joint and beta (P,). Derivatives are central
         differences: slow, to try an idea.
     :raises InvalidValueError: the name is one of Scope's own, not exactly one of `kernel` and

@@ -8,8 +8,8 @@ Lᵀ. Source: section 3 of the paper (shape prior).
 
 import numpy as np
 
-from ..compiled.kernel import kernel
-from ..compiled.part import Array, Linearization, Part
+from ..kernel import kernel
+from ..part import Array, Linearization, Part
 
 
 @kernel

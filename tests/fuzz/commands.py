@@ -29,7 +29,7 @@ PROGRAM = "scope.tests.fuzz.programs"
 SIZES = 0.05  # by which a format may differ that states times
 SHORT = 12  # frames of a short video
 CACHE = "home/scope-mocap/cache"
-KERNELS = """from .compiled.kernel import kernel
+KERNELS = """from .kernel import kernel
 @kernel
 def double(x):
     return 2.0 * x

@@ -8,7 +8,7 @@ import scope
 
 FILES = (
     "solver/code_keeper.py",
-    "solver/compiled/kernel.py",
+    "solver/kernel.py",
     "scope_addon/__init__.py",
     "scope_addon/processes.py",
     *(
@@ -20,7 +20,7 @@ FILES = (
 _LINES = "".join(f"    total += math.sin(x + {k}.0)\n" for k in range(30))
 LONG_CALLEE = f"""
 import math
-from .compiled.kernel import kernel
+from .kernel import kernel
 
 @kernel
 def inner(x):
@@ -40,9 +40,9 @@ def make_package(folder: Path) -> Path:
     ``package.scope_addon`` is imported.
     """
     package = folder / "package"
-    for name in ("solver/compiled", "scope_addon/machine_code"):
+    for name in ("solver", "scope_addon/machine_code"):
         (package / name).mkdir(parents=True)
-    for name in ("__init__", "solver/__init__", "solver/compiled/__init__"):
+    for name in ("__init__", "solver/__init__"):
         (package / f"{name}.py").touch()
     for name in FILES:
         shutil.copy(Path(scope.__file__).parent / name, package / name)

@@ -11,10 +11,10 @@ from .small_package import make_package
 
 SOURCE = {
     "__init__.py": "",
-    "inner.py": "from .compiled.kernel import kernel\n\n\n@kernel\ndef inner(x):\n    return x + "
+    "inner.py": "from .kernel import kernel\n\n\n@kernel\ndef inner(x):\n    return x + "
     "{value}.0\n",
     "outer.py": (
-        "from .compiled.kernel import kernel\nfrom .inner import inner\n\n@kernel\ndef outer(x):\n "
+        "from .kernel import kernel\nfrom .inner import inner\n\n@kernel\ndef outer(x):\n "
         "   return inner(x)\n"
     ),
 }
@@ -22,7 +22,7 @@ SOURCE = {
 
 # Prints the kernel's result, and whether its code came from disk.
 RUN = """
-from package.solver.compiled.kernel import announce_compilation
+from package.solver.kernel import announce_compilation
 from package.solver.outer import outer
 announce_compilation(outer); announce_compilation(outer)
 print(outer(0.0), len(outer.stats.cache_hits))

@@ -33,7 +33,7 @@ KERNELS = {
     "allocating_kernel",
     "inlined_kernel",
     "expanded_kernel",
-    "register_jitable",
+    "formula",
     "intrinsic",
     "compiled",
 }

@@ -4,7 +4,7 @@ complex steps.
 """
 
 import numpy as np
-from scope.solver.compiled.part import GRADIENT, SHAPE
+from scope.solver.part import GRADIENT, SHAPE
 
 from .synthetic import INTRINSICS, forward
 

@@ -36,8 +36,8 @@ from scope.solver import (
     Weights,
     rotations,
 )
-from scope.solver.custom_residuals import external
 from scope.solver.learned_prior import BUILT_IN
+from scope.solver.residuals import external
 
 from .small_problem import BODY, KEYPOINTS, POINTS, SEEN, K, M, P
 from .synthetic import INTRINSICS, project

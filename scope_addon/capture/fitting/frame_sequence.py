@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make_tree
-from ....solver.compiled.tree import with_fixed_shape
+from ....solver.tree import with_fixed_shape
 from ...arrays import BoolArray, FloatArray
 from .hand_measurements import smooth_fingers
 from .prepared_track import PreparedTrack

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Body, ClipFit, Fit, fit_clip
-from ....solver.residuals.image.outline import FLOATS, INTS, pack
+from ....solver.residuals.outline import FLOATS, INTS, pack
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...kinematics.added_keypoints import with_keypoints
 from ...kinematics.body_surface import one_per_cell

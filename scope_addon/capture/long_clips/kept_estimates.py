@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ....solver.errors import ScopeError
-from ....solver.loaders.archive import read_members
+from ....solver.loaders.files import read_members
 from ...arrays import Float64Array, Uint8Array
 from ...atomic_write import write_npz
 from ..perception.region import Region

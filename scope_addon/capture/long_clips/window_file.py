@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError, ScopeError
-from ....solver.loaders.archive import read_members
+from ....solver.loaders.files import read_members
 from ...arrays import Uint8Array
 from ...atomic_write import write_npz
 from ...capture_report import warnings_as_json

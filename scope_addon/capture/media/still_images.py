@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.loaders.regular_file import check_regular
+from ....solver.loaders.files import check_regular
 from ...arrays import Float32Array, Uint8Array
 from ...errors import VideoError
 from ...footage import MAX_PIXELS

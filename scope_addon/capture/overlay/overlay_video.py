@@ -19,8 +19,8 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ....solver.body import Body
-from ....solver.compiled.kernel import cached
 from ....solver.errors import ShapeError
+from ....solver.kernel import cached
 from ....solver.rotations import exp
 from ...arrays import Float64Array, FloatArray, Uint8Array
 from ...atomic_write import atomic_path, reason

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ....solver.compiled.kernel import cached
+from ....solver.kernel import cached
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array
 
 NEAR = 0.05  # metres; the near plane, at which triangles are clipped

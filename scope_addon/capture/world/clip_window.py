@@ -29,7 +29,7 @@ from ....solver import (
     fit_tree,
     make_tree,
 )
-from ....solver.compiled.tree import Tree, with_fixed_shape
+from ....solver.tree import Tree, with_fixed_shape
 from ...arrays import Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import BodySurface
 from ...kinematics.contact_points import contact_point_positions

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.loaders.regular_file import in_one_line
+from ....solver.loaders.files import in_one_line
 from ....solver.names import BODY_JOINTS
 from ....solver.rotations import exp, log
 from ...errors import MotionFileError

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.loaders.regular_file import in_one_line
+from ....solver.loaders.files import in_one_line
 from ...errors import MotionFileError, UsageError
 
 REACH_S = 0.4  # Time over which a correction fades out on each side.

@@ -130,7 +130,7 @@ class PoseRefit:
         self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
         self.names = list(body.joint_names)
         self._solver = compiled_solver()
-        tree = import_module(".compiled.tree", self._solver.__name__)
+        tree = import_module(".tree", self._solver.__name__)
         self._tree = tree.with_fixed_shape(self._solver.make_tree(self.body), self.betas)
         self._options = _options(self._solver)
         self._points = len(self.body.keypoint_names)

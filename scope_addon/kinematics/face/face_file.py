@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError
 from ....solver.loaders.arrays import Form, check_arrays, check_finite_array, check_index
-from ....solver.loaders.npz import read_npz
+from ....solver.loaders.files import read_npz
 from ....solver.names import EXPRESSIONS
 
 # (n,) vertices and (n, 3) offsets at weight 1, metres in the model frame.

@@ -36,7 +36,7 @@ from scope.solver import (
     fit,
     load_body,
 )
-from scope.solver.compiled.part import Part
+from scope.solver.part import Part
 from scope.solver.residuals.joint_limits import evaluate
 from scope.solver.rotations import exp, log
 

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 from scope.solver import rotations
-from scope.solver.compiled.kernel import kernel
 from scope.solver.fast import rows as fast
 from scope.solver.gauss_newton import plain_rows as plain
+from scope.solver.kernel import kernel
 from scope.solver.residuals import joint_flow
 
 WIDTHS = range(0, 44, 4)

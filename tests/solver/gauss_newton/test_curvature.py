@@ -22,7 +22,6 @@ from scope.solver import (
     make_tree,
     rotations,
 )
-from scope.solver.compiled.part import GRADIENT
 from scope.solver.gauss_newton.curvature import (
     apply_correction,
     make_curvature,
@@ -35,6 +34,7 @@ from scope.solver.gauss_newton.optimizer import MIN_DAMPING
 from scope.solver.gauss_newton.recursion import eliminate, make_workspace
 from scope.solver.gauss_newton.terms import make_terms
 from scope.solver.learned_prior import load_joint_prior
+from scope.solver.part import GRADIENT
 from scope.solver.residuals.registry import SHAPE_PRIOR
 
 from ..synthetic import forward, random_body, random_state

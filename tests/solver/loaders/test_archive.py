@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders.archive import npz_keys, read_members
-from scope.solver.loaders.npz import read_npz
+from scope.solver.loaders.files import npz_keys, read_members, read_npz
 
 HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }"
 # What numpy's reader raises at these: TokenError, IndentationError, SyntaxError, TypeError,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders import archive, is_user_model, load_model
+from scope.solver.loaders import files, is_user_model, load_model
 from scope.solver.loaders.model_file import read_gender
 
 
@@ -290,7 +290,7 @@ def test_lying_arrays_are_refused_before_memory_is_taken(tmp_path, tables_of, co
 
 
 def test_a_zip_bomb_is_refused(tmp_path, monkeypatch, tables_of):
-    monkeypatch.setattr(archive, "LARGEST_ARRAY", 10_000_000)
+    monkeypatch.setattr(files, "LARGEST_ARRAY", 10_000_000)
     path = save(tmp_path / "body.npz", tables_of("smpl"))
     rewrite(
         path, "weights", header((30_000_000, 1), "|u1") + bytes(30_000_000), zipfile.ZIP_DEFLATED

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.solver.errors import InputError
-from scope.solver.loaders import npz
-from scope.solver.loaders.npz import read_npz
+from scope.solver.loaders import files
+from scope.solver.loaders.files import read_npz
 
 
 class OwnError(InputError):
@@ -76,7 +76,7 @@ def test_nothing_is_unpickled(tmp_path):
 
 
 def test_what_would_unpack_to_too_much_is_refused_before(tmp_path, monkeypatch):
-    monkeypatch.setattr(npz, "LARGEST_BYTES", 1 << 20)
+    monkeypatch.setattr(files, "LARGEST_BYTES", 1 << 20)
     path = tmp_path / "bomb.npz"
     np.savez_compressed(path, a=np.zeros(1 << 20))
     assert path.stat().st_size < 1 << 16

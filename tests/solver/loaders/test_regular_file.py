@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from scope.solver.errors import InputError, ModelFileError
-from scope.solver.loaders.regular_file import check_regular
+from scope.solver.loaders.files import check_regular
 
 
 def test_files_folders_and_what_does_not_exist_pass(tmp_path):

@@ -10,7 +10,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders import load_model, restricted_pickle
+from scope.solver.loaders import load_model, pickles
 
 RECONSTRUCT = b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85U\x01b\x87R"
 F8 = (
@@ -343,7 +343,7 @@ def test_sizes_that_a_file_states_are_not_allocated(tmp_path):
 
 
 def test_an_oversized_file_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(restricted_pickle, "LARGEST_FILE", 1000)
+    monkeypatch.setattr(pickles, "LARGEST_FILE", 1000)
     (tmp_path / "body.pkl").write_bytes(bytes(1001))
     with pytest.raises(ModelFileError, match="too large"):
         load_model(tmp_path / "body.pkl")

@@ -16,8 +16,7 @@ from scope.solver import (
     make_tree,
     rotations,
 )
-from scope.solver.gauss_newton.optimizer import make_settings
-from scope.solver.gauss_newton.several_frames import SharedPriors
+from scope.solver.gauss_newton.optimizer import SharedPriors, make_settings
 from scope.solver.gauss_newton.terms import pack_priors
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 from scope.solver.motion.problem import ClipProblem, MotionTerms

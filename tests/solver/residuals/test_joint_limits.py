@@ -6,7 +6,7 @@ and right.
 import numpy as np
 import pytest
 from scope.solver import rotations
-from scope.solver.compiled.part import Part
+from scope.solver.part import Part
 from scope.solver.residuals.joint_limits import HINGES, evaluate
 
 # T-pose

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[3]
 RESIDUAL = '''
 """A joint that is drawn to one height of the image: r = sqrt(w) (t_y - height), metres."""
 import numpy as np
-from ..compiled.kernel import kernel
+from ..kernel import kernel
 from .accumulation import add_to_point
 INTS, FLOATS = 1, 2  # part;  height, w
 INDEXES = "parts"
@@ -41,8 +41,8 @@ import numpy as np
 gc.disable()  # takes an eighth of the time of compiling
 sys.path.insert(0, sys.argv[1])
 from copied import solver
-from copied.solver.compiled.tree import make_tree
-from copied.solver.compiled.kernel import kernel
+from copied.solver.tree import make_tree
+from copied.solver.kernel import kernel
 from copied.solver.gauss_newton.linearize import GRADIENT, make_blocks, make_pose, place_parts
 from copied.solver.gauss_newton.terms import make_terms
 from copied.solver.residuals import registry, toy

@@ -8,13 +8,14 @@ import inspect
 import numpy as np
 import pytest
 from scope.solver import Options, Priors, State, make_tree, rotations
-from scope.solver.compiled.part import GRADIENT, SHAPE, Part
 from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose, place_parts
 from scope.solver.gauss_newton.recursion import make_workspace
 from scope.solver.gauss_newton.terms import make_terms
 from scope.solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
 from scope.solver.options import Stage, Weights
+from scope.solver.part import GRADIENT, SHAPE, Part
 from scope.solver.residuals import (
+    accumulation,
     floor,
     foot_contact,
     joint_flow,
@@ -23,12 +24,11 @@ from scope.solver.residuals import (
     keypoint2d,
     keypoint3d,
     orientation_field,
+    outline,
     pose_prior,
     registry,
-    robust,
     shape_prior,
 )
-from scope.solver.residuals.image import outline
 
 from ..synthetic import INTRINSICS, random_body, random_flow, random_state
 
@@ -351,14 +351,14 @@ def test_direction_between_two_joints_and_between_two_keypoints_of_one_part():
 
 def test_geman_mcclure_and_its_derivative():
     for s in (0.0, 1e-4, 0.02, 3.0):
-        rho, slope = robust.geman_mcclure(s, 1 / 0.02)
+        rho, slope = accumulation.geman_mcclure(s, 1 / 0.02)
         assert rho == pytest.approx(0.02 * s / (0.02 + s))
         h = 1e-7
-        numeric = (robust.geman_mcclure(s + h, 50.0)[0] - robust.geman_mcclure(s - h, 50.0)[0]) / (
-            2 * h
-        )
+        numeric = (
+            accumulation.geman_mcclure(s + h, 50.0)[0] - accumulation.geman_mcclure(s - h, 50.0)[0]
+        ) / (2 * h)
         assert slope == pytest.approx(numeric, rel=1e-6)
-    assert robust.geman_mcclure(5.0, 0.0) == (5.0, 1.0)
+    assert accumulation.geman_mcclure(5.0, 0.0) == (5.0, 1.0)
 
 
 @pytest.mark.parametrize("way", MEASURED)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
-from .....solver.loaders.regular_file import check_regular
+from .....solver.loaders.files import check_regular
 from ....arrays import Float64Array, Uint8Array
 from ..sessions import Execution, open_session
 from .description import Description, description_path

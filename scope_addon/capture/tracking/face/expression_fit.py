@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
-from .....solver.loaders.npz import read_npz
+from .....solver.loaders.files import read_npz
 from .....solver.rotations import log
 from ....arrays import BoolArray, Float64Array, FloatArray
 from ...perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.body import Body
-from .....solver.loaders.npz import read_npz
+from .....solver.loaders.files import read_npz
 from ....edit.clip import Clip
 from ....errors import MotionFileError
 from ...animation_data.actions import read_keys

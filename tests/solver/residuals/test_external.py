@@ -29,10 +29,16 @@ from scope.solver import (
     register_residual,
     rotations,
 )
-from scope.solver.compiled.part import Part
-from scope.solver.custom_residuals import external, numeric
 from scope.solver.examples import own_residual
-from scope.solver.residuals import floor, foot_contact, joint_prior, pose_prior
+from scope.solver.part import Part
+from scope.solver.residuals import (
+    external,
+    floor,
+    foot_contact,
+    joint_prior,
+    numeric,
+    pose_prior,
+)
 
 from ..synthetic import forward, random_body, random_state
 

@@ -17,11 +17,10 @@ correspondences as in iterative closest points, point to line, renewed by the ca
 
 import numpy as np
 
-from ...compiled.kernel import kernel
-from ...compiled.part import Array, Linearization, Part, point_jacobian
-from ..accumulation import add_to_point, lever
-from ..keypoint2d import Z_MIN
-from ..robust import geman_mcclure
+from ..kernel import kernel
+from ..part import Array, Linearization, Part, point_jacobian
+from .accumulation import add_to_point, geman_mcclure, lever
+from .keypoint2d import Z_MIN
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 11  # delta (3), m (2), n (2), w_out, w_in, 1/sigma_out, 1/sigma_in

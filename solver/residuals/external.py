@@ -19,11 +19,11 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 
-from ..compiled.kernel import inlined_kernel
-from ..compiled.kernel import kernel as compiled
-from ..compiled.part import Array, Blocks, Pose
-from ..compiled.tree import Tree
 from ..errors import InvalidValueError
+from ..kernel import inlined_kernel
+from ..kernel import kernel as compiled
+from ..part import Array, Blocks, Pose
+from ..tree import Tree
 from . import numeric
 
 MAX_EXTERNAL = 16  # external residuals; each has a column of the weights

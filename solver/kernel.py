@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import njit
 
-from ..code_keeper import CodeKeeper, use_keeper
+from .code_keeper import CodeKeeper, use_keeper
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is
 # not, because the optimizer must recognise them. The GIL is released, so that frames can be solved
@@ -89,7 +89,7 @@ class NumbaCache:
 
     def __init__(self) -> None:
         digest = hashlib.sha256()
-        for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        for path in sorted(Path(__file__).parent.rglob("*.py")):
             digest.update(path.read_bytes())
         self._sources = digest.hexdigest()
 

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The wanted arrays of a .npz body file, one by one.
+"""Files that may come from anyone: what is checked before they are read, and the arrays of .npz
+files.
 
-Official SMPL-X files also carry pickled tables, which are not needed.
-Each array's size is checked against its own header before anything is allocated.
+Reading a pipe may wait forever, reading a device may never end. Nothing is unpickled, and the size
+of what is read is bounded: official SMPL-X files also carry pickled tables, which are not needed.
 """
 
 from __future__ import annotations
 
+import io
 import math
+import os
+import stat
 import struct
 import tokenize
 import zipfile
@@ -19,8 +23,54 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModelFileError
-from .regular_file import in_one_line
+from ..arrays import described
+from ..errors import InputError, InvalidValueError, ModelFileError
+
+_LONGEST = 200  # characters
+
+
+def in_one_line(cause: Exception) -> str:
+    """Return what another library said, for a message: one line of moderate length."""
+    return " ".join(str(cause).split())[:_LONGEST]
+
+
+def as_path(value: Any, name: str) -> Path:
+    """Return the path of a file.
+
+    :raises InvalidValueError: it is neither a text nor a path, or contains a null character.
+    """
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
+        raise InvalidValueError(
+            f"{name} must be a str or a pathlib.Path, but is {described(value)}."
+        )
+    if "\0" in os.fspath(value):  # what opens files refuses it with a plain ValueError
+        raise InvalidValueError(
+            f"{name} must be the name of a file, but contains a null character: "
+            f"{os.fspath(value)!r}."
+        )
+    return Path(value)
+
+
+def check_regular(path: Path, error: type[InputError], what: str, largest_bytes: int) -> None:
+    """Refuse a path that is a pipe or a device, or a file that is too large. What does not exist is
+    not refused.
+
+    :param error: class of what is raised.
+    :param what: what the file should be, for the message, e.g. ``motion file``.
+    :param largest_bytes: size up to which a file is accepted.
+    :raises InputError: as `error`, when the path is a pipe or a device, or the file is too large.
+    """
+    try:
+        status = path.stat()
+    except OSError:
+        return
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        raise error(f"{path} is a pipe or a device, not a regular file; choose a {what}")
+    if stat.S_ISREG(status.st_mode) and status.st_size > largest_bytes:
+        raise error(
+            f"{path} has {status.st_size >> 20} MiB, too large for a {what}; choose another file"
+        )
+
 
 LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in float64 have 100 million
 
@@ -116,3 +166,42 @@ def _read_array(file: IO[bytes], size: int, key: str) -> NDArray[Any]:
         if count
         else np.zeros(shape, dtype)
     )
+
+
+LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
+
+
+def read_npz(
+    path: Path,
+    error: type[InputError],
+    what: str,
+    content: bytes | None = None,
+    wanted: Collection[str] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Return all arrays of a .npz file, never unpickling.
+
+    :param error: class raised for a missing, broken, oversized or pickled file.
+    :param what: what the file should have been, for the message, e.g. ``motion file``.
+    :param content: the file's bytes if they are not on disk; ``path`` then only names them in
+        messages.
+    :param wanted: the arrays to read, if they are present; the others may hold anything. All if
+        None.
+    :raises InputError: as `error`, when the file cannot be read, would be too large or holds
+        pickled objects.
+    """
+    if content is None:
+        check_regular(path, error, what, LARGEST_BYTES)
+    source = path if content is None else io.BytesIO(content)
+    try:
+        with zipfile.ZipFile(source) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > LARGEST_BYTES:
+            raise error(f"{path} would unpack to {size >> 20} MiB, too large for a {what}")
+        with np.load(source, allow_pickle=False) as file:
+            return {key: file[key] for key in file.files if wanted is None or key in wanted}
+    except FileNotFoundError as cause:
+        raise error(f"{path} does not exist; choose an existing {what}") from cause
+    except UNREADABLE as cause:
+        raise error(
+            f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file"
+        ) from cause

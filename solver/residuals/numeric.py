@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled.part import GRADIENT, SHAPE, Array, Linearization, Part
 from ..errors import InvalidValueError, ShapeError
+from ..part import GRADIENT, SHAPE, Array, Linearization, Part
 from ..rotations import exp
 
 STEP = 1e-6  # of the differences, radians and metres: their error is its square and 1e-16 over it

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import as_array, as_integers
-from ..errors import ShapeError
-from ..validation import as_indices, check_finite, check_switch, warn_of_units
+from .arrays import as_array, as_integers
+from .errors import ShapeError
+from .validation import as_indices, check_finite, check_switch, warn_of_units
 
 
 class BodyArrays(Protocol):

@@ -19,7 +19,7 @@ from scope.solver import (
     rotations,
 )
 
-from ..synthetic import INTRINSICS, RandomBody, forward, project, random_body, random_state
+from .synthetic import INTRINSICS, RandomBody, forward, project, random_body, random_state
 
 TIGHT = Options(stages=[Stage(Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0), 1e-14, 300)])
 
