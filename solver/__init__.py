@@ -8,134 +8,88 @@ A name's module is imported when the name is first used: numba takes a third of 
 and the errors, the body files and the command line do without it.
 """
 
+import ast
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # the public names and their modules, in the only place that lists them
     from . import rotations as rotations
-    from .body import Body
-    from .errors import (
-        InputError,
-        InvalidValueError,
-        ModelFileError,
-        ScopeError,
-        ScopeWarning,
-        ShapeError,
-        UnitsWarning,
-    )
-    from .fitting.batch import fit_batch, fit_clips
-    from .fitting.clip import carry, fit_clip
-    from .fitting.frame_solver import FrameSolver, fit, fit_tree
-    from .fitting.residual_check import check_residual
-    from .learned_prior import JointPrior, load_joint_prior
-    from .loaders import load_body
-    from .measurements import (
-        Floor,
-        FootContacts,
-        Keypoints2D,
-        Keypoints3D,
-        Measurements,
-        OrientationField,
-        PosePriors,
-    )
-    from .motion.fit import MotionFit, fit_motion
-    from .motion.prior import MotionPrior, StandingPoints
-    from .motion.views import View
-    from .options import COLD_STAGES, WARM_STAGES, Options, Priors, Stage, Weights, default_priors
-    from .residuals.registry import register_residual
-    from .state import ClipFit, Fit, State, Status
-    from .temporal import Temporal, with_previous
-    from .tree import BodyArrays, Tree, make_tree
+    from .body import Body as Body
+    from .errors import InputError as InputError
+    from .errors import InvalidValueError as InvalidValueError
+    from .errors import ModelFileError as ModelFileError
+    from .errors import ScopeError as ScopeError
+    from .errors import ScopeWarning as ScopeWarning
+    from .errors import ShapeError as ShapeError
+    from .errors import UnitsWarning as UnitsWarning
+    from .fitting.batch import fit_batch as fit_batch
+    from .fitting.batch import fit_clips as fit_clips
+    from .fitting.clip import carry as carry
+    from .fitting.clip import fit_clip as fit_clip
+    from .fitting.frame_solver import FrameSolver as FrameSolver
+    from .fitting.frame_solver import fit as fit
+    from .fitting.frame_solver import fit_tree as fit_tree
+    from .fitting.residual_check import check_residual as check_residual
+    from .learned_prior import JointPrior as JointPrior
+    from .learned_prior import load_joint_prior as load_joint_prior
+    from .loaders import load_body as load_body
+    from .measurements import Floor as Floor
+    from .measurements import FootContacts as FootContacts
+    from .measurements import Keypoints2D as Keypoints2D
+    from .measurements import Keypoints3D as Keypoints3D
+    from .measurements import Measurements as Measurements
+    from .measurements import OrientationField as OrientationField
+    from .measurements import PosePriors as PosePriors
+    from .motion.fit import MotionFit as MotionFit
+    from .motion.fit import fit_motion as fit_motion
+    from .motion.prior import MotionPrior as MotionPrior
+    from .motion.prior import StandingPoints as StandingPoints
+    from .motion.views import View as View
+    from .options import COLD_STAGES as COLD_STAGES
+    from .options import WARM_STAGES as WARM_STAGES
+    from .options import Options as Options
+    from .options import Priors as Priors
+    from .options import Stage as Stage
+    from .options import Weights as Weights
+    from .options import default_priors as default_priors
+    from .residuals.registry import register_residual as register_residual
+    from .state import ClipFit as ClipFit
+    from .state import Fit as Fit
+    from .state import State as State
+    from .state import Status as Status
+    from .temporal import Temporal as Temporal
+    from .temporal import with_previous as with_previous
+    from .tree import BodyArrays as BodyArrays
+    from .tree import Tree as Tree
+    from .tree import make_tree as make_tree
 
+    __all__: list[str]
 
-__all__ = [
-    "COLD_STAGES",
-    "WARM_STAGES",
-    "Body",
-    "BodyArrays",
-    "ClipFit",
-    "Fit",
-    "Floor",
-    "FootContacts",
-    "FrameSolver",
-    "InputError",
-    "InvalidValueError",
-    "JointPrior",
-    "Keypoints2D",
-    "Keypoints3D",
-    "Measurements",
-    "ModelFileError",
-    "MotionFit",
-    "MotionPrior",
-    "Options",
-    "OrientationField",
-    "PosePriors",
-    "Priors",
-    "ScopeError",
-    "ScopeWarning",
-    "ShapeError",
-    "Stage",
-    "StandingPoints",
-    "State",
-    "Status",
-    "Temporal",
-    "Tree",
-    "UnitsWarning",
-    "View",
-    "Weights",
-    "carry",
-    "check_residual",
-    "default_priors",
-    "fit",
-    "fit_batch",
-    "fit_clip",
-    "fit_clips",
-    "fit_motion",
-    "fit_tree",
-    "load_body",
-    "load_joint_prior",
-    "make_tree",
-    "register_residual",
-    "with_previous",
-]
+if not TYPE_CHECKING:
 
-# What is imported from which module, as above. mypy compares the imports above with `__all__`, and
-# a test these.
-_HOMES = {
-    "body": "Body",
-    "tree": "BodyArrays Tree make_tree",
-    "errors": "InputError InvalidValueError ModelFileError ScopeError ScopeWarning ShapeError "
-    "UnitsWarning",
-    "fitting.batch": "fit_batch fit_clips",
-    "fitting.clip": "carry fit_clip",
-    "fitting.frame_solver": "FrameSolver fit fit_tree",
-    "fitting.residual_check": "check_residual",
-    "learned_prior": "JointPrior load_joint_prior",
-    "loaders": "load_body",
-    "measurements": "Floor FootContacts Keypoints2D Keypoints3D Measurements OrientationField "
-    "PosePriors",
-    "motion.fit": "MotionFit fit_motion",
-    "motion.prior": "MotionPrior StandingPoints",
-    "motion.views": "View",
-    "options": "COLD_STAGES WARM_STAGES Options Priors Stage Weights default_priors",
-    "residuals.registry": "register_residual",
-    "state": "ClipFit Fit State Status",
-    "temporal": "Temporal with_previous",
-}
-_MODULE_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
+    def _modules_of_names() -> dict[str, str]:
+        """Return the module of each public name: what a type checker imports above."""
+        tree = ast.parse(Path(__file__).read_text("utf-8"))
+        imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        return {
+            alias.name: node.module or alias.name
+            for node in imports
+            if node.level
+            for alias in node.names
+        }
 
-if not TYPE_CHECKING:  # or a name that does not exist would pass
+    _MODULE_OF = _modules_of_names()
+    __all__ = sorted(name for name, module in _MODULE_OF.items() if name != module)
 
     def __getattr__(name: str) -> Any:
-        """Import a name of `__all__`, or the module `rotations`, when it is first used (PEP
-        562).
-        """
-        if name == "rotations":
-            return import_module(f".{name}", __name__)
+        """Import a public name, or the module `rotations`, when it is first used (PEP 562)."""
         if name not in _MODULE_OF:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = globals()[name] = getattr(import_module(f".{_MODULE_OF[name]}", __name__), name)
+        module = import_module(f".{_MODULE_OF[name]}", __name__)
+        value = module if name == _MODULE_OF[name] else getattr(module, name)
+        globals()[name] = value
         return value
 
     def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__, "rotations"})
+        return sorted({*globals(), *_MODULE_OF})
