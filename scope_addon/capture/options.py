@@ -28,7 +28,7 @@ WINDOW_S = 120.0
 
 
 @dataclass(frozen=True)
-class CaptureOptions(CaptureDeclaration, NetworkDeclaration):
+class CaptureOptions(NetworkDeclaration, CaptureDeclaration):
     """How to capture; the defaults suit a phone clip of one person.
 
     Its fields are the declared options, of which ``start``, ``end`` and ``fps`` together are

@@ -65,7 +65,7 @@ def test_the_motion_stands_upright_on_the_floor(tmp_path, axis, said):
     lowest = [skinned(found.motion, t)[:, 2].min() for t in range(0, len(MOTION), 6)]
     assert abs(np.median(lowest)) < 0.02
     np.testing.assert_allclose(found.motion.timestamps, np.arange(len(MOTION)) / RATE)
-    assert any("Scope's own body" in note for note in found.notes)
+    assert any("Scope's own body" in note for note in map(str, found.notes))
     assert found.motion.foot_contact.max() > 0.5
     world = found.motion.world_from_camera[0]
     shown = found.motion.joints_cam @ world[:3, :3].T + world[:3, 3]
@@ -100,7 +100,7 @@ def test_an_own_file_of_another_body_is_applied_to_ours(tmp_path):
     own.save(tmp_path / "own.npz")
     found = import_motion(tmp_path / "own.npz")
     assert found.body.name == "scope"
-    assert any("Scope's own body" in note for note in found.notes)
+    assert any("Scope's own body" in note for note in map(str, found.notes))
     np.testing.assert_array_equal(found.motion.betas, 0)
 
 
@@ -133,7 +133,9 @@ def test_what_is_missing_is_assumed_and_said(tmp_path):
     np.savez(tmp_path / "walk.npz", poses=arrays["poses"])
     found = import_motion(tmp_path / "walk.npz")
     assert found.motion.mocap_framerate == DEFAULT_RATE
-    assert all(any(word in note for note in found.notes) for word in ("frame rate", "translation"))
+    said = " ".join(map(str, found.notes))
+    assert "frame rate" in said
+    assert "translation" in said
     assert import_motion(tmp_path / "walk.npz", rate=50.0).motion.mocap_framerate == 50.0
     np.testing.assert_allclose(np.ptp(found.motion.trans, axis=0), 0, atol=1e-6)
 
@@ -143,12 +145,10 @@ def test_an_unclear_up_axis_is_said(tmp_path):
     lying = arrays["poses"].copy()
     lying[:, :3] = [0.0, 0.0, np.pi / 2]  # along x
     np.savez(tmp_path / "lying.npz", **arrays | {"poses": lying})
-    assert any(
-        "up axis is not clear" in note for note in import_motion(tmp_path / "lying.npz").notes
-    )
-    assert not any(
-        "not clear" in note for note in import_motion(tmp_path / "lying.npz", up="z").notes
-    )
+    unsure = import_motion(tmp_path / "lying.npz").notes
+    told = import_motion(tmp_path / "lying.npz", up="z").notes
+    assert any("up axis is not clear" in note for note in map(str, unsure))
+    assert not any("not clear" in note for note in map(str, told))
 
 
 def test_one_frame_is_enough(tmp_path):
@@ -195,5 +195,5 @@ def test_on_the_users_own_smpl_body_shape_and_pelvis_are_exact(axis):
     np.testing.assert_allclose(raised[0, 0, :2], 0, atol=1e-4)
     if axis == "z":  # the floor of such a file is known
         np.testing.assert_allclose(raised, 0, atol=1e-4)
-    assert any("neutral body" in note for note in found.notes)
-    assert not any("Scope's own body" in note for note in found.notes)
+    assert any("neutral body" in note for note in map(str, found.notes))
+    assert not any("Scope's own body" in note for note in map(str, found.notes))
