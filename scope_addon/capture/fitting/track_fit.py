@@ -19,7 +19,6 @@ import numpy as np
 
 from ....solver import ClipFit, Fit, State, fit_clip
 from ...arrays import FloatArray, IndexArray
-from .frame_measurements import NEAREST_M
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline import PRIOR_SHARE, fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
@@ -28,7 +27,6 @@ from .weights import ROBUST, clip_weights, cold_stages
 
 SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
 PROGRESS_FRAMES = 16  # between two reports
-RESIZE = 0.03  # relative change of the distance from which on the shape is estimated again
 
 
 def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:
@@ -64,9 +62,9 @@ def ground(
     """Add the pelvis and the floor as estimated in a stance to the measurements, and move the first
     fit there.
 
-    A pose and a distance that explain the image together can both be wrong. With the distance
-    estimated from the floor, the pose follows. So does the shape, if the distance of the whole clip
-    has changed: a person on the same floor as others must have the size that this floor implies.
+    A pose, a shape and a distance that explain the image together can all be wrong: shoulders look
+    wide because they are, or because the body leans towards the camera. With distance and lean
+    estimated from floor, feet and balance, the shape is estimated again, and the pose follows.
 
     :param first: the first fit, in each frame's camera.
     :param stance: in each frame's camera.
@@ -74,17 +72,12 @@ def ground(
     """
     prepared = prepared.rotated(stance.turn)
     betas = first.betas
-    root_cam = stance.root_cam
     sigma = first.height_sigma_m
     if first.valid.any():
-        new, old = (
-            np.linalg.norm(at[first.valid], axis=1) for at in (root_cam, first.t_camera_root)
-        )
-        if abs(np.log(np.median(new / np.maximum(old, NEAREST_M)))) > RESIZE:
-            shape = _fit_shape(prepared, root_cam)
-            betas = shape.beta
-            sigma = _height_sigma(prepared, shape)
-    start = replace(first, t_camera_root=root_cam, betas=betas, height_sigma_m=sigma)
+        shape = _fit_shape(prepared, stance.root_cam)
+        betas = shape.beta
+        sigma = _height_sigma(prepared, shape)
+    start = replace(first, t_camera_root=stance.root_cam, betas=betas, height_sigma_m=sigma)
     return prepared.with_stance(stance, betas), start
 
 

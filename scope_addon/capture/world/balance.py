@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Balance: rotations of the whole body that bring its zero moment point between the contact points.
+"""Balance: rotations of the whole body that bring its zero moment point above its feet.
 
 How far a body leans towards the camera or away from it can hardly be seen in the image. With the
-centre of mass c, its height h above the contact points p_i, gravity g and the horizontal direction
-s of the line of sight, the zero moment point, in which weight and inertial forces act on the floor,
-must satisfy
+centre of mass c, its height h above the contact points, gravity g and the horizontal direction s of
+the line of sight, the zero moment point, in which weight and inertial forces act on the floor, is
 
-    x = s·(c − c̈ h / g),   min_i s·p_i ≤ x ≤ max_i s·p_i.
+    x = s·(c − c̈ h / g).
 
-If it does not, the whole body is rotated about the centre of the contact points. The correction
-gets weaker the faster a person moves, since c̈ is then not known well enough. It is not applied to
-people who may sit or kneel, see `leg_support`.
+Who stands keeps it near the middle of the feet, or anywhere between the two: x − m is normally
+distributed with the deviation σ_m, where m is the value nearest to x in the range of s·p_i over the
+middles p_i of the soles in contact, and palms. The lean found in the image is uncertain by σ_l, so
+the most probable displacement is
+
+    −(x − m) (σ_l h)² / ((σ_l h)² + σ_m²),
+
+and the whole body is rotated by it about the centre of the contact points. The correction gets
+weaker the faster a person moves, since c̈ is then not known well enough. It is not applied to people
+who may sit or kneel, see `leg_support`.
 
 Sources: Vukobratović and Borovac 2004 (zero moment point); Winter 2009 (masses of body parts and
-their centres).
+their centres; quiet standing: the zero moment point is 4 to 6 cm ahead of the ankles).
 """
 
 from __future__ import annotations
@@ -31,10 +37,12 @@ from .placement import PlacedTrack
 # The speed of the centre of mass at which the weight of the correction has fallen to 1/e.
 STANDING_M_S = 0.5
 CUTOFF_HZ = 1.0
-# How far a sole extends behind its heel point and beyond its toe point, in units of the distance
-# between the two.
-BEHIND = 1.2
-BEYOND = 0.4
+# From a sole's heel point, in units of the distance to its toe point. It is 5 cm ahead of ankles,
+# since the heel point, the middle of the lowest part of heel and arch, lies 7 cm ahead of it.
+MIDDLE = -0.2
+# σ_m: people sway by 1 to 2 cm, and the body's masses and feet are off by as much.
+STANCE_SIGMA_M = 0.03
+LEAN_SIGMA = np.radians(5.0)  # σ_l, of leans found in people whose true lean is known
 DOUBT = 0.2  # share of nearby frames in contact at which the correction is halved, roughly
 GRAVITY_M_S2 = 9.81
 LARGEST_TURN = np.radians(10.0)
@@ -130,21 +138,23 @@ def balancing_rotations(
         zero_moment_point = (
             mass - np.gradient(velocity, times, axis=0) * (height / GRAVITY_M_S2)[:, None]
         )
-    out = _excess(placed.contact_points, in_contact, zero_moment_point, sight)
-    angle = gaussian_smooth(-certainty * np.arctan2(out, height), times, CUTOFF_HZ)
+    off = _distance_from_middle(placed.contact_points, in_contact, zero_moment_point, sight)
+    lean_variance = np.square(LEAN_SIGMA * height)
+    displacement = -off * lean_variance / (lean_variance + STANCE_SIGMA_M**2)
+    angle = gaussian_smooth(certainty * np.arctan2(displacement, height), times, CUTOFF_HZ)
     angle /= gaussian_smooth(certainty, times, CUTOFF_HZ) + DOUBT
     angle = np.clip(angle, -LARGEST_TURN, LARGEST_TURN)
     return exp(angle[:, None] * np.cross(up, sight)), pivot
 
 
-def _excess(
+def _distance_from_middle(
     contact_points: FloatArray,
     in_contact: BoolArray,
     zero_moment_point: FloatArray,
     sight: FloatArray,
 ) -> FloatArray:
-    """Return by how much the zero moment point lies beyond the contact points along the line of
-    sight.
+    """Return x − m of the module's equation: how far the zero moment point lies along the line of
+    sight from the middle of the feet, or from the nearest point between the middles of several.
 
     :param contact_points: (T, 6, 3) metres, camera frame.
     :param in_contact: (T, 6).
@@ -152,23 +162,16 @@ def _excess(
     :param sight: (T, 3) horizontal unit vectors.
     :return: (T,) metres; negative towards the camera, 0 if nothing is in contact.
     """
-    at = (zero_moment_point * sight).sum(axis=1)
-    extent = (_sole_ends(contact_points) * sight[:, None]).sum(axis=-1)
-    any_contact = in_contact.any(axis=1)
-    low = np.where(any_contact, np.where(in_contact, extent, np.inf).min(axis=1), -np.inf)
-    high = np.where(any_contact, np.where(in_contact, extent, -np.inf).max(axis=1), np.inf)
-    excess: FloatArray = np.maximum(at - high, 0) - np.maximum(low - at, 0)
-    return excess
-
-
-def _sole_ends(contact_points: FloatArray) -> FloatArray:
-    """Move heel and toe points to the ends of the soles; palms stay. (T, 6, 3) in the order of the
-    contact points.
-    """
     soles, palms = np.split(contact_points, [len(SOLES)], axis=1)
-    heel = soles[:, 0::2]
-    toe = soles[:, 1::2]
-    ends = np.stack([heel - BEHIND * (toe - heel), toe + BEYOND * (toe - heel)], axis=2).reshape(
-        soles.shape
-    )
-    return np.concatenate([ends, palms], axis=1)
+    heels = soles[:, 0::2]
+    toes = soles[:, 1::2]
+    supports = np.concatenate([heels + MIDDLE * (toes - heels), palms], axis=1)
+    foot_in_contact = in_contact[:, 0 : len(SOLES) : 2] | in_contact[:, 1 : len(SOLES) : 2]
+    is_support = np.concatenate([foot_in_contact, in_contact[:, len(SOLES) :]], axis=1)
+    place = (supports * sight[:, None]).sum(axis=-1)
+    nearest = np.where(is_support, place, np.inf).min(axis=1)
+    farthest = np.where(is_support, place, -np.inf).max(axis=1)
+    x = (zero_moment_point * sight).sum(axis=1)
+    m = np.where(is_support.any(axis=1), np.clip(x, nearest, farthest), x)
+    distance: FloatArray = x - m
+    return distance
