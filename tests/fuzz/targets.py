@@ -97,7 +97,7 @@ def _load_bone_map(path: Path) -> None:
 
 
 def _check_network(path: Path) -> None:
-    from scope.scope_addon.capture.perception.adapters.graph import check_onnx_file
+    from scope.scope_addon.untrusted.onnx_file import check_onnx_file
 
     check_onnx_file(path)
 

@@ -195,7 +195,7 @@ def test_a_known_height_sets_size_and_distance():
     found = {}
     for height_m in (1.5, 1.9):
         options = CaptureOptions(
-            "fast", heights_m=(height_m, 1.6), fov_deg=60.0, wanted=VideoRange(0, 0.5)
+            quality="fast", heights_m=(height_m, 1.6), fov_deg=60.0, wanted=VideoRange(0, 0.5)
         )
         result = capture(SAMPLE, body, options)
         motion = result.motions[0]

@@ -13,12 +13,12 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector
-from scope.scope_addon.capture.perception.adapters.graph import check_onnx_file
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.untrusted.onnx_file import check_onnx_file
 from scope.solver.errors import ModelFileError
 
-from ...small_graphs import fixed, picture_input, save, simcc
+from ..capture.small_graphs import fixed, picture_input, save, simcc
 
 Open = Callable[..., object]
 OPENERS = pytest.mark.parametrize("opens", [BoxDetector, KeypointNetwork])
