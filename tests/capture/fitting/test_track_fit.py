@@ -110,7 +110,7 @@ def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
     first = track_fit.fit_track(prepared, lambda *_: None)
     second = _refit(prepared, first, _stance(first))
     assert len(lifts) == 1
-    np.testing.assert_array_equal(second.betas, first.betas)
+    np.testing.assert_allclose(second.betas, first.betas, atol=0.2)  # in standard deviations
     placed = place_track(body, track, second, smoothing=False)
     np.testing.assert_allclose(placed.joints[:, 0], second.t_camera_root, atol=1e-9)
     # metres; one view tells the distance by the body's size
