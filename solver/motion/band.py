@@ -54,6 +54,13 @@ def make_factor(system: ClipSystem) -> Factor:
 
 
 @kernel
+def _subtract_four_rows(z0, z1, z2, z3, row0, row1, row2, row3, target) -> None:  # type: ignore[no-untyped-def]
+    """Subtract four rows (n,), each times a number, from another."""
+    for k in range(target.shape[0]):
+        target[k] -= z0 * row0[k] + z1 * row1[k] + z2 * row2[k] + z3 * row3[k]
+
+
+@kernel
 def subtract_products(Z, n: int, trail) -> None:  # type: ignore[no-untyped-def]
     """Subtract ZᵀZ of the columns from n on of Z (n, n + m) from the upper triangle of `trail`
     (m, m).
@@ -64,17 +71,12 @@ def subtract_products(Z, n: int, trail) -> None:  # type: ignore[no-untyped-def]
     m = trail.shape[0]
     for r in range(0, n, 4):
         for a in range(m):
-            z0 = Z[r, n + a]
-            z1 = Z[r + 1, n + a]
-            z2 = Z[r + 2, n + a]
-            z3 = Z[r + 3, n + a]
-            for b in range(a, m):
-                trail[a, b] -= (
-                    z0 * Z[r, n + b]
-                    + z1 * Z[r + 1, n + b]
-                    + z2 * Z[r + 2, n + b]
-                    + z3 * Z[r + 3, n + b]
-                )
+            k = n + a
+            _subtract_four_rows(
+                Z[r, k], Z[r + 1, k], Z[r + 2, k], Z[r + 3, k],
+                Z[r, k:], Z[r + 1, k:], Z[r + 2, k:], Z[r + 3, k:],
+                trail[a, a:],
+            )  # fmt: skip
 
 
 @kernel

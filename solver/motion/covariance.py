@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..gauss_newton.optimizer import MIN_DAMPING
+from ..gauss_newton.recursion import subtract_row
 from ..kernel import kernel
 from ..part import Array, Pose
 from ..tree import Tree
@@ -129,8 +130,7 @@ def _invert_frame(Z, n: int, S) -> None:  # type: ignore[no-untyped-def]
             S[i, j] = 0.0
         for k in range(i + 1, size):
             share = u * (Z[i, k] if k < 3 * n else Z[i, k + GLOBALS])
-            for j in range(i + 1, size):
-                S[i, j] -= share * S[k, j]
+            subtract_row(S[k, i + 1 :], share, S[i, i + 1 :])
         variance = u * u
         for k in range(i + 1, size):
             share = u * (Z[i, k] if k < 3 * n else Z[i, k + GLOBALS])
