@@ -193,7 +193,8 @@ class Notice:
         """Return the sentence as its texts and the times in the footage between them.
 
         :raises KeyError: the code is unknown, or a value is missing.
-        :raises ValueError: a value does not have the type that the sentence needs. Also TypeError.
+        :raises ValueError: a number or time is not one that the sentence can show.
+        :raises TypeError: a value does not have the type that the sentence needs.
         """
         parts: list[str | TimeText] = []
         for literal, name, spec, _ in string.Formatter().parse(translate(SENTENCES[self.code])):
