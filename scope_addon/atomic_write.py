@@ -119,7 +119,8 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool =
         with zipfile.ZipFile(packed, "w", method) as archive:
             for name, array in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                    np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)  # type: ignore[no-untyped-call]
+                    write_array: Any = np.lib.format.write_array  # numpy declares no types
+                    write_array(member, np.asanyarray(array), allow_pickle=False)
                 if packed.size >= _PIECE:
                     packed.move_to(file)
         packed.move_to(file)

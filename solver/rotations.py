@@ -53,7 +53,9 @@ def exp3(x: float, y: float, z: float) -> tuple[float, ...]:
 
 
 @kernel
-def log3(r00, r01, r02, r10, r11, r12, r20, r21, r22) -> tuple[float, ...]:  # type: ignore[no-untyped-def]
+def log3(  # type: ignore[no-untyped-def]
+    r00, r01, r02, r10, r11, r12, r20, r21, r22
+) -> tuple[float, ...]:
     """Return the rotation vector (3 numbers) of the rotation matrix given row by row, of angle in
     [0, pi].
 

@@ -24,7 +24,9 @@ from ...solver.part import Pose
 
 
 @kernel
-def apply_frame(tree, pose, blocks, damping, root_scale, x, d, out) -> None:  # type: ignore[no-untyped-def]
+def apply_frame(  # type: ignore[no-untyped-def]
+    tree, pose, blocks, damping, root_scale, x, d, out
+) -> None:
     """Write (H_f + Lambda) d to out (n,); x (K+1, 6) is overwritten."""
     o = pose.t[0]
     n = tree.parents.shape[0]

@@ -39,7 +39,9 @@ FLOW_COLUMN = column_of("joint_flow")
 
 
 @kernel
-def _write_row(tree, pose, J, row, i, p, o, gx, gy, gz, moved, part_moves) -> None:  # type: ignore[no-untyped-def]
+def _write_row(  # type: ignore[no-untyped-def]
+    tree, pose, J, row, i, p, o, gx, gy, gz, moved, part_moves
+) -> None:
     """Write one row of J for a gradient g with respect to the point p of part i; `moved` (3, P) is
     dp/dbeta.
 

@@ -25,7 +25,9 @@ def put(bank, k, pose):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def steps(count, tree, terms, stage, damping, root_scale, bank, pose, blocks, work):  # type: ignore[no-untyped-def]
+def steps(  # type: ignore[no-untyped-def]
+    count, tree, terms, stage, damping, root_scale, bank, pose, blocks, work
+):
     """Linearize and solve `count` times; return something that depends on all of it."""
     total = 0.0
     for k in range(count):

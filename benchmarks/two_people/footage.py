@@ -116,7 +116,8 @@ def register(alone: Path, together: Path) -> tuple[float, NDArray[np.float64], i
 
     Also how many SIFT features agree, and their median distance in pixels.
     """
-    sift, matcher = cv2.SIFT_create(3000), cv2.BFMatcher(crossCheck=True)  # type: ignore[attr-defined]
+    sift = cv2.SIFT_create(3000)  # type: ignore[attr-defined]
+    matcher = cv2.BFMatcher(crossCheck=True)
     old = _images(alone, [k - LATER for k in _COMPARED])
     new = _images(together, list(_COMPARED))
     here = []

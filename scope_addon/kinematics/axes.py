@@ -2,15 +2,11 @@
 """The axis conventions of SMPL, OpenCV and the world, in one place; Blender's and glTF's are in
 ``scene/axes.py``.
 
-| frame    | right-handed axes                                    | used by
-                                                                  |
-|----------|------------------------------------------------------|------------------------------------|
-| camera   | OpenCV: x right, y down, z forward                   | solver, ``joints_cam``,
-                                                                  intrinsics |
-| world    | x right, z up, floor at z = 0                        | motion file, Blender scenes
-                                                                  |
-| model    | SMPL: y up, x to the person's left, person faces +z  | rest pose of a body
-                                                                  |
+| frame  | right-handed axes                                   | used by                         |
+|--------|-----------------------------------------------------|---------------------------------|
+| camera | OpenCV: x right, y down, z forward                  | solver, joints_cam, intrinsics  |
+| world  | x right, z up, floor at z = 0                       | motion file, Blender scenes     |
+| model  | SMPL: y up, x to the person's left, person faces +z | rest pose of a body             |
 
 ``R_a_b`` takes coordinates in frame b to coordinates in frame a: ``p_a = R_a_b @ p_b``.
 """

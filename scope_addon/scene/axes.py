@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The axis conventions of Blender's cameras and of glTF; see ``kinematics/axes.py`` for the others.
 
-| frame    | right-handed axes                                    | used by
-                                                                  |
-|----------|------------------------------------------------------|------------------------------------|
-| gltf     | y up, model faces +z                                 | .glb, .bvh
-                                                                  |
-| blendcam | Blender camera: x right, y up, looks along −z        | Blender camera objects
-                                                                  |
+| frame    | right-handed axes                             | used by                |
+|----------|-----------------------------------------------|------------------------|
+| gltf     | y up, model faces +z                          | .glb, .bvh             |
+| blendcam | Blender camera: x right, y up, looks along −z | Blender camera objects |
 """
 
 from __future__ import annotations

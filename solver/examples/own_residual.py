@@ -18,7 +18,9 @@ from ..residuals.accumulation import add_to_point
 from . import person
 
 
-def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+def accumulate(  # type: ignore[no-untyped-def]
+    tree, ints, floats, weight, inv_sigma, triggs, pose, blocks
+):
     """Add every row's JᵀJ and Jᵀr to the blocks and return the cost. ints (n, 1): part; floats (n,
     2): height, w.
     """

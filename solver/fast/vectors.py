@@ -140,7 +140,9 @@ def row_pass(formula: Callable[..., Sequence[Sequence[Vector]]], rows: Sequence[
         return context.get_dummy_value()
 
     @intrinsic
-    def apply(typingctx, scalars, n, a, a0, a_row, b, b0, b_row, c, c0, c_row):  # type: ignore[no-untyped-def]
+    def apply(  # type: ignore[no-untyped-def]
+        typingctx, scalars, n, a, a0, a_row, b, b0, b_row, c, c0, c_row
+    ):
         i = types.intp
         return types.void(scalars, i, a, i, i, b, i, i, c, i, i), generate
 
@@ -187,7 +189,9 @@ def tile_of(vectors: int, sign: int) -> Any:
         return context.get_dummy_value()
 
     @intrinsic
-    def tile(typingctx, C, at, c_row, X, x, x_row, Z, z, z_row, count):  # type: ignore[no-untyped-def]
+    def tile(  # type: ignore[no-untyped-def]
+        typingctx, C, at, c_row, X, x, x_row, Z, z, z_row, count
+    ):
         i = types.intp
         return types.void(C, i, i, X, i, i, Z, i, i, i), generate
 

@@ -342,7 +342,9 @@ def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def
 
 
 @expanded_kernel
-def _add_points(tree, terms, i, t, settings, pose, blocks, scratch, cost):  # type: ignore[no-untyped-def]
+def _add_points(  # type: ignore[no-untyped-def]
+    tree, terms, i, t, settings, pose, blocks, scratch, cost
+):
     """Add the terms of part i's points to the cost, N, C and c.
 
     settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.

@@ -117,7 +117,9 @@ def _velocities(tree, poses, h, table, f, v, M) -> None:  # type: ignore[no-unty
 
 
 @kernel
-def accumulate(tree, poses, motion, first, last, memory, system) -> float:  # type: ignore[no-untyped-def]
+def accumulate(  # type: ignore[no-untyped-def]
+    tree, poses, motion, first, last, memory, system
+) -> float:
     """Add the accelerations at frames first..last-1 of a clip to `system` and return their cost.
 
     :param poses: of `make_poses`; motion `MotionTerms`; memory of `make_memory` is overwritten.

@@ -54,7 +54,9 @@ def make_factor(system: ClipSystem) -> Factor:
 
 
 @kernel
-def _subtract_four_rows(z0, z1, z2, z3, row0, row1, row2, row3, target) -> None:  # type: ignore[no-untyped-def]
+def _subtract_four_rows(  # type: ignore[no-untyped-def]
+    z0, z1, z2, z3, row0, row1, row2, row3, target
+) -> None:
     """Subtract four rows (n,), each times a number, from another."""
     for k in range(target.shape[0]):
         target[k] -= z0 * row0[k] + z1 * row1[k] + z2 * row2[k] + z3 * row3[k]
@@ -153,7 +155,9 @@ def _advance(trail, n: int, q: int) -> None:  # type: ignore[no-untyped-def]
 
 
 @kernel
-def eliminate_frames(system, first, count, step, damping, root_scale, trail, Z) -> None:  # type: ignore[no-untyped-def]
+def eliminate_frames(  # type: ignore[no-untyped-def]
+    system, first, count, step, damping, root_scale, trail, Z
+) -> None:
     """Eliminate `count` frames from `first` on, upwards or downwards by step 1 or -1.
 
     `trail` (2 n + q, 2 n + q) is what the frames before have left of these two and of the global

@@ -104,7 +104,9 @@ def _make_memory(n: int, W: int, parts: int) -> _Memory:
 
 
 @kernel
-def _select(tree, poses, Z, first, count, step, memory, joints, from_root) -> None:  # type: ignore[no-untyped-def]
+def _select(  # type: ignore[no-untyped-def]
+    tree, poses, Z, first, count, step, memory, joints, from_root
+) -> None:
     """Write the covariances of `count` frames from `first` on, by step 1 or -1, each eliminated
     before the last one.
     """
@@ -162,7 +164,9 @@ def _advance(n: int, S) -> None:  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _write_joints(tree, poses, f, memory, joints, from_root) -> None:  # type: ignore[no-untyped-def]
+def _write_joints(  # type: ignore[no-untyped-def]
+    tree, poses, f, memory, joints, from_root
+) -> None:
     """Write the covariances (K+1, 3, 3) of the joints' positions, and relative to part 0, of frame
     f.
     """

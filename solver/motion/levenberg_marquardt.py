@@ -41,7 +41,9 @@ def _set_current(tree, poses, joints, curvature, added) -> None:  # type: ignore
 
 
 @kernel
-def _update(tree, poses, d, trial, joints, accepted, curvature) -> None:  # type: ignore[no-untyped-def]
+def _update(  # type: ignore[no-untyped-def]
+    tree, poses, d, trial, joints, accepted, curvature
+) -> None:
     parts = tree.parents.shape[0]
     for f in range(d.shape[0]):
         u = d[f, 3 : 3 + 3 * parts].reshape(parts, 3)  # row 0 is the root's position

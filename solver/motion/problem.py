@@ -150,7 +150,9 @@ def linearize_frames(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def couple_frames(tree, poses, motion, first, last, memory, system, costs) -> None:  # type: ignore[no-untyped-def]
+def couple_frames(  # type: ignore[no-untyped-def]
+    tree, poses, motion, first, last, memory, system, costs
+) -> None:
     """Add what couples each of the frames first..last-1 to the two before it; add to costs[1] and
     costs[2].
     """

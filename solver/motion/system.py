@@ -144,7 +144,9 @@ def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-u
 
 
 @kernel
-def write_frame(tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c) -> None:  # type: ignore[no-untyped-def]
+def write_frame(  # type: ignore[no-untyped-def]
+    tree: Tree, pose: Pose, blocks: Blocks, sums, D, N, C, c
+) -> None:
     """Write a frame's block (n, n), upper triangle, and its gradient and global columns (n, 4+W);
     add to C and c.
 

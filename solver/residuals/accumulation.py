@@ -55,7 +55,9 @@ def relative_log(h, R):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2):  # type: ignore[no-untyped-def]
+def add_to_joint(  # type: ignore[no-untyped-def]
+    tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2
+):
     """Add a Hessian and a gradient in the parent's axes to joint i: H_uu += R_par H R_parᵀ, g_u +=
     R_par g.
     """
@@ -107,7 +109,9 @@ def _shape_derivative(tree, pose, k, i, a):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_to_point(tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22, f0, f1, f2):  # type: ignore[no-untyped-def]
+def add_to_point(  # type: ignore[no-untyped-def]
+    tree, pose, blocks, k, lx, ly, lz, w00, w01, w02, w11, w12, w22, f0, f1, f2
+):
     """Add W (its upper triangle) and f of point k, whose `lever` is (lx, ly, lz). One point at a
     time, for the few that touch something; the many that are measured go through linearize.py.
     """

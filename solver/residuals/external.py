@@ -246,7 +246,9 @@ def _call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def accumulate_external(tree, external, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+def accumulate_external(  # type: ignore[no-untyped-def]
+    tree, external, weights, inv_sigma, triggs, pose, blocks
+):
     """Add all rows to the blocks and return their cost."""
     cost = 0.0
     n = tree.parents.shape[0]

@@ -339,7 +339,9 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
 
 
 @allocating_kernel
-def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+def accumulate(  # type: ignore[no-untyped-def]
+    tree, ints, floats, weight, inv_sigma, triggs, pose, blocks
+):
     """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, LANES), floats (n,
     FLOATS).
     """

@@ -38,7 +38,9 @@ HINGES = {
 
 
 @kernel
-def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+def accumulate(  # type: ignore[no-untyped-def]
+    tree, ints, floats, weight, inv_sigma, triggs, pose, blocks
+):
     """Add every row's H_uu and g_u to the blocks and return the cost. ints (n, 1), floats (n,
     8).
     """

@@ -12,6 +12,7 @@ import ctypes
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def differentiate(function: Callable[[Part], Any], part: Part) -> Linearization:
         return replace(part, beta=beta, t=part.t + h * part.D[:, k])
 
     moves = [(twisted, 6), (turned, 3), (shaped, len(part.beta))]
-    columns = [[slope(lambda h, m=move, k=k: m(k, h)) for k in range(n)] for move, n in moves]  # type: ignore[misc]
+    columns = [[slope(partial(move, k)) for k in range(n)] for move, n in moves]
     return Linearization(r, *(np.array(some).reshape(-1, len(r)).T for some in columns))
 
 

@@ -53,7 +53,9 @@ COLUMNS = FIRST_EXTERNAL + MAX_EXTERNAL
 
 
 @inlined_kernel
-def _nothing(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+def _nothing(  # type: ignore[no-untyped-def]
+    tree, ints, floats, weights, inv_sigma, triggs, pose, blocks
+):
     """Cost of no residual."""
     return 0.0
 
@@ -62,7 +64,9 @@ def _followed_by(before: Any, index: int, name: str, accumulate: Any) -> Any:
     """Return the kernel that runs `before`, then the residual with that index and name."""
     column = FIRST_TABLE + index
 
-    def run(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks):  # type: ignore[no-untyped-def]
+    def run(  # type: ignore[no-untyped-def]
+        tree, ints, floats, weights, inv_sigma, triggs, pose, blocks
+    ):
         cost = before(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks)
         w = weights[column]
         s = inv_sigma[column]

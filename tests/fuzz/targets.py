@@ -122,7 +122,8 @@ def _videos(folder: Path) -> list[bytes]:
     import cv2
 
     path = folder / "seed.mp4"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 10.0, (64, 48))  # type: ignore[attr-defined]
+    mp4v = cv2.VideoWriter_fourcc(*"mp4v")  # type: ignore[attr-defined]
+    writer = cv2.VideoWriter(str(path), mp4v, 10.0, (64, 48))
     for level in range(4):
         writer.write(np.full((48, 64, 3), 60 * level, np.uint8))
     writer.release()

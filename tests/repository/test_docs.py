@@ -353,7 +353,8 @@ def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
         if before in ("-o", "--overlay")
     ]
     assert len(written) == 3
-    assert report["outputs"] and all((folder / name).stat().st_size > 0 for name in written)  # noqa: PT018
+    assert report["outputs"]
+    assert all((folder / name).stat().st_size > 0 for name in written)
     entries = next(rows for first, rows in tables(DOCS / "command_line.md") if first == "entry")
     assert {code for row in entries for code in re.findall(r"`([^`]+)`", row[0])} == set(report)
 

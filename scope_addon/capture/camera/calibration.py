@@ -36,7 +36,8 @@ _NAMES = {
 }
 # Other keys that describe the lens or the picture, by words in them or as a whole.
 _LENS_KEY = re.compile(
-    r".*(dist|coef|matrix|intrin|skew|fish|model|focal|resolution|size|width|height).*|[kp]_?\d|f_?[xy]?|c_?[xy]|[wh]",
+    r".*(dist|coef|matrix|intrin|skew|fish|model|focal|resolution|size|width|height).*"
+    r"|[kp]_?\d|f_?[xy]?|c_?[xy]|[wh]",
     re.I | re.S,
 )
 _OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)

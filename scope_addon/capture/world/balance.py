@@ -15,8 +15,8 @@ the most probable displacement is
     −(x − m) (σ_l h)² / ((σ_l h)² + σ_m²),
 
 and the whole body is rotated by it about the centre of the contact points. The correction gets
-weaker the faster a person moves, since c̈ is then not known well enough. It is not applied to people
-who may sit or kneel, see `leg_support`.
+weaker the faster a person moves, since c̈ is then not known well enough. It is not applied to
+people who may sit or kneel, see `leg_support`.
 
 Sources: Vukobratović and Borovac 2004 (zero moment point); Winter 2009 (masses of body parts and
 their centres; quiet standing: the zero moment point is 4 to 6 cm ahead of the ankles).

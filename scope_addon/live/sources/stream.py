@@ -28,7 +28,8 @@ SCHEMES = ("http", "https", "rtsp", "rtsps", "rtmp", "rtmps", "srt", "udp", "rtp
 # What a stream may open in turn, such as the segments of a playlist: never a file of this computer.
 _PROTOCOLS = "http,https,httpproxy,tcp,tls,udp,rtp,rtmp,rtmps,rtsp,rtsps,srt,srtp,crypto"
 _FORMATS = (
-    "rtsp,rtp,sdp,mpjpeg,mjpeg,jpeg_pipe,hls,dash,flv,live_flv,mpegts,mpeg,mov,matroska,webm,avi,h264,hevc,m4v,ogg,asf,"
+    "rtsp,rtp,sdp,mpjpeg,mjpeg,jpeg_pipe,hls,dash,flv,live_flv,mpegts,mpeg,mov,matroska,webm,"
+    "avi,h264,hevc,m4v,ogg,asf,"
     "nut"
 )
 STALLED_S = 5.0  # without data, after which a stream counts as interrupted
