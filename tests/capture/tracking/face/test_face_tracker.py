@@ -171,16 +171,11 @@ def test_a_real_face_is_captured_and_moves_little_but_the_head(shared):
     nose = found.keypoints2d[:, KEYPOINT_NAMES.index("nose"), :2]
     assert (face.min(axis=1) < nose).all()
     assert (nose < face.max(axis=1)).all()
-    for name in (
-        "keypoints2d",
-        "frames",
-        "timestamps",
-        "valid",
-        "betas",
-        "joint_confidence",
-        "height_sigma_m",
-    ):
+    for name in ("keypoints2d", "frames", "timestamps", "valid", "joint_confidence"):
         np.testing.assert_array_equal(getattr(found, name), getattr(without, name))
+    # The head's direction shifts the weight a little, and with it the lean and what follows.
+    np.testing.assert_allclose(found.betas, without.betas, atol=0.05)
+    np.testing.assert_allclose(found.height_sigma_m, without.height_sigma_m, rtol=0.05)
     moved_m = np.linalg.norm(found.joints_cam - without.joints_cam, axis=-1).mean(axis=0)
     limbs = [
         k
