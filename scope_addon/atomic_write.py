@@ -30,7 +30,7 @@ _temporary_files: set[Path] = set()
 
 
 @contextmanager
-def atomic_path(path: Path) -> Iterator[Path]:
+def atomic_path(path: Path, durable: bool = True) -> Iterator[Path]:
     """Create a temporary file in the folder of ``path``, and rename it to ``path`` when the block
     ends.
 
@@ -38,6 +38,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     A power cut within the block leaves the earlier file; after it, the new one is on the disk. If
     ``path`` is a link, its target is written and the link stays.
 
+    :param durable: False: do not wait for the disk, for a file that nobody needs after a power cut.
     :return: context manager that gives the temporary file's path. The block may replace the file,
         which is empty at first, but has to leave a file of that name.
     :raises OSError: the file cannot be created or renamed.
@@ -56,15 +57,19 @@ def atomic_path(path: Path) -> Iterator[Path]:
         mode = stat.S_IMODE(os.fstat(handle).st_mode)
         os.close(handle)
         yield temporary
-        sync(temporary)
+        if durable:
+            _sync(temporary)
         os.chmod(temporary, mode)  # a library may have replaced the file by one of its own
-        replace_durably(temporary, target)
+        if durable:
+            replace_durably(temporary, target)
+        else:
+            os.replace(temporary, target)
     finally:
         _remove_with_drafts(temporary)
         _temporary_files.discard(temporary)
 
 
-def sync(path: Path) -> None:
+def _sync(path: Path) -> None:
     """Wait until a file's content is on the disk; otherwise its name may get there before it.
 
     :raises OSError: the disk refuses the content, which some only say now.

@@ -374,8 +374,9 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
         batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out))
-        clips_read = [path for path in batch.clips(args.recursive).values() if path.is_file()]
-        refuse_inputs(batch.results(args.recursive), [*files_to_read(vars(args)), *clips_read])
+        footage = batch.clips(args.recursive)
+        videos = [path for path in footage.values() if path.is_file()]
+        refuse_inputs(batch.results(footage), [*files_to_read(vars(args)), *videos])
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         stack.enter_context(
             interrupted("finished clips are kept; run the same command again to continue")

@@ -292,3 +292,15 @@ def test_a_disk_that_refuses_at_the_sync_leaves_the_earlier_file(tmp_path, monke
         write(path)
     assert path.read_text() == "earlier"
     assert os.listdir(tmp_path) == ["walk.txt"]
+
+
+def test_a_file_that_nobody_needs_after_a_power_cut_does_not_wait_for_the_disk(
+    tmp_path, monkeypatch
+):
+    def fsync(handle):
+        raise AssertionError("waits for the disk")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with atomic_path(tmp_path / "preview.rgb", durable=False) as temporary:
+        temporary.write_text("picture")
+    assert os.listdir(tmp_path) == ["preview.rgb"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -64,17 +64,19 @@ def names_below(url: str, without: str = "") -> list[str]:
     file_system, root = _open(url)
     left_out = _open(without)[1] + "/" if without else ""
     file_system.invalidate_cache()
-    found = [
-        str(path)
-        for path in file_system.find(root)
-        if not (left_out and str(path).startswith(left_out))
-    ]
-    names = [path.removeprefix(root).lstrip("/") for path in found]
-    return [
-        n
-        for n in names
-        if n and "\\" not in n and not {"..", ATTEMPTS} & set(PurePosixPath(n).parts)
-    ]
+    paths = (str(path) for path in file_system.find(root))
+    kept = [path for path in paths if not (left_out and path.startswith(left_out))]
+    return list(_by_name(kept, root))
+
+
+def _by_name(paths: Iterable[str], root: str) -> dict[str, str]:
+    """Return paths by their names relative to a folder, without those that would lead elsewhere."""
+    by_name = {path.removeprefix(root).lstrip("/"): path for path in paths}
+    return {
+        name: path
+        for name, path in by_name.items()
+        if name and "\\" not in name and not {"..", ATTEMPTS} & set(PurePosixPath(name).parts)
+    }
 
 
 def mirror_footage(url: str, out: str, folder: Path) -> Path:
@@ -98,13 +100,14 @@ def mirror_results(url: str, folder: Path) -> Path:
     :raises UsageError: the URL cannot be used.
     """
     with store_errors(OutputError, url):
-        names = names_below(url)
-        _touch(folder, names)
         file_system, root = _open(url)
-        sizes = {path: about["size"] for path, about in file_system.find(root, detail=True).items()}
-        for name in names:
+        file_system.invalidate_cache()
+        found = file_system.find(root, detail=True)
+        names = _by_name(found, root)
+        _touch(folder, list(names))
+        for name, path in names.items():
             # Of a file with a hole, nothing is written to the disk.
-            os.truncate(folder / name, sizes.get(f"{root}/{name}") or 0)
+            os.truncate(folder / name, found[path]["size"] or 0)
         if REPORT_NAME in names:
             file_system.get_file(f"{root}/{REPORT_NAME}", str(folder / REPORT_NAME))
     return folder

@@ -131,8 +131,7 @@ def check_outputs(
     written = [*outputs, *filter(None, (overlay, report))]
     for path in outputs:
         # Several people have a file each in formats that have room for one.
-        alike = path.with_name(f"{path.stem}.person1{path.suffix}")
-        written += path.parent.glob(f"{glob.escape(alike.stem[:-1])}*{alike.suffix}")
+        written += path.parent.glob(f"{glob.escape(path.stem)}.person*{path.suffix}")
     refuse_inputs(written, files_to_read(inputs))
 
 

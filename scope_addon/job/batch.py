@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -75,14 +75,15 @@ class Batch:
         several = self.settings.options.get("--people") not in (None, "1", "largest")
         return find_clips(self.folder, self.out, recursive=recursive, several_people=several)
 
-    def results(self, recursive: bool) -> list[Path]:
-        """Return the paths of all results of one person that the batch may write."""
+    def results(self, names: Iterable[str]) -> list[Path]:
+        """Return the paths of all results of one person that the batch may write for the clips of
+        these names.
+        """
         suffixes = [*self.settings.suffixes]
         if self.settings.extras.reports:
             suffixes.append(f"{REPORT}.html")
         if self.settings.extras.overlays:
             suffixes += [f"{OVERLAY}.mp4", f"{OVERLAY}.png"]
-        names = self.clips(recursive)
         return [self.out / f"{name}{suffix}" for name in names for suffix in suffixes]
 
     def run(

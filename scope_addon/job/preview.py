@@ -111,7 +111,7 @@ class PreviewWriter:
             if not self._open:
                 return
             try:
-                with atomic_path(self._path) as temporary:
+                with atomic_path(self._path, durable=False) as temporary:
                     temporary.write_bytes(picture[::-1].tobytes())
             except OSError:
                 # disk full, or Windows while the parent reads it: a capture must not fail for its

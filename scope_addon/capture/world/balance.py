@@ -7,7 +7,7 @@ the line of sight, the zero moment point, in which weight and inertial forces ac
 
     x = s·(c − c̈ h / g).
 
-Who stands keeps it near the middle of the feet, or anywhere between the two: x − m is normally
+A standing person keeps it near the middle of a foot, or between the two: x − m is normally
 distributed with the deviation σ_m, where m is the value nearest to x in the range of s·p_i over the
 middles p_i of the soles in contact, and palms. The lean found in the image is uncertain by σ_l, so
 the most probable displacement is

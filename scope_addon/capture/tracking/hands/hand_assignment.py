@@ -103,9 +103,9 @@ def assigned(
     length = HAND_LENGTH_M * scale
     wrists = person.keypoints_px[WRISTS]
     elbow = person.keypoints_px[ELBOWS[side]]
-    distance, other = (np.linalg.norm(estimate.keypoints_px[0] - wrists, axis=1) / length)[
-        [side, 1 - side]
-    ]
+    distances = np.linalg.norm(estimate.keypoints_px[0] - wrists, axis=1) / length
+    distance = distances[side]
+    other = distances[1 - side]
     probability = estimate.left if side == 0 else 1.0 - estimate.left
     crossing = np.linalg.norm(np.subtract(*wrists)) <= CROSSING * length
     is_in_reach = np.linalg.norm(estimate.keypoints_px[0] - elbow) <= FOREARM * length
@@ -236,7 +236,8 @@ def _reached(own: FloatArray, times: Float64Array, sure: BoolArray) -> BoolArray
 
 def _continues(before: FloatArray, after: FloatArray) -> bool:
     """Return whether two hands (21, 6) of successive frames may be one."""
-    a, b = (hand[:, :2] - hand[0, :2] for hand in (before, after))
+    a = before[:, :2] - before[0, :2]
+    b = after[:, :2] - after[0, :2]
     sizes = [max(float(np.ptp(points, axis=0).max()), 1e-6) for points in (a, b)]
     change = float(np.linalg.norm(a - b, axis=1).mean())
     return max(sizes) <= MAX_GROWTH * min(sizes) and change <= MAX_CHANGE * max(sizes)
