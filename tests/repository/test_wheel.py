@@ -79,6 +79,7 @@ def wheel(tmp_path_factory) -> Path:
         "__init__.py",
         "setup.py",
         "pyproject.toml",
+        "blender_manifest.toml",
         "README.md",
         "LICENSE",
         "THIRD_PARTY.md",
@@ -146,6 +147,12 @@ def test_the_wheel_has_every_package_of_the_product_and_its_data(wheel):
     }
     assert modules == on_disk | {"scope/__init__.py"}
     assert names - modules == DATA
+
+
+def test_the_version_is_stated_in_the_manifest_alone(wheel):
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
+    assert wheel.name == f"scope_mocap-{version}-py3-none-any.whl"
+    assert "version" not in tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 
 def test_every_folder_of_modules_is_a_package():
