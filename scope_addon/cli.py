@@ -42,6 +42,7 @@ from .command_line.outputs import (
     summary,
     write_outputs,
 )
+from .command_line.problem_command import add_problem_report
 from .command_line.signals import interrupted, stopped_by_signals
 from .command_line.terminal import (
     ProgressBar,
@@ -120,6 +121,12 @@ def build_parser() -> argparse.ArgumentParser:
     add_live(
         commands.add_parser(
             "live", help="capture a camera, a stream or a playing video while it runs"
+        )
+    )
+    add_problem_report(
+        commands.add_parser(
+            "report-a-problem",
+            help="write what a problem report needs, without names of files, folders or people",
         )
     )
     return parser
