@@ -18,6 +18,7 @@ from typing import Any, NoReturn, TextIO
 
 from ..solver.errors import ScopeError
 from ..solver.loaders.body_file import ASSETS
+from .atomic_write import remove_temporary_files
 from .command_line.arguments import (
     add_options,
     body_and_options,
@@ -70,10 +71,10 @@ from .footage import is_url, json_text
 from .installed import CAPTURE, check_installed
 from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
-from .job.parent import stop_with_parent
 from .job.private_folder import lasting_folder
 from .job.unfinished import unfinished_capture
 from .options.capture import OFF
+from .parent import end_with_parent
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
@@ -239,7 +240,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         args.command_text = getattr(args, "shown_command", "") or shown
         with stopped_by_signals(), stdout_for_report() as stdout:
             if getattr(args, "stop_with_stdin", False):
-                stop_with_parent()
+                end_with_parent(_remove_temporary, interrupts=True)
             report = args.run(args)
             if args.json:
                 _print_report(report, stdout)
@@ -414,18 +415,22 @@ def run() -> NoReturn:
     """Run ``main`` as the entry point of a process, and exit in a way that cannot hang.
 
     When bpy is unloaded, it destroys a condition variable on which one of its own threads still
-    waits, which blocks forever. All our files are written and closed at this point, so the process
-    exits without running destructors.
+    waits, which blocks forever, also if a signal has interrupted its import. All our files are
+    written and closed at this point, so the process exits without running destructors.
     """
     open_standard_streams()
     status = main()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # a full disk, or a reader who went away
             stream.flush()
-    if "bpy" in sys.modules:
-        remove_blender_folder()
-        os._exit(status)
-    sys.exit(status)
+    remove_blender_folder()
+    os._exit(status)
+
+
+def _remove_temporary() -> None:
+    """Remove what this process has not finished, before an exit without its main thread."""
+    remove_temporary_files()
+    remove_blender_folder()
 
 
 if __name__ == "__main__":

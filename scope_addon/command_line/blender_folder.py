@@ -23,6 +23,7 @@ from ..processes import is_abandoned, owner
 _START = "scope-blender-"
 # by which Blender finds the system's temporary folder, on Windows the others
 _VARIABLES = ("TMPDIR", "TEMP", "TMP")
+_made: list[str] = []  # by this process
 
 
 def load_blender() -> None:
@@ -36,14 +37,15 @@ def load_blender() -> None:
 
 
 def remove_blender_folder() -> None:
-    """Remove the temporary folder of Blender's module, before an exit without Blender's exit
-    handlers.
+    """Remove the temporary folder of Blender's module, if it was loaded, or while it is being
+    loaded, before an exit without Blender's exit handlers.
     """
-    folder = Path(sys.modules["bpy"].app.tempdir)
-    if folder.name.startswith("blender_"):  # not a folder that the user has chosen
-        shutil.rmtree(
-            folder.parent if folder.parent.name.startswith(_START) else folder, ignore_errors=True
-        )
+    for made in _made:
+        shutil.rmtree(made, ignore_errors=True)
+    if (bpy := sys.modules.get("bpy")) is not None and hasattr(bpy, "app"):
+        folder = Path(bpy.app.tempdir)
+        if folder.name.startswith("blender_"):  # not a folder that the user has chosen
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
@@ -56,6 +58,7 @@ def _temporary_folder() -> Iterator[None]:
         system = _system_folder()
         _remove_abandoned(system)
         made = tempfile.mkdtemp(prefix=f"{_START}{owner()}-", dir=system)
+        _made.append(made)
         os.environ.update(dict.fromkeys(_VARIABLES, made))
     try:
         yield

@@ -17,10 +17,10 @@ from typing import IO, NoReturn
 from ...solver.errors import ScopeError
 from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
+from ..parent import end_with_parent
 from .live.commands import Commands
 from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
-from .parent import when_parent_ends
 from .request import WARM_UP, JobRequest
 from .unfinished import unfinished_capture
 
@@ -156,7 +156,7 @@ def main(job_folder: Path) -> NoReturn:
         _remove(job_folder)
         _exit(1)
     commands = Commands()
-    _exit_with_parent(job_folder, commands)
+    end_with_parent(lambda: _remove(job_folder), commands.receive)
     status = 1
     reporter = Reporter(stream)
     with contextlib.suppress(BrokenPipeError):
@@ -188,18 +188,6 @@ def _exit(status: int) -> NoReturn:
     with contextlib.suppress(OSError):
         sys.stderr.flush()
     os._exit(status)
-
-
-def _exit_with_parent(job_folder: Path, commands: Commands | None = None) -> None:
-    """Exit and remove the job's folder when the parent ends or closes the job; pass its commands
-    on.
-    """
-
-    def end() -> NoReturn:
-        _remove(job_folder)
-        os._exit(1)
-
-    when_parent_ends(end, (commands or Commands()).receive)
 
 
 def _remove(job_folder: Path) -> None:

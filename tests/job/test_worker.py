@@ -20,6 +20,7 @@ from scope.scope_addon.job.messages import WorkerFailedError
 from scope.scope_addon.job.process import START_SCRIPT, WorkerProcess
 from scope.scope_addon.job.request import JobRequest, code_version
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.parent import STOPPED
 from scope.solver import learned_prior
 from scope.solver.loaders.body_file import BUILT_IN, GROWTH
 
@@ -93,9 +94,10 @@ def test_a_worker_that_keeps_writing_without_a_parent_leaves_nothing_behind(tmp_
     code = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from scope.scope_addon.job.worker import _exit_with_parent\n"
+        "from scope.scope_addon.job.worker import _remove\n"
+        "from scope.scope_addon.parent import end_with_parent\n"
         f"folder, number = Path({str(folder)!r}), 0\n"
-        "_exit_with_parent(folder)\n"
+        "end_with_parent(lambda: _remove(folder))\n"
         "while True:\n"
         "    number += 1\n"
         "    try:\n"
@@ -106,7 +108,7 @@ def test_a_worker_that_keeps_writing_without_a_parent_leaves_nothing_behind(tmp_
     process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
     wait_for(lambda: len(list(folder.iterdir())) > 100)
     process.stdin.close()
-    assert process.wait(300) == 1
+    assert process.wait(300) == STOPPED
     assert list((tmp_path / "jobs").iterdir()) == []
 
 

@@ -84,6 +84,7 @@ SHARED = (
     "footage",
     "counts",
     "json_file",
+    "parent",
     "processes",
     "review_spans",
     "notices",

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import IO, Any
 
-from ..parent import GRACE_S
+from ...parent import GRACE_S
 
 STOPPED = 130  # exit status of a process that was stopped, or not started any more
 # Ctrl-C on a terminal must reach the batch only, which stops its clips: a second signal would

@@ -11,6 +11,7 @@ nothing.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import threading
@@ -139,7 +140,8 @@ class NetworkProcess:
 
 def _start() -> subprocess.Popen[bytes]:
     # An empty entry means the current folder, which isolated Python omits on purpose.
-    command = [sys.executable, "-I", "-S", str(SERVER), *(p for p in sys.path if p)]
+    parent = str(os.getpid())
+    command = [sys.executable, "-I", "-S", str(SERVER), parent, *(p for p in sys.path if p)]
     try:
         return subprocess.Popen(
             command,

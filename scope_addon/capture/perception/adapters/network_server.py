@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run one ONNX network in a process of its own, within limits of time and memory.
 
-    python -I -S network_server.py SEARCH_PATH...
+    python -I -S network_server.py PARENT SEARCH_PATH...
 
-A script: it imports nothing of Scope, so that it starts fast and a network finds little in its
-process. Requests come on standard input, answers leave on standard output: the length of a JSON
-text as four bytes, the text, and the contents of the arrays that it describes.
+A script: of Scope it loads only the module that ends it with its parent, the process PARENT, so
+that it starts fast and a network finds little in its process. Requests come on standard input,
+answers leave on standard output: the length of a JSON text as four bytes, the text, and the
+contents of the arrays that it describes.
 
 The limits hold on every system, whatever the network does: the time is kept by a thread of the
 interpreter's own, which needs no lock. Memory is limited by the system itself on Linux, and watched
@@ -14,6 +15,7 @@ by a thread elsewhere and on a GPU, whose drivers reserve addresses without end.
 
 import contextlib
 import faulthandler
+import importlib.util
 import json
 import os
 import sys
@@ -21,6 +23,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
 
@@ -256,6 +259,19 @@ def main() -> None:
     os._exit(0)  # without the exit handlers, which would wait for threads
 
 
+def _end_with(parent: int) -> None:
+    """End this process with its parent, also in the middle of a run of the network."""
+    file = Path(__file__).resolve().parents[3] / "parent.py"
+    spec = importlib.util.spec_from_file_location("parent", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.end_with_parent(receive=None, parent=parent)
+
+
 if __name__ == "__main__":
-    sys.path[:] = sys.argv[1:] + [p for p in sys.path if p not in sys.argv[1:]]
+    parent, *search_path = sys.argv[1:]
+    sys.path[:] = search_path + [p for p in sys.path if p not in search_path]
+    _end_with(int(parent))
     main()
