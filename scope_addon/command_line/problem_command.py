@@ -16,10 +16,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from ...solver.errors import InputError
 from ...solver.loaders.body_file import BUILT_IN
 from ..atomic_write import atomic_path, reason
 from ..capture_report import Report
-from ..errors import InputError, OutputError
+from ..errors import OutputError
 from ..footage import json_text
 from ..json_file import read_json_object
 from ..notices import PHRASES, SENTENCES
