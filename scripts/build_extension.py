@@ -119,6 +119,12 @@ def main() -> int:
         help="leave the compiled solver out; it is compiled on first use",
     )
     parser.add_argument(
+        "--kernels-only",
+        action="store_true",
+        help="build no zip, only the compiled solver, in build/kernels, where another computer "
+        "takes it from",
+    )
+    parser.add_argument(
         "--website", metavar="URL", default="", help="page for users, written into the manifest"
     )
     args = parser.parse_args()
@@ -135,6 +141,9 @@ def main() -> int:
         for p in args.platforms or PLATFORMS
         for python in pythons
     ]
+    if args.kernels_only:
+        made = [compile_kernels(target) for target in targets]
+        return 0 if all(made) else 1
     folder = OTHER_DIST if args.any_blender else DIST
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -149,6 +158,13 @@ def main() -> int:
     if not args.any_blender:
         check_listing(folder, targets)
     return 0
+
+
+def compile_kernels(target: Target) -> bool:
+    """Compile the solver for a target; return whether this computer can."""
+    wheels = download_wheels(target)
+    stage(target, wheels)
+    return add_kernels(STAGING, target.platform, target.python, wheels)
 
 
 def build(target: Target, folder: Path, website: str = "", *, kernels: bool = True) -> Path:
