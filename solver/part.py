@@ -70,16 +70,3 @@ class Blocks(NamedTuple):
 
 GRADIENT = 6  # column of m and g_u
 SHAPE = 8  # first column of N and H_ubeta
-
-
-def hat_identity(e: Array) -> Array:
-    """Return dp/dx = [-[e]x, I] (3, 6) of a point at e (3,) from the origin of twists."""
-    return np.hstack([np.array([[0, e[2], -e[1]], [-e[2], 0, e[0]], [e[1], -e[0], 0]]), np.eye(3)])
-
-
-def point_jacobian(part: Part, p: Array, V: Array) -> tuple[Array, Array]:
-    """Return dp/dx (3, 6) and dp/dbeta (3, P) of a point fixed to a part.
-
-    dp = w x (p - origin) + nu + (R V + D) dbeta
-    """
-    return hat_identity(p - part.origin), part.R @ V + part.D

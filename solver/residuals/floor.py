@@ -13,7 +13,7 @@ are. Source: a one-sided height keeps the form r_i(T_i, beta) of section 3 of th
 import numpy as np
 
 from ..kernel import kernel
-from ..part import Array, Linearization, Part, point_jacobian
+from ..part import Array
 from .accumulation import add_to_point, lever
 
 INTS = 1  # point, numbered as in the measurements
@@ -81,28 +81,3 @@ def pack(
     floats[:, 4] = w_below
     floats[:, 5] = w_above
     return np.reshape(points, (n, 1)).astype(np.int64), floats
-
-
-def evaluate(
-    part: Part,
-    v_bar: Array,
-    V: Array,
-    normal: Array,
-    offset: float,
-    w_below: float,
-    w_above: float,
-    weight: float = 1.0,
-) -> Linearization:
-    """Return the residual (1 row) times sqrt(weight) and its derivatives.
-
-    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
-    :param normal, offset: of the plane normal^T p = offset in camera axes; (3,), a unit vector
-        pointing up, and metres.
-    """
-    p = part.R @ (V @ part.beta + v_bar) + part.t
-    J_x, J_beta = point_jacobian(part, p, V)
-    h = float(normal @ p) - offset
-    g = np.sqrt(weight * (w_below if h < 0.0 else w_above))
-    return Linearization(
-        np.array([g * h]), g * (normal @ J_x)[None], np.zeros((1, 3)), g * (normal @ J_beta)[None]
-    )

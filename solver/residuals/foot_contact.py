@@ -12,7 +12,7 @@ r_i(T_i, beta) of section 3 of the paper.
 import numpy as np
 
 from ..kernel import kernel
-from ..part import Array, Linearization, Part, point_jacobian
+from ..part import Array
 from .accumulation import add_to_point, lever
 
 INTS = 1  # point, numbered as in the measurements
@@ -51,17 +51,3 @@ def pack(points: Array, p_stand: Array, weights: Array) -> tuple[Array, Array]:
     floats[:, :3] = p_stand
     floats[:, 3] = weights
     return np.reshape(points, (n, 1)).astype(np.int64), floats
-
-
-def evaluate(
-    part: Part, v_bar: Array, V: Array, p_stand: Array, weight: float = 1.0
-) -> Linearization:
-    """Return the residual (3 rows) times sqrt(weight) and its derivatives.
-
-    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
-    :param p_stand: (3,) where the point rests, metres, camera frame.
-    """
-    p = part.R @ (V @ part.beta + v_bar) + part.t
-    J_x, J_beta = point_jacobian(part, p, V)
-    g = np.sqrt(weight)
-    return Linearization(g * (p - p_stand), g * J_x, np.zeros((3, 3)), g * J_beta)

@@ -32,7 +32,7 @@ from numba.extending import register_jitable
 from ..gauss_newton.plain_rows import LANES, STATE
 from ..gauss_newton.rows import in_lanes
 from ..kernel import allocating_kernel, kernel
-from ..part import Array, Linearization, Part
+from ..part import Array
 from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
 from .accumulation import add_to_joint
 
@@ -489,23 +489,3 @@ def invert(parameters: Array, z: Array) -> Array:
     w = 2.0 / (squared + np.sqrt(squared * squared + 4.0))  # |y|^2 = (1 - w^2) / w
     quaternion = np.concatenate([w, x * np.sqrt(w)], axis=-1)
     return p[MEAN : MEAN + 9].reshape(3, 3) @ matrix_from_quaternion(quaternion)
-
-
-def evaluate(
-    part: Part, parameters: Array, weight: float = 1.0, log_det: float = 0.0
-) -> Linearization:
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h)
-    l, h = log_det.
-
-    :param parameters: (SIZE,) of the joint.
-    """
-    z, J, value, gradient = transform(parameters, part.Omega)
-    a = parameters[BOUND] - value
-    half = 0.5 * (a + np.sqrt(a * a + 1.0))
-    last = np.sqrt(2.0 * log_det * half)
-    slope = -np.sqrt(0.5 * log_det * half / (a * a + 1.0))
-    scale = np.sqrt(weight)
-    J_u = scale * np.vstack([J, slope * gradient]) @ part.R_parent.T
-    return Linearization(
-        scale * np.append(z, last), np.zeros((4, 6)), J_u, np.zeros((4, len(part.beta)))
-    )

@@ -18,8 +18,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..kernel import kernel
-from ..part import Array, Linearization, Part
-from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log, log3
+from ..part import Array
+from ..rotations import left_jacobian_inverse3, log3
 from .accumulation import add_to_joint
 
 INTS = 1  # joint
@@ -156,43 +156,3 @@ def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
     joints, axes, lower, upper, swing = (np.array(column) for column in zip(*found, strict=True))
     ones = np.ones(len(joints))
     return pack(joints, axes, lower, upper, swing, ones, ones)
-
-
-def evaluate(
-    part: Part,
-    axis: Array,
-    lower: float,
-    upper: float,
-    swing_limit: float,
-    w: float,
-    w_swing: float,
-    weight: float = 1.0,
-) -> Linearization:
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives.
-
-    :param axis: (3,) a unit vector, in the parent's rest axes.
-    :param lower, upper, swing_limit: radians.
-    """
-    phi = log(part.Omega)
-    J = left_jacobian_inverse(phi) @ part.R_parent.T
-    angle = float(axis @ phi)
-    s = phi - angle * axis
-    swing = np.linalg.norm(s)
-    r = np.zeros(4)
-    J_u = np.zeros((4, 3))
-    r[0] = max(0.0, angle - upper) - max(0.0, lower - angle)
-    if r[0] != 0.0:
-        J_u[0] = axis @ J
-    if swing > swing_limit:
-        share = 1.0 - swing_limit / swing
-        unit = s / swing
-        r[1:] = share * s
-        J_u[1:] = (
-            (share * np.eye(3) + (1.0 - share) * np.outer(unit, unit))
-            @ (np.eye(3) - np.outer(axis, axis))
-            @ J
-        )
-    scale = np.sqrt(weight * np.array([w, w_swing, w_swing, w_swing]))
-    return Linearization(
-        scale * r, np.zeros((4, 6)), scale[:, None] * J_u, np.zeros((4, len(part.beta)))
-    )

@@ -11,8 +11,8 @@ The gradient is w Omega_mean phi in the parent's axes, because J^-T(phi) phi = p
 import numpy as np
 
 from ..kernel import kernel
-from ..part import Array, Linearization, Part
-from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
+from ..part import Array
+from ..rotations import left_jacobian_inverse3
 from .accumulation import add_to_joint, relative_log
 
 INTS = 1  # joint
@@ -67,13 +67,3 @@ def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array
     floats[:, :9] = np.reshape(Omega_mean, (n, 9))
     floats[:, 9] = weights
     return np.reshape(joints, (n, 1)).astype(np.int64), floats
-
-
-def evaluate(part: Part, Omega_mean: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (3 rows) times sqrt(weight) and its derivatives; `Omega_mean` (3, 3) is a
-    joint state.
-    """
-    phi = log(Omega_mean.T @ part.Omega)
-    g = np.sqrt(weight)
-    J_u = g * left_jacobian_inverse(phi) @ Omega_mean.T @ part.R_parent.T
-    return Linearization(g * phi, np.zeros((3, 6)), J_u, np.zeros((3, len(part.beta))))

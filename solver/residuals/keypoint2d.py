@@ -15,10 +15,7 @@ residual, (z_min - z) / z_min, which no robust kernel flattens, pushes the point
 is finite and continuous. Source: section 3 of the paper, pinhole projection.
 """
 
-import numpy as np
-
 from ..kernel import kernel
-from ..part import Array, Linearization, Part, point_jacobian
 from .accumulation import geman_mcclure, triggs_share
 
 Z_MIN = 0.1  # metres
@@ -84,27 +81,3 @@ def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-un
         w * (gx * gx + gy * gy),
         w * (gx * rx + gy * ry),
     )
-
-
-def evaluate(
-    part: Part, v_bar: Array, V: Array, uv: Array, weight: float = 1.0, focal: float = 1.0
-) -> Linearization:
-    """Return r sqrt(weight) (2 rows, or 3 behind z_min), without robust kernel, and its
-    derivatives.
-
-    v_bar (3,), V (3, P) of the keypoint in metres; uv (2,) normalized image coordinates.
-    """
-    p = part.R @ (V @ part.beta + v_bar) + part.t
-    front = p[2] > Z_MIN
-    z = p[2] if front else Z_MIN
-    r = focal * p[:2] / z - uv
-    G = np.zeros((2, 3))
-    G[0, 0] = G[1, 1] = focal / z
-    if front:
-        G[:, 2] = -focal * p[:2] / z**2
-    else:
-        r = np.append(r, (Z_MIN - p[2]) / Z_MIN)
-        G = np.vstack([G, [0.0, 0.0, -1.0 / Z_MIN]])
-    J_x, J_beta = point_jacobian(part, p, V)
-    G = G * np.sqrt(weight)
-    return Linearization(r * np.sqrt(weight), G @ J_x, np.zeros((len(r), 3)), G @ J_beta)

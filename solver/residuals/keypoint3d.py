@@ -7,10 +7,7 @@ It serves temporal terms as well: last frame's position, or its extrapolation, i
 Source: section 3 of the paper.
 """
 
-import numpy as np
-
 from ..kernel import kernel
-from ..part import Array, Linearization, Part, point_jacobian
 from .accumulation import geman_mcclure, triggs_share
 
 
@@ -27,17 +24,3 @@ def term(x, y, z, mx, my, mz, weight, inv_sigma, triggs):  # type: ignore[no-unt
     if triggs > 0.0 and s > 0.0 and w > 0.0:
         kappa = triggs_share(s, inv_sigma, triggs) / (s * w)
     return 0.5 * weight * rho, w, kappa, w * rx, w * ry, w * rz
-
-
-def evaluate(
-    part: Part, v_bar: Array, V: Array, point: Array, weight: float = 1.0
-) -> Linearization:
-    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
-
-    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
-    :param point: (3,) where it was measured, metres, camera frame.
-    """
-    p = part.R @ (V @ part.beta + v_bar) + part.t
-    J_x, J_beta = point_jacobian(part, p, V)
-    g = np.sqrt(weight)
-    return Linearization(g * (p - point), g * J_x, np.zeros((3, 3)), g * J_beta)

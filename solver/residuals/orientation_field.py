@@ -12,10 +12,7 @@ Source: section 3 of the paper (part orientation field).
 
 import math
 
-import numpy as np
-
 from ..kernel import kernel
-from ..part import Array, Linearization, Part, hat_identity
 from .accumulation import geman_mcclure, triggs_share
 
 SHORTEST = 1e-4  # metres
@@ -58,26 +55,3 @@ def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-
         w12 = w12 - k * fy * fz
         w22 = w22 - k * fz * fz
     return 0.5 * weight * rho, w00, w01, w02, w11, w12, w22, fx, fy, fz
-
-
-def evaluate(
-    part: Part, v_bar: Array, V: Array, direction: Array, weight: float = 1.0
-) -> Linearization:
-    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
-
-    :param v_bar, V: (3,), (3, P) of the second point relative to the first, metres.
-    :param direction: (3,) measured unit vector, camera frame.
-    """
-    d = part.R @ (V @ part.beta + v_bar)
-    length = np.linalg.norm(d)
-    zeros = np.zeros((3, 3))
-    if length < SHORTEST:
-        return Linearization(np.zeros(3), np.zeros((3, 6)), zeros, np.zeros((3, len(part.beta))))
-    unit = d / length
-    G = np.sqrt(weight) * (np.eye(3) - np.outer(unit, unit)) / length
-    return Linearization(
-        np.sqrt(weight) * (unit - direction),
-        G @ np.hstack([hat_identity(d)[:, :3], zeros]),
-        zeros,
-        G @ part.R @ V,
-    )

@@ -18,7 +18,7 @@ correspondences as in iterative closest points, point to line, renewed by the ca
 import numpy as np
 
 from ..kernel import kernel
-from ..part import Array, Linearization, Part, point_jacobian
+from ..part import Array
 from .accumulation import add_to_point, geman_mcclure, lever
 from .keypoint2d import Z_MIN
 
@@ -102,22 +102,3 @@ def pack(
         [delta, contour, normal, *weights, *(1.0 / np.asarray(sigma) for sigma in sigmas)]
     )
     return np.reshape(points, (len(floats), 1)).astype(np.int64), floats
-
-
-def evaluate(
-    part: Part, v_bar: Array, V: Array, m: Array, n: Array, weight: float = 1.0
-) -> Linearization:
-    """Return the residual (1 row) of one side times sqrt(weight), without robust kernel, and its
-    derivatives.
-
-    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, delta included,
-        metres.
-    :param m, n: (2,) contour point and (2,) outward normal, normalized image coordinates.
-    """
-    p = part.R @ (V @ part.beta + v_bar) + part.t
-    J_x, J_beta = point_jacobian(part, p, V)
-    g = np.sqrt(weight) * np.append(n, -n @ p[:2] / p[2]) / p[2]
-    d = float(n @ (p[:2] / p[2] - m))
-    return Linearization(
-        np.array([np.sqrt(weight) * d]), (g @ J_x)[None], np.zeros((1, 3)), (g @ J_beta)[None]
-    )

@@ -11,8 +11,8 @@ camera. Source: section 3 of the paper (pose prior on T_i).
 import numpy as np
 
 from ..kernel import kernel
-from ..part import GRADIENT, Array, Linearization, Part, hat_identity
-from ..rotations import left_jacobian_inverse, left_jacobian_inverse3, log
+from ..part import GRADIENT, Array
+from ..rotations import left_jacobian_inverse3
 from .accumulation import add_to_point, relative_log
 
 INTS = 1  # part
@@ -79,22 +79,3 @@ def pack(
     floats[:, 12] = w_R
     floats[:, 13] = w_t
     return np.reshape(parts, (n, 1)).astype(np.int64), floats
-
-
-def evaluate(
-    part: Part, R_hat: Array, t_hat: Array, w_R: float, w_t: float, weight: float = 1.0
-) -> Linearization:
-    """Return the residual (6 rows) times sqrt(weight) and its derivatives.
-
-    :param R_hat, t_hat: (3, 3), (3,) the expected pose of the part, metres, camera frame.
-    """
-    phi = log(R_hat.T @ part.R)
-    a = np.sqrt(weight * w_R)
-    b = np.sqrt(weight * w_t)
-    J_x = np.zeros((6, 6))
-    J_x[:3, :3] = a * left_jacobian_inverse(phi) @ R_hat.T
-    J_x[3:] = b * hat_identity(part.t - part.origin)
-    J_beta = np.vstack([np.zeros_like(part.D), b * part.D])
-    return Linearization(
-        np.concatenate([a * phi, b * (part.t - t_hat)]), J_x, np.zeros((6, 3)), J_beta
-    )

@@ -11,8 +11,6 @@ A residual r_i(T_i, Omega_i, beta) in addition to the measurements is a module w
         1..K. Rows outside are refused; without it, negative ones
     accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost
         compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
-    evaluate(part, ...) -> Linearization
-        the same in plain numpy, for the derivative test
 
 To add it here: its import, and one line, its module in RESIDUALS. Its tables come in through
 `Measurements.tables[name]`, or through a field of `Measurements` or `Priors` of its own; its weight

@@ -6,10 +6,7 @@ earlier frames. As a residual, r = sqrt(w) Lᵀ (beta - mean) with Lambda = L L�
 Lᵀ. Source: section 3 of the paper (shape prior).
 """
 
-import numpy as np
-
 from ..kernel import kernel
-from ..part import Array, Linearization, Part
 
 
 @kernel
@@ -26,12 +23,3 @@ def accumulate(mean, information, weight, pose, blocks):  # type: ignore[no-unty
         blocks.c[a] += weight * total
         cost += 0.5 * weight * total * (pose.beta[a] - mean[a])
     return cost
-
-
-def evaluate(part: Part, mean: Array, information: Array, weight: float = 1.0) -> Linearization:
-    """Return the residual (P rows) and its derivatives for `mean` (P,) and `information` (P, P),
-    positive definite.
-    """
-    root = np.sqrt(weight) * np.linalg.cholesky(information).T
-    n = len(part.beta)
-    return Linearization(root @ (part.beta - mean), np.zeros((n, 6)), np.zeros((n, 3)), root)

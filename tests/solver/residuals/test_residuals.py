@@ -27,10 +27,10 @@ from scope.solver.residuals import (
     outline,
     pose_prior,
     registry,
-    shape_prior,
 )
 
 from ..synthetic import INTRINSICS, random_body, random_flow, random_state
+from . import references as ref
 
 P = 6
 AXIS = np.array([0.6, 0.0, 0.8])
@@ -96,23 +96,19 @@ HAT = rotations.exp([0.2, -0.5, 0.3])
 FLOW = random_flow(np.random.default_rng(11), HAT)
 
 CASES = {
-    "keypoint2d": lambda part, w: keypoint2d.evaluate(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
-    "keypoint3d": lambda part, w: keypoint3d.evaluate(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
-    "orientation_field": lambda part, w: orientation_field.evaluate(part, V_BAR, V, AXIS, w),
-    "foot_contact": lambda part, w: foot_contact.evaluate(
-        part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w
-    ),
-    "floor": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
-    "floor_above": lambda part, w: floor.evaluate(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
-    "outline": lambda part, w: outline.evaluate(part, V_BAR, V, CONTOUR, NORMAL, w),
-    "pose_prior": lambda part, w: pose_prior.evaluate(
-        part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w
-    ),
-    "joint_prior": lambda part, w: joint_prior.evaluate(part, HAT, w),
-    "joint_flow": lambda part, w: joint_flow.evaluate(part, FLOW, w),
-    "joint_flow_log_det": lambda part, w: joint_flow.evaluate(part, FLOW, w, 0.6),
-    "joint_limits": lambda part, w: joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w),
-    "shape_prior": lambda part, w: shape_prior.evaluate(part, np.ones(P), L @ L.T, w),
+    "keypoint2d": lambda part, w: ref.keypoint2d(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
+    "keypoint3d": lambda part, w: ref.keypoint3d(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "orientation_field": lambda part, w: ref.orientation_field(part, V_BAR, V, AXIS, w),
+    "foot_contact": lambda part, w: ref.foot_contact(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "floor": lambda part, w: ref.floor(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
+    "floor_above": lambda part, w: ref.floor(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
+    "outline": lambda part, w: ref.outline(part, V_BAR, V, CONTOUR, NORMAL, w),
+    "pose_prior": lambda part, w: ref.pose_prior(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w),
+    "joint_prior": lambda part, w: ref.joint_prior(part, HAT, w),
+    "joint_flow": lambda part, w: ref.joint_flow(part, FLOW, w),
+    "joint_flow_log_det": lambda part, w: ref.joint_flow(part, FLOW, w, 0.6),
+    "joint_limits": lambda part, w: ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w),
+    "shape_prior": lambda part, w: ref.shape_prior(part, np.ones(P), L @ L.T, w),
 }
 
 
@@ -137,7 +133,7 @@ def test_derivatives_near_identity_and_near_pi(name, angle):
         part.Omega = (np.eye(3) if name == "joint_limits" else HAT) @ turn
     if name == "joint_limits":  # the swing's kink is not at zero angle
         check_derivatives(
-            lambda p: joint_limits.evaluate(p, AXIS, -2.9, 0.4, 0.3, 2.0, 3.0), part, atol=2e-5
+            lambda p: ref.joint_limits(p, AXIS, -2.9, 0.4, 0.3, 2.0, 3.0), part, atol=2e-5
         )
     else:
         check_derivatives(lambda p: CASES[name](p, 1.0), part, atol=2e-5)
@@ -233,14 +229,14 @@ def test_table_kernels_accumulate_their_residual(name, seed):
     part = part_of(tree, pose, i)
     if name == "pose_prior":
         tables = pose_prior.pack([i], HAT[None], np.array([[0.1, 0.1, 2.5]]), [2.0], [3.0])
-        found = pose_prior.evaluate(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w)
+        found = ref.pose_prior(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w)
     elif name == "joint_prior":
         tables = joint_prior.pack([i], HAT[None], [2.0])
-        found = joint_prior.evaluate(part, HAT, 2.0 * w)
+        found = ref.joint_prior(part, HAT, 2.0 * w)
     elif name.startswith("joint_flow"):
         h = 0.7 if name.endswith("log_det") else 0.0
         tables = joint_flow.pack([i], FLOW[None], [2.0], h)
-        found = joint_flow.evaluate(part, FLOW, 2.0 * w, h)
+        found = ref.joint_flow(part, FLOW, 2.0 * w, h)
         name = "joint_flow"
     elif name.startswith("foot_contact"):
         if name.endswith("joint"):
@@ -248,27 +244,27 @@ def test_table_kernels_accumulate_their_residual(name, seed):
             v_bar = np.zeros(3)
             shape = np.zeros((3, P))
         tables = foot_contact.pack([k], np.array([[0.1, 0.2, 3.1]]), [2.0])
-        found = foot_contact.evaluate(part, v_bar, shape, np.array([0.1, 0.2, 3.1]), 2.0 * w)
+        found = ref.foot_contact(part, v_bar, shape, np.array([0.1, 0.2, 3.1]), 2.0 * w)
         name = "foot_contact"
     elif name.startswith("floor"):
         offset = -9.0 if name.endswith("above") else 9.0
         tables = floor.pack([k], AXIS, offset, [2.0], [3.0])
-        found = floor.evaluate(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
+        found = ref.floor(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
         name = "floor"
     elif name.startswith("outline"):
         delta = np.array([0.02, -0.01, 0.03])
         normal = NORMAL * (-1.0 if name.endswith("inside") else 1.0)
-        found = outline.evaluate(part, v_bar + delta, shape, CONTOUR, normal, 1.0)
+        found = ref.outline(part, v_bar + delta, shape, CONTOUR, normal, 1.0)
         inside = bool(found.r[0] < 0)
         never = [[np.inf], [np.inf]]
         tables = outline.pack([k], delta[None], CONTOUR[None], normal[None], ([2.0], [3.0]), never)
-        found = outline.evaluate(
+        found = ref.outline(
             part, v_bar + delta, shape, CONTOUR, normal, (3.0 if inside else 2.0) * w
         )
         name = "outline"
     else:
         tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
-        found = joint_limits.evaluate(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)
+        found = ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)
     blocks = make_blocks(tree)
     cost = registry.RESIDUALS[name].accumulate(tree, *tables, w, 0.0, 0.0, pose, blocks)
     check_blocks(tree, blocks, cost, i, found)
@@ -320,11 +316,11 @@ def test_measurement_kernel_accumulates_its_residual(way, behind):
     part = part_of(tree, pose, i)
     uv = np.array([(700.0 - 640.0) / 1100.0, (300.0 - 360.0) / 1080.0])
     found = {
-        "image": lambda: keypoint2d.evaluate(part, body.v_bar[j], body.V[j], uv, 15.0),
-        "space": lambda: keypoint3d.evaluate(
+        "image": lambda: ref.keypoint2d(part, body.v_bar[j], body.V[j], uv, 15.0),
+        "space": lambda: ref.keypoint3d(
             part, body.v_bar[j], body.V[j], np.array([0.2, 0.1, 4.2]), 20.0
         ),
-        "direction": lambda: orientation_field.evaluate(part, body.v_bar[j], body.V[j], AXIS, 25.0),
+        "direction": lambda: ref.orientation_field(part, body.v_bar[j], body.V[j], AXIS, 25.0),
     }[way]()
     check_blocks(tree, blocks, cost, i, found)
 
