@@ -30,7 +30,7 @@ from ..scope_addon.scene.character.animation import animate_armature
 from ..scope_addon.scene.character.armature import build_armature, rest_pose
 from ..scope_addon.scene.character.body_mesh import build_mesh, rest_vertices_world
 from ..scope_addon.scene.character.expression_keys import add_expression_keys, key_expressions
-from ..solver.loaders.body_file import load_body
+from ..scope_addon.untrusted.body_file import load_body
 from ..solver.names import EXPRESSIONS
 
 WRITTEN = 10_000  # frames

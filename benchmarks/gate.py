@@ -27,8 +27,8 @@ from ..scope_addon.atomic_write import atomic_path  # noqa: E402
 from ..scope_addon.capture.options import CaptureOptions  # noqa: E402
 from ..scope_addon.capture.pipeline import capture  # noqa: E402
 from ..scope_addon.cli import SAMPLE  # noqa: E402
+from ..scope_addon.untrusted.body_file import load_body  # noqa: E402
 from ..solver.body import Body  # noqa: E402
-from ..solver.loaders.body_file import load_body  # noqa: E402
 from . import report  # noqa: E402
 from .frames import DATA  # noqa: E402
 from .perception.accuracy import CAMERAS, evaluate_clip  # noqa: E402

@@ -22,7 +22,7 @@ from ..scope_addon.capture.pipeline import capture
 from ..scope_addon.errors import NoPersonError
 from ..scope_addon.motion import Motion
 from ..solver import Body, load_body
-from ..solver.loaders.body_file import ASSETS
+from ..solver.body_file import ASSETS
 from .frames import DATA
 from .perception.accuracy import CAMERAS, evaluate_motion
 from .perception.perception import PRESETS

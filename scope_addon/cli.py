@@ -16,8 +16,8 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
+from ..solver.body_file import ASSETS
 from ..solver.errors import ScopeError
-from ..solver.loaders.body_file import ASSETS
 from .atomic_write import remove_temporary_files
 from .command_line.arguments import (
     add_options,

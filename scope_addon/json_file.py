@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..solver.errors import InputError
-from ..solver.loaders.files import check_regular
 from .atomic_write import atomic_path, reason
 from .errors import OutputError
+from .untrusted.files import check_regular
 
 LARGEST_JSON_BYTES = 1_000_000
 # that every reader of JSON holds exactly; 10**400 fits no float (RFC 7493, 2.2)

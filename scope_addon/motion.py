@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..solver.loaders.files import in_one_line, read_npz
 from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
+from .untrusted.files import in_one_line, read_npz
 
 if TYPE_CHECKING:
     from ..solver.body import Body

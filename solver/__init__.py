@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # the public names and their modules, in the only place that lists them
     from . import rotations as rotations
     from .body import Body as Body
+    from .body_file import load_body as load_body
     from .errors import InputError as InputError
     from .errors import InvalidValueError as InvalidValueError
     from .errors import ModelFileError as ModelFileError
@@ -33,7 +34,6 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .fitting.residual_check import check_residual as check_residual
     from .learned_prior import JointPrior as JointPrior
     from .learned_prior import load_joint_prior as load_joint_prior
-    from .loaders import load_body as load_body
     from .measurements import Floor as Floor
     from .measurements import FootContacts as FootContacts
     from .measurements import Keypoints2D as Keypoints2D

@@ -10,7 +10,7 @@ body parts.
     v      = Σ_k w_vk T_k · (v̄(β) − J_k(β))     linear blend skinning
     p_j    = R_i (V_j β + v̄_j) + t_i            keypoint j on part i (the paper's Assumption 1)
 
-Files are read by ``loaders.body_file.load_body``.
+Files are read by ``body_file.load_body``.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from .arrays import as_array, as_arrays, described
+from .body_file import as_path, read_arrays
 from .errors import InvalidValueError, ModelFileError
-from .loaders.files import as_path, read_npz
 from .part import Array
 from .residuals import joint_flow
 from .validation import check_count, check_list, check_type, check_weight
@@ -126,7 +126,7 @@ def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
 
 @lru_cache(maxsize=4)
 def _read(path: Path) -> JointPrior:
-    arrays = read_npz(path, ModelFileError, "joint prior")
+    arrays = read_arrays(path, "joint prior")
     expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}
     for key in ("joint_names", "parameters", *expected):
         if key not in arrays:

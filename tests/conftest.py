@@ -181,7 +181,7 @@ def sessions_are_opened_once() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def body() -> Body:
     """The built-in body without fingers."""
-    from scope.solver.loaders.body_file import load_body
+    from scope.solver.body_file import load_body
 
     return load_body("scope")
 

@@ -308,7 +308,7 @@ def test_help_lists_every_option(capsys):
 
 
 def test_hands_need_a_body_with_fingers(tmp_path, capsys):
-    from scope.solver.loaders.body_file import BUILT_IN
+    from scope.solver.body_file import BUILT_IN
 
     out = tmp_path / "out.npz"
     status, _, err = run(

@@ -6,7 +6,7 @@ from subprocess import run
 
 import numpy as np
 from scope.scope_addon.review_spans import Span, body_confidence, find_review_spans
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from .made_motion import made_motion
 

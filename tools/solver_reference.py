@@ -38,7 +38,7 @@ shape coefficients, M keypoints of the body and N measurements.
 ```python
 from scope import solver
 
-body = solver.load_body("scope")  # or your own SMPL.npz, SMPLH.pkl, …
+body = solver.load_body("scope")  # or your own SMPL.npz
 index = list(body.keypoint_set("coco").values())[:17]  # COCO's 17 points
 keypoints = solver.Keypoints2D(index, pixels, confidence)
 fit = solver.fit(body, solver.Measurements(K, keypoints2d=keypoints))

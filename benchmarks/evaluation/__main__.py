@@ -19,9 +19,9 @@ from ...scope_addon.errors import OutputError, UsageError, exit_status
 from ...scope_addon.footage import display_text
 from ...scope_addon.job.request import code_version
 from ...scope_addon.options.capture import QUALITIES
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
 from ...solver.errors import ScopeError
-from ...solver.loaders.body_file import load_body
 from .clips import Clip
 from .models import Models
 from .protocols import MEASURES, PROTOCOLS, Protocol

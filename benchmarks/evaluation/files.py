@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from ...scope_addon.errors import SetupError
 from ...scope_addon.footage import pictures_in
+from ...scope_addon.untrusted.files import check_regular, read_npz
+from ...scope_addon.untrusted.pickles import read_pickle, to_array
 from ...solver.errors import InputError, ModelFileError
-from ...solver.loaders.files import check_regular, read_npz
-from ...solver.loaders.pickles import read_pickle, to_array
 
 LARGEST_BYTES = 1 << 30  # of a file, and of one array in it
 LARGEST_SMALL = 64 << 20  # of a regressor or an .xml file

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ...solver.loaders.keypoints import SKELETONS
+from ...solver.smpl_family import SKELETONS
 
 SMPL24 = SKELETONS[24].joint_names
 SMPL22 = SMPL24[:22]  # those that SMPL-X has as well

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
-from ...solver.loaders.body_file import load_body
 from ...solver.rotations import exp
 from .files import DatasetError, read_matrix
 from .joint_sets import REGRESSED17

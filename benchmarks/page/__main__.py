@@ -22,9 +22,9 @@ from ...scope_addon.report.footage_pictures import overlay_pictures
 from ...scope_addon.report.machine import machine, versions
 from ...scope_addon.report.viewer_data import shown_rows, viewer_data
 from ...scope_addon.scene.export.output_paths import check_output
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
 from ...solver.errors import InputError, ScopeError
-from ...solver.loaders.body_file import load_body
 from ..frames import ROOT
 from .commands import (
     LONG,

@@ -20,7 +20,7 @@ from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.errors import NoPersonError
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
-from ...solver.loaders.body_file import ASSETS
+from ...solver.body_file import ASSETS
 from ...solver.rotations import exp
 from ..frames import DATA
 from ..report import table

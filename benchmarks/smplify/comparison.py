@@ -19,7 +19,7 @@ from ...scope_addon.capture.overlay.overlay_video import body_colors, camera_ver
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
-from ...solver.loaders.body_file import ASSETS
+from ...solver.body_file import ASSETS
 from ...tools.readme_pictures.__main__ import write_jpeg
 from ...tools.render_sample.truth import LIMBS, project
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to

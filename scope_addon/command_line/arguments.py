@@ -83,8 +83,8 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
 
     :raises ScopeError: an argument has an invalid value, or the body does not exist.
     """
-    from ...solver.loaders.body_file import load_body
     from ..capture.options import capture_options, check_options
+    from ..untrusted.body_file import load_body
 
     values = option_values(args)
     options = capture_options(values)

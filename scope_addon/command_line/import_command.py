@@ -7,7 +7,7 @@ import argparse
 import sys
 from typing import Any
 
-from ...solver.loaders.keypoints import SKELETONS
+from ...solver.smpl_family import SKELETONS
 from ..capture_report import warnings_as_json
 from ..counts import counted
 from ..options import Place

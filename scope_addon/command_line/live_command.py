@@ -54,11 +54,11 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     options = _checked(values)
     check_outputs(_paths(values), vars(args), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
-    from ...solver.loaders.body_file import load_body
     from ..live.outputs.footage import Footage
     from ..live.outputs.people_recording import PeopleRecording
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
+    from ..untrusted.body_file import load_body
 
     source = open_source(args.source)
     body = load_body(chosen_body(values))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
-from ...solver.loaders.body_file import ASSETS
+from ...solver.body_file import ASSETS
 from ..counts import counted
 from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url

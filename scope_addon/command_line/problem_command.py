@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.errors import InputError
-from ...solver.loaders.body_file import BUILT_IN
+from ...solver.body_file import BUILT_IN
 from ..atomic_write import atomic_path, reason
 from ..capture_report import Report
 from ..errors import OutputError

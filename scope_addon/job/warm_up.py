@@ -12,7 +12,7 @@ import gc
 
 import numpy as np
 
-from ...solver.loaders.body_file import ASSETS, load_body
+from ...solver.body_file import ASSETS
 from ..capture.media.video_range import VideoRange
 from ..capture.options import CaptureOptions
 from ..capture.overlay.rasterizer import fill_silhouette
@@ -21,6 +21,7 @@ from ..capture.stages.clock import Progress
 from ..edit.pins.corrected_motion import with_corrections
 from ..edit.pins.corrections import Pin
 from ..machine_code.code_cache import compiled_kernels
+from ..untrusted.body_file import load_body
 from .preview import load_rasterizer
 
 ROOT = ASSETS.parent

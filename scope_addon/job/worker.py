@@ -114,10 +114,10 @@ def run(
 def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     """Capture and write the results."""
     # Imported here, so that a missing package is reported in the panel.
-    from ...solver.loaders.body_file import load_body
     from ..capture.long_clips.windowed_clip import lasting
     from ..capture.options import capture_options
     from ..capture.pipeline import capture
+    from ..untrusted.body_file import load_body
     from .preview import PreviewWriter
 
     with unfinished_capture(_caches(job_folder), Path(request.footage)) as unfinished:

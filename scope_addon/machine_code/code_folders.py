@@ -50,7 +50,7 @@ LEVELS = {
     "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
 }
 # folders whose sources do not count; an installation may lack the first
-WITHOUT_KERNELS = {"examples", "loaders"}
+WITHOUT_KERNELS = {"examples"}
 _chosen: list[Path] = []  # at most one
 _STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
 

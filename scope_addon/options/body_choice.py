@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...solver.loaders.body_file import CHILD_BELOW_M, body_with_children, body_with_hands
+from ...solver.body_file import CHILD_BELOW_M, body_with_children, body_with_hands
 from .capture import OFF
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...solver.errors import InputError
-from ...solver.loaders.files import check_regular
 from ..errors import UsageError
+from ..untrusted.files import check_regular
 from .bone_map import BoneMap, load_bone_map
 from .expression_map import ExpressionMap, load_expression_map
 from .fbx_check import check_fbx

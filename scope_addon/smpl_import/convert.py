@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ...solver.loaders.body_file import BUILT_IN, load_body
-from ...solver.loaders.files import npz_keys
+from ...solver.body_file import BUILT_IN
 from ...solver.rotations import exp, log
 from ..edit.clip import Clip
 from ..errors import MotionFileError, UsageError
@@ -26,6 +25,8 @@ from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.standing import standing_probability
 from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
 from ..notices import Notice, notice
+from ..untrusted.body_file import load_body
+from ..untrusted.files import npz_keys
 from .layouts import SmplMotion, read_smpl_motion
 
 DEFAULT_RATE = 30.0  # frames per second

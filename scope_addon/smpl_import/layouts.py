@@ -17,13 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.loaders.files import read_npz
-from ...solver.loaders.keypoints import FACE_JOINTS, HAND_ORDER, SKELETONS
-from ...solver.loaders.model_file import read_gender
 from ...solver.names import BODY_JOINTS
 from ...solver.rotations import log
+from ...solver.smpl_family import FACE_JOINTS, HAND_ORDER, SKELETONS, gender_of
 from ..errors import MotionFileError
 from ..kinematics.frame_blocks import by_blocks
+from ..untrusted.files import read_npz
 
 MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
 _MAX_BETAS = 400
@@ -147,7 +146,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         trans=position,
         betas=_betas(arrays, count, path),
         rate=_positive(arrays, _RATES, "a number of frames per second", _LARGEST_RATE, path),
-        gender=read_gender(arrays.get(_GENDER), Path("neutral")),
+        gender=gender_of(arrays.get(_GENDER), Path("neutral")),
         body_model=_text(arrays.get(_MODEL)),
         usual_up=usual_up,
     )

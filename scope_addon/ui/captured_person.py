@@ -97,9 +97,9 @@ def body_of(armature: bpy.types.Object) -> Body:
     :raises ModelFileError: the body's file no longer exists or cannot be read.
     :raises UsageError: the armature does not store which body it is.
     """
-    from ...solver.loaders.body_file import load_body
     from ..errors import UsageError
     from ..scene.animation_data.stored_values import stored_text
+    from ..untrusted.body_file import load_body
 
     which = stored_text(armature, "scope_body_file") or stored_text(armature, "scope_body")
     if not which:

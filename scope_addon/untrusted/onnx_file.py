@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ...solver.errors import ModelFileError
-from ...solver.loaders.files import check_regular
+from .files import check_regular
 
 # Of each kind of message, the fields that lead to tensors: {field number: kind of its message}.
 _FIELDS = {

@@ -29,8 +29,8 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.notices import notice
 from scope.scope_addon.report.capture_page import CapturedClip, write_capture_page
+from scope.scope_addon.untrusted.body_file import load_body
 from scope.solver.body import Body
-from scope.solver.loaders.body_file import load_body
 from scope.solver.rotations import exp
 
 CAPTURED = "captured.html"

@@ -15,7 +15,7 @@ import pytest
 from scope.benchmarks import stills
 from scope.scope_addon.errors import NoPersonError
 from scope.solver import Body
-from scope.solver.loaders.body_file import ASSETS
+from scope.solver.body_file import ASSETS
 
 from ..made_motion import made_motion
 

@@ -19,7 +19,7 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError, NoPersonError
 from scope.scope_addon.motion import Motion
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from ..job.processes import wait_for
 

@@ -20,7 +20,7 @@ from scope.scope_addon.capture.pipeline import Capture, capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import NoPersonError
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from .small_graphs import fixed
 from .wrapped_networks import box_rows, coco_simcc

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 

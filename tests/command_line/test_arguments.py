@@ -10,7 +10,7 @@ import pytest
 from scope.scope_addon.cli import build_parser
 from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments
 from scope.scope_addon.errors import UsageError
-from scope.solver.loaders.body_file import BUILT_IN
+from scope.solver.body_file import BUILT_IN
 
 
 def options(*argv):

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.untrusted.body_file import load_body
 from scope.solver.errors import ScopeError
-from scope.solver.loaders.body_file import load_body
 
 from ..machine_code.small_package import make_package
 from ..made_motion import made_motion

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..solver.loaders.conftest import dump_python2, make_tables
+from ..untrusted.conftest import dump_python2, make_tables
 from . import own_targets as own
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
@@ -64,7 +64,7 @@ def _read_quicktime(path: Path) -> None:
 
 
 def _load_body(path: Path) -> None:
-    from scope.solver.loaders.body_file import load_body
+    from scope.scope_addon.untrusted.body_file import load_body
 
     load_body(path)
 
@@ -207,7 +207,7 @@ def _motions(_: Path) -> list[bytes]:
         Pin,
         Upright,
     )
-    from scope.solver.loaders.body_file import load_body
+    from scope.scope_addon.untrusted.body_file import load_body
 
     from ..made_motion import made_face, made_motion
 

@@ -20,8 +20,8 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.job.clips.runner import LocalRunner
 from scope.scope_addon.motion import Motion
+from scope.solver.body_file import BUILT_IN
 from scope.solver.errors import InputError
-from scope.solver.loaders.body_file import BUILT_IN
 
 from .processes import runs, wait_for
 

@@ -22,7 +22,7 @@ from scope.scope_addon.job.request import JobRequest, code_version
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.parent import STOPPED
 from scope.solver import learned_prior
-from scope.solver.loaders.body_file import BUILT_IN, GROWTH
+from scope.solver.body_file import BUILT_IN, GROWTH
 
 from .long_clip import played_again_and_again
 from .processes import runs, wait_for

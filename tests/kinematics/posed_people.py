@@ -9,7 +9,7 @@ import numpy as np
 from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import rotations
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 FPS = 30.0
 

@@ -11,7 +11,7 @@ from scope.scope_addon.kinematics.contact_points import (
     with_contact_points,
 )
 from scope.solver import rotations
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 
 @pytest.mark.parametrize("which", ["scope", "scope_h"])

@@ -6,7 +6,7 @@ import pytest
 from scope.scope_addon.kinematics import foot_skin
 from scope.scope_addon.kinematics.foot_skin import FootSkin, lower_floors, steps, upper_floors
 from scope.solver import rotations
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from ..made_motion import made_motion
 from .posed_people import FPS

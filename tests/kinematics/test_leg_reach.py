@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.kinematics.leg_reach import move_feet
 from scope.solver import rotations
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 
 @pytest.fixture(scope="module")

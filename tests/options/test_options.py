@@ -29,7 +29,7 @@ from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, 
 from scope.scope_addon.options.capture import AUTO, OFF, ON
 from scope.scope_addon.options.record import declared, options_of
 from scope.scope_addon.retarget.rig_source import ROOTS
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 # Listed again on purpose, because users' scripts rely on the flags.
 FLAGS = """

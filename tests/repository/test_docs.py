@@ -37,7 +37,7 @@ from scope.scope_addon.edit.pins.corrections import (
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, Motion
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.scene.export.output_paths import check_output
-from scope.solver.loaders.body_file import BUILT_IN
+from scope.solver.body_file import BUILT_IN
 from scope.solver.names import EXPRESSIONS
 from scope.tools import solver_reference
 

@@ -19,7 +19,7 @@ PRODUCT = ("solver", "scope_addon")
 SOLVER: dict[str, set[str]] = {"solver": set()}
 CAPTURE = {
     "scope_addon/capture/media": {"scope_addon/files", "scope_addon/machine_code"},
-    "scope_addon/capture/perception": {"scope_addon/kinematics", "scope_addon/untrusted"},
+    "scope_addon/capture/perception": {"scope_addon/kinematics"},
     "scope_addon/capture/camera": {"scope_addon/capture/perception"},
     "scope_addon/capture/tracking": {"scope_addon/capture/camera"},
     "scope_addon/capture/fitting": {"scope_addon/capture/tracking", "scope_addon/capture/overlay"},
@@ -38,10 +38,10 @@ CAPTURE = {
 ROOMS = {
     **SOLVER,
     # the files directly in scope_addon that every room may use, see SHARED
-    "scope_addon/files": {"solver"},
+    "scope_addon/files": {"scope_addon/untrusted"},
     "scope_addon/machine_code": {"scope_addon/files"},
     "scope_addon/kinematics": {"scope_addon/files"},
-    "scope_addon/untrusted": {"scope_addon/files"},
+    "scope_addon/untrusted": {"solver"},
     **CAPTURE,
     "scope_addon/options": {"scope_addon/files"},
     "scope_addon/edit": {"scope_addon/kinematics"},

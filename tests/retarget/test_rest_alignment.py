@@ -10,7 +10,7 @@ import pytest
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.rest_alignment import heading_alignment, rest_alignment
 from scope.scope_addon.retarget.skeleton import Skeleton
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 from ..edit.walking import BETAS, BODY, NAMES

@@ -13,7 +13,7 @@ import pytest
 from mathutils import Quaternion, Vector
 from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from ..made_motion import made_motion
 

@@ -42,7 +42,7 @@ def test_joints_and_skin_are_the_bodys(body, make_motion, truth, joints_world, b
 
 
 def test_the_body_with_fingers(make_motion, truth, blender):
-    from scope.solver.loaders.body_file import load_body
+    from scope.solver.body_file import load_body
 
     hands = load_body("scope_h")
     motion = make_motion(hands, 5)

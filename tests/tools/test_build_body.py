@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from scope.solver.loaders.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
+from scope.solver.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
 from scope.tools.build_body.anthropometry import ADULTS, draw_adults, draw_children
 from scope.tools.build_body.build import rig_body
 from scope.tools.build_body.geometry import growth

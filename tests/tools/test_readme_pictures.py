@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError
-from scope.solver.loaders.body_file import ASSETS
+from scope.solver.body_file import ASSETS
 from scope.tools.readme_pictures import animation, photographs
 from scope.tools.readme_pictures.__main__ import (
     ANIMATIONS,

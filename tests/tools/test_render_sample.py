@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
 from scope.solver.body import Body
-from scope.solver.loaders.body_file import ASSETS
+from scope.solver.body_file import ASSETS
 from scope.tools.render_sample.choreography import choreograph, standing_feet
 from scope.tools.render_sample.leg import solve_leg
 from scope.tools.render_sample.truth import sample_shot, write_truth

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.names import EXPRESSIONS
 from scope.tools.render_talk.draw import PersonPainter
 from scope.tools.render_talk.shot import SIZE, talk_shot

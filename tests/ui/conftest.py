@@ -16,9 +16,9 @@ import pytest
 import scope
 from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.motion import Motion
+from scope.solver import body_file
 from scope.solver.body import Body
-from scope.solver.loaders import body_file
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from ..made_motion import made_motion
 

@@ -32,7 +32,7 @@ for package in ("scope", NAME):
     folders = importlib.import_module(f"{{package}}.scope_addon.machine_code.code_folders")
     assert folders.places() == [Path({kernels!r})], folders.places()
 
-body = importlib.import_module(f"{{NAME}}.solver.loaders.body_file").load_body("scope")
+body = importlib.import_module(f"{{NAME}}.solver.body_file").load_body("scope")
 # Takes a body of the package of the other name.
 refit = pose_refit.PoseRefit(body, np.zeros(body.P))
 assert type(refit._tree).__module__.startswith("scope.solver."), type(refit._tree)

@@ -10,7 +10,7 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.visibility import hide
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
 from scope.scope_addon.ui.live.live_job import live_rig
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from ..edit.walking import motion_of, walk
 from ..scene.made_rigs import captured

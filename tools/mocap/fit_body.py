@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import atomic_path
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver import (
     Keypoints3D,
     Measurements,
@@ -40,7 +41,6 @@ from ...solver import (
     make_tree,
 )
 from ...solver.body import Body
-from ...solver.loaders.body_file import load_body
 from ...solver.residuals import joint_limits
 from ...solver.rotations import log
 from .kinds import kind_of

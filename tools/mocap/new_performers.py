@@ -30,7 +30,7 @@ from pathlib import Path
 import numpy as np
 
 from ...scope_addon.errors import MotionFileError
-from ...solver.loaders.body_file import load_body
+from ...scope_addon.untrusted.body_file import load_body
 from ..pinned_wheel import DOWNLOADS, PinnedDebian, PinnedSource, PinnedWheel
 from . import markers
 from .fit_body import fit_library, report, save

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
-from ...solver.loaders.files import read_npz
+from ...scope_addon.untrusted.files import read_npz
 from ...solver.rotations import exp, matrix_from_quaternion
 from .joint_centres import SIDES, Points, take_from_joints
 from .straight_legs import with_knees_back

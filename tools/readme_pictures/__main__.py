@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.atomic_write import atomic_path
-from ...solver.loaders.body_file import ASSETS
+from ...solver.body_file import ASSETS
 from . import animation, photographs, pictures
 from .clips import DATA
 

@@ -17,7 +17,7 @@ from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.kinematics.face.expressions import body_with_mouth
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
-from ...solver.loaders.body_file import ASSETS
+from ...solver.body_file import ASSETS
 from ..render_talk.shot import FOLDER, VIDEO
 from .shapes import joints, true_joints
 

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
-from ...solver.loaders.body_file import load_body
 from .beard import bearded
 from .identities import draw_identity, identity_targets
 from .looks import draw_look, with_beard

@@ -11,7 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from ...solver.loaders.body_file import ASSETS, load_body
+from ...scope_addon.untrusted.body_file import load_body
+from ...solver.body_file import ASSETS
 from .choreography import choreograph
 from .truth import BETAS, FPS, sample_shot, write_truth
 

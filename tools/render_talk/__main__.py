@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from ...solver.loaders.body_file import load_body
+from ...scope_addon.untrusted.body_file import load_body
 from .draw import draw_clip
 from .shot import FOLDER, TRUTH, VIDEO, talk_shot, write_talk_truth
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.lifter import ends_of_runs
 from ...scope_addon.errors import MotionFileError
-from ...solver.loaders.files import read_npz
+from ...scope_addon.untrusted.files import read_npz
 from ...solver.rotations import exp
 from ..train_prior.data import group_of
 

@@ -29,8 +29,8 @@ import torch
 from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.perception.lifter import MIDDLE
 from ...scope_addon.errors import MotionFileError
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
-from ...solver.loaders.body_file import load_body
 from .dataset import Batch, Dataset, Variety
 from .export import export, read_exported
 from .measure import COUNT, calibrate, held_out_batches, measure_all

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.errors import MotionFileError
-from ...solver.loaders.files import read_npz
+from ...scope_addon.untrusted.files import read_npz
 from ...solver.rotations import exp
 
 STEP = 3  # every third frame: 10 a second, neighbours are nearly the same

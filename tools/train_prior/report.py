@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.learned_prior import BUILT_IN, JointPrior, load_joint_prior
-from ...solver.loaders.body_file import load_body
 from .baselines import Density, gaussian, matrix_fisher
 from .data import MODELS, TEST, TRUNK, Samples, load_samples, mirrored
 from .rotation_statistics import balanced, mean_rotation

@@ -20,8 +20,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.learned_prior import BUILT_IN
-from ...solver.loaders.body_file import load_body
 from .data import FOLDS, MODELS, Samples, load_samples
 from .export import by_joint, save
 from .flow import Flow, chart

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
-from ....solver.loaders.body_file import CHILD_BELOW_M
+from ....solver.body_file import CHILD_BELOW_M
 from ...arrays import FloatArray, IndexArray
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points

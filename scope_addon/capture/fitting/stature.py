@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver import Body, Priors
-from ....solver.loaders.body_file import CHILD_BELOW_M, body_with_children, growth_of, load_body
+from ....solver.body_file import CHILD_BELOW_M, body_with_children, growth_of
 from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
+from ...untrusted.body_file import load_body
 
 SIGMA_M = 0.005
 # Statures outside are input errors.

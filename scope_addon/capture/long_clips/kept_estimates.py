@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from ....solver.errors import ScopeError
-from ....solver.loaders.files import read_members
 from ...arrays import Float64Array, Uint8Array
 from ...atomic_write import write_npz
+from ...untrusted.files import read_members
 from ..perception.region import Region
 
 INTERVAL_S = 20.0  # between two files: the work that a kill can cost

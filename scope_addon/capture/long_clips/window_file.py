@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError, ScopeError
-from ....solver.loaders.files import read_members
 from ...arrays import Uint8Array
 from ...atomic_write import write_npz
 from ...capture_report import warnings_as_json
 from ...notices import Notice, notices_of
+from ...untrusted.files import read_members
 from ..camera.background_record import BackgroundRecord
 from ..camera.heading_drift import FrameEdges
 from ..camera.line_segments import Segments

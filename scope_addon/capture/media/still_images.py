@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.loaders.files import check_regular
 from ...arrays import Float32Array, Uint8Array
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
+from ...untrusted.files import check_regular
 from .exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
 from .file_names import utf8_name
 from .frame_readers import decode_items

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....solver.loaders.body_file import CHILD_BELOW_M
+from ....solver.body_file import CHILD_BELOW_M
 from ...arrays import Float64Array
 from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.loaders.files import in_one_line
 from ....solver.names import BODY_JOINTS
 from ....solver.rotations import exp, log
 from ...errors import MotionFileError
 from ...kinematics.smoothing import smooth_rotations
 from ...motion import Motion
+from ...untrusted.files import in_one_line
 from ..clip import Clip, clip_from_motion
 from ..spans import swap_sides
 from .corrections import (

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.loaders.files import in_one_line
 from ...errors import MotionFileError, UsageError
+from ...untrusted.files import in_one_line
 
 REACH_S = 0.4  # Time over which a correction fades out on each side.
 FEET = ("left", "right")

@@ -37,8 +37,8 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the
         recording.
     """
-    from ....solver.loaders.body_file import load_body
     from ...live.clock import Clock
+    from ...untrusted.body_file import load_body
 
     chosen = request.values
     source = open_source(request.source, online=request.online)

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ....solver.body_file import BUILT_IN
 from ....solver.errors import ModelFileError
-from ....solver.loaders.arrays import Form, check_index
-from ....solver.loaders.body_file import BUILT_IN
 from ....solver.names import EXPRESSIONS
+from ...untrusted.body_arrays import Form, check_index
 from .face_file import moves_of, read_face_file, told_to_install
 from .mouth import read_mouth, with_teeth_and_tongue
 

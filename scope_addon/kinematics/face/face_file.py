@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError
-from ....solver.loaders.arrays import Form, check_arrays, check_finite_array, check_index
-from ....solver.loaders.files import read_npz
 from ....solver.names import EXPRESSIONS
+from ...untrusted.body_arrays import Form, check_arrays, check_finite_array, check_index
+from ...untrusted.files import read_npz
 
 # (n,) vertices and (n, 3) offsets at weight 1, metres in the model frame.
 Moves = tuple[NDArray[np.intp], NDArray[np.float64]]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.loaders.arrays import Form, check_arrays, check_index
-from ....solver.loaders.body_file import BUILT_IN
+from ....solver.body_file import BUILT_IN
+from ...untrusted.body_arrays import Form, check_arrays, check_index
 from .face_file import Moves, moves_of, read_face_file, told_to_install
 
 FILE = Path(BUILT_IN["scope"]).with_name("mouth.npz")

@@ -17,7 +17,6 @@ from typing import Any
 
 import bpy
 
-from ....solver.loaders.body_file import load_body
 from ...capture_report import Report
 from ...errors import UsageError, VideoError
 from ...job.cache import Cache, CachedCapture
@@ -32,6 +31,7 @@ from ...options.body_choice import chosen_body
 from ...scene.build import BuildOptions, BuildResult, build_scene
 from ...scene.local_scene import check_local
 from ...scene.packed_motion import pack_motion
+from ...untrusted.body_file import load_body
 from ..declared_properties import option_values
 from ..preferences import cache, preferences
 from . import preview_picture

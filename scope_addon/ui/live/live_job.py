@@ -19,7 +19,6 @@ import bpy
 
 from ....solver.body import Body
 from ....solver.errors import ScopeError
-from ....solver.loaders.body_file import load_body
 from ...atomic_write import remove_abandoned
 from ...capture_report import Report
 from ...errors import OfflineError, UsageError, VideoError
@@ -39,6 +38,7 @@ from ...scene.live.scene_before import SceneBefore, select_only
 from ...scene.local_scene import check_local
 from ...scene.rigs.rig_retarget import guess_bone_map
 from ...scene.visibility import hide
+from ...untrusted.body_file import load_body
 from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
 from ..preferences import cache
 from ..retarget.bone_list import listed_map

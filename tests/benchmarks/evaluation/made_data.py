@@ -15,7 +15,7 @@ from cdflib.cdfwrite import CDF
 from scope.scope_addon.cli import SAMPLE
 from scope.solver.rotations import exp
 
-from ...solver.loaders.conftest import dump_python2, make_tables
+from ...untrusted.conftest import dump_python2, make_tables
 
 K = np.array([[940.0, 0, 319.5], [0, 940, 239.5], [0, 0, 1]])  # of the sample clip
 SIZE = (480, 640)

@@ -26,7 +26,7 @@ from scope.benchmarks.perception.renders import (
     presets_table,
 )
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
-from scope.solver.loaders.body_file import ASSETS
+from scope.solver.body_file import ASSETS
 from scope.solver.rotations import log
 from scope.tools.render_sample.choreography import choreograph
 from scope.tools.render_sample.truth import sample_shot

@@ -37,8 +37,9 @@ from scope.solver import (
     load_body,
 )
 from scope.solver.part import Part
-from scope.solver.residuals.joint_limits import evaluate
 from scope.solver.rotations import exp, log
+
+from ...solver.residuals.references import joint_limits
 
 K = np.array([[1200.0, 0, 640], [0, 1200, 360], [0, 0, 1]])
 SIDES = ("left", "right")
@@ -197,7 +198,7 @@ def test_limits_let_fingers_bend_towards_the_palm_only(body):
             row = at[joint]
             for angle, allowed in ((1.2, True), (-0.9, False)):
                 part = _bent(exp(sign * angle * np.array([0.0, 0.0, 1.0])), body.P)
-                r = evaluate(part, row[:3], row[3], row[4], row[5], row[6], 0.0).r
+                r = joint_limits(part, row[:3], row[3], row[4], row[5], row[6], 0.0).r
                 assert (abs(r[0]) < 1e-9) == allowed, body.joint_names[joint]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from scope.scope_addon.capture.fitting.hand_measurements import without_fingers
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 

@@ -16,7 +16,7 @@ from scope.scope_addon.capture.overlay.overlay_video import draw_overlay
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 WANTED = CaptureOptions(quality="fast", wanted=VideoRange(end_s=1.2))
 LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]

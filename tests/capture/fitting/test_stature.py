@@ -21,7 +21,7 @@ from scope.solver import (
     fit_clip,
     load_body,
 )
-from scope.solver.loaders.body_file import ASSETS
+from scope.solver.body_file import ASSETS
 from scope.solver.rotations import exp
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"

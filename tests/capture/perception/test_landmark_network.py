@@ -21,7 +21,7 @@ from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.perception.sessions import landmark_network_name
 from scope.scope_addon.errors import UsageError
-from scope.solver.loaders.body_file import ASSETS
+from scope.solver.body_file import ASSETS
 
 from ...required import package
 

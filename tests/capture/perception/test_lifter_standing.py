@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.lifter import WINDOW, default_lifter
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from ..stages.standing_views import DISTANCE_M, knee_flexion, standing_views
 

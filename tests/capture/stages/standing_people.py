@@ -15,7 +15,7 @@ from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.kinematics.axes import transform_points, world_from_level_camera
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 BODY = load_body("scope")

@@ -15,7 +15,7 @@ from scope.scope_addon.capture.stages.solve import solve
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from .standing_views import K, knee_flexion, standing_views
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera

@@ -21,7 +21,7 @@ from scope.scope_addon.kinematics.axes import (
 )
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import rotations
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 
 def walk(body, T=60, lean_deg=0.0):

@@ -14,7 +14,7 @@ from scope.scope_addon.kinematics.face.expressions import (
     expressions_of,
     mouth_faces_of,
 )
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 from .test_expressions import by_name
 

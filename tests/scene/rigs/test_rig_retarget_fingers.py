@@ -9,7 +9,7 @@ from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.scene.animation_data.actions import bone_path, fcurves
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 from ...edit.walking import BODY, RATE, motion_of, walk

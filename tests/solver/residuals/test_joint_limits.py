@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scope.solver import rotations
 from scope.solver.part import Part
-from scope.solver.residuals.joint_limits import HINGES, evaluate
+from scope.solver.residuals.joint_limits import HINGES
+
+from .references import joint_limits
 
 # T-pose
 REST = {"knee": [0.0, -1.0, 0.0], "left_elbow": [1.0, 0.0, 0.0], "right_elbow": [-1.0, 0.0, 0.0]}
@@ -21,7 +23,8 @@ def cost(name, rotation_vector):
     origin = np.zeros(3)
     identity = np.eye(3)
     part = Part(Omega, origin, np.zeros((3, 0)), Omega, identity, origin, np.zeros(0))
-    return float(np.sum(evaluate(part, np.array(axis), lower, upper, swing_limit, 1.0, 1.0).r ** 2))
+    residual = joint_limits(part, np.array(axis), lower, upper, swing_limit, 1.0, 1.0)
+    return float(np.sum(residual.r**2))
 
 
 @pytest.mark.parametrize("name", HINGES)

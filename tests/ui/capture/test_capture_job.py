@@ -21,8 +21,8 @@ from scope.scope_addon.ui.capture.capture_operators import (
     state,
 )
 from scope.scope_addon.ui.preferences import cache
+from scope.solver.body_file import load_body
 from scope.solver.errors import ScopeError
-from scope.solver.loaders.body_file import load_body
 
 from ...job.processes import wait_for
 

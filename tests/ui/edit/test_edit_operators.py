@@ -10,7 +10,7 @@ from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.keys import read_clip
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.ui.captured_person import body_of
-from scope.solver.loaders.body_file import BUILT_IN, load_body
+from scope.solver.body_file import BUILT_IN, load_body
 from scope.solver.rotations import exp, log
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk

@@ -24,7 +24,7 @@ COCO_17 = (
     ),
 )
 _SIDES = ("left", "right")
-# Weights of BlazePose's foot tip; see solver/loaders/keypoints.py.
+# Weights of BlazePose's foot tip; see solver/smpl_family.py.
 _TOES = {"big_toe": 0.85, "small_toe": 0.15}
 
 # Our name: {index in the set: weight}.

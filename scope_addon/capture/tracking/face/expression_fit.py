@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.errors import ModelFileError
-from .....solver.loaders.files import read_npz
 from .....solver.rotations import log
 from ....arrays import BoolArray, Float64Array, FloatArray
+from ....untrusted.files import read_npz
 from ...perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
 from ...perception.face_record import gaze, kept_landmarks, landmarks_of, parts, with_expression
 

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....solver.body import Body
-from .....solver.loaders.files import read_npz
 from ....edit.clip import Clip
 from ....errors import MotionFileError
+from ....untrusted.files import read_npz
 from ...animation_data.actions import read_keys
 from ...animation_data.stored_values import start_frame
 from ..keys import channel_curves, write_clip

@@ -9,7 +9,7 @@ from scope.benchmarks.evaluation.models import Models
 from scope.benchmarks.evaluation.readers.emdb import clips
 from scope.solver.rotations import exp
 
-from ....solver.loaders.conftest import make_tables, smpl_formula
+from ....untrusted.conftest import make_tables, smpl_formula
 from ..made_data import K, motion, rigid, write_emdb, write_models
 
 

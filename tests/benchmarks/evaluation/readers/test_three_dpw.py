@@ -11,7 +11,7 @@ from scope.benchmarks.evaluation.models import Models
 from scope.benchmarks.evaluation.readers.three_dpw import clips
 from scope.solver.rotations import exp
 
-from ....solver.loaders.conftest import make_tables, smpl_formula
+from ....untrusted.conftest import make_tables, smpl_formula
 from ..made_data import K, rigid, table_3dpw, write_3dpw, write_models, write_regressor
 
 COUNT = 5

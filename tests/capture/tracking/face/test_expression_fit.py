@@ -17,8 +17,8 @@ from scope.scope_addon.capture.perception.face_record import parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
 from scope.scope_addon.capture.tracking.face.expression_fit import fitted, load_response, view_terms
+from scope.solver.body_file import load_body
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders.body_file import load_body
 from scope.solver.names import EXPRESSIONS
 from scope.solver.rotations import exp
 from scope.tools.render_faces.looks import draw_look

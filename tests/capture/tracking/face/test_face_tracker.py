@@ -22,7 +22,7 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.face import face_tracker
 from scope.scope_addon.capture.tracking.face.face_tracker import FaceTracker
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 
 IMAGE = np.zeros((800, 800, 3), np.uint8)
 SHAPE = np.random.default_rng(0).uniform(-0.5, 0.5, (FACE_POINTS, 3))

@@ -15,7 +15,7 @@ from scope.scope_addon.capture.perception.face_landmarks import FaceEstimate, Fa
 from scope.scope_addon.capture.perception.face_record import RECORD, presence_of, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face.head_direction import across_head, certainty
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 from scope.tools.render_faces.looks import draw_look
 from scope.tools.render_faces.shaded import ShadedStage

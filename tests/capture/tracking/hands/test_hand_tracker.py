@@ -24,7 +24,7 @@ from scope.scope_addon.capture.tracking.hands import hand_tracker
 from scope.scope_addon.capture.tracking.hands.hand_assignment import without_duplicates
 from scope.scope_addon.capture.tracking.hands.hand_tracker import HandTracker
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
-from scope.solver.loaders.body_file import load_body
+from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 from ...followed_people import FollowedPeople

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scope.solver.loaders.body_file import BUILT_IN
+from scope.solver.body_file import BUILT_IN
 from scope.solver.names import EXPRESSIONS
 from scope.tools.build_body.geometry.mouth import build_mouth
 from scope.tools.build_body.source import fetch_wheel

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..body import Body
-from ..errors import ModelFileError
+from ...solver.body import Body
+from ...solver.errors import ModelFileError
 
 # What a file's array must hold, and its shape; None is any extent.
 Form = tuple[str, tuple[int | None, ...]]
@@ -20,7 +20,7 @@ _MIN_EXTENT_M = 0.01
 _MAX_EXTENT_M = 50.0
 _KINDS = {"numbers": "iuf", "whole numbers": "iu", "text": "U"}
 
-REQUIRED: dict[str, Form] = {
+REQUIRED_ARRAYS: dict[str, Form] = {
     "joint_names": ("text", (None,)),
     "kintree_table": ("whole numbers", (2, None)),
     "v_template": ("numbers", (None, 3)),
@@ -35,7 +35,7 @@ REQUIRED: dict[str, Form] = {
     "keypoint_template": ("numbers", (None, 3)),
     "keypoint_shapedirs": ("numbers", (None, 3, None)),
 }
-OPTIONAL: dict[str, Form] = {
+OPTIONAL_ARRAYS: dict[str, Form] = {
     "uv": ("numbers", (None, 2)),
     "uv_faces": ("whole numbers", (None, None)),
     "face_material": ("whole numbers", (None,)),
@@ -111,9 +111,9 @@ def check_body(body: Body, path: Path) -> None:
             f"{path}: kintree_table must list each joint after its parent, the root first"
         )
     _check_indices(body, path)
-    for key in (key for key, (kind, _) in (REQUIRED | OPTIONAL).items() if kind == "numbers"):
-        array = getattr(body, key)
-        if array is not None:
+    for key, (kind, _) in (REQUIRED_ARRAYS | OPTIONAL_ARRAYS).items():
+        array = getattr(body, key, None)
+        if kind == "numbers" and array is not None:
             check_finite_array(key, array, path)
 
 

@@ -27,7 +27,7 @@ from typing import Any, NoReturn, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ModelFileError
+from ...solver.errors import ModelFileError
 from .files import in_one_line
 
 # elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million

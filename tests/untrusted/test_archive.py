@@ -9,8 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from scope.scope_addon.untrusted.files import npz_keys, read_members, read_npz
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders.files import npz_keys, read_members, read_npz
 
 HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }"
 # What numpy's reader raises at these: TokenError, IndentationError, SyntaxError, TypeError,

@@ -6,9 +6,11 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from scope.solver.errors import ModelFileError
-from scope.solver.loaders import body_file
-from scope.solver.loaders.body_file import BUILT_IN, load_body
+from scope.solver import body_file
+from scope.solver.body_file import BUILT_IN, load_body
+from scope.solver.errors import ModelFileError, ScopeWarning
+
+from ..untrusted.conftest import make_tables
 
 
 def test_a_body_knows_its_file_unless_it_is_built_in(tmp_path):
@@ -74,21 +76,27 @@ def test_a_missing_or_damaged_file_of_growth_is_named(tmp_path, monkeypatch):
         load_body("scope_child")
 
 
-def test_a_body_without_joints_is_refused(tmp_path):
-    with np.load(BUILT_IN["scope"]) as file:
-        arrays = {key: file[key] for key in file.files}
-    vertices = len(arrays["v_template"])
-    arrays |= {
-        "kintree_table": np.zeros((2, 0), np.int32),
-        "joint_names": np.zeros(0, "U1"),
-        "J_template": np.zeros((0, 3), np.float32),
-        "J_shapedirs": np.zeros((0, 3, arrays["J_shapedirs"].shape[2]), np.float32),
-        "skin_joints": np.zeros((vertices, 4), np.uint8),
-    }
-    np.savez(tmp_path / "none.npz", **arrays)
-    with pytest.raises(
-        ModelFileError,
-        match=r"none\.npz: kintree_table must list each joint after "
-        r"its parent",
-    ):
-        load_body(tmp_path / "none.npz")
+def test_what_is_unexpected_of_a_users_model_is_told(tmp_path):
+    """Dropped shape coefficients, weights that are scaled, and a gender read off a name."""
+    tables = make_tables("smpl", betas=20)
+    np.savez(tmp_path / "SMPL_FEMALE.npz", **{**tables, "weights": 2.0 * tables["weights"]})
+    with pytest.warns(ScopeWarning) as told:
+        body = load_body(tmp_path / "SMPL_FEMALE.npz")
+    assert (body.P, body.gender) == (16, "female")
+    np.testing.assert_allclose(body.skin_weights.sum(axis=1), 1.0)
+    messages = " ".join(str(each.message) for each in told)
+    assert "of 20 shape coefficients, the first 16 are kept" in messages
+    assert "sum to 2 instead of 1" in messages
+    assert "taken as female" in messages
+
+
+def test_a_model_without_surprises_is_loaded_without_a_word(tmp_path, recwarn):
+    np.savez(tmp_path / "SMPL_FEMALE.npz", **make_tables("smpl", betas=20), gender="female")
+    assert load_body(tmp_path / "SMPL_FEMALE.npz", betas=20).P == 20
+    assert not recwarn.list
+
+
+def test_a_pickle_is_not_opened_but_the_way_to_read_it_is_told(tmp_path):
+    (tmp_path / "model.pkl").write_bytes(b"cos\nsystem\n(S'true'\ntR.")
+    with pytest.raises(ModelFileError, match=r"scope_addon\.untrusted\.body_file\.load_body"):
+        load_body(tmp_path / "model.pkl")

@@ -5,8 +5,8 @@ import os
 from pathlib import Path
 
 import pytest
+from scope.scope_addon.untrusted.files import check_regular
 from scope.solver.errors import InputError, ModelFileError
-from scope.solver.loaders.files import check_regular
 
 
 def test_files_folders_and_what_does_not_exist_pass(tmp_path):

@@ -9,8 +9,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from scope.scope_addon.untrusted import pickles
+from scope.scope_addon.untrusted.body_file import load_model
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders import load_model, pickles
 
 RECONSTRUCT = b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85U\x01b\x87R"
 F8 = (
@@ -148,7 +149,7 @@ FORBIDDEN = [
     "scipy.sparse.dok_matrix",
     "scipy.sparse.lil.lil_matrix", "chumpy.ch.ChLambda", "chumpy.ch.wraps", "chumpy.utils.timer",
     "codecs.encode",
-    "_codecs.decode", "scope.solver.loaders.load_model", "pathlib.PosixPath",
+    "_codecs.decode", "scope.scope_addon.untrusted.body_file.load_model", "pathlib.PosixPath",
     "bpy.ops.wm.quit_blender", ".", "numpy.",
 ]  # fmt: skip
 

@@ -5,8 +5,8 @@ used.
 
 import numpy as np
 import pytest
+from scope.scope_addon.untrusted.body_file import load_body
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders.body_file import load_body
 
 N = 3
 V = 8

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from scope.scope_addon.untrusted import files
+from scope.scope_addon.untrusted.body_file import is_user_model, load_model
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders import files, is_user_model, load_model
-from scope.solver.loaders.model_file import read_gender
+from scope.solver.smpl_family import gender_of
 
 
 def random_rotations(count: int, seed: int = 1) -> np.ndarray:
@@ -352,4 +353,4 @@ def test_missing_files_and_folders_are_refused(tmp_path):
     ],
 )
 def test_gender_comes_from_the_file_or_its_name(name, stored, gender):
-    assert read_gender(None if stored is None else np.array(stored), Path(name)) == gender
+    assert gender_of(None if stored is None else np.array(stored), Path(name)) == gender

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scope.scope_addon.untrusted import files
+from scope.scope_addon.untrusted.files import read_npz
 from scope.solver.errors import InputError
-from scope.solver.loaders import files
-from scope.solver.loaders.files import read_npz
 
 
 class OwnError(InputError):

@@ -9,8 +9,8 @@ import sys
 
 import numpy as np
 import pytest
+from scope.scope_addon.untrusted.body_file import load_model
 from scope.solver.errors import ModelFileError
-from scope.solver.loaders import load_model
 
 PROTOCOLS = range(pickle.HIGHEST_PROTOCOL + 1)
 

@@ -1,6 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the 2D detectors find, placed on a user's body and rigidly attached to its parts (Assumption
-1 of the paper); and the joint names, trees and well-known vertex numbers of the SMPL family.
+"""A user's SMPL, SMPL+H, SMPL-X or STAR model as a ``Body``: tree, shape, skin and keypoints.
+
+    J̄ = J_regressor v_template,   J_s = J_regressor shapedirs
+    weights: the four largest of each vertex, scaled to sum to one
+
+J(β) stays exactly linear, and official files have four weights at most. Only the
+linear-blend-skinning part is used. The pose correctives (``posedirs``: from rotation matrices in
+SMPL, from quaternions and the second shape coefficient in STAR) are left out: they move the surface
+near bent joints, never the joints, so that a fitted motion is a motion of the full model.
+``Body.license`` states this.
+
+The keypoints are what the 2D detectors find, rigidly attached to parts (Assumption 1 of the paper).
 
 The sets and names are those of the default body: ``blazepose/`` 33, ``coco/`` 17 and six feet
 points, ``hand/`` 21 a side. Shoulders, elbows, wrists, hips, knees and ankles are the joints.
@@ -19,14 +29,26 @@ from the default body.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..body import Body
-from ..names import BLAZEPOSE, BODY_JOINTS, BODY_PARENTS, COCO
+from .body import Body
+from .errors import ModelFileError
+from .names import BLAZEPOSE, BODY_JOINTS, BODY_PARENTS, COCO
+
+MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
+# how a full SMPL-X file divides shapedirs; older ones have 10 and 10
+SMPLX_SHAPE = 300
+SMPLX_EXPRESSION = 100
+STAR_CORRECTIVES = 93  # 23 quaternions and one shape coefficient; SMPL has 207
+REQUIRED = ("v_template", "J_regressor", "kintree_table", "weights", "f")
+_GENDERS = {"m": "male", "f": "female", "male": "male", "female": "female", "neutral": "neutral"}
 
 HAND_ORDER = ("index", "middle", "pinky", "ring", "thumb")  # as SMPL+H and SMPL-X store them
 FACE_JOINTS = ("jaw", "left_eye_smplhf", "right_eye_smplhf")
@@ -353,3 +375,147 @@ def _hand(points: RestPoints, side: str) -> dict[str, Attached]:
                 )
             hand[f"{_HAND_NAMES[finger]}_{label}"] = each
     return hand
+
+
+def smpl_body(arrays: Mapping[str, NDArray[Any]], path: Path, betas: int = MAX_BETAS) -> Body:
+    """Return the body of a model's arrays.
+
+    Needs v_template (V, 3), weights (V, K+1), J_regressor (K+1, V), kintree_table (2, K+1) with
+    par(i) < i and f (F, 3); takes shapedirs (V, 3, P'), posedirs (.., n), of which n tells STAR
+    from SMPL, gender and joint_names when present. Metres, y up, facing +z.
+
+    :param path: of the file, for names and messages.
+    :param betas: the most shape coefficients to keep; the leading ones are kept.
+    :return: a ``Body`` named smpl, smplh, smplx, star, or after the file when the tree is none of
+        these.
+    :raises ModelFileError: an array is missing, or they contradict each other.
+    """
+    missing = [key for key in REQUIRED if key not in arrays]
+    if missing:
+        raise ModelFileError(
+            f"{path} lacks {', '.join(missing)}: it is not an SMPL, SMPL+H, SMPL-X or STAR body; "
+            "choose another file"
+        )
+    parents = _parents(arrays["kintree_table"], path)
+    skeleton = recognise_skeleton(parents)
+    name = skeleton.name if skeleton else path.stem
+    posedirs = np.shape(arrays.get("posedirs", ()))
+    if name == "smpl" and posedirs[-1:] == (STAR_CORRECTIVES,):
+        name = "star"
+    v_template = arrays["v_template"].astype(np.float64)
+    shapedirs = _shapedirs(arrays.get("shapedirs"), len(v_template), name, betas)
+    regressor = arrays["J_regressor"].astype(np.float64)
+    skin_joints, skin_weights = reduce_weights(arrays["weights"], path)
+    body = Body(
+        name=name,
+        joint_names=skeleton.joint_names
+        if skeleton
+        else _joint_names(arrays.get("joint_names"), len(parents)),
+        parents=parents,
+        J_template=regressor @ v_template,
+        J_shapedirs=np.tensordot(regressor, shapedirs, axes=1),
+        v_template=v_template,
+        shapedirs=shapedirs,
+        skin_joints=skin_joints,
+        skin_weights=skin_weights,
+        faces=arrays["f"].astype(np.int32),
+        license=_license(name, path),
+        gender=gender_of(arrays.get("gender"), path),
+    )
+    return derive_keypoints(body)
+
+
+def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:
+    """Return the parents (K+1,). Row 1 names the joints, row 0 the parents; the root's is 2³² − 1,
+    −1 or itself.
+    """
+    columns = {int(name): column for column, name in enumerate(kintree[1])}
+    if len(columns) != kintree.shape[1]:
+        raise ModelFileError(f"{path}: kintree_table names a joint twice; download it again")
+    parents = np.array([-1, *(columns.get(int(name), -1) for name in kintree[0, 1:])], np.int32)
+    if (parents[1:] < 0).any() or (parents[1:] >= np.arange(1, len(parents))).any():
+        raise ModelFileError(
+            f"{path}: kintree_table must list each joint after its parent, the root first"
+        )
+    return parents
+
+
+def _shapedirs(
+    shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int
+) -> NDArray[np.float64]:
+    """Return the leading shape directions (V, 3, P), without the facial expressions that SMPL-X
+    stores after them.
+    """
+    if shapedirs is None:
+        return np.zeros((vertices, 3, 0))
+    count = shapedirs.shape[2]
+    if name == "smplx":
+        count = min(count, SMPLX_SHAPE if count >= SMPLX_SHAPE + SMPLX_EXPRESSION else 10)
+    return shapedirs[:, :, : min(count, max_betas)].astype(np.float64)
+
+
+def reduce_weights(
+    weights: NDArray[Any], path: Path
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return the four largest skin weights of each vertex, scaled to sum to one; weights below zero
+    count as zero.
+
+    :param weights: (V, K+1).
+    :return: skin_joints (V, 4) int and skin_weights (V, 4); with fewer than four joints, the rest
+        is joint 0 at zero.
+    :raises ModelFileError: a vertex has no weight that is positive.
+    """
+    weights = np.maximum(weights.astype(np.float64), 0.0)
+    if weights.shape[1] < 4:
+        weights = np.pad(weights, ((0, 0), (0, 4 - weights.shape[1])))
+    joints = np.argsort(-weights, axis=1, kind="stable")[:, :4]
+    kept = np.take_along_axis(weights, joints, axis=1)
+    total = kept.sum(axis=1, keepdims=True)
+    if not (total > 0.0).all():
+        raise ModelFileError(f"{path}: weights leaves a vertex without a joint; download it again")
+    joints[kept == 0.0] = 0
+    return joints, kept / total
+
+
+def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
+    if (
+        names is not None
+        and names.shape == (count,)
+        and names.dtype.kind == "U"
+        and len(set(names.tolist())) == count
+    ):
+        return tuple(names.tolist())
+    return tuple(f"joint_{i:02d}" for i in range(count))
+
+
+def stored_gender(stored: NDArray[Any] | None) -> str | None:
+    """Return male, female or neutral as a file holds it, () text; None if it does not."""
+    if stored is None or stored.size != 1 or stored.dtype.kind not in "SU":
+        return None
+    item = stored.reshape(-1)[0]
+    text = (item.decode("latin1") if isinstance(item, bytes) else str(item)).strip().lower()
+    return _GENDERS.get(text)
+
+
+def gender_of(stored: NDArray[Any] | None, path: Path) -> str:
+    """Return male, female or neutral: as the file says, else as its name or its folder's says, else
+    neutral.
+
+    :param stored: () text, what the file holds as gender.
+    """
+    found = stored_gender(stored)
+    if found is not None:
+        return found
+    for text in (path.stem, path.parent.name):
+        for word in re.split(r"[^a-z]+", text.lower()):
+            if word in _GENDERS:
+                return _GENDERS[word]
+    return "neutral"
+
+
+def _license(name: str, path: Path) -> str:
+    return (
+        f"Read from the user's own file {path.name} ({name}): its publisher's licence holds for "
+        "mesh and shape. "
+        "Pose correctives are not used."
+    )

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.solver.loaders.keypoints import LANDMARK_VERTICES, SKELETONS, recognise_skeleton
+from scope.solver.smpl_family import LANDMARK_VERTICES, SKELETONS, recognise_skeleton
 
 # kintree_table[0] of SMPL
 BODY = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]

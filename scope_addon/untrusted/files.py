@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import io
 import math
-import os
 import stat
 import struct
 import tokenize
@@ -23,8 +22,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import described
-from ..errors import InputError, InvalidValueError, ModelFileError
+from ...solver.errors import InputError, ModelFileError
 
 _LONGEST = 200  # characters
 
@@ -32,23 +30,6 @@ _LONGEST = 200  # characters
 def in_one_line(cause: Exception) -> str:
     """Return what another library said, for a message: one line of moderate length."""
     return " ".join(str(cause).split())[:_LONGEST]
-
-
-def as_path(value: Any, name: str) -> Path:
-    """Return the path of a file.
-
-    :raises InvalidValueError: it is neither a text nor a path, or contains a null character.
-    """
-    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
-        raise InvalidValueError(
-            f"{name} must be a str or a pathlib.Path, but is {described(value)}."
-        )
-    if "\0" in os.fspath(value):  # what opens files refuses it with a plain ValueError
-        raise InvalidValueError(
-            f"{name} must be the name of a file, but contains a null character: "
-            f"{os.fspath(value)!r}."
-        )
-    return Path(value)
 
 
 def check_regular(path: Path, error: type[InputError], what: str, largest_bytes: int) -> None:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.scope_addon.untrusted.body_file import load_body, load_model
 from scope.solver.body import Body
-from scope.solver.loaders import load_model
-from scope.solver.loaders.body_file import load_body
 
 # Vertex numbers, as found in several public projects.
 OF_SMPL = {

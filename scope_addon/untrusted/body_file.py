@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bodies from files of anyone: built-in ones by name, and users' models, .npz or .pkl.
+
+Everything that a file holds is checked here, once, before ``solver.smpl_family`` and
+``solver.body_file`` make a ``Body`` of it.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.body_file import BUILT_IN, CHOICE, as_path, scope_body
+from ...solver.body_file import load_body as load_trusted_body
+from ...solver.errors import ModelFileError
+from ...solver.smpl_family import MAX_BETAS, REQUIRED, SMPLX_SHAPE, smpl_body
+from .body_arrays import (
+    OPTIONAL_ARRAYS,
+    REQUIRED_ARRAYS,
+    Form,
+    check_arrays,
+    check_body,
+    check_extent,
+)
+from .files import npz_keys, read_members, read_npz
+from .pickles import read_pickle, to_array
+
+# SMPL-X: 10475, 55, 576125
+MAX_VERTICES = 200_000
+MAX_JOINTS = 500
+MAX_WEIGHTS = 20_000_000
+
+_NUMERIC = (*REQUIRED, "shapedirs")
+_TEXT = ("gender", "joint_names")
+
+
+def load_body(which: str | Path = "scope") -> Body:
+    """Load a body by name, from a .npz in the format of ours, or a user's model, as
+    ``solver.load_body`` does; of a pickle nothing is run.
+
+    :raises ModelFileError: the file is missing, not a body, or contradicts itself.
+    :raises InvalidValueError: `which` is neither a name nor a path.
+    """
+    if str(which) in BUILT_IN:
+        return load_trusted_body(which)
+    path = as_path(which, "which, the name or file of a body,")
+    # unlike Path.is_file also of names that are too long for the system
+    if not os.path.isfile(path):
+        raise ModelFileError(f"body '{which}' was not found: {CHOICE}")
+    if is_user_model(path):
+        return load_model(path)
+    if is_motion(path):
+        raise ModelFileError(
+            f"{path} is a motion file, which holds how a body moves, not the body itself: {CHOICE}"
+        )
+    data = read_npz(path, ModelFileError, "body file")
+    check_arrays(data, REQUIRED_ARRAYS | OPTIONAL_ARRAYS, path)
+    body = replace(scope_body(data, path), file=str(path.resolve()))
+    check_body(body, path)
+    check_extent(body.v_template, path)
+    return body
+
+
+def is_user_model(path: Path) -> bool:
+    """Whether a file is one for ``load_model``: a pickle, or a .npz with a joint regressor. Cheap;
+    reads no array.
+    """
+    return path.suffix.lower() in (".pkl", ".pickle") or "J_regressor" in npz_keys(path)
+
+
+def is_motion(path: Path) -> bool:
+    """Whether a .npz holds poses and no body, as AMASS's files and our own motions do. Cheap; reads
+    no array.
+    """
+    keys = npz_keys(path)
+    return {"poses", "trans"} <= keys and "v_template" not in keys
+
+
+def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
+    """Load a user's SMPL, SMPL+H, SMPL-X or STAR file, .npz or .pkl: see ``solver.smpl_family``.
+    The file may be hostile; nothing in it is run.
+
+    :param max_betas: the most shape coefficients to keep, 0 to 300; the leading ones are kept.
+    :raises ModelFileError: missing, unreadable, not a body, contradicts itself, or asks for more
+        than arrays.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ModelFileError(
+            f"{path} does not exist; choose an SMPL, SMPL+H, SMPL-X or STAR file (.npz or .pkl)"
+        )
+    if not 0 <= max_betas <= SMPLX_SHAPE:
+        raise ModelFileError(f"max_betas must lie in 0..{SMPLX_SHAPE}, but is {max_betas}")
+    arrays = _read_tables(path)
+    try:
+        body = smpl_body(arrays, path, max_betas)
+    except MemoryError as cause:
+        raise ModelFileError(
+            f"{path} is too large for this computer's memory; choose a smaller body file"
+        ) from cause
+    check_body(body, path)
+    return replace(body, file=str(path.resolve()))
+
+
+def _read_tables(path: Path) -> dict[str, NDArray[Any]]:
+    if zipfile.is_zipfile(path):
+        arrays, posedirs = read_members(path, (*_NUMERIC, *_TEXT), shape_of="posedirs")
+    else:
+        content = read_pickle(path)
+        try:
+            arrays = {key: to_array(content[key]) for key in _NUMERIC if key in content}
+            posedirs = to_array(content["posedirs"]).shape if "posedirs" in content else ()
+            if isinstance(content.get("gender"), str | bytes):
+                arrays["gender"] = to_array(content["gender"])
+        except (ModelFileError, ValueError, TypeError, IndexError, OverflowError) as cause:
+            raise ModelFileError(
+                f"{path} cannot be used as a body: {cause}; get it from its publisher again"
+            ) from None
+    if all(key in arrays for key in REQUIRED):
+        _check_tables(arrays, path)
+    if posedirs:  # of which only the last extent is used
+        arrays["posedirs"] = np.zeros((0, posedirs[-1]))
+    return arrays
+
+
+def _check_tables(arrays: dict[str, NDArray[Any]], path: Path) -> None:
+    """Check types and shapes."""
+    check_arrays(
+        arrays,
+        {"kintree_table": ("whole numbers", (2, None)), "v_template": ("numbers", (None, 3))},
+        path,
+    )
+    vertices = len(arrays["v_template"])
+    n = arrays["kintree_table"].shape[1]
+    if 0 in (vertices, n):
+        raise ModelFileError(
+            f"{path}: {vertices} vertices and {n} joints do not match any supported body; choose "
+            "another file"
+        )
+    if vertices > MAX_VERTICES or n > MAX_JOINTS or vertices * n > MAX_WEIGHTS:
+        raise ModelFileError(
+            f"{path}: {vertices} vertices and {n} joints are too many for a body; choose another"
+        )
+    forms: dict[str, Form] = {
+        "weights": ("numbers", (vertices, n)),
+        "J_regressor": ("numbers", (n, vertices)),
+        "f": ("whole numbers", (None, 3)),
+        "shapedirs": ("numbers", (vertices, 3, None)),
+    }
+    check_arrays(arrays, forms, path)
+    for key in ("J_regressor", "v_template", "shapedirs", "weights"):
+        if key in arrays and not np.isfinite(arrays[key]).all():
+            raise ModelFileError(f"{path}: {key} contains NaN or infinity; download it again")
+    check_extent(arrays["v_template"].astype(np.float64), path)
+    faces = arrays["f"]
+    if faces.size and (int(faces.min()) < 0 or int(faces.max()) >= vertices):
+        raise ModelFileError(f"{path}: f points outside 0..{vertices - 1}; download it again")
