@@ -177,6 +177,7 @@ def read_arrays(path: Path, what: str) -> dict[str, NDArray[Any]]:
 def scope_body(data: Mapping[str, NDArray[Any]], path: Path) -> Body:
     """Return the body of a file in our own format.
 
+    :param data: its arrays by name: v_template (V, 3), and the others as `Body` has them.
     :raises ModelFileError: an array is missing.
     """
     missing = [k for k in REQUIRED if k not in data]
