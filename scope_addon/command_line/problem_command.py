@@ -16,8 +16,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ...solver.errors import InputError
 from ...solver.body_file import BUILT_IN
+from ...solver.errors import InputError
 from ..atomic_write import atomic_path, reason
 from ..capture_report import Report
 from ..errors import OutputError
