@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Atomic writes: a file is written under a temporary name and renamed, so that it is complete or
-absent.
-
-A process that is killed leaves its temporary file, whose name contains the computer and the
-process. The next process that writes a file of that name there removes it.
+absent. What a killed process leaves, the next one that writes there removes.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import glob
 import io
 import os
 import stat
@@ -20,13 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .errors import OutputError
-from .processes import is_abandoned, owner
+from .temporary import claim, discard
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _PIECE = 1 << 23  # bytes of an archive that are written at once, at least
-_temporary_files: set[Path] = set()
 
 
 @contextmanager
@@ -44,29 +39,40 @@ def atomic_path(path: Path, durable: bool = True) -> Iterator[Path]:
     :raises OSError: the file cannot be created or renamed.
     :raises OutputError: ``path`` exists and is not a regular file.
     """
-    target = resolve_link(path)
-    start, suffix = _temporary_name(path)
-    _remove_abandoned(target.parent, start)
-    temporary = target.parent / f"{start}{owner()}-{os.urandom(4).hex()}{suffix}"
-    # The system decides on the permissions of a new file, by the process's umask or the folder's
-    # list. To read the umask, one has to change it for a moment, in which other threads' files
-    # would be writable for everybody.
-    handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
-    _temporary_files.add(temporary)
+    with complete_file(resolve_link(path), durable) as temporary:
+        yield temporary
+
+
+@contextmanager
+def complete_file(target: Path, durable: bool = True, mode: int | None = None) -> Iterator[Path]:
+    """Write a file as `atomic_path` does, but replace a link by it: for a name that nobody but this
+    program gives, under which a link leads where nobody has asked to write.
+
+    :param mode: permissions; None: those of any new file.
+    :raises OSError: the file cannot be created or renamed.
+    """
+    # Short enough for the limit on names, even where a letter takes several bytes, and without
+    # bytes that are not UTF-8, at which exporters fail.
+    stem = target.stem[:40].encode("utf-8", "ignore").decode()
+    temporary = claim(target.parent, f".{stem}.", target.suffix.lower())
     try:
-        mode = stat.S_IMODE(os.fstat(handle).st_mode)
+        # The system decides on the permissions of a new file, by the process's umask or the
+        # folder's list. To read the umask, one has to change it for a moment, in which other
+        # threads' files would be writable for everybody.
+        handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+        of_new_files = stat.S_IMODE(os.fstat(handle).st_mode)
         os.close(handle)
         yield temporary
         if durable:
             _sync(temporary)
-        os.chmod(temporary, mode)  # a library may have replaced the file by one of its own
+        # A library may have replaced the file by one of its own.
+        os.chmod(temporary, of_new_files if mode is None else mode)
         if durable:
             replace_durably(temporary, target)
         else:
             os.replace(temporary, target)
     finally:
-        _remove_with_drafts(temporary)
-        _temporary_files.discard(temporary)
+        discard(temporary)
 
 
 def _sync(path: Path) -> None:
@@ -194,47 +200,3 @@ def reason(error: OSError) -> str:
     if error.errno == errno.ENOENT:
         return "its folder does not exist; create it or choose another"
     return f"{error.strerror or error}; free some space or choose another folder"
-
-
-def remove_abandoned(path: Path) -> None:
-    """Remove what processes that do not run any more have left of writing ``path``."""
-    _remove_abandoned(path.parent, _temporary_name(path)[0])
-
-
-def _temporary_name(path: Path) -> tuple[str, str]:
-    """Return the beginning of the temporary files' names and their suffix.
-
-    The name is short enough for the limit on file names, even where a letter takes several bytes,
-    and without bytes that are not UTF-8, at which exporters fail.
-    """
-    return f".{path.stem[:40].encode('utf-8', 'ignore').decode()}.scope-", path.suffix.lower()
-
-
-def _remove_abandoned(folder: Path, start: str) -> None:
-    """Remove temporary files of processes that do not run any more, and the drafts of their
-    libraries.
-    """
-    with contextlib.suppress(OSError):
-        for path in folder.glob(f"{glob.escape(start)}*-*-*"):
-            if is_abandoned(path, path.name.removeprefix(start)):
-                path.unlink(missing_ok=True)
-
-
-def remove_temporary_files() -> None:
-    """Remove the files that are being written, in a process that is about to exit without cleaning
-    up.
-    """
-    for temporary in list(_temporary_files):
-        with contextlib.suppress(OSError):
-            _remove_with_drafts(temporary)
-
-
-def _remove_with_drafts(temporary: Path) -> None:
-    """Remove a temporary file and what a library keeps beside it until it is complete.
-
-    Blender adds ``@`` to the name of a .blend file, and USD replaces the suffix by random letters.
-    """
-    start, separator, rest = temporary.name.rpartition(".scope-")
-    own = start + separator + rest.partition(".")[0]  # without the suffix
-    for path in temporary.parent.glob(f"{glob.escape(own)}*"):
-        path.unlink(missing_ok=True)

@@ -18,7 +18,6 @@ from typing import Any, NoReturn, TextIO
 
 from ..solver.body_file import ASSETS
 from ..solver.errors import ScopeError
-from .atomic_write import remove_temporary_files
 from .command_line.arguments import (
     add_options,
     body_and_options,
@@ -26,7 +25,7 @@ from .command_line.arguments import (
     path_argument,
     with_bare_values,
 )
-from .command_line.blender_folder import remove_blender_folder
+from .command_line.blender_folder import discard_temporary
 from .command_line.cluster_runner import dask_runner, folder_argument, local_folders
 from .command_line.import_command import add_import
 from .command_line.live_command import add_live
@@ -240,7 +239,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
         args.command_text = getattr(args, "shown_command", "") or shown
         with stopped_by_signals(), stdout_for_report() as stdout:
             if getattr(args, "stop_with_stdin", False):
-                end_with_parent(_remove_temporary, interrupts=True)
+                end_with_parent(discard_temporary, interrupts=True)
             report = args.run(args)
             if args.json:
                 _print_report(report, stdout)
@@ -423,14 +422,8 @@ def run() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # a full disk, or a reader who went away
             stream.flush()
-    remove_blender_folder()
+    discard_temporary()
     os._exit(status)
-
-
-def _remove_temporary() -> None:
-    """Remove what this process has not finished, before an exit without its main thread."""
-    remove_temporary_files()
-    remove_blender_folder()
 
 
 if __name__ == "__main__":

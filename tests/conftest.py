@@ -196,9 +196,9 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if "bpy" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
-        from scope.scope_addon.command_line.blender_folder import remove_blender_folder
+        from scope.scope_addon.command_line.blender_folder import discard_temporary
 
-        remove_blender_folder()
+        discard_temporary()
         os._exit(int(config.stash.get(EXIT_STATUS, 1)))
 
 

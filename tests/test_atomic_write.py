@@ -8,8 +8,6 @@ from __future__ import annotations
 import errno
 import os
 import socket
-import subprocess
-import sys
 import tracemalloc
 
 import numpy as np
@@ -119,49 +117,6 @@ def test_circular_links_are_an_error(tmp_path):
     for refused in (check_output, write):
         with pytest.raises(OutputError, match="form a loop"):
             refused(path)
-
-
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from scope.scope_addon.atomic_write import atomic_path
-with atomic_path(Path(sys.argv[1])) as temporary:
-    temporary.write_text("half")
-    Path(f"{temporary}@").write_text("a draft, as Blender writes it")
-    temporary.with_suffix(".pqSxDJ").write_text("a draft, as USD writes it")
-    os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
-def test_the_file_of_a_killed_process_is_removed_by_the_next_one(tmp_path):
-    path = tmp_path / "walk [1].npz"
-    subprocess.run([sys.executable, "-c", KILLED, path], check=False)
-    left = set(os.listdir(tmp_path))
-    assert len(left) == 3
-    others = (
-        ".walk [1].npz",
-        ".walk [1].scope-notes.npz",
-        ".walk [2].scope-0-0-x.npz",
-        f".walk [1].scope-0-{os.getpid()}-x.npz",
-    )
-    for name in others:  # a user's, another result's, another computer's
-        (tmp_path / name).write_text("kept")
-    with atomic_path(path) as temporary:
-        temporary.write_text("new")
-        write(path, "another")  # does not remove what is being written
-        assert not left & set(os.listdir(tmp_path))
-    assert sorted(os.listdir(tmp_path)) == sorted(["walk [1].npz", *others])
-
-
-def test_an_old_temporary_file_of_another_computer_is_removed(tmp_path):
-    left = tmp_path / ".walk.scope-00000000-1-x.npz"
-    left.write_text("half")
-    write(tmp_path / "walk.npz")
-    assert left.exists()
-    os.utime(left, (1e9, 1e9))
-    write(tmp_path / "walk.npz")
-    assert os.listdir(tmp_path) == ["walk.npz"]
 
 
 def make_pipe(path):

@@ -23,12 +23,13 @@ BEGIN = """
 import atexit, ctypes, os, signal, subprocess, sys, time
 from pathlib import Path
 from scope.scope_addon import parent
-from scope.scope_addon.atomic_write import atomic_path, remove_temporary_files
+from scope.scope_addon.atomic_write import atomic_path
+from scope.scope_addon.temporary import discard_all
 # As the command line does; background jobs of a shell ignore SIGINT.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 parent.GRACE_S = 0.2
 """
-INTERRUPTED = "parent.end_with_parent(remove_temporary_files, interrupts=True)\n"
+INTERRUPTED = "parent.end_with_parent(discard_all, interrupts=True)\n"
 SERVER = "parent.end_with_parent(receive=None)\n"
 KEEPS_THE_LOCK = """
 pipe = os.pipe()

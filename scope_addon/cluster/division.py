@@ -6,12 +6,12 @@ captures the clip.
 from __future__ import annotations
 
 import math
-import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..job.clips.task import COUNT, ClipTask, Entry
+from ..temporary import remove
 
 MAX_WINDOWS = 5  # in a task: what a lost worker costs
 TASKS_PER_WORKER = 2  # at least, so that a faster worker gets more of them
@@ -80,7 +80,7 @@ class Divisions:
         division = self._open.pop(task.name, None)
         if division is None:
             return 0, {}
-        shutil.rmtree(division.folder, ignore_errors=True)
+        remove(division.folder)
         about = {"windows": division.windows, "window_seconds": round(division.seconds, 2)}
         return division.frames, about | {"window_workers": sorted(division.workers)}
 

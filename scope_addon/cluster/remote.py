@@ -21,8 +21,11 @@ from ...solver.errors import InputError, ScopeError
 from ..errors import OutputError, UsageError
 from ..footage import is_url
 from ..job.batch import REPORT_NAME
-from ..processes import has_ended, owner
-from .staging import ATTEMPTS, TOKEN
+from ..job.private_folder import lasting_folder
+from ..temporary import hold, is_abandoned, release
+from .staging import TOKEN
+
+ATTEMPTS = ".scope-attempts"  # folder of all batches in a store of results
 
 
 @contextmanager
@@ -179,7 +182,14 @@ class RemoteStaging:
     def __init__(self, out: str) -> None:
         self._out = out.rstrip("/")
         self.token = secrets.token_hex(16)
-        self.folder = f"{self._out}/{ATTEMPTS}/{owner()}-{self.token[:8]}"
+        self.folder = f"{self._out}/{ATTEMPTS}/{self.token}"
+        # A store has no locks. A batch is known to be abandoned on the machine that ran it.
+        lasting = lasting_folder()
+        self._locks = None if lasting is None else lasting / "batches"
+        if self._locks is not None:
+            with suppress(OSError):
+                self._locks.mkdir(exist_ok=True)
+                hold(self._locks / self.token)
         with store_errors(OutputError, out):
             self._remove_abandoned()
             file_system, path = _open(f"{self.folder}/{TOKEN}")
@@ -244,13 +254,19 @@ class RemoteStaging:
         with suppress(Exception):  # it is not empty, or the store has no folders
             file_system, path = _open(f"{self._out}/{ATTEMPTS}")
             file_system.rmdir(path)
+        if self._locks is not None:
+            release(self._locks / self.token)
 
     def _remove_abandoned(self) -> None:
-        """Remove the attempts of batches of this computer that do not run any more."""
+        """Remove the attempts of batches of this machine that do not run any more."""
+        if self._locks is None:
+            return
         file_system, root = _open(f"{self._out}/{ATTEMPTS}")
         for path in file_system.ls(root, detail=False) if file_system.isdir(root) else []:
-            if has_ended(PurePosixPath(path).name):
+            lock = self._locks / PurePosixPath(path).name
+            if is_abandoned(lock):
                 file_system.rm(path, recursive=True)
+                release(lock)
 
 
 def _remove(url: str) -> None:

@@ -2,32 +2,25 @@
 """Folders of attempts below the output folder, and publishing: only checked results get their final
 names.
 
-An attempt that was given up has no folder any more. A worker that was thought lost and still runs
-can therefore not publish anything, because only this machine renames results.
+The folder is a temporary one, and is removed by another batch if this one is killed. An attempt
+that was given up has no folder any more. A worker that was thought lost and still runs can
+therefore not publish anything, because only this machine renames results.
 """
 
 from __future__ import annotations
 
 import errno
-import os
-import re
 import secrets
 import shutil
-import stat
-import time
 from pathlib import Path
 from typing import Any
 
 from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError
 from ..job.clips.finished import file_hash
-from ..processes import has_ended, owner
+from ..temporary import claim, discard, remove
 
-ATTEMPTS = ".scope-attempts"
 TOKEN = "token"  # file by which a worker shows that it sees the same folder
-# Of a batch's folder: computer, process and the beginning of its token.
-_OWN_NAME = re.compile("[0-9a-f]{8}-[0-9]+-[0-9a-f]{8}")
-_ABANDONED_S = 7 * 24 * 3600.0  # of another computer's batch, which may take days for a clip
 
 
 class Staging:
@@ -40,18 +33,13 @@ class Staging:
     def __init__(self, out: Path) -> None:
         self._out = out
         self.token = secrets.token_hex(16)
-        if (out / ATTEMPTS).is_symlink():
-            raise OutputError(
-                f"{out / ATTEMPTS} is a link to another folder; a batch makes and removes folders "
-                "there: remove the link, or choose another output folder"
-            )
-        _remove_abandoned(out / ATTEMPTS)
-        self.folder = out / ATTEMPTS / f"{owner()}-{self.token[:8]}"
         try:
-            self.folder.mkdir(parents=True)
+            out.mkdir(parents=True, exist_ok=True)
+            self.folder = claim(out, ".attempts-")
+            self.folder.mkdir()  # for whoever the workers run as
             (self.folder / TOKEN).write_text(self.token)
         except OSError as error:
-            raise OutputError(f"cannot write {self.folder}: {reason(error)}") from error
+            raise OutputError(f"cannot write to {out}: {reason(error)}") from error
 
     def attempt(self, number: int) -> str:
         """Return the path of an attempt's folder, which the worker makes."""
@@ -91,12 +79,11 @@ class Staging:
 
     def remove(self, attempt: str) -> None:
         """Remove the folder of an attempt, after which its results cannot be published."""
-        shutil.rmtree(attempt, ignore_errors=True)
+        remove(Path(attempt))
 
     def close(self) -> None:
         """Remove the folders of all attempts."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        _remove_if_empty(self.folder.parent)
+        discard(self.folder)
 
 
 def _rename(staged: Path, final: Path) -> None:
@@ -109,42 +96,3 @@ def _rename(staged: Path, final: Path) -> None:
             raise
         with atomic_path(final) as temporary:  # a folder of the results is a link to another disk
             shutil.copyfile(staged, temporary)
-
-
-def _remove_abandoned(folder: Path) -> None:
-    """Remove the folders of batches that do not run any more, and nothing that a batch has not
-    made: a folder with another name, without a token, or behind a link is somebody else's.
-    """
-    try:
-        found = list(folder.iterdir())
-    except OSError:
-        return
-    for path in found:
-        if not _OWN_NAME.fullmatch(path.name) or path.is_symlink() or not _is_own(path):
-            continue
-        try:
-            old = time.time() - path.stat().st_mtime > _ABANDONED_S
-        except OSError:
-            continue
-        if old or has_ended(path.name):
-            shutil.rmtree(path, ignore_errors=True)
-    _remove_if_empty(folder)
-
-
-def _is_own(folder: Path) -> bool:
-    """Return whether a folder has the file that every batch writes into its own first, or nothing
-    yet.
-    """
-    try:
-        if not os.listdir(folder):
-            return True
-        return stat.S_ISREG((folder / TOKEN).lstat().st_mode)
-    except OSError:
-        return False
-
-
-def _remove_if_empty(folder: Path) -> None:
-    try:
-        folder.rmdir()
-    except OSError:
-        pass

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import platform
 import sys
-import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,7 @@ from ..job.clips.task import (
     failure,
 )
 from ..job.request import program_version
+from ..temporary import remove_abandoned, system_folder, temporary_folder
 from . import remote
 from .staging import TOKEN
 
@@ -48,6 +48,7 @@ def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
     :param wanted: plain values, because a worker with another version of Scope has to understand
         them.
     """
+    remove_abandoned(system_folder())  # footage that a killed worker of this machine has left
     try:
         problem = _problem(wanted)
     except (ScopeError, OSError) as error:
@@ -121,18 +122,16 @@ def capture_on_worker(
             }
     run = partial(ClipProcesses().run, wanted=partial(_is_wanted, worker, key))
     threads = max(1, min(worker.state.nthreads, os.cpu_count() or 1) // jobs)
-    with tempfile.TemporaryDirectory(prefix="scope-clip-") as scratch:
+    with temporary_folder("footage") as scratch:
         local = task
         try:
             if is_url(task.footage):
                 with remote.store_errors(InputError, task.footage):
-                    local = local._replace(
-                        footage=str(remote.download(task.footage, Path(scratch)))
-                    )
+                    local = local._replace(footage=str(remote.download(task.footage, scratch)))
         except ScopeError as error:
             return failure(task, str(error))
         if is_url(task.out):
-            local = local._replace(out=str(Path(scratch, "results")))
+            local = local._replace(out=str(scratch / "results"))
         entry = capture_clip(local, program or PROGRAM, run, threads)
         if "message" in entry:
             entry["message"] = entry["message"].replace(local.footage, task.footage)

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..atomic_write import remove_temporary_files
 from ..capture.perception.adapters.network_server import used_bytes
 from ..errors import FAILED
+from ..temporary import discard_all
 
 _INTERVAL_S = 0.1
 # A file may take these, and in addition as many seconds for a megabyte, and as many bytes for a
@@ -61,7 +61,7 @@ def bounded_import(path: Path) -> Iterator[None]:
 
 
 def _stop(what: str) -> None:
-    remove_temporary_files()
+    discard_all()
     os.write(
         2, f"scope: {what}; export it again or choose another\n".encode("utf-8", "surrogateescape")
     )

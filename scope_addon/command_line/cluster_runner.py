@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 from ..errors import UsageError
 from ..footage import is_url
 from ..installed import check_cluster
+from ..temporary import temporary_folder
 from .arguments import path_argument
 from .terminal import print_message
 
@@ -61,7 +61,7 @@ def local_folders(args: argparse.Namespace, stack: ExitStack) -> tuple[Path, Pat
         check_cluster()
         from ..cluster.remote import mirror_footage, mirror_results
 
-        scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="scope-batch-")))
+        scratch = stack.enter_context(temporary_folder("batch"))
         folder = mirror_footage(folder, str(out), scratch / "clips") if is_url(folder) else folder
         out = mirror_results(out, scratch / "results") if is_url(out) else out
     return folder, out

@@ -19,9 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.errors import InputError
-from ..atomic_write import atomic_path
+from ..atomic_write import atomic_path, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
+from ..temporary import remove
 from .clips.find import OVERLAY, find_clips
 from .clips.finished import finished_file, has_content
 from .clips.runner import LocalRunner, Runner
@@ -175,7 +176,10 @@ class Batch:
     def _previous_entries(self) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or
         damaged.
+
+        :raises OutputError: what has its name is no file, so that no report could be written.
         """
+        resolve_link(self.report_file)
         try:
             entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
             return {e["name"]: e for e in entries if isinstance(e["status"], str)}
@@ -216,8 +220,8 @@ class Batch:
         written = {name for name, entry in entries.items() if entry["status"] in FINISHED}
         for name in written - self._reported:
             # a record remains harmless: an entry of its key is in the report
-            with suppress(OSError, KeyError):
-                finished_file(self.out, name, entries[name]["key"]).unlink(missing_ok=True)
+            with suppress(KeyError):
+                remove(finished_file(self.out, name, entries[name]["key"]))
         self._reported |= written
         taken = time.monotonic() - start
         self._next_report = 0.0 if taken < _QUICK_S else start + taken / _WRITING_SHARE

@@ -19,10 +19,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..temporary import discard, new_folder, own_entries, remove
+
 REPORT = "report.json"
 # a folder of scope_addon/machine_code/code_folders.py, less its program
-_VERSION = re.compile(r"(\w+-[0-9a-f]{8})-[0-9a-f]{12}")
-_JOB = "job-"  # begins the name of a job's folder, before its owner
+_VERSION = re.compile(r"\w+-[0-9a-f]{8}-[0-9a-f]{12}")
+# What is ours in a folder that the user chooses, and that may have others of these names.
+_KEY = re.compile("[0-9a-f]{32}")
 
 
 class CachedCapture(NamedTuple):
@@ -33,7 +36,9 @@ class CachedCapture(NamedTuple):
 
 
 class Cache:
-    """A cache folder. Only files that the cache itself created are ever removed."""
+    """A cache folder. Only what the cache itself has made is ever removed: the user may choose a
+    folder that has others of these names, or links to other folders.
+    """
 
     def __init__(self, root: Path) -> None:
         self.root = Path(root)
@@ -50,6 +55,8 @@ class Cache:
         from .messages import is_result
 
         folder = self.root / "captures" / key
+        if not (folder / REPORT).is_file():  # opening a pipe would wait for a writer
+            return None
         try:
             content = json.loads((folder / REPORT).read_text(encoding="utf-8"))
             motions = [folder / name for name in content["motions"]] if is_result(content) else []
@@ -66,16 +73,11 @@ class Cache:
 
         :raises OutputError: the cache folder cannot be written to.
         """
-        import tempfile
-
-        from ..processes import owner
-
         jobs = self.root / "jobs"
         try:
             jobs.mkdir(parents=True, exist_ok=True)
             self.kernels.mkdir(exist_ok=True)
-            _remove_abandoned(jobs)
-            return Path(tempfile.mkdtemp(prefix=f"{_JOB}{owner()}-", dir=jobs))
+            return new_folder("job", jobs)
         except OSError as error:
             raise self._not_writable(error) from error
 
@@ -88,13 +90,13 @@ class Cache:
         :raises OutputError: the cache folder cannot be written to.
         """
         import json
-        import shutil
 
         target = self.root / "captures" / key
         try:
             content = json.dumps({"motions": motions, "report": report})
             (job_folder / REPORT).write_text(content, encoding="utf-8")
             target.parent.mkdir(parents=True, exist_ok=True)
+            # Its name begins with the job's, so that it is removed with the job.
             former = job_folder.with_name(f"{job_folder.name}.former")
             if target.exists():
                 os.replace(target, former)
@@ -104,7 +106,7 @@ class Cache:
                 if former.exists():
                     os.replace(former, target)
                 raise
-            shutil.rmtree(former, ignore_errors=True)
+            discard(job_folder)
         except OSError as error:
             raise self._not_writable(error) from error
         return CachedCapture([target / name for name in motions], report)
@@ -121,22 +123,18 @@ class Cache:
 
         Running jobs and the compiled code in use are kept.
         """
-        import shutil
-
         before = self.size()
         for folder in self._owned():
-            shutil.rmtree(folder, ignore_errors=True)
+            remove(folder)
         return before - self.size()
 
     def prune(self, limit: int) -> None:
         """Remove the least recently used captures until the others fit into ``limit`` bytes."""
-        import shutil
-
         total = 0
-        for index, folder in enumerate(_by_time(self.root / "captures")):
+        for index, folder in enumerate(_by_time(own_entries(self.root / "captures", _KEY))):
             total += _size(folder)
             if index and total > limit:  # the newest is kept: it has just been captured
-                shutil.rmtree(folder, ignore_errors=True)
+                remove(folder)
 
     def _not_writable(self, error: OSError) -> Exception:
         from ..errors import OutputError
@@ -149,44 +147,29 @@ class Cache:
         )
 
     def _owned(self) -> list[Path]:
-        return [self.root / "captures", self.root / "unfinished", *self._replaced_kernels()]
+        from .unfinished import unfinished_captures
+
+        captures = own_entries(self.root / "captures", _KEY)
+        return [*captures, *unfinished_captures(self.root), *self._replaced_kernels()]
 
     def _replaced_kernels(self) -> list[Path]:
-        """Return the folders of code that another version has replaced, or that numba's own cache
-        had made.
-        """
+        """Return the folders of code that another version has replaced."""
         newest: set[str] = set()
         replaced = []
-        for path in _by_time(self.kernels):
-            version = _VERSION.fullmatch(path.name)
-            if version is None or version[1] in newest:
+        for path in _by_time(own_entries(self.kernels, _VERSION)):
+            area = path.name.rpartition("-")[0]
+            if area in newest:
                 replaced.append(path)
-            else:
-                newest.add(version[1])
-        return [path for path in replaced if path.is_dir()]
+            newest.add(area)
+        return replaced
 
 
-def _remove_abandoned(jobs: Path) -> None:
-    """Remove the folders of jobs whose Blender does not run any more."""
-    import shutil
-
-    from ..processes import is_abandoned
-
-    for folder in _by_time(jobs):
-        with suppress(OSError):  # another process has removed it
-            if is_abandoned(folder, folder.name.removeprefix(_JOB)):
-                shutil.rmtree(folder, ignore_errors=True)
-
-
-def _by_time(folder: Path) -> list[Path]:
-    """Return the content of a folder, what was changed last first, without concurrently removed
-    entries.
-    """
+def _by_time(folders: list[Path]) -> list[Path]:
+    """Return folders, what was changed last first, without concurrently removed ones."""
     times: dict[Path, float] = {}
-    with suppress(OSError):
-        for path in folder.iterdir():
-            with suppress(OSError):
-                times[path] = path.stat().st_mtime
+    for path in folders:
+        with suppress(OSError):
+            times[path] = path.stat().st_mtime
     return sorted(times, key=times.__getitem__, reverse=True)
 
 

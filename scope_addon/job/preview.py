@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -29,6 +28,7 @@ from ..capture.media.frame import Frame
 from ..capture.overlay.overlay_video import body_colors, draw_overlay
 from ..capture.perception.landmark_network import KEYPOINT_NAMES
 from ..capture.perception.observation import Observation
+from ..temporary import remove
 
 _LOG = logging.getLogger(__name__)
 
@@ -85,8 +85,7 @@ class PreviewWriter:
     ) -> None:
         with self._writing:
             self._open = False
-            with suppress(OSError):  # Windows, while the parent reads it: it remains in its folder
-                self._path.unlink(missing_ok=True)
+            remove(self._path)  # unless the parent reads it, on Windows: it stays in its folder
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def __call__(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:

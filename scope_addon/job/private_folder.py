@@ -9,6 +9,8 @@ import sys
 from functools import cache
 from pathlib import Path
 
+from ..temporary import new_folder
+
 _NAME = "scope-mocap"
 
 
@@ -22,9 +24,7 @@ def private_folder() -> Path:
     """
     if lasting := lasting_folder():
         return lasting
-    import tempfile  # adds to the time that Blender takes to start
-
-    return Path(tempfile.mkdtemp(prefix=f"{_NAME}-"))
+    return new_folder(_NAME)
 
 
 def lasting_folder() -> Path | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import queue
-import shutil
 import subprocess
 import sys
 import threading
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SetupError
+from ..temporary import discard, remove
 from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
 from .messages import (
@@ -75,7 +75,7 @@ class WorkerProcess:
                     creationflags=_WINDOWS_FLAGS,
                 )
         except OSError as error:
-            shutil.rmtree(job_folder, ignore_errors=True)
+            discard(job_folder)
             raise SetupError(
                 f"cannot start {python[0]}: {error.strerror}; reinstall Blender"
             ) from error
@@ -125,12 +125,12 @@ class WorkerProcess:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout_s)
         self._end()
-        (self.job_folder / LOG).unlink(missing_ok=True)
+        remove(self.job_folder / LOG)
 
     def close(self) -> None:
         """End the worker if it is running, and remove its folder if it exists."""
         self._end()
-        shutil.rmtree(self.job_folder, ignore_errors=True)
+        discard(self.job_folder)
 
     def _send_line(self, line: bytes) -> None:
         with contextlib.suppress(OSError):  # the worker has ended already; poll() reports that

@@ -8,16 +8,18 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
+import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import NoPersonError
+from ..temporary import own_entries, remove, remove_if_empty
 from .request import code_version
 
 FOLDER = "unfinished"
+_FOLDER_NAME = re.compile("[0-9a-f]{32}")
 ROOT = Path(__file__).resolve().parents[2]
 _ABANDONED_S = 7 * 24 * 3600.0
 _LARGEST = 2 << 30  # bytes of all captures
@@ -37,7 +39,7 @@ def unfinished_capture(root: Path | None, footage: Path) -> Iterator[Path | None
     if root is None:
         yield None
         return
-    _remove_abandoned(root / FOLDER)
+    _remove_old(root)
     folder = root / FOLDER / _name(footage)
     try:
         yield folder
@@ -56,25 +58,28 @@ def _name(footage: Path) -> str:
     return hashlib.sha256(json.dumps(described).encode()).hexdigest()[:32]
 
 
+def unfinished_captures(root: Path) -> list[Path]:
+    """Return the folders of captures in a folder of caches."""
+    return own_entries(root / FOLDER, _FOLDER_NAME)
+
+
 def _remove(folder: Path) -> None:
-    shutil.rmtree(folder, ignore_errors=True)
-    with suppress(OSError):  # of other captures
-        folder.parent.rmdir()
+    remove(folder)
+    remove_if_empty(folder.parent)
 
 
-def _remove_abandoned(parent: Path) -> None:
+def _remove_old(root: Path) -> None:
     """Remove what is old, and if all is too much, the oldest."""
     found = []
-    with suppress(OSError):
-        for folder in parent.iterdir():
-            with suppress(OSError):
-                size, changed_s = _size_and_time(folder)
-                found.append((time.time() - changed_s, size, folder))
+    for folder in unfinished_captures(root):
+        with suppress(OSError):
+            size, changed_s = _size_and_time(folder)
+            found.append((time.time() - changed_s, size, folder))
     total = 0
     for age_s, size, folder in sorted(found):
         total += size
         if age_s > _ABANDONED_S or (total > _LARGEST and age_s > _RUNNING_S):
-            shutil.rmtree(folder, ignore_errors=True)
+            remove(folder)
 
 
 def _size_and_time(folder: Path) -> tuple[int, float]:

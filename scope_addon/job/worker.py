@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import sys
 import threading
 import time
@@ -18,6 +17,7 @@ from ...solver.errors import ScopeError
 from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
 from ..parent import end_with_parent
+from ..temporary import discard, remove
 from .live.commands import Commands
 from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
@@ -198,8 +198,8 @@ def _remove(job_folder: Path) -> None:
     with contextlib.suppress(OSError):
         job_folder.rename(renamed)
     for _ in range(_REMOVAL_ATTEMPTS):
-        for folder in (renamed, job_folder):
-            shutil.rmtree(folder, ignore_errors=True)
+        discard(job_folder)
+        remove(renamed)
         if not renamed.exists() and not job_folder.exists():
             return
 

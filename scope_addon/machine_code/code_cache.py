@@ -18,7 +18,8 @@ from typing import Any
 
 from numba.core.caching import _Cache
 
-from .code_files import SUFFIX, read_code, remove_code, remove_drafts, write_code
+from ..temporary import remove, remove_abandoned
+from .code_files import SUFFIX, read_code, write_code
 from .code_folders import PACKAGE, SOLVER, Area, digest_of, mark_used
 from .numba_internals import load_result, payload_of, use_cache, use_kernel_compiler
 
@@ -93,7 +94,7 @@ class CodeCache(_Cache):
             try:
                 result = load_result(target_context, *pickle.loads(payload))
             except Exception:  # whatever an unusable file leads to, compiling it again mends it
-                remove_code(path)
+                remove(path)
                 continue
             if not trusted:
                 _used(self._area, folder)
@@ -139,7 +140,7 @@ class CodeCache(_Cache):
         """Remove the code of all signatures that this processor's own folder has."""
         for folder in self._area.own_folders():
             for path in folder.glob(f"{self._name}-*{SUFFIX}"):
-                remove_code(path)
+                remove(path)
 
     def _key(self, sig: Any) -> str:
         return repr((self._function, str(sig)))
@@ -162,5 +163,5 @@ def _used(area: Area, folder: Path) -> None:
     left in it.
     """
     mark_used(folder)
-    remove_drafts(folder)
+    remove_abandoned(folder)
     area.remove_stale(folder)

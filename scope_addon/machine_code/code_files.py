@@ -18,17 +18,15 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-import uuid
-from contextlib import suppress
 from pathlib import Path
 
-from ..processes import is_abandoned, owner
+from ..atomic_write import complete_file
+from ..temporary import remove
 
 SUFFIX = ".code"
 _MAGIC = b"Scope machine code 1\n"
 # a named pipe must not block
 _OPEN = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
-_CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 
 
 def read_code(path: Path, key: str, *, trusted: bool) -> bytes | None:
@@ -54,43 +52,21 @@ def read_code(path: Path, key: str, *, trusted: bool) -> bytes | None:
         return None
     payload = content[len(_header(key, b"")) :]
     if content != _header(key, payload) + payload:
-        remove_code(path)
+        remove(path)
         return None
     return payload
 
 
 def write_code(path: Path, key: str, payload: bytes) -> None:
-    """Write a file that is either complete or not there. What a kill leaves, `remove_drafts`
-    removes.
+    """Write a file that is either complete or not there.
 
     :raises OSError: the system refused.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{owner()}-{uuid.uuid4().hex[:8]}")
-    try:
-        # Nobody else may write to it, also where new files are the group's as well: it would not be
-        # read again.
-        with open(os.open(temporary, _CREATE, 0o644), "wb") as file:
-            file.write(_header(key, payload) + payload)
-        os.replace(temporary, path)
-    except OSError:
-        remove_code(temporary)
-        raise
-
-
-def remove_drafts(folder: Path) -> None:
-    """Remove what processes that do not run any more have left of writing files in a folder."""
-    with suppress(OSError):
-        for draft in folder.glob(f"*{SUFFIX}.*-*-*"):
-            with suppress(OSError):  # another process has removed it
-                if is_abandoned(draft, draft.suffix[1:]):
-                    remove_code(draft)
-
-
-def remove_code(path: Path) -> None:
-    """Remove a file, unless the system refuses."""
-    with suppress(OSError):
-        path.unlink()
+    # Nobody else may write to it, also where new files are the group's as well: it would not be
+    # read again.
+    with complete_file(path, durable=False, mode=0o644) as temporary:
+        temporary.write_bytes(_header(key, payload) + payload)
 
 
 def _header(key: str, payload: bytes) -> bytes:

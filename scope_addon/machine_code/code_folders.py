@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -30,6 +30,8 @@ import numba
 import numba.core.config
 import numpy as np
 from numba.misc import appdirs
+
+from ..temporary import own_entries, remove
 
 config: Any = numba.core.config  # these declare no types
 llvm: Any = llvmlite.binding
@@ -110,11 +112,11 @@ class Area:
         """Remove what lies beside the folder of an area, is of another program, and has not been
         used for long.
         """
-        prefix = folder.name[: -len(self._program)]
-        with suppress(OSError):
-            for other in folder.parent.glob(f"{prefix}*"):
+        area = re.escape(folder.name[: -len(self._program)])
+        for other in own_entries(folder.parent, re.compile(f"{area}[0-9a-f]{{12}}")):
+            with suppress(OSError):  # another process has removed it
                 if other != folder and time.time() - other.stat().st_mtime > _STALE_S:
-                    shutil.rmtree(other, ignore_errors=True)
+                    remove(other)
 
     def _folder_name(self, processor: str) -> str:
         environment = sys.implementation.cache_tag, sys.platform, _machine(), processor

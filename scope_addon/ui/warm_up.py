@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ..temporary import discard, new_folder
 from .preferences import PACKAGE, cache, preferences
 from .reporting import iface_
 from .view.sidebar import redraw_sidebars
 
 if TYPE_CHECKING:
     import subprocess
-    import tempfile
 
 ROOT = Path(__file__).resolve().parents[2]
 KERNELS = 77  # that a capture and its preview compile
@@ -37,7 +37,7 @@ class WarmUp:
 
     process: subprocess.Popen[bytes] | None = None
     files_before = 0  # of compiled code, when it began
-    folder: tempfile.TemporaryDirectory[str] | None = None
+    folder: Path | None = None
 
 
 def attach() -> None:
@@ -76,7 +76,6 @@ def start() -> bool:
     solver.
     """
     import subprocess
-    import tempfile
 
     from ..job.start_worker import worker_command
 
@@ -88,10 +87,8 @@ def start() -> bool:
     try:
         kernels.mkdir(parents=True, exist_ok=True)
         WarmUp.files_before = _files()
-        WarmUp.folder = tempfile.TemporaryDirectory(
-            prefix="scope-warm-up-", ignore_cleanup_errors=True
-        )
-        command, environment = worker_command(python, ROOT, Path(WarmUp.folder.name), kernels)
+        WarmUp.folder = new_folder("warm-up")
+        command, environment = worker_command(python, ROOT, WarmUp.folder, kernels)
         quiet = subprocess.DEVNULL
         WarmUp.process = subprocess.Popen(
             command,
@@ -123,7 +120,7 @@ def stop() -> None:
             with contextlib.suppress(OSError):
                 process.stdin.close()
     if folder is not None:
-        folder.cleanup()
+        discard(folder)
 
 
 def draw(layout: bpy.types.UILayout) -> None:

@@ -3,7 +3,10 @@
 for other stores.
 """
 
+import os
+
 import pytest
+from scope.scope_addon import temporary
 from scope.scope_addon.cluster import remote
 from scope.scope_addon.cluster.remote import RemoteStaging, mirror_footage, mirror_results, upload
 from scope.scope_addon.errors import OutputError, UsageError
@@ -65,6 +68,20 @@ def test_results_replace_earlier_ones_and_nothing_else_stays(store, tmp_path):
             f"/bucket/out/{REPORT_NAME}",
         ]
         assert store.cat_file("/bucket/out/below/a.npz").decode() == text
+
+
+def test_what_a_killed_batch_of_this_machine_has_left_is_removed(store, monkeypatch, tmp_path):
+    monkeypatch.setattr(remote, "lasting_folder", lambda: tmp_path)
+    out = "memory://bucket/out"
+    killed = RemoteStaging(out)
+    os.close(temporary._locks.pop(tmp_path / "batches" / killed.token))  # as a process's end does
+    store.pipe_file("/bucket/out/.scope-attempts/elsewhere/token", b"another machine's")
+    running = RemoteStaging(out)
+    RemoteStaging(out).close()
+    left = {path.split("/")[-2] for path in store.find("/bucket/out")}
+    assert left == {running.token, "elsewhere"}
+    running.close()
+    assert list((tmp_path / "batches").iterdir()) == []
 
 
 @pytest.mark.parametrize("damage", ["cut", "given up"])

@@ -53,7 +53,7 @@ def test_an_interrupted_capture_is_continued_until_the_footage_changes(tmp_path,
 
 
 def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
-    folders = [tmp_path / FOLDER / name for name in ("new", "hour", "two", "month")]
+    folders = [tmp_path / FOLDER / name for name in ("0" * 32, "1" * 32, "2" * 32, "3" * 32)]
     for folder, age_s in zip(folders, (0, 3600, 7200, 30 * 86400), strict=True):
         folder.mkdir(parents=True)
         (folder / "0.npz").write_bytes(bytes(1000))
@@ -66,7 +66,7 @@ def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
 
 
 def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypatch):
-    folders = [tmp_path / FOLDER / name for name in ("hour", "written", "month")]
+    folders = [tmp_path / FOLDER / name for name in ("0" * 32, "1" * 32, "2" * 32)]
     for folder, age_s, inner_s in zip(
         folders, (3600, 86400, 30 * 86400), (3600, 0, 30 * 86400), strict=True
     ):

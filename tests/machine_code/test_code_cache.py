@@ -6,8 +6,6 @@ and kept again.
 import os
 import pickle
 import shutil
-import subprocess
-import sys
 
 import pytest
 from scope.scope_addon.machine_code.code_files import SUFFIX, read_code, write_code
@@ -17,7 +15,7 @@ from scope.scope_addon.machine_code.code_folders import (
     can_run_shipped,
     shipped_processor,
 )
-from scope.scope_addon.processes import computer
+from scope.scope_addon.temporary import claim, discard
 
 from .small_package import LONG_CALLEE, make_package
 
@@ -152,16 +150,27 @@ def test_code_is_kept_whatever_the_times_of_the_sources_and_what_a_killed_compil
     run, folder
 ):
     first = code_files(folder / "cache")[0]
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
     own = first.parent
-    others = (f"00000000-{ended.pid}", f"{computer()}-{os.getpid()}")
-    for name in (f"{computer()}-{ended.pid}", *others):
-        (own / f"{first.stem}{SUFFIX}.{name}-1a2b3c4d").write_bytes(first.read_bytes()[:100])
+    before = set(os.listdir(own))
+    draft = f".{first.stem}.scope-0123456789abcdef"
+    (own / f"{draft}-lock").touch()
+    (own / f"{draft}{SUFFIX}").write_bytes(first.read_bytes()[:100])
+    written = claim(own, f".{first.stem}.", SUFFIX)  # by this process
     assert run(folder, folder / "cache") == ([1] * COUNT, "")
-    drafts = {path.suffix[1:] for path in own.iterdir() if path.suffix != SUFFIX}
-    # another computer's, and one that is being written
-    assert drafts == {f"{name}-1a2b3c4d" for name in others}
+    assert set(os.listdir(own)) == before | {f"{written.stem}-lock"}
+    discard(written)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
+def test_code_is_not_written_through_a_link(run, folder):
+    file = code_files(folder / "cache")[0]
+    elsewhere = folder / "elsewhere"
+    elsewhere.write_text("a user's")
+    file.unlink()
+    file.symlink_to(elsewhere)
+    run(folder, folder / "cache")
+    assert elsewhere.read_text("utf-8") == "a user's"
+    assert run(folder, folder / "cache") == ([1] * COUNT, "")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows reports no owner")

@@ -85,7 +85,7 @@ SHARED = (
     "counts",
     "json_file",
     "parent",
-    "processes",
+    "temporary",
     "review_spans",
     "notices",
     "capture_report",

@@ -52,7 +52,8 @@ class KeptEstimates:
         self._bytes = 0
         if folder is not None:
             for path in sorted(folder.glob("*.npz")):
-                self._read_keys(path)
+                if path.is_file():  # opening a pipe would wait for a writer
+                    self._read_keys(path)
 
     def key(self, network: str, crop_rgb: Uint8Array, region: Region) -> bytes | None:
         """Return the key of an estimate; None if nothing is kept.

@@ -5,13 +5,13 @@ segmentation fault.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import VideoError
 from ...footage import display_text, is_utf8
+from ...temporary import temporary_folder
 
 
 @contextmanager
@@ -26,8 +26,8 @@ def utf8_name(path: Path) -> Iterator[str]:
     if is_utf8(absolute):
         yield str(absolute)
         return
-    with tempfile.TemporaryDirectory(prefix="scope-name-", ignore_cleanup_errors=True) as folder:
-        link = Path(folder) / f"file{path.suffix if is_utf8(path.suffix) else ''}"
+    with temporary_folder("name") as folder:
+        link = folder / f"file{path.suffix if is_utf8(path.suffix) else ''}"
         try:
             link.symlink_to(absolute)
         except OSError as error:

@@ -17,9 +17,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...atomic_write import atomic_path
+from ...atomic_write import complete_file
 from ...errors import OutputError
 from ...footage import json_text
+from ...temporary import remove
 
 FINISHED_FILE = "--finished-file"  # option that only a batch passes to its processes
 _KEY = 16  # characters of a clip's key in the name
@@ -44,7 +45,7 @@ def write_finished(file: Path, report: dict[str, Any]) -> None:
     """
     with suppress(OSError, OutputError):
         content = content_of(Path(), report["outputs"])
-        with atomic_path(file) as temporary:
+        with complete_file(file) as temporary:
             record = {"report": report, "content": content}
             temporary.write_text(json_text(record), encoding="utf-8")
 
@@ -56,7 +57,7 @@ def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
     :param out: output folder, in which the results have to be.
     """
     try:
-        if file.stat().st_size > _LARGEST_BYTES:
+        if not file.is_file() or file.stat().st_size > _LARGEST_BYTES:
             return None
         found = json.loads(file.read_text(encoding="utf-8"))
         report = found["report"]
@@ -70,14 +71,14 @@ def read_finished(file: Path, out: Path) -> dict[str, Any] | None:
 
 def remove_finished(out: Path, name: str) -> None:
     """Remove the records of a clip, of whatever key. This reads the whole folder; for one key,
-    unlink its file.
+    remove its file.
     """
     target = out / name
     with suppress(OSError):
         for path in target.parent.glob(
             f".{glob.escape(target.name)}.finished-{'[0-9a-f]' * _KEY}.json"
         ):
-            path.unlink(missing_ok=True)
+            remove(path)
 
 
 def content_of(folder: Path, names: Iterable[str]) -> dict[str, dict[str, Any]]:

@@ -9,12 +9,12 @@ and nothing else.
 from __future__ import annotations
 
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from ...errors import UsageError
+from ...temporary import temporary_folder
 from ..messages import WARM_UP_FIELDS, Fields, WorkerFailedError
 from ..process import START_SCRIPT, WorkerProcess
 from .cameras import LONGEST_NAME, Camera, camera_number, camera_source
@@ -96,8 +96,8 @@ def ask_for_formats(text: str) -> Camera:
     if source is None:
         said = "a stream" if "://" in text else text  # whose address may contain a password
         raise UsageError(f"{said} is not a camera; give its number, 0 for the first")
-    with tempfile.TemporaryDirectory(prefix="scope-formats-", ignore_cleanup_errors=True) as folder:
-        process = FormatsProcess(source, Path(folder), [sys.executable])
+    with temporary_folder("formats") as folder:
+        process = FormatsProcess(source, folder, [sys.executable])
         try:
             while (camera := process.answer()) is None:
                 time.sleep(_INTERVAL_S)

@@ -23,6 +23,7 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, UsageError
 from ...motion import Motion
 from ...notices import Notice
+from ...temporary import remove
 from ..animation_data import actions
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from ..character.bone_display import remove_if_unused
@@ -249,7 +250,7 @@ def _write(path: Path, writer: Callable[[Path], None]) -> None:
     """
     try:
         with atomic_path(path) as temporary:
-            temporary.unlink()  # Blender's writers differ in what they do with an existing file
+            remove(temporary)  # Blender's writers differ in what they do with an existing file
             with formats.quiet():
                 writer(temporary)
             if not temporary.is_file():

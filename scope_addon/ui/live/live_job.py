@@ -19,7 +19,6 @@ import bpy
 
 from ....solver.body import Body
 from ....solver.errors import ScopeError
-from ...atomic_write import remove_abandoned
 from ...capture_report import Report
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import display_text
@@ -38,6 +37,7 @@ from ...scene.live.scene_before import SceneBefore, select_only
 from ...scene.local_scene import check_local
 from ...scene.rigs.rig_retarget import guess_bone_map
 from ...scene.visibility import hide
+from ...temporary import remove_abandoned
 from ...untrusted.body_file import load_body
 from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
 from ..preferences import cache
@@ -168,7 +168,7 @@ class LiveJob:
         """End the process in any state, without leaving a file behind; the scene stays as it is."""
         self._worker.close()
         if self._kept:
-            remove_abandoned(Path(self._kept))
+            remove_abandoned(Path(self._kept).parent)
 
     def step(self) -> bool:
         """Continue as far as possible without waiting; return False at the end.

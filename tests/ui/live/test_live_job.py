@@ -238,7 +238,7 @@ def test_cancelling_leaves_nothing_of_the_footage(live, tmp_path, monkeypatch):
             pose(1); receive(); receive()
     """)
     until(job, lambda: job.has_body)
-    assert len(list((tmp_path / "takes").iterdir())) == 1
+    assert len(list((tmp_path / "takes").iterdir())) == 2  # the file and its lock
     job.cancel()
     assert not list((tmp_path / "takes").iterdir())
 
