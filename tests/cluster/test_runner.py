@@ -3,6 +3,7 @@
 workers and scheduler.
 """
 
+import importlib
 import json
 import os
 import signal
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import threading
 from contextlib import ExitStack, contextmanager
+from unittest.mock import MagicMock
 
 import pytest
 from scope.scope_addon.cli import main
@@ -43,6 +45,27 @@ for path in outputs:
     pathlib.Path(path).write_text("result of " + text)
 print(json.dumps({"frames": 3, "outputs": outputs, "warnings": []}))
 """
+
+
+DOWNLOADS = """
+import os, signal
+from scope.scope_addon.temporary import temporary_folder
+with temporary_folder("footage") as folder:
+    (folder / "clip.mp4").write_text("footage")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_footage_that_a_killed_worker_had_downloaded_is_removed_by_the_next(tmp_path, monkeypatch):
+    """Before its first clip, whatever that is."""
+    package("distributed")
+    worker = importlib.import_module("scope.scope_addon.cluster.worker")
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    subprocess.run([sys.executable, "-c", DOWNLOADS], check=False)
+    assert len(list(tmp_path.rglob("clip.mp4"))) == 1
+    monkeypatch.setattr(worker, "get_worker", MagicMock())
+    worker.check_worker({"program": "another version"})
+    assert list(tmp_path.iterdir()) == []
 
 
 @contextmanager
@@ -138,7 +161,7 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(
     assert files(folder) == sorted([*outputs, REPORT_NAME])
     assert (folder.parent / "out" / "below" / "d.npz").read_text("utf-8") == "result of d"
     staged, shown = (calls(folder / "below" / "d.mp4")[0]["arguments"][k] for k in (6, -1))
-    assert ".scope-attempts" in staged
+    assert ".attempts-scope-" in staged
     assert f"-o {folder.parent}/out/below/d.npz" in shown  # what a page about the capture shows
     assert sum(row["clips"] for row in report["workers"]) == 4
     assert sum(row["frames"] for row in report["workers"]) == report["throughput"]["frames"] == 6

@@ -10,7 +10,10 @@ FILES = (
     "solver/code_keeper.py",
     "solver/kernel.py",
     "scope_addon/__init__.py",
-    "scope_addon/processes.py",
+    "scope_addon/atomic_write.py",
+    "scope_addon/errors.py",
+    "scope_addon/temporary.py",
+    "solver/errors.py",
     *(
         f"scope_addon/machine_code/{name}.py"
         for name in ("__init__", "code_cache", "code_files", "code_folders", "numba_internals")
