@@ -9,13 +9,12 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-import scope.scope_addon  # noqa: F401 - keeps the machine code of what tests compile
 
 from .required import missing
 
@@ -24,7 +23,22 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
-IS_SECOND = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
+
+
+def make_importable() -> None:
+    """Let tests, and the processes that they start, import a checkout that is not installed."""
+    folder = ROOT / "build" / "types"
+    link = folder / "scope"
+    if not link.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(ROOT, target_is_directory=True)
+    sys.path.insert(0, str(folder))
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
+
+
+if importlib.util.find_spec("scope") is None:
+    make_importable()
+importlib.import_module("scope.scope_addon")  # It keeps the machine code of what tests compile.
 
 # Blender reads this once, when bpy is first imported: tests must not write in the home folder.
 # Processes that this one starts use the same folder, and leave it.
@@ -36,73 +50,9 @@ if "BLENDER_USER_RESOURCES" not in os.environ:
 # Tests that use onnxruntime itself, not through Scope, do not report to its makers either.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-# In this order, ahead of all others, so that two processes never compile the same. The first file
-# compiles the solver, and the second a version of its own, whose process then takes the third,
-# which needs none. When the first is done, the fourth compiles all other kernels of a capture, and
-# the next six need none. A process is given another file when two tests are left of its own: the
-# long ones of these files come first in them. The rig that Rigify generates is shared in the same
-# way. Files that take long would otherwise end last, alone.
-FIRST = (
-    "solver/test_validation.py",
-    "solver/residuals/test_registry.py",
-    "capture/tracking/test_tracker.py",
-    "job/test_warm_up.py",
-    "tools/test_build_body.py",
-    "capture/tracking/test_people.py",
-    "fuzz/test_findings.py",
-    "tools/test_convert_networks.py",
-    "scene/rigs/test_rig_retarget.py",
-    "scene/export/test_export.py",
-    "tools/mocap/test_mocap_library.py",
-    "capture/test_pipeline.py",
-    "capture/test_pipeline_own_networks.py",
-    "ui/capture/test_capture_job.py",
-    "fuzz/test_kills.py",
-    "fuzz/test_faults_outputs.py",
-    "job/test_batch.py",
-    "machine_code/test_code_cache.py",
-    "test_cli.py",
-    "scene/rigs/test_rig_export.py",
-    "ui/test_compiled_solver.py",
-    "ui/edit/test_edit_operators.py",
-    "ui/pins/test_correction_operators.py",
-    "cluster/test_runner.py",
-    "scripts/test_build_extension.py",
-    "ui/capture/test_capture_panel.py",
-    "ui/pins/test_upright_operators.py",
-    "capture/test_pipeline_moving_camera.py",
-    "capture/camera/test_heading_drift.py",
-    "capture/test_pipeline_visitor.py",
-    "live/test_session.py",
-)
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_make_collect_report(
-    collector: pytest.Collector,
-) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Let every second process collect folders backwards.
-
-    Pytest compiles each file of tests for itself, which takes seconds, and keeps the code: two
-    processes compile a half each and find the other's.
-    """
-    report = yield
-    if IS_SECOND and isinstance(collector, pytest.Directory):
-        report.result.reverse()
-    return report
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files of `FIRST` first, and all others in one order in every process."""
-    places = {ROOT / "tests" / name: place for place, name in enumerate(FIRST)}
-    items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
-
 
 def pytest_collection_finish() -> None:
-    """Search for garbage less often, and never in what the collection made: it took a twentieth of
-    the time.
-    """
+    """Search for garbage less often, and never in what the collection made, which saves time."""
     gc.freeze()
     gc.set_threshold(10_000, 20, 20)
 
