@@ -5,13 +5,8 @@ measured.
 
 from __future__ import annotations
 
-from pathlib import Path
-from types import SimpleNamespace
-
 import numpy as np
-import pytest
 from scope.benchmarks import ablation
-from scope.benchmarks.perception.accuracy import CAMERAS, SHOWN
 from scope.benchmarks.perception.outline import silhouette
 from scope.scope_addon.capture.overlay.overlay_video import camera_vertices
 from scope.scope_addon.capture.perception.observation import PersonMask
@@ -19,82 +14,6 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.solver import Body
 
 from ..made_motion import made_motion
-
-
-def test_a_table_has_means_of_people_and_medians_of_iou(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(ablation, "RENDERS", tmp_path)
-    (tmp_path / "walks.mp4").touch()
-    camera = dict.fromkeys(SHOWN, 1.0) | {"jitter_rel": 7.0, "foot_slide_cm": 0.25}
-    clips: dict[str, dict[str, ablation.People]] = {
-        name: {"row": [camera | {"mpjpe_root": 60.0 + k, "pa_mpjpe": 40.0, "iou": 0.8 + 0.01 * k}]}
-        for k, name in enumerate(CAMERAS)
-    }
-    clips |= {"walks": {"row": [camera | {"mpjpe_root": 80.0, "pa_mpjpe": 50.0, "iou": 0.5}]}}
-    clips |= {
-        "development_00": {"row": [{"mpjpe_root": 90.0, "pa_mpjpe": 30.0}]},
-        "development_03": {
-            "row": [
-                {"mpjpe_root": 100.0, "pa_mpjpe": 40.0},
-                {"mpjpe_root": 110.0, "pa_mpjpe": 50.0},
-            ]
-        },
-        "development_06": {"row": [None]},
-        "jumps": {"row": [{"iou": 0.7}]},
-        "nobody": {"row": [None]},
-    }
-    shown = ablation.ablation_table(clips, {"row": {}}).splitlines()
-    assert "1 renders" in shown[0]
-    cells = [cell.strip() for cell in shown[-1].strip("|").split("|")]
-    expected = [
-        "row",
-        "61.5 / 40.0",
-        "7",
-        "0.25",
-        "80.0 / 50.0",
-        "100.0 / 40.0",
-        "",
-        "0.815",
-        "0.700",
-    ]
-    assert cells == expected
-
-
-def test_feet_that_never_stand_count_in_no_mean(
-    monkeypatch: pytest.MonkeyPatch, body: Body, tmp_path: Path
-) -> None:
-    """The tool has no sliding for a clip in which nobody stands; the means are of the other
-    clips.
-    """
-    motion = made_motion(body, np.zeros((1, body.K + 1, 3)), np.zeros((1, 3)))
-    track = SimpleNamespace(masks=())
-    observed = SimpleNamespace(
-        solve=lambda **_: [motion], tracks=[track], shot=SimpleNamespace(image_size=(640, 480))
-    )
-    figures = dict.fromkeys(SHOWN, 50.0) | {"foot_slide_cm": None}
-    monkeypatch.setattr(ablation, "observe_clip", lambda *_: observed)
-    monkeypatch.setattr(ablation, "evaluate_motion", lambda *_: figures)
-    rolls = ablation.measure_clip(
-        body, tmp_path / "cam1.mp4", tmp_path / "truth_cam1.npz", {"row": {}}
-    )
-    first = rolls["row"][0]
-    assert first is not None
-    assert np.isnan(first["foot_slide_cm"])
-    walks: dict[str, ablation.People] = {
-        "row": [dict(first) | {"foot_slide_cm": 0.5, "mpjpe_root": 70.0}]
-    }
-    shown = ablation.ablation_table({"cam1": rolls, "cam2": walks}, {"row": {}}).splitlines()[-1]
-    assert [cell.strip() for cell in shown.strip("|").split("|")][1:4] == [
-        "60.0 / 50.0",
-        "50",
-        "0.50",
-    ]
-
-
-def test_what_was_not_measured_is_a_dash() -> None:
-    shown = ablation.ablation_table({"jumps": {"row": [None]}}, {"row": {}}).splitlines()[-1]
-    assert [cell.strip() for cell in shown.strip("|").split("|")] == ["row", *"–––––", "", "–", "–"]
 
 
 def test_people_are_compared_with_themselves() -> None:

@@ -27,25 +27,6 @@ def test_only_what_is_worse_by_more_than_its_noise_fails(error, time, worse):
     assert verdict(RECORD, {"error": error, "time": time})[1] == worse
 
 
-def test_a_figure_without_a_record_fails_and_one_that_cannot_be_measured_does_not():
-    rows, worse = verdict(RECORD, {"error": 70.0, "new": 1.0})
-    assert worse == ["new"]
-    assert [row[-1] for row in rows] == ["", "not recorded"]
-
-
-def test_the_status_is_that_of_the_figures(monkeypatch, capsys):
-    found = {name: figure.value for name, figure in read().items()}
-    monkeypatch.setattr("sys.argv", ["gate"])
-    monkeypatch.setattr(gate, "clips", dict)
-    monkeypatch.setattr(gate, "ratios", lambda *_: {})
-    monkeypatch.setattr(gate, "accuracy", lambda *_: found)
-    assert gate.main() == 0
-    name = "pose2sim mpjpe_root"
-    found[name] += 1.01 * read()[name].noise
-    assert gate.main() == 1
-    assert f"worse than recorded: {name};" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("variables", "status"),
     [
@@ -78,10 +59,3 @@ def test_a_ratio_of_times_fails_only_if_it_is_worse_in_all_runs(monkeypatch):
     assert least(11.0, 10.0, 10.0) == ({"time": 11.0}, [10.0, 10.0])
     assert least(30.0, 11.0, 10.0) == ({"time": 11.0}, [10.0])
     assert least(30.0, 14.0, 13.0) == ({"time": 13.0}, [])
-
-
-def test_every_noise_is_smaller_than_its_figure_would_be_if_a_part_failed():
-    """Without the outline, errors on pose2sim grow by 6 %: the gate must see that."""
-    for name, figure in read().items():
-        if name.endswith(("mpjpe_root", "pa_mpjpe")):
-            assert figure.noise < 0.05 * figure.value, name

@@ -6,15 +6,11 @@ small program.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
-import av
-import numpy as np
 import pytest
 
 pytest.importorskip("pty", reason="the benchmark reads a terminal")
 from scope.benchmarks import interrupted
-from scope.scope_addon.capture.media.video import open_video
 
 from ..job.processes import wait_for
 
@@ -33,32 +29,6 @@ for k in range(1, 101):
         time.sleep(600)
 child.kill()
 """
-
-
-def test_a_clip_goes_there_and_back_again_at_an_even_rate(tmp_path: Path) -> None:
-    source = tmp_path / "source.mp4"
-    greys = [40, 90, 140, 190]
-    with av.open(str(source), "w") as target:
-        stream = target.add_stream("libx264", rate=30)
-        stream.width = 64
-        stream.height = 36
-        stream.pix_fmt = "yuv420p"
-        for grey in greys:
-            image = np.full((36, 64, 3), grey, np.uint8)
-            target.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        target.mux(stream.encode())
-    clip = tmp_path / "clip.mp4"
-    interrupted.make_clip(clip, 15, source)
-    with open_video(clip) as video:
-        assert (video.width, video.height, video.frame_count) == (1920, 1080, 15)
-        frames = list(video)
-    np.testing.assert_allclose(
-        [frame.timestamp_s for frame in frames], np.arange(15) / 30, atol=1e-6
-    )
-    expected = [greys[k] for k in (0, 1, 2, 3, 2, 1, 0, 1, 2, 3, 2, 1, 0, 1, 2)]
-    np.testing.assert_allclose([frame.image_rgb.mean() for frame in frames], expected, atol=4)
-    with open_video(clip) as video:
-        assert next(video.frames_from(8 / 30)).image_rgb.mean() == pytest.approx(140, abs=4)
 
 
 class RunThatIsWatched(interrupted.Run):

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import cv2
 import numpy as np
 import pytest
 from scope.benchmarks import stills
@@ -20,19 +19,6 @@ from scope.solver.body_file import ASSETS
 from ..made_motion import made_motion
 
 SAMPLE = stills.Clip(ASSETS / "sample" / "sample.mp4", ASSETS / "sample" / "sample_truth.npz")
-
-
-def test_images_are_the_frames_asked_for(tmp_path: Path) -> None:
-    """Each frame of the clip has its own brightness."""
-    video = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (64, 48))
-    for k in range(6):
-        writer.write(np.full((48, 64, 3), 40 * k, np.uint8))
-    writer.release()
-    found = {k: cv2.imread(str(path)).mean() for k, path in stills.frames_as_images(video, [1, 4])}
-    assert found == pytest.approx({1: 40.0, 4: 160.0}, abs=3)
-    with pytest.raises(ValueError, match="no frame 6"):
-        list(stills.frames_as_images(video, [6]))
 
 
 def test_the_truth_of_a_frame_has_no_error(monkeypatch: pytest.MonkeyPatch, body: Body) -> None:
@@ -65,25 +51,3 @@ def test_the_truth_of_a_frame_has_no_error(monkeypatch: pytest.MonkeyPatch, body
     assert first == pytest.approx((0.0, 0.0), abs=1e-3)
     assert second[0] > 300 * np.linalg.norm(moved[1] - moved[0], axis=1).mean()
     assert np.isnan(third).all()
-
-
-def test_table() -> None:
-    """Means are of clips, medians of people; who was not found is counted, and counts in
-    neither.
-    """
-    missed = (np.nan, np.nan)
-    clips = {"a": [(10.0, 1.0), (20.0, 2.0), missed], "b": [(45.0, 4.0)], "c": [missed]}
-    shown = stills.errors_table(
-        {"best": {"cameras": clips, "nobody": {"c": [missed]}}}
-    ).splitlines()
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in shown[2:]]
-    assert cells[0] == [
-        "best, cameras",
-        "5",
-        "30.0 (15.0 to 45.0)",
-        "20.0",
-        "2.8 (1.5 to 4.0)",
-        "2.0",
-        "2",
-    ]
-    assert cells[1] == ["best, nobody", "1", "", "", "", "", "1"]

@@ -20,7 +20,6 @@ from pathlib import Path
 from .commands import ACTIONS, CACHE, COMMANDS, INPUTS, Command
 from .system_calls import KILL, Traced, traced
 
-ROOT = Path(__file__).resolve().parents[2]
 OLD = b"an earlier result"
 REMOVALS = ("unlink", "rmdir")  # what could not be removed, the next run removes
 FOLDERS = ("in", "out", "tmp", "clips", "home")

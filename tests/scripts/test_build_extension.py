@@ -297,27 +297,6 @@ def changed(target, archive, contents):
 
 
 @pytest.mark.usefixtures("networks")
-def test_the_compiled_solver_can_be_left_out(with_empty_wheels, monkeypatch):
-    builder = with_empty_wheels
-    added = []
-    monkeypatch.setattr(builder, "add_kernels", lambda *arguments: added.append(arguments[1:3]))
-    assert run(builder, monkeypatch, "linux-x64", "--python", "3.13", "--no-kernels") == 0
-    assert added == []
-    assert run(builder, monkeypatch, "linux-x64", "--python", "3.13") == 0
-    assert added == [("linux-x64", "3.13")]
-
-
-def test_a_zip_for_a_distributions_blender_leaves_the_others_alone(with_empty_wheels, monkeypatch):
-    builder = with_empty_wheels
-    builder.DIST.mkdir()
-    (builder.DIST / "kept.zip").touch()
-    assert run(builder, monkeypatch, "linux-x64", "--python", "3.13", "--any-blender") == 0
-    names = sorted(p.name for p in builder.OTHER_DIST.iterdir())
-    assert names == [f"scope-0.1.0-python_3.13-linux_x64.{end}" for end in ("cdx.json", "zip")]
-    assert [p.name for p in builder.DIST.iterdir()] == ["kept.zip"]
-
-
-@pytest.mark.usefixtures("networks")
 def test_two_zips_for_one_blender_are_refused(with_empty_wheels, monkeypatch):
     if not hasattr(blenders_tool(), "pkg_manifest_detect_duplicates"):
         pytest.skip(f"the tool of Blender {bpy.app.version_string} does not look for them")
@@ -363,16 +342,3 @@ def test_no_shipped_module_uses_the_network_or_has_the_metadata_of_an_old_add_on
             assert not network & {name.split(".")[0] for name in names}, module
             if isinstance(node, ast.Name) and node.id == "bl_info":
                 raise AssertionError(f"{module} has the metadata of an old add-on")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [(["amiga"], "amiga"), (["linux-x64", "--python", "2.7"], "invalid choice: '2.7'")],
-)
-def test_bad_arguments(builder, monkeypatch, capsys, arguments, says):
-    try:
-        status = run(builder, monkeypatch, *arguments)
-    except SystemExit as stop:
-        status = stop.code
-    assert status == 2
-    assert says in capsys.readouterr().err

@@ -13,7 +13,6 @@ from types import SimpleNamespace
 
 import pytest
 from scope.scope_addon.cli import SAMPLE, build_parser
-from scope.scope_addon.footage import FOOTAGE_SUFFIXES
 from scope.scope_addon.motion import Motion
 
 from ..required import missing
@@ -102,12 +101,6 @@ def test_each_clip_is_a_task_with_results_of_its_own(folder):
         assert args.output == [Path(f"{out}.npz"), Path(f"{out}.glb")]
         assert args.report == Path(f"{out}.report.html")
         assert (args.people, args.height, args.quality) == ("all", "182", "best")
-
-
-def test_what_is_footage_is_the_same_as_in_a_batch(folder):
-    for suffix in FOOTAGE_SUFFIXES:
-        (folder / f"clip_{suffix[1:]}{suffix}").touch()
-    assert len(compiled(given(folder))["tasks"]) == len(FOOTAGE_SUFFIXES)
 
 
 @pytest.mark.parametrize(

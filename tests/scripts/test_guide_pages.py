@@ -105,9 +105,3 @@ def test_nothing_that_is_written_is_lost(extension):
         )
         code_languages = set(re.findall(r"^```(\w+)$", source, re.M))
         assert set(re.findall(r"\w+", source)) - shown - code_languages == set(), path.name
-
-
-def test_marks_of_emphasis_are_gone(extension):
-    for path in extension[1]:
-        text = re.sub(r"<(pre|code)>.*?</\1>", "", path.read_text("utf-8"), flags=re.S)
-        assert not re.search(r"\*\*|\]\(|^#+ |^\|", text, re.M), path.name

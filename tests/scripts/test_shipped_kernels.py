@@ -60,12 +60,6 @@ def test_code_of_other_sources_is_not_shipped(shipped, staging, changed, capsys,
     assert "no compiled code for windows-x64, Python 3.13" in capsys.readouterr().err
 
 
-def test_code_for_another_python_is_not_shipped(shipped, staging, monkeypatch):
-    monkeypatch.setattr(shipped, "_THIS", {})
-    keep(shipped, staging, WHEELS[:1])
-    assert not shipped.add_kernels(staging, "windows-x64", "3.11", WHEELS)
-
-
 def test_the_processors_are_those_that_the_solver_looks_for(shipped):
     from scope.scope_addon.machine_code.code_folders import LEVELS
 

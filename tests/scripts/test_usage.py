@@ -42,13 +42,6 @@ def test_a_script_prints_its_own_usage_in_any_folder(name, option, monkeypatch):
     assert len(done.stdout.splitlines()) < 15
 
 
-def test_the_usage_names_every_part():
-    assert len(parts()) > 10
-    assert [
-        part for part in parts() if not re.search(rf"\b{part}\b", run("blender", "--help").stdout)
-    ] == []
-
-
 def test_an_unknown_part_is_refused_with_those_that_exist():
     done = run("blender", "--part", "panel", "--part", "nonsense")
     assert done.returncode != 0
@@ -56,11 +49,3 @@ def test_an_unknown_part_is_refused_with_those_that_exist():
     (line,) = done.stderr.splitlines()
     assert line.startswith("blender: there is no part 'nonsense'; there are panel ")
     assert [part for part in parts() if not re.search(rf"\b{part}\b", line)] == []
-
-
-@pytest.mark.parametrize("arguments", [["--part"], ["--seed"], ["--parts", "panel"]])
-def test_other_mistakes_are_one_sentence(arguments):
-    done = run("blender", *arguments)
-    assert done.returncode != 0
-    assert len(done.stderr.splitlines()) == 1
-    assert "--help shows" in done.stderr

@@ -14,8 +14,6 @@ import onnxruntime
 import pytest
 from scope.scope_addon.errors import SetupError
 from scope.solver.errors import ModelFileError
-from scope.tools.convert_networks import build
-from scope.tools.convert_networks.build import build_networks
 from scope.tools.convert_networks.catalogue import NETWORKS, WHEEL, Network
 from scope.tools.convert_networks.constants import densify
 from scope.tools.convert_networks.fetch import fetch, read_member
@@ -209,11 +207,6 @@ def test_densify_rejects_hostile_layouts(rows: DimensionMetadata) -> None:
         )
 
 
-def test_rejects_other_files() -> None:
-    with pytest.raises(ModelFileError, match="picture.tflite: not a TFL3 FlatBuffer"):
-        read_model(b"\x89PNG\r\n\x1a\n" + bytes(100), "picture.tflite")
-
-
 def test_damaged_files_give_a_clear_error_or_convert() -> None:
     network = next(n for n in NETWORKS if n.name == "pose_detection")
     whole = model_bytes(network)
@@ -232,28 +225,6 @@ def test_damaged_files_give_a_clear_error_or_convert() -> None:
         except ModelFileError:
             refused += 1
     assert refused >= 20
-
-
-def test_wrong_expectation_is_named() -> None:
-    network = NETWORKS[0]
-    model = read_model(model_bytes(network), network.member)
-    with pytest.raises(ModelFileError, match="expected \\(1, 9, 9, 3\\)"):
-        convert_model(model, (1, 9, 9, 3), network.outputs)
-    with pytest.raises(ModelFileError, match=r"output 1 \(scores\)"):
-        convert_model(model, network.input_shape, ((1, "scores", (1, 2254, 2)),))
-
-
-def test_second_build_does_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    some = NETWORKS[:2]
-    monkeypatch.setattr(build, "NETWORKS", some)
-    for network in some:
-        model_bytes(network)
-    assert build_networks(tmp_path, DOWNLOADS) == [network.name for network in some]
-    assert "Apache License" in (tmp_path / "LICENSE-mediapipe.txt").read_text("utf-8")
-    assert build_networks(tmp_path, DOWNLOADS) == []
-    (tmp_path / "pose_detection.onnx").write_bytes(b"cut short")
-    assert build_networks(tmp_path, DOWNLOADS) == ["pose_detection"]
-    assert not list(tmp_path.glob(".*.part"))
 
 
 def test_damaged_download_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

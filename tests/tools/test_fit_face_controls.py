@@ -7,17 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 from scope.scope_addon.retarget.face.face_controls import built_in
-from scope.solver.names import EXPRESSIONS
 from scope.tools.build_body.source import fetch_wheel
 from scope.tools.fit_face_controls.amounts import (
     Problem,
-    eye_amounts,
-    free_of,
     jacobian,
-    mirror,
-    other,
     share_shown,
-    write_map,
 )
 from scope.tools.fit_face_controls.default_rig import CHANNELS as OF_DEFAULT_RIG
 from scope.tools.fit_face_controls.default_rig import SkinnedFace
@@ -51,44 +45,6 @@ def test_known_amounts_are_found_and_small_ones_left_out():
     assert rig.fit(rig.show(np.array([15.0, 0.0, 0.1, 0.01])), free, base, 8)[3] == 0
     beyond = rig.fit(rig.show(np.array([15.0, 0.3, 0.0, 0.0])), free, np.array([15.0, 0, 0, 0]), 8)
     np.testing.assert_allclose(beyond, [0, 0.3, 0, 0], atol=1e-3)
-
-
-def test_the_jaw_moves_where_the_expression_is_its_own():
-    assert free_of(CHANNELS, "jawOpen", "jaw").tolist() == [True] * 4
-    assert free_of(CHANNELS, "mouthSmileLeft", "jaw").tolist() == [False, True, True, True]
-    assert eye_amounts("eyeLookInLeft") == {("eye.L", "yaw"): -15.0}
-    assert eye_amounts("eyeLookInRight") == {}
-
-
-def test_the_other_side():
-    names = ["lip.T.L.001", "lips.R", "jaw", "eyeLookInLeft", "mouthRight", "jawOpen"]
-    assert [other(name) for name in names] == [
-        *("lip.T.R.001", "lips.L", "jaw", "eyeLookInRight", "mouthLeft", "jawOpen"),
-    ]
-    assert mirror({("lips.L", "left"): 0.1, ("jaw", "pitch"): 9.0}) == {
-        ("lips.R", "left"): -0.1,
-        ("jaw", "pitch"): 9.0,
-    }
-
-
-def test_a_map_has_both_sides_without_what_is_small(tmp_path):
-    fitted = {name: {} for name in EXPRESSIONS if not name.endswith("Right")}
-    fitted["jawOpen"] = {
-        ("jaw", "pitch"): 17.26,
-        ("lips.L", "left"): -0.05,
-        ("lips.R", "left"): 0.07,
-        ("jaw", "up"): 0.01,
-    }
-    fitted["mouthLeft"] = {("lip.B", "left"): 0.104}
-    found = write_map(tmp_path / "map.json", fitted, {"eyeBlinkLeft": {("lid.L", "up"): -1.0}})
-    assert found.controls == {
-        "jaw": {"pitch": {"jawOpen": 17.3}},
-        "lips.L": {"left": {"jawOpen": -0.06}},
-        "lips.R": {"left": {"jawOpen": 0.06}},
-        "lip.B": {"left": {"mouthLeft": 0.1, "mouthRight": -0.1}},
-        "lid.L": {"up": {"eyeBlinkLeft": -1.0}},
-        "lid.R": {"up": {"eyeBlinkRight": -1.0}},
-    }
 
 
 def test_mpfbs_map_moves_its_mesh_as_the_shapes_do():

@@ -4,12 +4,8 @@ no PyTorch.
 """
 
 import numpy as np
-import pytest
-from scope.scope_addon.errors import MotionFileError
 from scope.solver.rotations import exp
-from scope.tools.mocap.kinds import KINDS
-from scope.tools.mocap.position_sets import LAYOUTS
-from scope.tools.train_lifter.motions import KIND_SHARES, REPEATED, Motions, load_motions
+from scope.tools.train_lifter.motions import Motions, load_motions
 from scope.tools.train_lifter.split import held_out_frames, is_held_out, training_frames
 
 
@@ -50,45 +46,6 @@ def test_takes_of_the_sets_are_held_out_by_performer_only():
     assert held_out_frames(motions).take.tolist() == [195, 196, 197, 198]
 
 
-def test_rare_poses_are_drawn_more_often_than_their_number_says():
-    """Ninety frames of one pose and ten of another: shares per frame in the ratio of 1/√90 to
-    1/√10.
-    """
-    motions = motions_of(["cmu_01"] * 100)
-    motions.Omega[90:, 5] = exp(np.array([1.0, 0, 0]))
-    # Of a hundred identical centres, the first takes all frames of its pose.
-    share = motions.share
-    assert np.isclose(share.sum(), 1)
-    assert np.allclose(share[:90], share[0])
-    assert np.isclose(share[95] / share[0], 3.0)
-
-
-def test_common_poses_of_people_who_stand_are_drawn_as_often_as_they_are():
-    motions = motions_of(["cmu_01"] * 100, kinds=["stand"] * 100)
-    motions.Omega[90:, 5] = exp(np.array([1.0, 0, 0]))
-    assert np.allclose(motions.share, 0.01)
-
-
-def test_kinds_have_fixed_shares_and_sets_theirs_within_a_kind():
-    kinds = ["stand"] * 60 + ["walk"] * 20 + ["sit"] * 20
-    sets = ["reactidle"] * 50 + ["style100"] * 10 + ["cmu_more"] * 40
-    motions = motions_of(["a"] * 100, kinds, sets)
-    given = sum(KIND_SHARES[kind] for kind in ("stand", "walk", "sit"))
-    for kind in ("stand", "walk", "sit"):
-        assert motions.share[motions.kinds == kind].sum() == pytest.approx(
-            KIND_SHARES[kind] / given
-        )
-    assert motions.share[55] / motions.share[0] == pytest.approx(
-        REPEATED["style100"] / REPEATED["reactidle"]
-    )
-
-
-def test_every_kind_and_set_has_a_share():
-    assert set(KIND_SHARES) == set(KINDS)
-    assert sum(KIND_SHARES.values()) == pytest.approx(1.0)
-    assert set(REPEATED) == {*LAYOUTS, "cmu_asf_amc", "cmu_expmap", "deepmimic"}
-
-
 def test_only_valid_frames_are_read_with_their_take_s_rate_and_performer(tmp_path):
     poses = np.zeros((5, 72), np.float32)
     poses[:, 3] = 0.1 * np.arange(5)
@@ -114,20 +71,3 @@ def test_only_valid_frames_are_read_with_their_take_s_rate_and_performer(tmp_pat
         motions.Omega[:, 1], exp(np.array([[0.1 * k, 0, 0] for k in (0, 2, 3, 4)])), atol=1e-6
     )
     assert [end.tolist() for end in motions.ends] == [[0, 0, 2, 2], [1, 1, 3, 3]]
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(MotionFileError, match="absent"):
-        load_motions(tmp_path / "absent.npz")
-
-
-def test_kinds_without_a_share_are_named(tmp_path):
-    path = tmp_path / "motions.npz"
-    take = {f"take_{key}": np.array(["x"]) for key in ("source", "subject", "set")}
-    frames = {"poses": np.zeros((1, 72)), "valid": np.array([True])}
-    np.savez(path, **frames, **take, take_start=[0, 1], take_fps=[30.0], take_kind=["swim"])
-    with pytest.raises(MotionFileError, match="no share for swim, x"):
-        load_motions(path)
-    np.savez(path, **frames, **take, take_start=[0, 1], take_fps=[30.0])
-    with pytest.raises(MotionFileError, match="no kinds"):
-        load_motions(path)

@@ -79,27 +79,3 @@ def test_who_squats_keeps_the_feet_as_they_were(body):
     assert (root[squats] >= 0).all()  # the trunk leans forward
     assert (hip[squats] < 0).all()  # and the thighs are ahead of it
     assert (ankle[squats] <= 0).all()
-
-
-def test_some_who_squat_stretch_their_arms_forward(body):
-    sampler = standing_sampler(body, 0.0)
-    windows = sampler._states.reshape(20, 1, -1, 3, 3).expand(20, WINDOW, -1, 3, 3)[
-        torch.zeros(400, dtype=torch.long)
-    ]
-    Omega = sampler.squats(windows, torch.ones(400, dtype=torch.bool))[:, MIDDLE]
-    for sign, side in ((1.0, "left"), (-1.0, "right")):
-        shoulder, elbow = (
-            body.joint_names.index(f"{side}_{joint}") for joint in ("shoulder", "elbow")
-        )
-        # The recording turns no joint between root and shoulder, and upper arms at rest point to
-        # their side.
-        arm = (Omega[:, 0] @ Omega[:, shoulder])[:, :, 0] * sign
-        ahead = arm[:, 2] > 0.5
-        squats = turns_about_x(Omega[:, None].expand(-1, WINDOW, -1, -1, -1), body, "knee") > 0.01
-        assert (ahead & ~squats).sum() == 0
-        assert ahead.sum() / squats.sum() == pytest.approx(augment.ARMS_AHEAD_SHARE, abs=0.1)
-        assert arm[ahead, 1].mean().abs() < 0.1  # level
-        assert arm[ahead, 0].mean().abs() < 0.1  # neither across nor to the side
-        # the forearm's component to the front of the upper arm at rest
-        bend = sign * Omega[ahead, elbow][:, 2, 0]
-        assert (bend >= -1e-4).all()  # elbows bend forwards, not backwards

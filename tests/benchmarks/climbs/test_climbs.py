@@ -8,13 +8,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.benchmarks.climbs import accuracy
-from scope.benchmarks.climbs.accuracy import climbs, compare, truth_of, world_mm
+from scope.benchmarks.climbs.accuracy import compare, world_mm
 from scope.benchmarks.climbs.draw import draw_climb, rise_m
 from scope.benchmarks.perception.held_out import Take
 from scope.benchmarks.scenes.draw import FPS
 from scope.benchmarks.scenes.people import LIMB_JOINTS
-from scope.benchmarks.scenes.scene import STATIC, Scene, write_truth
+from scope.benchmarks.scenes.scene import Scene, write_truth
 from scope.solver import Body
 from scope.solver.rotations import exp, log
 
@@ -63,30 +62,6 @@ def captured(body: Body, scene: Scene, share: float) -> SimpleNamespace:
     )
 
 
-def test_a_climb_rises_before_a_camera_at_rest(body, scene):
-    limbs = scene.people[0].limbs(body)
-    assert len(scene) == 60
-    assert rise_m(limbs) == pytest.approx(BOX_M, abs=0.1)  # times the ratio of leg lengths
-    assert scene.camera == STATIC
-    assert np.ptp(scene.world_from_camera, axis=0).max() == 0
-    pixels = scene.project(scene.to_camera(limbs))
-    assert ((pixels >= 0) & (pixels < scene.size)).all()
-
-
-def test_recordings_that_are_too_short_are_refused(body, takes):
-    short = Take(
-        0,
-        "up_0",
-        takes[0].poses[:60],
-        takes[0].trans[:60],
-        takes[0].valid[:60],
-        takes[0].betas,
-        30.0,
-    )
-    with pytest.raises(ValueError, match="climb 1"):
-        draw_climb(body, [short], 1)
-
-
 def test_a_rise_is_that_of_the_lower_ankle_and_not_of_a_knee():
     limbs = np.zeros((40, len(LIMB_JOINTS), 3))
     # a foot in the air
@@ -119,11 +94,3 @@ def test_a_capture_that_is_the_truth_has_no_error_and_half_the_rise_is_half(body
     low = compare(body, captured(body, scene, 0.5), "climb_0", truth)
     assert low["rise_share"] == pytest.approx(0.5, abs=1e-3)
     assert low["world_mm"] > 50
-
-
-def test_without_clips_it_says_what_to_run(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(accuracy, "FOLDER", tmp_path)
-    (tmp_path / "climb_0.mp4").touch()  # without ground truth
-    assert not truth_of(tmp_path / "climb_0.mp4").exists()
-    assert climbs(quick=True) == {}
-    assert "./scripts/bench climbs" in capsys.readouterr().err

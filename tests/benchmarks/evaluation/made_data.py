@@ -18,7 +18,6 @@ from scope.solver.rotations import exp
 from ...untrusted.conftest import dump_python2, make_tables
 
 K = np.array([[940.0, 0, 319.5], [0, 940, 239.5], [0, 0, 1]])  # of the sample clip
-SIZE = (480, 640)
 
 
 def write_pictures(folder: Path, names: list[str]) -> None:

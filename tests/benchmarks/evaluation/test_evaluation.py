@@ -11,7 +11,7 @@ from scope.benchmarks.evaluation import run
 from scope.benchmarks.evaluation.__main__ import main
 from scope.scope_addon.cli import SAMPLE
 
-from .made_data import K, rigid, table_3dpw, write_3dhp, write_3dpw
+from .made_data import rigid, table_3dpw, write_3dhp, write_3dpw
 
 COUNT = 8
 
@@ -93,25 +93,6 @@ def test_an_interrupted_run_goes_on(tmp_path, capsys, monkeypatch):
     assert len(seen) == 8  # other options are another capture
 
 
-def test_footage_that_cannot_be_decoded_is_told_and_left_out(tmp_path, capsys, monkeypatch):
-    joints = np.random.default_rng(0).normal(scale=500, size=(2, 17, 3)) + [0, 0, 4000]
-    write_3dhp(tmp_path / "data", joints, np.ones(2))
-    for picture in (tmp_path / "data/mpi_inf_3dhp_test_set/TS2/imageSequence").iterdir():
-        picture.write_bytes(b"no picture")
-    command = [
-        "3dhp",
-        str(tmp_path / "data"),
-        "--results",
-        str(tmp_path / "results"),
-        "--clips",
-        "TS2",
-    ]
-    assert main(command) == 1
-    err = capsys.readouterr().err
-    assert "TS2 is not in these figures:" in err
-    assert "Traceback" not in err
-
-
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
@@ -133,29 +114,3 @@ def test_wrong_arguments_are_one_sentence(tmp_path, capsys, arguments, status, s
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert said in captured.err
-
-
-def test_a_pattern_that_no_clip_has_is_told(tmp_path, capsys):
-    write_3dpw(tmp_path, table_3dpw("a", [np.ones((2, 24, 3))], rigid(2)))
-    assert main(["3dpw", str(tmp_path), "--clips", "b*"]) == 2
-    assert "no clip" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"\x93NUMPY", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order'"]
-)
-def test_a_damaged_regressor_is_told(tmp_path, capsys, content):
-    (tmp_path / "J.npy").write_bytes(content)
-    assert main(["3dpw", str(tmp_path), "--regressor", str(tmp_path / "J.npy")]) == 1
-    assert "J.npy is not a readable .npy file" in capsys.readouterr().err
-
-
-def test_a_regressor_of_other_joints_is_told(tmp_path, capsys):
-    np.save(tmp_path / "J.npy", np.zeros((9, 6890)))
-    assert main(["3dpw", str(tmp_path), "--regressor", str(tmp_path / "J.npy")]) == 1
-    assert "must have shape (17, any), but has (9, 6890)" in capsys.readouterr().err
-
-
-def test_k_is_the_sample_clips():
-    with np.load(SAMPLE.with_name("sample_truth.npz")) as file:
-        assert np.allclose(file["intrinsics"], K)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -57,27 +56,6 @@ def test_the_similarity_agrees_with_horns(with_scale, mirrored):
         assert np.allclose(moved, by_quaternion(source, target, with_scale), atol=1e-9)
 
 
-def test_no_small_change_of_the_similarity_is_better():
-    source, target = RNG.normal(size=(2, 9, 3))
-    scale, R, t = metrics.similarity(source, target)
-
-    def cost(scale, R, t):
-        return np.square(scale * source @ R.T + t - target).sum()
-
-    best = cost(scale, R, t)
-    for axis, sign in itertools.product(range(3), (-1, 1)):
-        step = sign * 1e-3 * np.eye(3)[axis]
-        assert cost(scale, exp(step) @ R, t) > best
-        assert cost(scale, R, t + step) > best
-    assert min(cost(scale * 1.001, R, t), cost(scale * 0.999, R, t)) > best
-
-
-def test_coinciding_points_have_no_scale():
-    scale, R, t = metrics.similarity(np.ones((4, 3)), CORNERS)
-    assert scale == 1.0
-    assert np.allclose(metrics.aligned(np.ones((4, 3)), (scale, R, t)), CORNERS.mean(axis=0))
-
-
 def test_joint_errors_by_hand():
     captured = CORNERS + np.array([[0.003, 0.004, 0], [0, 0, 0.1], [0, 0, 0], [0, 0.15, 0]])
     errors = metrics.joint_errors(captured[None], CORNERS[None])
@@ -98,10 +76,6 @@ def test_pck_and_auc_by_hand():
     # Of the 31 thresholds, 0 is above 30, 149.9 above the last one's 1, 150 above none, 75 above
     # those from 80 on: 15.
     assert metrics.auc(errors) == pytest.approx([100 * (30 + 1 + 0 + 15) / (4 * 31), 0.0])
-
-
-def test_the_best_auc_is_below_100_as_in_the_official_program():
-    assert metrics.auc(np.zeros((1, 14))) == pytest.approx([100 * 30 / 31])
 
 
 def test_the_challenges_pck_and_auc_by_hand():
@@ -140,10 +114,6 @@ def test_root_translation_error_by_hand():
     assert metrics.root_translation_error(2 * turned, true) == pytest.approx([50, 25, 0, 25, 50])
 
 
-def test_a_root_that_stands_still_has_no_translation_error():
-    assert np.isnan(metrics.root_translation_error(np.zeros((3, 3)), np.ones((3, 3)))).all()
-
-
 def test_world_errors_are_of_segments_of_100_frames():
     true = RNG.normal(size=(250, 6, 3)) + np.arange(250)[:, None, None] * [0.01, 0, 0]
     moves = [0.5 * true[:100] + 3, 2 * true[100:200] @ exp(np.array([0, 1.0, 0])).T, true[200:] - 1]
@@ -154,15 +124,6 @@ def test_world_errors_are_of_segments_of_100_frames():
     one[50:] += 1
     assert metrics.wa_mpjpe(one, true)[:100].min() > 1
     assert metrics.wa_mpjpe(one, true)[100:] == pytest.approx(np.zeros(150), abs=1e-8)
-
-
-def test_w_mpjpe_lets_errors_grow_after_the_first_two_frames():
-    true = RNG.normal(size=(40, 6, 3))
-    drifting = true + 0.01 * np.maximum(np.arange(40) - 1, 0)[:, None, None] * [1, 0, 0]
-    assert metrics.w_mpjpe(drifting, true) == pytest.approx(
-        10.0 * np.maximum(np.arange(40) - 1, 0), abs=1e-8
-    )
-    assert metrics.wa_mpjpe(drifting, true).mean() < metrics.w_mpjpe(drifting, true).mean()
 
 
 def test_world_errors_frame_by_frame_with_horns_alignment():

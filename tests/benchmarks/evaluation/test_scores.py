@@ -123,18 +123,6 @@ def test_people_are_told_apart_by_the_image(body):
     assert found.means()["mpjpe"] == pytest.approx(0, abs=1e-4)
 
 
-def test_someone_else_is_not_taken_for_the_person(body):
-    truth = Truth([person(body, walking(body, -1.2, 1))], K)
-    assert module.assign(clip(alone=False), truth, [walking(body, 1.2, 2)]) == [None]
-
-
-def test_nobody_was_found(body):
-    found = module.score_clip(
-        clip(), Truth([person(body, walking(body))]), body, [], PROTOCOLS["rich"]
-    )
-    assert (found.missed, found.seen, found.means()) == (1, 0, {})
-
-
 def test_means_are_over_frames_not_clips():
     scores = module.Scores({"mpjpe": [np.array([1.0, 1.0, 1.0])]})
     other = module.Scores({"mpjpe": [np.array([5.0])]})

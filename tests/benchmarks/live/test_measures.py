@@ -8,12 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.benchmarks.live.measures import (
-    common_rows,
     compared,
     jerk,
-    lowest_sole_m,
-    seen_from_the_world,
-    world_joints,
 )
 from scope.scope_addon.motion import Motion
 from scope.solver import Body, rotations
@@ -44,20 +40,6 @@ def walking(body: Body) -> Motion:
     return replace(motion, joints_cam=joints)
 
 
-def test_joints_in_the_world_are_those_of_the_poses(body: Body, walking: Motion) -> None:
-    R = rotations.exp(walking.poses.reshape(-1, body.K + 1, 3).astype(float))
-    truth = body.forward_kinematics(R, walking.trans, walking.betas)[1]
-    np.testing.assert_allclose(world_joints(walking), truth, atol=1e-5)
-    np.testing.assert_allclose(world_joints(seen_from_the_world(walking)), truth, atol=1e-5)
-
-
-def test_only_frames_in_which_both_are_valid_count(walking: Motion) -> None:
-    live = replace(walking, frames=walking.frames + 2, valid=walking.frames != 3)
-    ours, theirs = common_rows(live, walking)
-    assert list(ours) == [0, 1, 2, 4, 5, 6, 7, 8, 9]
-    assert list(theirs) == [2, 3, 4, 6, 7, 8, 9, 10, 11]
-
-
 def test_a_hand_that_is_elsewhere_and_twice_the_jitter(body: Body, walking: Motion) -> None:
     """All joints but the pelvis are off by 3 cm; dropped frames are far off, and do not count."""
     off = walking.joints_cam + np.array([0.03, 0, 0], np.float32)
@@ -70,21 +52,3 @@ def test_a_hand_that_is_elsewhere_and_twice_the_jitter(body: Body, walking: Moti
     assert compared(replace(walking, joints_cam=twice), walking, body)["jitter"] == pytest.approx(
         2.0, rel=1e-3
     )
-
-
-def test_the_lowest_sole_follows_the_body(body: Body) -> None:
-    """The soles of a body at rest are its lowest vertices; in the second of three frames, it is 20
-    cm lower.
-    """
-    upright = np.zeros((3, body.K + 1, 3))
-    upright[:, 0, 0] = np.pi / 2  # the body's y axis becomes the world's z axis
-    trans = (
-        np.array([[0, 0, 1.2], [0, 0, 1.0], [0, 0, 1.3]]) - body.rest_joints(np.zeros(body.P))[0]
-    )
-    motion = made_motion(
-        body, upright, trans, joints_cam=np.random.default_rng(0).normal(size=(3, body.K + 1, 3))
-    )
-    lowest_vertex = (body.rest_vertices(np.zeros(body.P)) - body.rest_joints(np.zeros(body.P))[0])[
-        :, 1
-    ].min()
-    assert lowest_sole_m(motion, np.arange(3), body) == pytest.approx(1.0 + lowest_vertex, abs=0.01)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.benchmarks.perception.faces import BLINKS, closures, pooled
+from scope.benchmarks.perception.faces import BLINKS, closures
 from scope.solver.names import EXPRESSIONS
 
 
@@ -26,13 +26,3 @@ def blinks(*starts):
 )
 def test_closures_are_matched_in_time(found, figures):
     assert closures(blinks(*found), blinks(10, 40), np.zeros(60, int)) == figures
-
-
-def test_eyes_that_never_close_have_no_offset():
-    assert np.isnan(closures(blinks(), blinks(10), np.zeros(60, int))["closed_frames"])
-
-
-def test_the_nearest_sequence_that_does_not_decrease():
-    np.testing.assert_allclose(
-        pooled(np.array([1.0, 3, 2, 2, 5, 4])), [1, 7 / 3, 7 / 3, 7 / 3, 4.5, 4.5]
-    )

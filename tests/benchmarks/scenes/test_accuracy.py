@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scope.benchmarks.scenes import accuracy
 from scope.benchmarks.scenes.people import LIMB_JOINTS
-from scope.scope_addon.errors import NoPersonError
 
 T = 6
 FOCAL = 500.0
@@ -82,50 +81,11 @@ def test_errors_are_those_put_in(body, truth, monkeypatch):
     assert second.size == pytest.approx(body.stature(np.zeros(body.P)) / 1.4)
 
 
-def test_who_is_not_captured_has_no_errors(body, truth, monkeypatch):
-    first, second = evaluate(body, truth, [motion(body, truth["limbs_cam"][0])], monkeypatch)
-    assert np.isfinite(first.mpjpe_root).all()
-    assert np.isnan(second.mpjpe_root).all()
-
-    def nobody(*_):
-        raise NoPersonError("no person found")
-
-    monkeypatch.setattr(accuracy, "capture", nobody)
-    both = accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth)
-    assert all(np.isnan(result.mpjpe_root).all() for result in both)
-
-
 def test_a_captured_person_counts_for_one_true_person_only(body, truth, monkeypatch):
     truth["limbs_cam"][1] = truth["limbs_cam"][0] + [0.2, 0.0, 0.1]  # almost in front of each other
     first, second = evaluate(body, truth, [motion(body, truth["limbs_cam"][1])], monkeypatch)
     assert np.isnan(first.mpjpe_root).all()
     np.testing.assert_allclose(second.mpjpe_root, 0.0, atol=1e-6)
-
-
-def test_statures_are_given_in_order_of_size_to_a_body_that_can_have_them(body, truth, monkeypatch):
-    given = []
-
-    def found(_, body, options):
-        given.append((body.name, options.heights_m))
-        return SimpleNamespace(motions=[])
-
-    monkeypatch.setattr(accuracy, "capture", found)
-    truth["limbs_cam"][0, ..., 2] += 1.0  # appears smaller
-    accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth, statures_given=True)
-    truth["stature_m"][1] = 1.5
-    accuracy.evaluate_scene(body, accuracy.FOLDER / "test_01.mp4", truth, statures_given=True)
-    assert given == [("scope_child", (1.4, 1.7)), ("scope", (1.5, 1.7))]
-
-
-def test_frames_in_which_nothing_is_visible_are_left_out(body, truth, monkeypatch):
-    truth["hidden"][0, :2] = True
-    valid = np.arange(T) > 1
-    rows = accuracy.groups(
-        evaluate(body, truth, [motion(body, truth["limbs_cam"][0], valid)], monkeypatch)
-    )
-    assert rows["indoors"]["found"].people == 2
-    # the first in all frames that count, the second in none
-    assert rows["all"]["found"].mean == 0.5
 
 
 def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
@@ -143,42 +103,3 @@ def test_groups_are_of_frames_and_of_people(body, truth, monkeypatch):
     assert rows["stature below 1.5 m"]["mpjpe_root"].mean == pytest.approx(1.0)
     assert rows["all"]["found"].mean == 1.0
     assert "travelling camera" not in rows
-
-
-def test_a_group_of_which_nobody_was_found_has_dashes_in_the_tables(
-    body, truth, monkeypatch, capsys
-):
-    evaluated = evaluate(body, truth, [motion(body, truth["limbs_cam"][0])], monkeypatch)
-    accuracy._tables("test", {"default preset": evaluated})
-    lines = capsys.readouterr().out.splitlines()
-    cells = {
-        line.split("|")[1].strip(): [cell.strip() for cell in line.split("|")[2:-1]]
-        for line in lines
-        if line
-    }
-    assert cells["stature below 1.5 m"] == ["1", "–", "–", "0 %", "–"]
-    assert cells["1.5 to 1.75 m"][:2] == ["1", "0.0"]
-    assert "nan" not in "\n".join(lines)
-
-
-def test_variants_are_compared_where_both_found_the_person(body, truth, monkeypatch):
-    right = truth["limbs_cam"][0]
-    wrong = truth["limbs_cam"][0].copy()
-    wrong[:, LIMB_JOINTS.index("left_wrist"), 2] += 0.12
-    default = evaluate(body, truth, [motion(body, right, np.arange(T) > 1)], monkeypatch)
-    other = evaluate(
-        body, truth, [motion(body, wrong), motion(body, truth["limbs_cam"][1])], monkeypatch
-    )
-    more = accuracy.more_than(default, other)
-    assert (more.people, more.mean) == (1, pytest.approx(10.0))
-
-
-def test_people_are_told_apart_by_their_performers(body, truth, monkeypatch):
-    captured = [motion(body, truth["limbs_cam"][k]) for k in range(2)]
-    rows = accuracy.by_performer(evaluate(body, truth, captured, monkeypatch))
-    assert list(rows) == ["all, performers drawn", "climber_a", "fencer"]
-    assert rows["all, performers drawn"]["mpjpe_root"].people == 2
-    assert rows["fencer"]["found"].mean == 1.0
-    assert rows["climber_a"]["size_off"].mean == pytest.approx(
-        100 * abs(body.stature(np.zeros(body.P)) / 1.4 - 1)
-    )

@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scope.benchmarks.scenes.draw import look_at
-from scope.benchmarks.scenes.people import LIMB_JOINTS, Person
+from scope.benchmarks.scenes.people import Person
 from scope.benchmarks.scenes.scene import OUTDOORS, STATIC, TEST, Block, Scene, write_truth
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 
@@ -40,27 +38,6 @@ def scene(body):
     )
 
 
-def test_what_the_box_hides(body, scene):
-    hidden = dict(zip(LIMB_JOINTS, scene.hidden(scene.people[0], body)[0], strict=True))
-    assert hidden["left_ankle"]
-    assert hidden["right_ankle"]
-    assert not hidden["left_hip"]
-    assert not hidden["right_wrist"]
-
-
-def test_who_walks_past_hides_the_other(body, scene):
-    """Somebody 1.5 m nearer to the camera stands in front of the left side only."""
-    behind = scene.people[0]
-    aside = behind.joints(body)[0, body.joint_names.index("left_shoulder"), 0]
-    front = replace(behind, trans=behind.trans + [2.5 / 4.0 * aside + 0.1, -1.5, 0.0])
-    both = replace(scene, people=(behind, front), block=None)
-    hidden = dict(zip(LIMB_JOINTS, both.behind_others(behind, body)[0], strict=True))
-    assert hidden["left_shoulder"]
-    assert not hidden["right_knee"]
-    assert not hidden["right_ankle"]
-    assert not both.behind_others(front, body).any()
-
-
 def test_a_box_hides_what_a_walk_along_the_ray_meets():
     rng = np.random.default_rng(2)
     box = Block(np.array([-0.5, 1.0, 0.0]), np.array([0.5, 1.6, 1.0]))
@@ -70,10 +47,6 @@ def test_a_box_hides_what_a_walk_along_the_ray_meets():
     met = ((steps > box.low) & (steps < box.high)).all(axis=-1).any(axis=0)
     assert 20 < met.sum() < 480
     assert (box.hides(eye, points) == met).mean() > 0.995
-
-
-def test_the_angle_of_view(body, scene):
-    np.testing.assert_allclose(scene.view_deg(scene.people[0], body), 0.0, atol=3.0)
 
 
 def test_the_ground_truth_projects_to_where_the_person_is(body, scene, tmp_path):

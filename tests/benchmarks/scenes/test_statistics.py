@@ -24,14 +24,6 @@ def test_the_interval_covers_the_true_mean_as_often_as_it_says():
     assert 86 <= inside <= 100
 
 
-def test_people_without_a_value_do_not_count():
-    assert mean_over_people([np.nan, 3.0, 5.0])[::3] == (4.0, 2)
-    alone = mean_over_people([7.0, np.nan])
-    assert (alone.mean, alone.people) == (7.0, 1)
-    assert np.isnan([alone.low, alone.high]).all()
-    assert np.isnan(mean_over_people([]).mean)
-
-
 def test_people_of_one_performer_count_together():
     values = np.repeat([10.0, 20.0, 60.0], 50)
     performers = np.repeat(["a", "b", "c"], 50)

@@ -6,21 +6,6 @@ import pytest
 from scope.benchmarks.smplify.dense import minimize
 
 
-def rosenbrock(x):
-    return np.stack([10 * (x[:, 1] - x[:, 0] ** 2), 1 - x[:, 0]], axis=1)
-
-
-def test_the_minimum_of_rosenbrocks_function():
-    found = minimize(rosenbrock, np.array([-1.2, 1.0]), np.ones(2, bool), 100, 1e-14)
-    np.testing.assert_allclose(found.x, 1.0, atol=1e-5)
-    assert found.cost < 1e-10
-
-
-def test_unknowns_that_are_not_free_stay():
-    found = minimize(rosenbrock, np.array([-1.2, 1.0]), np.array([False, True]), 100, 1e-14)
-    np.testing.assert_allclose(found.x, [-1.2, 1.44], atol=1e-6)
-
-
 def test_a_linear_problem_has_the_normal_equations_solution():
     rng = np.random.default_rng(0)
     A = rng.normal(size=(20, 6))

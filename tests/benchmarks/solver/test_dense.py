@@ -27,9 +27,3 @@ def test_dense_and_sparse_steps_agree(K, P, N, prior):
         found = np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[:P]])
         expected = dense.step(k)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
-
-
-def test_the_problem_has_the_terms_it_says():
-    p = make_problem(23, 10, 120)
-    assert np.array_equal(np.bincount(p.terms.flags, minlength=16)[15:], [40])
-    assert (p.terms.V[:, :, :10] != 0.0).all()

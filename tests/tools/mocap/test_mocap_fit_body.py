@@ -5,10 +5,7 @@ can do.
 
 import numpy as np
 import pytest
-from scope.solver.errors import ShapeError
-from scope.solver.rotations import exp
-from scope.tools.mocap import fit_body, library, retarget
-from scope.tools.mocap.take import Take
+from scope.tools.mocap import fit_body, library
 
 from .archives import beginning
 
@@ -35,14 +32,6 @@ def joint(fit, body, name):
     return fit.t[:, body.joint_names.index(name)]
 
 
-def test_the_joints_meet_their_targets(fitted):
-    assert [f.take.source for f in fitted] == ["cmu_asf_amc", "cmu_expmap", "deepmimic"]
-    for fit in fitted:
-        error = fit.error[np.isfinite(fit.error)]
-        assert np.median(error) < 0.006
-        assert np.quantile(error, 0.95) < 0.02
-
-
 def test_limbs_point_where_the_source_points(fitted, body):
     for fit in fitted:
         for a, b in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow")):
@@ -52,17 +41,6 @@ def test_limbs_point_where_the_source_points(fitted, body):
                 cosine = np.einsum("ti,ti->t", ours, theirs)
                 cosine /= np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1)
                 assert np.degrees(np.arccos(cosine)).max() < 10, (fit.take.name, a)
-
-
-def test_bones_have_the_source_s_lengths(fitted, body):
-    for fit in fitted:
-        J = body.rest_joints(fit.betas)
-        # CMU's shoulders lie further in than ours, which makes their upper arms longer.
-        for a, b, most in (("left_hip", "left_knee", 0.03), ("right_knee", "right_ankle", 0.03),
-                           ("left_shoulder", "left_elbow", 0.05)):  # fmt: skip
-            ours = np.linalg.norm(J[body.joint_names.index(a)] - J[body.joint_names.index(b)])
-            theirs = np.linalg.norm(fit.take.joint(a)[0] - fit.take.joint(b)[0])
-            assert ours == pytest.approx(theirs, abs=most)
 
 
 def test_the_body_walks_forwards_upright_with_its_soles_on_the_floor(fitted, body):
@@ -92,43 +70,3 @@ def test_hinges_bend_the_human_way_and_palms_face_the_thighs(fitted, body):
             inwards = sign * fit.R[:, 0, :, 0]
             assert np.median(np.einsum("ti,ti->t", palm, inwards)) > 0.4, (fit.take.name, side)
         assert fit.valid.all()
-
-
-def test_poses_and_trans_give_the_joints_back(fitted, body):
-    for fit in fitted:
-        _, t = body.forward_kinematics(
-            exp(fit.poses.reshape(len(fit.poses), -1, 3)), fit.trans, fit.betas
-        )
-        np.testing.assert_allclose(t, fit.t, atol=1e-6)
-
-
-def test_a_broken_recording_is_marked(body):
-    Omega = np.tile(np.eye(3), (9, body.K + 1, 1, 1))
-    assert fit_body.plausible(body, Omega, 30.0).all()
-    ankle, hip = (body.joint_names.index(n) for n in ("left_ankle", "left_hip"))
-    Omega[3, ankle] = exp([0.0, 0.0, np.pi])
-    np.testing.assert_array_equal(
-        fit_body.plausible(body, Omega, 30.0), [True] * 2 + [False] * 3 + [True] * 4
-    )
-    Omega[3, ankle] = np.eye(3)
-    Omega[7:, hip] = exp([1.5, 0.0, 0.0])
-    np.testing.assert_array_equal(np.flatnonzero(~fit_body.plausible(body, Omega, 30.0)), [6, 7])
-
-
-def test_the_file_holds_every_take(fitted, body, tmp_path):
-    path = tmp_path / "mocap" / "motions.npz"
-    fit_body.save(path, body, fitted)
-    with np.load(path) as data:
-        assert data["poses"].shape == (sum(len(f.take) for f in fitted), 72)
-        assert list(data["take_name"]) == ["02_01", "test_walking_19", "walk"]
-        start = data["take_start"]
-        np.testing.assert_allclose(data["trans"][start[1] : start[2]], fitted[1].trans, atol=1e-6)
-        assert data["take_betas"].shape == (3, body.P)
-        assert str(data["up"]) == "y"
-    assert [p.name for p in path.parent.iterdir()] == ["motions.npz"]
-
-
-def test_positions_alone_are_refused(body):
-    take = Take("a", "s", 30.0, ("pelvis",), np.zeros((2, 1, 3)), "cmu_asf_amc")
-    with pytest.raises(ShapeError, match="orientations"):
-        retarget.segment_rotations(take, retarget.Follow("pelvis"))

@@ -3,11 +3,8 @@
 person has.
 """
 
-from collections import Counter
-
 import numpy as np
 import pytest
-from scope.scope_addon.errors import MotionFileError
 from scope.tools.mocap import library
 
 from .archives import beginning
@@ -46,30 +43,6 @@ def takes(shared, texts):
 
 def lengths(take, a, b):
     return np.linalg.norm(take.joint(a) - take.joint(b), axis=1)
-
-
-def test_the_takes_are_as_long_as_their_files_and_none_is_there_twice(takes, texts):
-    frames = Counter()
-    for take in takes:
-        frames[take.source] += len(take) * (not take.mirrored)
-    # A line with its number alone begins a frame of an .amc; the first line of the others is a
-    # reference pose.
-    written = {
-        name: sum(map(str.isdigit, text.splitlines()))
-        for name, text in texts["cmu_asf_amc"].items()
-    }
-    # 30 of 120 a second
-    assert frames["cmu_asf_amc"] == sum(-(-count // 4) for count in written.values())
-    others = {name: len(text.splitlines()) - 1 for name, text in texts["cmu_expmap"].items()}
-    # the same recording
-    assert others.pop("cmu_mocap/train/walking/walking_1.txt") == written["02/02_01.amc"]
-    assert frames["cmu_expmap"] == sum(-(-count // 4) for count in others.values())
-    seconds = sum(t.seconds for t in takes if t.source == "deepmimic" and not t.mirrored)
-    assert seconds / 60 == pytest.approx(4.5, abs=0.2)
-    assert len({t.name for t in takes}) == len(takes)
-    assert len(
-        library.without_doubles([*takes, *[t for t in takes if t.source != "deepmimic"][:5]])
-    ) == len(takes)
 
 
 def test_bones_are_rigid_and_of_human_length(takes):
@@ -143,11 +116,3 @@ def test_mirrored_takes_mirror_their_originals(takes):
             )
             # about the start's heading, which both share, the sides exchange
             assert np.abs(a * [-1, 1, 1] - b).max() < 0.02, take.name
-
-
-def test_a_missing_archive_is_named(tmp_path):
-    with pytest.raises(MotionFileError, match="cmu_asf_amc"):
-        library.load_library(tmp_path)
-    (tmp_path / "cmu_asf_amc.tar.xz").write_bytes(b"not an archive")
-    with pytest.raises(MotionFileError, match="cmu_asf_amc"):
-        library.load_library(tmp_path)

@@ -3,8 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.errors import MotionFileError
-from scope.tools.mocap.position_sets import LAYOUTS, load_set, load_sets
+from scope.tools.mocap.position_sets import LAYOUTS, load_set
 from scope.tools.mocap.straight_legs import knee_flexions
 
 from ...required import missing
@@ -59,45 +58,6 @@ def test_pelvis_and_rib_cage_are_upright_wherever_the_spine_lies(tmp_path):
         np.testing.assert_allclose(up, [[0.0, 1.0, 0.0]] * len(take), atol=1e-4)
     hips = 0.5 * (take.joint("left_hip") + take.joint("right_hip"))
     np.testing.assert_allclose(take.joint("pelvis"), hips)
-
-
-def test_the_longest_section_with_all_joints_is_kept(tmp_path):
-    gaps = [(20, "left_wrist"), (21, "neck"), (50, "right_knee")]
-    (take,) = load_set(write_set(tmp_path / "accad.npz", gaps=gaps))
-    assert len(take) == 28
-    gaps = [(frame, "neck") for frame in range(0, T, 10)]
-    assert load_set(write_set(tmp_path / "accad.npz", gaps=gaps)) == []
-
-
-def test_sets_are_resampled_and_can_be_left_out(tmp_path):
-    write_set(tmp_path / "accad.npz", fps=60.0)
-    write_set(tmp_path / "rocketbox.npz")
-    found = load_sets(tmp_path, without=("rocketbox",))
-    assert [(take.source, take.fps, len(take)) for take in found] == [("accad", 30.0, T // 2)]
-    with pytest.raises(MotionFileError, match="none of the sets"):
-        load_sets(tmp_path, without=("rocketbox", "accad"))
-
-
-@pytest.mark.parametrize(
-    ("name", "turned"), [("m_idle_breathe_01", 4.3), ("f_walk_slow_01", 4.3), ("f_idle_cough", 0.0)]
-)
-def test_bent_legs_of_rocketbox_are_straightened(tmp_path, name, turned):
-    plain = load_set(write_set(tmp_path / "accad.npz", knee_deg=10.0))
-    bent = load_set(write_set(tmp_path / "rocketbox.npz", knee_deg=10.0, name=name))
-    before, after = (
-        knee_flexions({joint: take[0].joint(joint) for joint in LEGS}) for take in (plain, bent)
-    )
-    np.testing.assert_allclose(before - after, turned, atol=0.3)
-
-
-def test_unknown_and_malformed_sets_are_named(tmp_path):
-    with pytest.raises(MotionFileError, match="unknown set"):
-        load_set(write_set(tmp_path / "other.npz"))
-    with pytest.raises(MotionFileError, match="malformed"):
-        load_set(write_set(tmp_path / "reactidle.npz", fps=30.0).rename(tmp_path / "cmu_more.npz"))
-    np.savez(tmp_path / "accad.npz", take_name=np.array(["a"]))
-    with pytest.raises(MotionFileError, match="malformed"):
-        load_set(tmp_path / "accad.npz")
 
 
 @pytest.mark.parametrize("name", sorted(LAYOUTS))

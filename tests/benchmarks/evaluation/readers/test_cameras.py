@@ -13,9 +13,3 @@ def test_the_camera_of_projected_points_is_found():
     pixels = (points @ K.T)[..., :2] / points[..., 2:]
     pixels[0, 0] = 1e6
     assert np.allclose(intrinsics_of_projection(points, pixels), K)
-
-
-def test_points_that_no_camera_projects_give_none():
-    points = np.random.default_rng(0).normal(size=(4, 17, 3)) + [0, 0, 4]
-    assert intrinsics_of_projection(-points, points[..., :2]) is None
-    assert intrinsics_of_projection(points, -points[..., :2]) is None

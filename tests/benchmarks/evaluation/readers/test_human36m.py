@@ -2,8 +2,6 @@
 """Human3.6M's layout: compressed CDF files in millimetres beside videos."""
 
 import numpy as np
-import pytest
-from scope.benchmarks.evaluation.files import DatasetError
 from scope.benchmarks.evaluation.joint_sets import LSP14
 from scope.benchmarks.evaluation.models import Models
 from scope.benchmarks.evaluation.readers.human36m import clips
@@ -48,58 +46,3 @@ def test_every_fifth_frame_in_metres(tmp_path):
         ), name
     assert np.allclose(person.camera.joints(["neck"])[0, 0], JOINTS[0, 24] / 1000, atol=1e-6)
     assert np.allclose(truth.intrinsics, K, atol=0.01)
-
-
-def test_without_pixels_the_camera_is_unknown(tmp_path):
-    write(tmp_path, with_pixels=False)
-    assert clips(tmp_path, Models())[0].truth().intrinsics is None
-
-
-def test_the_folders_of_h36m_fetch_are_read_as_well(tmp_path):
-    write(tmp_path)
-    for subject in ("S9", "S11"):
-        for kind in ("D2_Positions", "D3_Positions_mono"):
-            (tmp_path / subject / "MyPoseFeatures" / kind).rename(
-                tmp_path / subject / f"Poses_{kind}"
-            )
-    found = clips(tmp_path, Models())
-    assert [clip.truth().intrinsics is not None for clip in found] == [True, True]
-
-
-def test_a_video_that_is_missing_is_named(tmp_path):
-    write(tmp_path)
-    (tmp_path / "S11/Videos/Directions.54138969.mp4").unlink()
-    with pytest.raises(DatasetError, match=r"Directions\.54138969\.mp4 does not exist"):
-        clips(tmp_path, Models())
-
-
-@pytest.mark.parametrize(
-    ("damage", "said"),
-    [
-        (lambda path: path.write_bytes(path.read_bytes()[:300]), "is not a readable CDF file"),
-        (lambda path: path.write_bytes(b"no CDF"), "is not a readable CDF file"),
-        (lambda path: write_cdf(path, "Other", np.zeros((1, 4, 96))), "is not a readable CDF file"),
-        (
-            lambda path: write_cdf(path, "Pose", np.zeros((1, 4, 95))),
-            r"Pose must have shape \(any, "
-            r"96\)",
-        ),
-        (lambda path: write_cdf(path, "Pose", np.full((1, 4, 96), np.nan)), "Pose contains NaN"),
-        (lambda path: write_cdf(path, "Pose", np.full((1, 4, 96), 1e9)), "m from the origin"),
-    ],
-)
-def test_damage_is_one_sentence(tmp_path, damage, said):
-    path = write(tmp_path)
-    damage(path)
-    with pytest.raises(DatasetError, match=said) as found:
-        clips(tmp_path, Models())[1].truth()
-    assert str(path) in str(found.value)
-
-
-def test_another_folder_is_one_sentence(tmp_path):
-    with pytest.raises(
-        DatasetError,
-        match=r"S9.Videos does not exist, where the videos of "
-        r"Human3\.6M are expected",
-    ):
-        clips(tmp_path, Models())

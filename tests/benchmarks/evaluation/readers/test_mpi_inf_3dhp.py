@@ -43,30 +43,6 @@ def replace(path, key, value):
             file[key] = value
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("univ_annot3", None, "lacks univ_annot3"),
-        ("univ_annot3", np.zeros((4, 1, 16, 3)), r"univ_annot3 must have shape \(any, 1, 17, 3\)"),
-        ("univ_annot3", np.zeros((3, 1, 17, 3)), r"univ_annot3 must have shape \(4, 1, 17, 3\)"),
-        ("univ_annot3", np.full((4, 1, 17, 3), 1e9), "m from the origin"),
-        ("valid_frame", np.ones((9, 1)), "univ_annot3 must have shape"),
-        ("annot2", h5py.SoftLink("/annot3"), "annot2 is no array of the file itself"),
-        (
-            "annot2",
-            h5py.ExternalLink("other.mat", "annot2"),
-            "annot2 is no array of the file itself",
-        ),
-    ],
-)
-def test_damage_is_one_sentence(tmp_path, key, value, said):
-    write_3dhp(tmp_path, JOINTS, VALID)
-    replace(tmp_path / FILE, key, value)
-    with pytest.raises(DatasetError, match=said) as found:
-        clips(tmp_path, Models())[2].truth()
-    assert str(tmp_path / FILE) in str(found.value)
-
-
 def test_an_array_that_claims_more_than_memory_is_not_read(tmp_path):
     write_3dhp(tmp_path, JOINTS, VALID)
     with h5py.File(tmp_path / FILE, "r+") as file:
@@ -85,22 +61,3 @@ def test_values_in_other_files_are_not_read(tmp_path):
         file.create_dataset("annot3", (4, 1, 17, 3), "f8", external=outside)
     with pytest.raises(DatasetError, match="annot3 is no array of the file itself"):
         clips(tmp_path, Models())[2].truth()
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n" + bytes(100)]
-)
-def test_what_is_no_hdf5_is_one_sentence(tmp_path, content):
-    write_3dhp(tmp_path, JOINTS, VALID)
-    (tmp_path / FILE).write_bytes(content)
-    with pytest.raises(DatasetError, match=r"is not a readable \.mat file of MATLAB 7\.3"):
-        clips(tmp_path, Models())[2].truth()
-
-
-def test_another_folder_is_one_sentence(tmp_path):
-    with pytest.raises(
-        DatasetError,
-        match=r"TS1 does not exist, where imageSequence and "
-        r"annot_data\.mat",
-    ):
-        clips(tmp_path, Models())

@@ -108,15 +108,3 @@ def test_a_pickle_that_asks_for_functions_runs_nothing(tmp_path, table):
     with pytest.raises(DatasetError, match="exec, which such a file has no use for"):
         clips(tmp_path, Models())[0].truth()
     assert not (tmp_path / "ran").exists()
-
-
-def test_another_folder_is_one_sentence_that_names_what_is_expected(tmp_path):
-    with pytest.raises(DatasetError, match=r"sequenceFiles/test/\*\.pkl matches no file"):
-        clips(tmp_path, Models())
-
-
-def test_missing_images_are_named(tmp_path, table):
-    write_3dpw(tmp_path, table)
-    (tmp_path / "imageFiles").rename(tmp_path / "elsewhere")
-    with pytest.raises(DatasetError, match=r"imageFiles.downtown_arguing_00 does not exist"):
-        clips(tmp_path, Models())
