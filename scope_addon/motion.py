@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
+from .footage_view import FootageView
 from .untrusted.files import in_one_line, read_npz
 
 if TYPE_CHECKING:
@@ -64,6 +65,11 @@ class Motion:
     # standard deviation of the stature of `betas`; NaN where it is not known
     height_sigma_m: float = float("nan")
     uneven_ground: bool = False  # feet rest at any height, so none is under a floor
+    # How the footage was seen: turned clockwise by degrees, then mirrored left to right; and how
+    # many times as fast as it plays everything happened.
+    footage_rotation: int = 0
+    footage_mirrored: bool = False
+    footage_speed: float = 1.0
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named
     # CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -85,7 +91,22 @@ class Motion:
             float(self.height_sigma_m),
         )
         self.uneven_ground = bool(self.uneven_ground)
+        self.footage_rotation = int(self.footage_rotation) % 360
+        self.footage_mirrored = bool(self.footage_mirrored)
+        self.footage_speed = float(self.footage_speed)
         self.validate()
+
+    @property
+    def footage_times_s(self) -> NDArray[np.float64]:
+        """(T,) seconds in the footage as it plays, which for slow motion are more than those of the
+        motion.
+        """
+        return self.timestamps * self.footage_speed
+
+    @property
+    def view(self) -> FootageView:
+        """How the footage was turned and mirrored."""
+        return FootageView(self.footage_rotation, self.footage_mirrored)
 
     @property
     def joint_count(self) -> int:
@@ -102,6 +123,10 @@ class Motion:
         :raises MotionFileError: an array has the wrong shape; the message names it.
         """
         T = len(self.frames)
+        if self.footage_rotation % 90 or not 0 < self.footage_speed < np.inf:
+            raise MotionFileError(
+                f"{where}: footage_rotation must be a multiple of 90, and footage_speed above 0"
+            )
         if self.joints_cam.ndim != 3 or self.keypoints2d.ndim != 3:
             raise MotionFileError(f"{where}: joints_cam and keypoints2d must have three dimensions")
         sizes = {
@@ -258,6 +283,9 @@ OPTIONAL_KEYS = {
     *SIGMA_KEYS,
     "height_sigma_m",
     "uneven_ground",
+    "footage_rotation",
+    "footage_mirrored",
+    "footage_speed",
     *CORRECTION_KEYS,
     *FACE_KEYS,
 }

@@ -37,6 +37,11 @@ SENTENCES = {
     "captured; convert it to an .mp4 or a .gif to capture all of them",
     "mirrored": "{footage} is mirrored by its metadata, which Blender ignores; there, switch on "
     "Flip {axis} of the camera's background image",
+    "variable_frame_rate": "{footage} has a variable frame rate: most of it {rate:.5g} frames per "
+    "second, on average {average:.5g}. The keys have the exact times of its frames, so some lie "
+    "between the scene's frames",
+    "slow_motion": "{footage} was recorded {speed:g} times as fast as it plays, so the motion "
+    "has its true speed; capture with --speed 1 for the speed at which it plays",
     "frame_rate_above_footage": "{footage} has {rate:g} frames per second; {wanted:g} would "
     "repeat some, so each was used once",
     "frame_size_changes": "the frame size changes within {footage}; all frames were scaled to the "
@@ -57,6 +62,12 @@ SENTENCES = {
     # the captured people
     "cuts": "{footage} cuts to another scene {times:times}: capture each scene separately, with a "
     "start and end time",
+    "left_out": "{footage} shows more people than were captured: {others} more, one of them at "
+    "{place} (x, y in pixels, @ seconds). Capture everyone, or choose the one to be captured with "
+    "--person {place}",
+    "turned_footage": "{footage}: the person lies or stands on the head in the picture from "
+    "beginning to end. If the camera was turned, capture with Turn, --rotate {degrees} on the "
+    "command line",
     "heights_for_one": "{footage}: {heights} heights were given, but one person was found",
     "heights_for_several": "{footage}: {heights} heights were given, but {people} people were "
     "found",

@@ -5,6 +5,7 @@ opened.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,16 +13,19 @@ from typing import Any
 
 from ...solver.body import Body
 from ..errors import UsageError
+from ..footage_view import FootageView
 from ..options import Place, option, options_at
 from ..options.capture import ALL, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
-from .media.video_range import FootageRange, VideoRange, parse_range
+from .media.video_range import FootageRange, Timecode, VideoRange, parse_range, parse_time
 from .perception.adapters.box_detector import BoxDetector
 from .perception.adapters.keypoint_network import KeypointNetwork
+from .perception.crop import Crop, parse_crop
 from .perception.sessions import Execution, landmark_network_name
+from .tracking.chosen_person import ChosenPerson
 from .tracking.tracker import MAX_PEOPLE
 
 WINDOW_S = 120.0
@@ -31,11 +35,13 @@ WINDOW_S = 120.0
 class CaptureOptions(NetworkDeclaration, CaptureDeclaration):
     """How to capture; the defaults suit a phone clip of one person.
 
-    Its fields are the declared options, of which ``start``, ``end`` and ``fps`` together are
-    ``wanted``.
+    Its fields are the declared options, of which ``start``, ``end``, ``fps``, ``rotate`` and
+    ``mirror`` together are ``wanted``.
     """
 
     wanted: FootageRange = VideoRange()  # range of frames
+    part: Crop | None = None  # of the picture in which people are looked for
+    chosen: ChosenPerson | None = None  # who is captured first; None: the most prominent one
     # The length of the windows in which clips at least twice as long are observed.
     window_s: float = WINDOW_S
 
@@ -44,16 +50,36 @@ def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
     """Convert the values of a command line or a request to the pipeline's options.
 
     :param values: by option name; other names are ignored.
-    :raises UsageError: a time or the frame rate cannot be parsed, or the end does not come after
-        the start.
+    :raises UsageError: a time, the frame rate, the part of the picture or the chosen person cannot
+        be parsed, or the end does not come after the start.
     """
     fields: dict[str, Any] = {}
     for each in options_at(Place.CAPTURE | Place.WORKER):
         value = values[each.name]
         fields[each.name] = Path(value) if each.value_type is Path and value is not None else value
+    view = FootageView(int(values["rotate"]), values["mirror"])
     return CaptureOptions(
-        wanted=parse_range(values["start"], values["end"], values["fps"]), **fields
+        wanted=parse_range(values["start"], values["end"], values["fps"], view=view),
+        part=parse_crop(values["crop"]) if values["crop"] else None,
+        chosen=parse_person(values["person"]) if values["person"] else None,
+        **fields,
     )
+
+
+def parse_person(text: str) -> ChosenPerson:
+    """Parse "x,y@time" or "x,y", which is at the beginning.
+
+    :raises UsageError: it is neither.
+    """
+    place, _, time = text.partition("@")
+    numbers = re.fullmatch(r"\s*(\d{1,6}(?:\.\d+)?)\s*,\s*(\d{1,6}(?:\.\d+)?)\s*", place, re.A)
+    time_s = parse_time(time) if time else 0.0
+    if numbers is None or isinstance(time_s, Timecode):
+        raise UsageError(
+            f"--person {text[:60]!r} is not a place: give x and y in pixels and a time in seconds "
+            "or MM:SS, such as 640,360@2.5"
+        )
+    return ChosenPerson(float(numbers[1]), float(numbers[2]), time_s if time else None)
 
 
 def check_options(body: Body, options: CaptureOptions) -> None:

@@ -6,6 +6,7 @@ stages.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 
 from ...solver.body import Body
@@ -56,10 +57,12 @@ def capture(
             video, body, options, clock, Listeners(progress, watch), observe_frames
         )
     with clock.stage("solver"):
-        tracks = [repair(track, footage.camera) for track in tracks]
         shot = shot_of(video, body, options, footage)
+        tracks = [replace(track, times=track.times / shot.speed) for track in tracks]
+        tracks = [repair(track, footage.camera) for track in tracks]
         solved = solve(shot, tracks, progress, options.heights_m)
-        motions = [replace(motion, timestamps=footage.timestamps) for motion in solved.motions]
+        times_s = footage.timestamps / shot.speed
+        motions = [replace(motion, timestamps=times_s) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))
 
@@ -69,6 +72,7 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
     rotation.
     """
     frames = len(footage.timestamps)
+    speed = options.speed or video.recorded_speed
     path = CameraPath.static(frames)
     if not footage.camera_motion.is_static:
         path = CameraPath.rotating(footage.camera_motion.R_first_camera)
@@ -77,9 +81,11 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         camera=footage.camera,
         path=path,
         lines=footage.lines,
-        fps=video.fps,
+        fps=video.fps * Fraction(speed).limit_denominator(1000),
         image_size=(video.width, video.height),
         source=display_text(Path(video.path).name),
         smoothing=options.smoothing and frames > 1,
         uneven_ground=options.uneven_ground,
+        view=video.wanted.view,
+        speed=speed,
     )

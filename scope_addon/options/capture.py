@@ -33,6 +33,12 @@ PEOPLE = (
     Choice(ALL, "Everyone", "Everyone who is clearly visible", 1),
 )
 _COUNT = Choice("count", "At Most", "The most prominent people, up to a number", 2)
+ROTATIONS = (
+    Choice("0", "As in the File", "The footage is upright as its file says", 0),
+    Choice("90", "90° Clockwise", "Turn the footage a quarter turn clockwise", 1),
+    Choice("180", "Upside Down", "The footage is upside down", 2),
+    Choice("270", "90° Counterclockwise", "Turn the footage a quarter turn counterclockwise", 3),
+)
 BODIES = (
     Choice("scope", "Body", "The built-in body with SMPL's 24 joints", 0),
     Choice(
@@ -135,6 +141,18 @@ class CaptureDeclaration:
         maximum=12,
         blender=Property(label="At Most"),
     )
+    person: ClassVar[Option] = Option(
+        "person",
+        str,
+        "",
+        Place.COMMAND_LINE | Place.WORKER,
+        "capture this person first, or alone unless --people says how many: who is at x, y, in "
+        "pixels, at a time",
+        argument=Argument(
+            metavar="X,Y[@TIME]",
+            default_text="the most prominent",
+        ),
+    )
     start: ClassVar[Option] = Option(
         "start",
         str,
@@ -179,6 +197,35 @@ class CaptureDeclaration:
         "capture only a part of the video",
         blender=Property(label="Part of the Video"),
     )
+    rotate: ClassVar[Option] = Option(
+        "rotate",
+        str,
+        "0",
+        _EVERYWHERE,
+        "turn the footage clockwise before the capture, for clips filmed sideways whose file does "
+        "not say so",
+        choices=ROTATIONS,
+        argument=Argument(metavar="DEGREES"),
+        blender=Property(label="Turn", section=Section.FOOTAGE),
+    )
+    mirror: ClassVar[Option] = Option(
+        "mirror",
+        bool,
+        False,
+        _EVERYWHERE,
+        "exchange left and right in the footage, after turning it, as for a mirrored selfie video",
+        blender=Property(section=Section.FOOTAGE),
+    )
+    crop: ClassVar[Option] = Option(
+        "crop",
+        str,
+        "",
+        _EVERYWHERE,
+        "look for people only in this part of the turned picture: x, y, width and height in "
+        "pixels, from its top left corner",
+        argument=Argument(metavar="X,Y,WIDTH,HEIGHT", default_text="all of it"),
+        blender=Property(label="Only in Part", section=Section.FOOTAGE),
+    )
     fps: ClassVar[Option] = Option(
         "fps",
         str,
@@ -186,6 +233,24 @@ class CaptureDeclaration:
         Place.COMMAND_LINE | Place.WORKER,
         "frame rate of the capture, such as 12 or 29.97",
         argument=Argument(metavar="N", default_text="the footage's"),
+    )
+    speed: float | None = declared(
+        None,
+        _EVERYWHERE,
+        "how many times as fast as the footage plays everything happened: 8 for slow motion of 240 "
+        "frames per second that plays at 30",
+        minimum=0.05,
+        maximum=100.0,
+        argument=Argument(metavar="FACTOR", default_text="as the file says, or 1"),
+        blender=Property(
+            label="Slow Motion",
+            description="How many times as fast as the footage plays everything happened: 8 for "
+            "240 frames per second that play at 30. 0: as the file says",
+            default=0.0,
+            minimum=0.0,
+            value=lambda settings: settings.speed or None,
+            section=Section.FOOTAGE,
+        ),
     )
     body: ClassVar[Option] = Option(
         "body",

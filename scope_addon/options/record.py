@@ -35,6 +35,7 @@ class Section(enum.Enum):
     """
 
     PERSON = enum.auto()
+    FOOTAGE = enum.auto()
     MOTION = enum.auto()
     SCENE = enum.auto()
 

@@ -55,6 +55,12 @@ def pixel_aspect(motion: Motion) -> tuple[float, float]:
     return (float(ratio), 1.0) if ratio > 1 else (1.0, float(1 / ratio))
 
 
+def _footage_aspect(motion: Motion) -> tuple[float, float]:
+    """Return the pixel aspect of the file's picture, which a quarter turn exchanges."""
+    x, y = pixel_aspect(motion)
+    return (x, y) if motion.view.is_upright else (y, x)
+
+
 def store_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
     """Store the size and pixel aspect of the footage in a capture's collection."""
     collection[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
@@ -155,14 +161,15 @@ def show_footage(
     background.alpha = 1.0
     background.display_depth = "BACK"
     background.frame_method = "FIT"
+    _turn(background, motion)
     camera.data.show_background_images = True
     undistorted = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES else _show_video
     show = _show_clip if motion.dist.any() else undistorted
     size, warnings = show(camera.data, background, path, motion, frames)
     if not min(size):
         return [notice("undecodable_footage", footage=path.name)]
-    if tuple(motion.image_size) != size:
-        captured_width, captured_height = motion.image_size.tolist()
+    captured_width, captured_height = motion.view.size(*motion.image_size.tolist())
+    if (captured_width, captured_height) != size:
         warnings.append(
             notice(
                 "footage_size",
@@ -176,6 +183,21 @@ def show_footage(
     return warnings
 
 
+def _turn(background: bpy.types.CameraBackgroundImage, motion: Motion) -> None:
+    """Show the footage as it was turned and mirrored for the capture.
+
+    Blender fits the picture into the frame before it turns it, and exchanges its sides before that.
+    """
+    view = motion.view
+    width, height = motion.image_size.tolist()
+    background.rotation = np.radians(view.clockwise_deg)
+    if view.is_mirrored:
+        background.use_flip_x = view.is_upright
+        background.use_flip_y = not view.is_upright
+    if not view.is_upright and min(width, height):
+        background.scale = max(width, height) / min(width, height)
+
+
 def _show_picture(
     camera: bpy.types.Camera,
     background: bpy.types.CameraBackgroundImage,
@@ -186,7 +208,7 @@ def _show_picture(
     """Show a picture, or numbered ones; return the size in pixels, and warnings."""
     background.source = "IMAGE"
     background.image = bpy.data.images.load(str(path), check_existing=True)
-    background.image.display_aspect = pixel_aspect(motion)
+    background.image.display_aspect = _footage_aspect(motion)
     size = tuple(background.image.size)
     several = len(motion.frames) > 1
     return size, _show_picture_sequence(camera, background, path, motion, frames) if several else []
@@ -206,7 +228,7 @@ def _show_clip(
     size = tuple(clip.size)
     background.source = "MOVIE_CLIP"
     background.clip = clip
-    clip.display_aspect = pixel_aspect(motion)
+    clip.display_aspect = _footage_aspect(motion)
     _set_lens_distortion(clip, background, motion)
     if (drift := _drift(motion, frames)) <= 1.0:
         return size, []
@@ -283,7 +305,7 @@ def _show_video(
     bpy.data.movieclips.remove(clip)  # which was never shown
     background.source = "IMAGE"
     background.image = image = bpy.data.images.load(str(path), check_existing=True)
-    image.display_aspect = pixel_aspect(motion)
+    image.display_aspect = _footage_aspect(motion)
     if _drift(motion, frames) <= _MAX_OFFSET:
         _show_frames(background.image_user, _start(motion, frames))
         return size, []
@@ -292,7 +314,7 @@ def _show_video(
         camera,
         background,
         scene_frames,
-        np.round(np.interp(scene_frames, frames, motion.timestamps) * rate),
+        np.round(np.interp(scene_frames, frames, motion.footage_times_s) * rate),
     )
     return size, []
 
@@ -356,16 +378,19 @@ def _set_lens_distortion(
 
     :param motion: with OpenCV's distortion in ``dist``.
     """
-    width, height = (float(n) for n in motion.image_size)
+    # The clip's lens is that of the file's picture.
+    size = motion.image_size.tolist()
+    width, height = motion.view.size(*size)
+    intrinsics = motion.view.inverse.intrinsics(motion.intrinsics, *size)
     lens = clip.tracking.camera
     lens.sensor_width = SENSOR_WIDTH
     lens.units = "MILLIMETERS"
-    lens.focal_length = SENSOR_WIDTH * motion.intrinsics[0, 0] / width
-    lens.pixel_aspect = motion.intrinsics[1, 1] / motion.intrinsics[0, 0]
+    lens.focal_length = SENSOR_WIDTH * intrinsics[0, 0] / width
+    lens.pixel_aspect = intrinsics[1, 1] / intrinsics[0, 0]
     # Blender measures the principal point's v from the bottom.
-    lens.principal_point_pixels = motion.intrinsics[0, 2], height - motion.intrinsics[1, 2]
+    lens.principal_point_pixels = intrinsics[0, 2], height - intrinsics[1, 2]
     lens.distortion_model = "BROWN"
-    k1, k2, k3, p1, p2 = blender_brown_distortion(motion.dist)
+    k1, k2, k3, p1, p2 = blender_brown_distortion(motion.view.inverse.distortion(motion.dist))
     lens.brown_k1 = k1
     lens.brown_k2 = k2
     lens.brown_k3 = k3

@@ -82,6 +82,7 @@ SHARED = (
     "motion",
     "atomic_write",
     "footage",
+    "footage_view",
     "counts",
     "json_file",
     "parent",

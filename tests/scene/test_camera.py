@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
+from scope.scope_addon.footage_view import FootageView
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.scene.match_rate import change_rate
@@ -382,3 +383,46 @@ def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
     image.save()
     result = build_scene([make_motion(body, 1)], body, footage=picture)
     assert any("32 x 48" in warning for warning in map(str, result.warnings))
+
+
+def shown_by_blender(
+    background: bpy.types.CameraBackgroundImage, size: tuple[int, int], frame: tuple[int, int]
+) -> np.ndarray:
+    """The (3, 3) map from the file's picture to the frame, both from −1 to 1 with y up.
+
+    Blender fits the picture into the frame, scales it, exchanges its sides, and turns it clockwise
+    (image_camera_background_matrix_get of overlay_image).
+    """
+    image_aspect = size[0] / size[1]
+    frame_aspect = frame[0] / frame[1]
+    width, height = float(frame[0]), float(frame[1])
+    if image_aspect > frame_aspect:
+        height = width / image_aspect
+    else:
+        width = height * image_aspect
+    flip = [-1 if background.use_flip_x else 1, -1 if background.use_flip_y else 1]
+    fitted = np.diag([width * flip[0], height * flip[1]]) * background.scale / 2
+    c, s = np.cos(-background.rotation), np.sin(-background.rotation)
+    return np.diag([2 / frame[0], 2 / frame[1]]) @ np.array([[c, -s], [s, c]]) @ fitted
+
+
+@pytest.mark.parametrize("turn", [0, 90, 180, 270])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(
+    body, make_motion, clip, turn, mirrored
+):
+    view = FootageView(turn, mirrored)
+    size = view.size(64, 48)
+    motion = make_motion(body, 5, image_size=size)
+    motion.footage_rotation, motion.footage_mirrored = turn, mirrored
+    result = build_scene([motion], body, footage=clip, options=NEW_SCENE)
+    assert result.warnings == []
+    background = result.people[0].camera.data.background_images[0]
+    shows = shown_by_blender(background, (64, 48), size)
+    # A mark near the top left corner of the file's picture.
+    picture = np.zeros((48, 64, 3), np.uint8)
+    picture[4, 8] = 255
+    row, column = np.argwhere(view.show(picture)[..., 0])[0]
+    u, v = shows @ [2 * 8.5 / 64 - 1, 1 - 2 * 4.5 / 48]
+    assert (u + 1) / 2 * size[0] == pytest.approx(column + 0.5, abs=1e-3)
+    assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=1e-3)

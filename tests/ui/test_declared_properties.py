@@ -55,6 +55,10 @@ LABELS = {
     "focal_mm": "Focal Length",
     "fov": "Field of View",
     "calibration_file": "Calibration",
+    "rotate": "Turn",
+    "mirror": "Mirror",
+    "crop": "Only in Part",
+    "speed": "Slow Motion",
     "use_range": "Part of the Video",
     "range_start": "From",
     "range_end": "To",
@@ -105,7 +109,8 @@ def test_defaults_and_ranges_of_the_properties_are_within_the_options(declared, 
         return
     scale = UNITS[declared.unit, declared.blender.unit] if declared.blender.unit else 1.0
     assert found.hard_min <= found.default <= found.hard_max
-    if declared.minimum is not None and declared.name != "heights_m":  # 0: no height is given
+    # 0: no height or speed is given
+    if declared.minimum is not None and declared.name not in ("heights_m", "speed"):
         assert found.hard_min >= declared.minimum * scale
     if declared.maximum is not None:
         assert found.hard_max <= declared.maximum * scale * (1 + 1e-6)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
+from ...footage_view import AS_IN_FILE, FootageView
 from .calibration import read_calibration
 
 # The default is a field of view of 60 degrees along the longer side, between a phone's main camera
@@ -84,6 +85,7 @@ def choose_camera(
     fov_deg: float | None = None,
     calibration: str | Path | None = None,
     metadata_focal_mm: float | None = None,
+    view: FootageView = AS_IN_FILE,
 ) -> Camera:
     """Choose the camera for footage of this size: from the user, otherwise the metadata, otherwise
     the default.
@@ -94,6 +96,7 @@ def choose_camera(
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov /
         2)).
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
+    :param view: how the footage was turned; a calibration is for the frames as they were before.
     :raises UsageError: the user's values contradict each other, or one is impossible.
     :raises InputError: the calibration cannot be used for footage of this size.
     """
@@ -104,8 +107,11 @@ def choose_camera(
     longer = max(width, height)
     if calibration is not None:
         known = read_calibration(Path(calibration))
+        size = view.size(width, height)
         return Camera(
-            known.intrinsics_for(width, height), known.dist, f"calibration {known.path.name}"
+            view.intrinsics(known.intrinsics_for(*size), *size),
+            view.distortion(known.dist),
+            f"calibration {known.path.name}",
         )
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:

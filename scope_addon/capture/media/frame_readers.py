@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -39,6 +40,10 @@ _FORMATS = (
 )  # fmt: skip
 _ONLY = {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
 _MIN_SEEK_S = 20.0  # start from which seeking is tried
+# Where Android's phones write at how many frames per second they recorded.
+_RECORDED_RATE = "com.android.capture.fps"
+_MAX_RATE = 10_000.0
+_TIMED_PACKETS = 2000  # from whose times the usual frame rate is estimated
 _DAMAGED_PACKETS = 4096  # in a row, after which no more are tried
 # Degrees clockwise by which an image has to be rotated to be upright.
 _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
@@ -224,8 +229,10 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
 class PyavReader:
     """A video file, decoded by PyAV, in which frames are read in order.
 
-    ``rate``: frames per second, 0 if the container does not say; ``frame_count`` according to the
-    container; ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut
+    ``rate``: frames per second, 0 if the container does not say; ``average_rate``: the same over
+    the whole file, which differs where the frame rate varies; ``recorded_rate``: at which a phone
+    says that it recorded slow motion, 0 if it does not; ``frame_count`` according to the container;
+    ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut
     without re-encoding holds more frames than it shows. ``is_mirrored``, ``clockwise_deg``: whether
     the last frame that was read had to be mirrored, and by how much it was rotated then.
 
@@ -253,6 +260,8 @@ class PyavReader:
         # Width of a pixel over its height.
         self._aspect = float(self._stream.sample_aspect_ratio or 1)
         self.rate = float(self._stream.guessed_rate or self._stream.average_rate or 0)
+        self.average_rate = float(self._stream.average_rate or self.rate)
+        self.recorded_rate = _recorded_rate(container)
         duration_s = (container.duration or 0) / 1e6
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
         if self._stream.duration and self._stream.time_base:
@@ -386,6 +395,44 @@ def exact_fps(fps: float) -> Fraction | None:
     if abs(nearest - Fraction(fps)) < nearest / 10**5:
         return nearest
     return Fraction(fps).limit_denominator(100_000)
+
+
+def _recorded_rate(container: InputContainer) -> float:
+    """Return at how many frames per second a phone says that it recorded; 0 if it does not."""
+    try:
+        rate = float(container.metadata.get(_RECORDED_RATE, 0))
+    except ValueError:
+        return 0.0
+    return rate if 0.0 < rate <= _MAX_RATE else 0.0
+
+
+def usual_fps(path: Path) -> Fraction | None:
+    """Return the frame rate that most frames of a video have, from the times of its packets, which
+    are not decoded; None if they have none.
+
+    A standard rate counts as such within 3 %, because containers round times to milliseconds.
+
+    :raises VideoError: PyAV is not installed, or there is no video in the file.
+    """
+    failure, container = _open_with_pyav(path)
+    if container is None:
+        return None
+    times_s: list[float] = []
+    with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
+        for packet in container.demux(_film(path, container)):
+            if packet.pts is not None and packet.time_base:
+                times_s.append(float(packet.pts * packet.time_base))
+            if len(times_s) == _TIMED_PACKETS:
+                break
+    steps_s = np.diff(np.sort(times_s))
+    steps_s = steps_s[steps_s > 1e-4]
+    if not len(steps_s):
+        return None
+    rate = Fraction(float(1 / np.median(steps_s)))
+    standard = min(_STANDARD_RATES, key=lambda each: abs(each - rate))
+    if abs(standard - rate) < Fraction(3, 100) * rate:
+        return standard
+    return exact_fps(round(float(rate), 2))
 
 
 def estimate_fps(reader: PyavReader) -> Fraction:

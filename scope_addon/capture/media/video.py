@@ -30,7 +30,14 @@ from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...notices import Notice, notice
 from .frame import Frame
-from .frame_readers import DEFAULT_FPS, PyavReader, estimate_fps, exact_fps, next_time
+from .frame_readers import (
+    DEFAULT_FPS,
+    PyavReader,
+    estimate_fps,
+    exact_fps,
+    next_time,
+    usual_fps,
+)
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
 from .still_images import is_picture, read_picture
@@ -41,6 +48,8 @@ cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 # How lists of other files begin (ffconcat, HLS, DASH, SDP), which FFmpeg opens by their content,
 # whatever the name.
 _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
+_VARYING = Fraction(2, 100)  # of the rate, by which the average differs where it varies
+_SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
 _QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
@@ -63,7 +72,10 @@ class Video:
     focal_35mm: float | None = None
     warnings: list[Notice] = field(default_factory=list)
     wanted: VideoRange = field(default_factory=VideoRange)
+    # How many times as fast as it plays the footage was recorded, according to the file.
+    recorded_speed: float = 1.0
     _source_fps: Fraction | None = field(default=None, repr=False)
+    _average_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: Uint8Array | None = field(default=None, repr=False)
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
@@ -75,6 +87,11 @@ class Video:
         return self._source_fps or self.fps
 
     @property
+    def average_fps(self) -> Fraction:
+        """Frame rate over the whole file, which differs from `source_fps` where the rate varies."""
+        return self._average_fps or self.source_fps
+
+    @property
     def expected_frames(self) -> int:
         """Number of frames that an iteration yields, if the container's frame count is right."""
         if self._sequence is not None:
@@ -82,10 +99,10 @@ class Video:
             return max(
                 1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times)
             )
-        length = self.frame_count / self.source_fps
+        length = self.frame_count / self.average_fps
         start = Fraction(self.wanted.start_s)
         end = Fraction(min(self.wanted.end_s, float(length)))
-        return max(1, round((min(end, length) - start) * self.fps))
+        return max(1, round((min(end, length) - start) * min(self.fps, self.average_fps)))
 
     def __iter__(self) -> Iterator[Frame]:
         if self._still is not None:
@@ -180,7 +197,7 @@ def _open_sequence(path: Path, sequence: PictureSequence, requested: FootageRang
     first = read_picture(sequence.paths[0])
     if first is None:
         raise _damaged(sequence.paths[0])
-    height, width = first.rgb.shape[:2]
+    width, height = wanted.view.size(first.rgb.shape[1], first.rgb.shape[0])
     count = len(sequence.paths)
     video = Video(
         path, width, height, fps, count, first.focal_35mm, wanted=replace(wanted, fps=None)
@@ -196,9 +213,13 @@ def _open_still(path: Path, requested: FootageRange) -> Video:
     picture = read_picture(path)
     if picture is None:
         raise _damaged(path)
-    height, width = picture.rgb.shape[:2]
-    video = Video(path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, _still=picture.rgb)
-    if requested != VideoRange():
+    image = requested.view.show(picture.rgb)
+    height, width = image.shape[:2]
+    wanted = VideoRange(view=requested.view)
+    video = Video(
+        path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, wanted=wanted, _still=image
+    )
+    if requested != wanted:
         video.warnings.append(notice("range_of_image", footage=path.name))
     if picture.length > 1:
         video.warnings.append(
@@ -223,18 +244,37 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
                 "convert it to H.264 .mp4"
             )
         fps = exact_fps(reader.rate) or estimate_fps(reader)
+        average_fps = exact_fps(reader.average_rate) or fps
+        varies = abs(average_fps - fps) > _VARYING * fps
+        if varies:
+            fps = usual_fps(path) or fps
+        else:
+            average_fps = fps
+        recorded_speed = reader.recorded_rate / float(fps)
         count = reader.frame_count
         flip = ("Y" if reader.clockwise_deg % 180 == 0 else "X") if reader.is_mirrored else ""
-    height, width = first[1].shape[:2]
-    claimed = reader.shown_s * fps if reader.shown_s else count
+    width, height = requested.view.size(first[1].shape[1], first[1].shape[0])
+    claimed = reader.shown_s * average_fps if reader.shown_s else count
     frame_count = max(1, round(claimed)) if 0 < claimed < 1e9 else 1
     wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
+    video._average_fps = average_fps
+    if recorded_speed > _SLOW_MOTION:
+        video.recorded_speed = recorded_speed
+    if abs(average_fps - fps) > _VARYING * fps:
+        video.warnings.append(
+            notice(
+                "variable_frame_rate",
+                footage=path.name,
+                rate=float(fps),
+                average=float(average_fps),
+            )
+        )
     if flip:
         video.warnings.append(notice("mirrored", footage=path.name, axis=flip))
-    if wanted.start_s > 0 and count > 0 and wanted.start_s * fps > frame_count + fps:
+    if wanted.start_s > 0 and count > 0 and wanted.start_s * average_fps > frame_count + fps:
         raise VideoError(
-            f"{path} lasts {frame_count / float(fps):.1f} s, but the start is at "
+            f"{path} lasts {frame_count / float(average_fps):.1f} s, but the start is at "
             f"{wanted.start_s:g} s; start earlier"
         )
     if wanted.fps is not None:
@@ -314,7 +354,7 @@ class _Decoder:
             index, time = reader.skip_to(video.wanted.start_s, video.source_fps)
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
             time = next_time(time, decoded[0], float(1 / video.source_fps))
-            image = decoded[1]
+            image = video.wanted.view.show(decoded[1])
             if time > video.wanted.end_s + 1e-6:
                 break
             if image.shape[:2] != (video.height, video.width):
@@ -340,7 +380,7 @@ class _Decoder:
         # Both tests: a container that counts frames from its duration is wrong for a variable frame
         # rate.
         missing = video.frame_count - index
-        last = min(float((video.frame_count - 1) / video.source_fps), video.wanted.end_s)
+        last = min(float((video.frame_count - 1) / video.average_fps), video.wanted.end_s)
         if missing > max(1, video.frame_count // 50) and time < 0.95 * last:
             self._warn(
                 notice(

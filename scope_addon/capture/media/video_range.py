@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The range of frames to capture: start, end and frame rate.
+"""The range of frames to capture: start, end and frame rate; and how they have to be turned.
 
 Times are seconds, MM:SS, HH:MM:SS.mmm, or timecode HH:MM:SS:FF or HH:MM:SS;FF. A timecode counts
 frames at the nominal rate r, the integer nearest to the footage's rate (30 for 30000/1001). With a
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ...errors import UsageError
+from ...footage_view import AS_IN_FILE, FootageView
 from .frame import Frame
 
 _MARGIN = Fraction(1, 4)  # of a frame, for containers that round the times of their frames
@@ -35,7 +36,7 @@ _SAME_RATE = Fraction(1, 10_000)
 @dataclass(frozen=True)
 class VideoRange:
     """Frames shown from ``start_s`` to ``end_s``, both included: ``fps`` of them per second, or all
-    if None.
+    if None; seen as ``view`` says.
 
     :raises UsageError: start, end or rate is out of range, or the end does not come after the
         start.
@@ -44,6 +45,7 @@ class VideoRange:
     start_s: float = 0.0
     end_s: float = float("inf")
     fps: Fraction | None = None
+    view: FootageView = AS_IN_FILE
 
     def __post_init__(self) -> None:
         if not 0 <= self.start_s < float("inf"):
@@ -71,6 +73,7 @@ class TimecodeRange:
     start: float | Timecode = 0.0
     end: float | Timecode = float("inf")
     fps: Fraction | None = None
+    view: FootageView = AS_IN_FILE
 
     def at_rate(self, fps: Fraction) -> VideoRange:
         """Convert to seconds, in footage of this rate.
@@ -84,7 +87,7 @@ class TimecodeRange:
             start = max(0.0, float((start.frame(fps) - _MARGIN) / fps))
         if isinstance(end, Timecode):
             end = float((end.frame(fps) + _MARGIN) / fps)
-        return VideoRange(start, end, self.fps)
+        return VideoRange(start, end, self.fps, self.view)
 
 
 FootageRange = VideoRange | TimecodeRange
@@ -142,7 +145,13 @@ class FrameSampler:
         self._next = max(self._next + 1, int((time - self._start) * float(self._fps) + 0.5) + 1)
 
 
-def parse_range(start: str | None, end: str | None, fps: str | None) -> FootageRange:
+def parse_range(
+    start: str | None,
+    end: str | None,
+    fps: str | None,
+    *,
+    view: FootageView = AS_IN_FILE,
+) -> FootageRange:
     """Parse the arguments of ``--start``, ``--end`` and ``--fps``.
 
     :raises UsageError: one of them is not a time or a rate, or the end does not come after the
@@ -152,8 +161,8 @@ def parse_range(start: str | None, end: str | None, fps: str | None) -> FootageR
     last = float("inf") if end is None else parse_time(end)
     rate = None if fps is None else parse_rate(fps)
     if isinstance(first, Timecode) or isinstance(last, Timecode):
-        return TimecodeRange(first, last, rate)
-    return VideoRange(first, last, rate)
+        return TimecodeRange(first, last, rate, view)
+    return VideoRange(first, last, rate, view)
 
 
 def parse_rate(text: str) -> Fraction:

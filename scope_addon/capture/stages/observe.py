@@ -34,13 +34,15 @@ from ..perception.adapters.description import description_path
 from ..perception.landmark_network import EstimateMemory
 from ..perception.observation import Observation
 from ..perception.sessions import Execution
+from ..tracking.chosen_person import ChosenPerson, find_chosen, place_of
 from ..tracking.face.face_tracker import FaceTracker
 from ..tracking.hands.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.mask_schedule import MaskSchedule
-from ..tracking.people import build_tracks
+from ..tracking.people import people_of
 from ..tracking.scene_cuts import SCENE_GAP_S, SceneCuts
-from ..tracking.track import Track, Tracklet
-from ..tracking.tracker import PeopleTracker
+from ..tracking.track import Track, Tracklet, make_track
+from ..tracking.tracker import MAX_PEOPLE, PeopleTracker
+from ..tracking.turned_footage import needed_turn
 from .clock import COMPILING, FINDING, Progress, StageClock
 
 # Called with each decoded frame, its largest person, and the object that fits the body to such an
@@ -78,6 +80,7 @@ def given_camera(video: Video, options: CaptureOptions) -> Camera:
         fov_deg=options.fov_deg,
         calibration=options.calibration,
         metadata_focal_mm=video.focal_35mm,
+        view=video.wanted.view,
     )
 
 
@@ -112,10 +115,11 @@ def open_trackers(
     people = PeopleTracker(
         options.quality,
         threads,
-        None if options.people == LARGEST else most_people(options.people),
+        _followed_people(options),
         detector=options.detector,
         keypoints=options.keypoints,
         execution=execution,
+        crop=options.part,
     )
     people.remember_in(memory)
     least_px = LARGE_HAND_PX if options.hands == AUTO else SMALLEST_HAND_PX
@@ -127,6 +131,13 @@ def open_trackers(
     # The face's small layers take twice the processor time in two threads, which mostly wait for
     # each other.
     return Trackers(people, hands, FaceTracker(1, execution=execution) if options.face else None)
+
+
+def _followed_people(options: CaptureOptions) -> int | None:
+    """Return how many people the tracker follows; None: those who may be the most prominent one."""
+    if options.chosen is not None:
+        return MAX_PEOPLE
+    return None if options.people == LARGEST else most_people(options.people)
 
 
 @dataclass(frozen=True)
@@ -154,14 +165,24 @@ class Observed:
     execution: str  # what the networks ran on, for the report
     warnings: list[Notice]
 
-    def tracks(self, most: int) -> list[Track]:
-        """Return the tracks of at most ``most`` people; see `build_tracks`."""
+    def tracks(
+        self, most: int, chosen: ChosenPerson | None = None
+    ) -> tuple[list[Track], list[ChosenPerson]]:
+        """Return the tracks of at most ``most`` people, and where others are, who are left out.
+
+        :param chosen: who comes first; None: the most prominent one.
+        :raises UsageError: the chosen person was not found.
+        """
         cuts = np.zeros(len(self.timestamps))
         cuts[self.cut_rows] = 1.0
         times = np.array(self.timestamps) + SCENE_GAP_S * np.cumsum(cuts)
         seen = [tracklet for tracklet in self.tracklets if tracklet.rows]
         in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
-        return build_tracks(self.frames, times.tolist(), in_order, most)
+        people = people_of(times.tolist(), in_order)
+        if chosen is not None and people:
+            people.insert(0, people.pop(find_chosen(chosen, people, self.timestamps)))
+        tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]
+        return tracks, [place_of(person, self.timestamps) for person in people[most:]]
 
 
 # Observes all frames of a clip. The plain one is `observe_frames`; `long_clips` has another.
@@ -278,10 +299,13 @@ def observe(
 
     :param observe_frames: another way to observe the frames than all in one pass.
     :raises VideoError: there is no frame in the chosen range.
+    :raises UsageError: the part of the picture reaches beyond it.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
     """
     camera = given_camera(video, options)
+    if options.part is not None:
+        options.part.check(video.width, video.height)
     live = LiveBody(body, camera, next(iter(options.heights_m), None))
     with (
         BackgroundEstimators(
@@ -298,9 +322,10 @@ def observe(
         )
         with clock.stage("solver"):
             footage = _footage(job, observed)
-            tracks = observed.tracks(most_people(options.people))
+            tracks, left_out = observed.tracks(most_people(options.people), options.chosen)
     if not tracks:
         raise _no_person_error(video, options, len(observed.timestamps))
+    footage.warnings.extend(_warnings_about_people(video, tracks, left_out))
     return footage, tracks
 
 
@@ -385,6 +410,25 @@ def _footage(job: ObservationJob, observed: Observed) -> Footage:
         execution=observed.execution,
         warnings=observed.warnings,
     )
+
+
+def _warnings_about_people(
+    video: Video, tracks: list[Track], left_out: list[ChosenPerson]
+) -> list[Notice]:
+    """Say who was seen but left out, and whether the footage seems to be turned."""
+    name = Path(video.path).name
+    warnings = []
+    if left_out:
+        warnings.append(
+            notice("left_out", footage=name, others=len(left_out), place=str(left_out[0]))
+        )
+    turn_deg = needed_turn(tracks[0])
+    if turn_deg:
+        view = video.wanted.view
+        sign = -1 if view.is_mirrored else 1
+        degrees = (view.clockwise_deg + sign * turn_deg) % 360
+        warnings.append(notice("turned_footage", footage=name, degrees=degrees))
+    return warnings
 
 
 def _no_person_error(video: Video, options: CaptureOptions, frames: int) -> NoPersonError:

@@ -70,6 +70,7 @@ def make_report(
         iterations=solved.iterations,
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
+        + speed_warnings(video, options)
         + up_warnings(Path(video.path).name, solved.up_source, is_still)
         + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
         + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
@@ -118,6 +119,14 @@ def up_warnings(name: str, up_source: str, is_still: bool) -> list[Notice]:
     if up_source == LINES or not is_still:
         return []
     return [notice("guessed_up", footage=name, degrees=UP_DEVIATIONS_DEG[up_source][is_still])]
+
+
+def speed_warnings(video: Video, options: CaptureOptions) -> list[Notice]:
+    """Say that the file, not the user, says that the footage is slow motion."""
+    if options.speed is not None or video.recorded_speed == 1.0:
+        return []
+    name = Path(video.path).name
+    return [notice("slow_motion", footage=name, speed=video.recorded_speed)]
 
 
 def face_frames(motion: Motion) -> dict[str, Any]:
@@ -235,7 +244,7 @@ def _other_floors(
                     **of_person,
                     height_m=height,
                     side=side,
-                    times=[float(motion.timestamps[first]) for first, _ in spans],
+                    times=[float(motion.footage_times_s[first]) for first, _ in spans],
                     cause=wrong_scale if wrong_scale and from_the_start else "several_floors",
                 )
             )
@@ -255,7 +264,7 @@ def _steps(of_person: dict[str, Value], body: Body, motion: Motion) -> list[Noti
             **of_person,
             height_cm=100 * abs(float(height)),
             side="above" if height > 0 else "below",
-            times=[float(motion.timestamps[first])],
+            times=[float(motion.footage_times_s[first])],
         )
     ]
 

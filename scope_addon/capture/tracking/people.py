@@ -195,6 +195,11 @@ def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
 MIN_SHARE = 0.02  # of the frames; a person who was seen in fewer is a mistake of the detector
 MIN_INTERVAL_S = 0.3  # the same for the longest time without interruption
 MIN_PROMINENCE = 0.05  # of the most prominent person's
+# Speed of hands and feet, in sides of the region per second, from which somebody counts as moving
+# throughout: half that of walking. Who sits or stands and watches has less than 0.05.
+ACTIVE = 0.2
+_ACTIVITY_STEP_S = 0.3
+_LIMB_ENDS = [15, 16, 27, 28]  # wrists and ankles
 # The mean distance of the keypoints, in sides of the region, while a target drifts onto another.
 MERGER_DISTANCE = 0.25
 MAX_MERGER_S = 0.38
@@ -205,13 +210,22 @@ MIN_REAPPEARANCE_S = 0.1
 def build_tracks(
     frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet], most: int
 ) -> list[Track]:
-    """Return the tracks of at most ``most`` people, the most prominent (size times frames) first.
+    """Return the tracks of at most ``most`` people, the most prominent first; see `people_of`.
 
-    Each track has a row per frame. The list is empty if nobody was seen in enough frames to be
-    plausible.
+    Each track has a row per frame.
 
     :param frames: source frame index of each frame.
-    :param times: their times in seconds, with a long gap at a cut.
+    """
+    people = people_of(times, tracklets)[:most]
+    return [make_track(frames, times, person) for person in people]
+
+
+def people_of(times: Sequence[float], tracklets: Sequence[Tracklet]) -> list[list[Tracklet]]:
+    """Return the tracklets of each person of a clip, the most prominent one first.
+
+    The list is empty if nobody was seen in enough frames to be plausible.
+
+    :param times: seconds of each frame of the clip, with a long gap at a cut.
     :param tracklets: in the order in which they begin; they are truncated.
     """
     if not tracklets:
@@ -220,10 +234,11 @@ def build_tracks(
         tracklet.truncate(frames_before_flicker(tracklet, times))
         tracklet.truncate(frames_before_merger(tracklet, tracklets, times))
     people = [[tracklets[k] for k in chain] for chain in link(tracklets, times)]
-    people.sort(key=_prominence, reverse=True)
-    counted = _plausible(people, times)[:most]
-    least = MIN_PROMINENCE * _prominence(counted[0]) if counted else 0.0
-    return [make_track(frames, times, person) for person in counted if _prominence(person) >= least]
+    counted = _plausible(people, times)
+    prominence = [_prominence(person, times) for person in counted]
+    order = sorted(range(len(counted)), key=lambda k: prominence[k], reverse=True)
+    least = MIN_PROMINENCE * max(prominence, default=0.0)
+    return [counted[k] for k in order if prominence[k] >= least]
 
 
 def _plausible(people: list[list[Tracklet]], times: Sequence[float]) -> list[list[Tracklet]]:
@@ -294,6 +309,32 @@ def frames_before_flicker(tracklet: Tracklet, times: Sequence[float]) -> int:
     return end
 
 
-def _prominence(person: list[Tracklet]) -> float:
-    """Return the person's size in the image, summed over the frames."""
-    return sum(float(np.sum(t.sides_px)) for t in person)
+def _prominence(person: list[Tracklet], times: Sequence[float]) -> float:
+    """Return the person's size in the image, summed over the frames, and doubled for somebody who
+    moves.
+
+    Who walks or dances is the subject, rather than somebody of the same size who watches.
+    """
+    size = sum(float(np.sum(t.sides_px)) for t in person)
+    return size * (1.0 + min(_activity(person, times) / ACTIVE, 1.0))
+
+
+def _activity(person: list[Tracklet], times: Sequence[float]) -> float:
+    """Return how fast hands and feet move relative to the trunk: the median over the clip, in sides
+    of the region per second.
+
+    A step of `_ACTIVITY_STEP_S` is long against the noise of keypoints.
+    """
+    speeds = []
+    for tracklet in person:
+        at = np.array([times[row] for row in tracklet.rows])
+        later = np.searchsorted(at, at + _ACTIVITY_STEP_S)
+        first = np.flatnonzero(later < len(at))
+        if not len(first):
+            continue
+        limbs = np.array([values[_LIMB_ENDS, :2] for values in tracklet.values], float)
+        limbs -= np.array(tracklet.centers_px)[:, None]
+        moved = np.linalg.norm(limbs[later[first]] - limbs[first], axis=2).mean(axis=1)
+        elapsed = at[later[first]] - at[first]
+        speeds.append(moved / elapsed / np.array(tracklet.sides_px)[first])
+    return float(np.median(np.concatenate(speeds))) if speeds else 0.0

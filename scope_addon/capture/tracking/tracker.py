@@ -20,6 +20,7 @@ import numpy as np
 from ....solver.errors import ShapeError
 from ...arrays import Uint8Array
 from ..perception.adapters.keypoint_network import KeypointNetwork
+from ..perception.crop import Crop
 from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection
@@ -87,6 +88,8 @@ class PeopleTracker:
         clip. Then only those who may turn out to be that one are tracked.
     :param detector: an ONNX file of the user's that replaces the built-in detector; see `adapters`.
     :param keypoints: the same for the landmark network.
+    :param crop: the part of the picture that the networks are given; None: all of it. Everything
+        else is in pixels of the whole picture.
     :raises UsageError: the quality is unknown.
     :raises SetupError: a built-in network is missing.
     :raises ModelFileError: a user's network cannot be used.
@@ -101,7 +104,9 @@ class PeopleTracker:
         detector: Path | None = None,
         keypoints: Path | None = None,
         execution: Execution | None = None,
+        crop: Crop | None = None,
     ) -> None:
+        self._crop = crop
         self._networks = networks = open_networks(quality, threads, detector, keypoints, execution)
         self._estimator = LandmarkEstimator(networks)
         self._reference = ReferenceEstimator(networks.reference) if networks.reference else None
@@ -127,7 +132,7 @@ class PeopleTracker:
         tracker = copy.copy(self)
         tracker._estimator = LandmarkEstimator(self._networks)
         tracker.reset()
-        tracker._given = list(regions)
+        tracker._given = [tracker._moved(region, -1) for region in regions]
         return tracker
 
     def reset(self) -> None:
@@ -180,6 +185,9 @@ class PeopleTracker:
             raise ShapeError(
                 f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}."
             )
+        if self._crop is not None:
+            image_rgb = self._crop.cut(image_rgb)
+            upcoming_rgb = None if upcoming_rgb is None else self._crop.cut(upcoming_rgb)
         self._clock.advance(time_s)
         self._estimator.advance(upcoming_with_masks)
         self._update_live(image_rgb, upcoming_rgb)
@@ -190,9 +198,28 @@ class PeopleTracker:
             self._search(image_rgb)
         references = self._begin_references(image_rgb)
         return [
-            (f.tracklet, self._observe(image_rgb, f, references.get(f.tracklet)))
+            (f.tracklet, self._in_picture(self._observe(image_rgb, f, references.get(f.tracklet))))
             for f in self._live
         ]
+
+    def _moved(self, region: Region, sign: int) -> Region:
+        """Return a region of the cropped picture in the whole one, or reversely with sign −1."""
+        if self._crop is None:
+            return region
+        return region.moved(np.array([sign * self._crop.x, sign * self._crop.y], float))
+
+    def _in_picture(self, observation: Observation) -> Observation:
+        """Return an observation of the cropped picture in pixels of the whole one; without its
+        mask, which does not know what lies beyond the crop.
+        """
+        if self._crop is None:
+            return observation
+        return replace(
+            observation,
+            keypoints_px=observation.keypoints_px + [self._crop.x, self._crop.y],
+            region=self._moved(observation.region, 1),
+            mask=None,
+        )
 
     def _update_live(self, image_rgb: Uint8Array, upcoming_rgb: Uint8Array | None) -> None:
         """Track everybody from the frame before to this one; people who are not found are lost."""

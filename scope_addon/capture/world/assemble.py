@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ....solver import rotations
 from ....solver.body import Body
 from ...arrays import Float32Array, Float64Array, FloatArray
+from ...footage_view import AS_IN_FILE, FootageView
 from ...kinematics.contact_points import SOLES
 from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
@@ -104,6 +105,9 @@ def assemble_motion(
         joint_sigma_depth_m=None if sigma is None else sigma[..., 0],
         height_sigma_m=raw.height_sigma_m,
         uneven_ground=shot.uneven_ground,
+        footage_rotation=shot.view.clockwise_deg,
+        footage_mirrored=shot.view.is_mirrored,
+        footage_speed=shot.speed,
         face=face,
     )
 
@@ -185,6 +189,8 @@ class Shot:
     source: str  # name of the footage
     smoothing: bool = True  # False: every frame is fitted alone
     uneven_ground: bool = False  # True: feet rest at any height
+    view: FootageView = AS_IN_FILE  # how the footage was turned
+    speed: float = 1.0  # how many times as fast as the footage plays everything happened
 
     @property
     def is_still(self) -> bool:

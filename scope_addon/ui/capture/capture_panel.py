@@ -124,6 +124,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         elif settings.lens == "FILE":
             draw_file(layout, settings, "calibration_file", text="File")
         draw_section(layout, settings, Section.MOTION)
+        draw_section(layout, settings, Section.FOOTAGE)
         layout.prop(settings, "use_range")
         if settings.use_range:
             column = layout.column(align=True)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The person whom the user chose by a place in the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Float64Array
+from ...errors import UsageError
+from .track import Tracklet
+
+MAX_DISTANCE = 0.2  # from the nearest keypoint, in sides of the region
+MAX_DELAY_S = 0.5  # between the chosen time and a frame in which the person was seen
+
+
+@dataclass(frozen=True)
+class ChosenPerson:
+    """Who is at ``x``, ``y`` pixels of the upright picture at ``time_s`` in the footage; None: at
+    the beginning.
+    """
+
+    x: float
+    y: float
+    time_s: float | None
+
+    def __str__(self) -> str:
+        """Write the place as the option has it."""
+        time = "" if self.time_s is None else f"@{self.time_s:.2f}"
+        return f"{self.x:.0f},{self.y:.0f}{time}"
+
+
+def find_chosen(
+    chosen: ChosenPerson, people: Sequence[list[Tracklet]], times_s: Sequence[float]
+) -> int:
+    """Return which of the people is the chosen one.
+
+    :param people: the tracklets of each.
+    :param times_s: of the clip's frames.
+    :raises UsageError: nobody is near that place then; the message says where people are.
+    """
+    time_s = times_s[0] if chosen.time_s is None else chosen.time_s
+    place = np.array([chosen.x, chosen.y])
+    distances = []
+    others = []
+    for person in people:
+        tracklet, k = _nearest_frame(person, times_s, time_s)
+        if abs(times_s[tracklet.rows[k]] - time_s) > MAX_DELAY_S:
+            distances.append(np.inf)
+            continue
+        points: Float64Array = tracklet.values[k][:, :2].astype(float)
+        distance = np.linalg.norm(points - place, axis=1).min()
+        distances.append(float(distance / tracklet.sides_px[k]))
+        x, y = tracklet.centers_px[k]
+        others.append(f"{x:.0f},{y:.0f}")
+    nearest = int(np.argmin(distances))
+    if distances[nearest] > MAX_DISTANCE:
+        seen = f"people are then at {' and '.join(others)}" if others else "nobody was seen then"
+        raise UsageError(f"--person {chosen}: nobody was found there at {time_s:.2f} s; {seen}")
+    return nearest
+
+
+def place_of(person: Sequence[Tracklet], times_s: Sequence[float]) -> ChosenPerson:
+    """Return a place by which a person can be chosen: in the middle of the longest tracklet."""
+    longest = max(person, key=lambda tracklet: len(tracklet.rows))
+    k = len(longest.rows) // 2
+    x, y = longest.centers_px[k].tolist()
+    return ChosenPerson(x, y, times_s[longest.rows[k]])
+
+
+def _nearest_frame(
+    person: Sequence[Tracklet], times_s: Sequence[float], time_s: float
+) -> tuple[Tracklet, int]:
+    """Return the tracklet, and the number of its frame, that is nearest to a time."""
+    frames = [
+        (abs(times_s[row] - time_s), number, k)
+        for number, tracklet in enumerate(person)
+        for k, row in enumerate(tracklet.rows)
+    ]
+    _, number, k = min(frames)
+    return person[number], k

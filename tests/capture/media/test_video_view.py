@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Videos, pictures and sequences that are turned and mirrored on request; variable frame rates."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.footage_view import FootageView
+
+from .corner_picture import corner_image, corners
+from .made_video import with_time_table, write_video
+
+# As `corners` reads the picture: top left, top right, bottom right, bottom left.
+SHOWN = {
+    (0, False): "rgbw",
+    (0, True): "grwb",
+    (90, False): "brwg",
+    (180, False): "wbgr",
+    (270, False): "gwrb",
+    (90, True): "rbgw",
+}
+
+
+def files(folder: Path) -> list[Path]:
+    picture = corner_image()[..., ::-1]
+    names = ["still.png", "film_1.png", "film_2.png"]
+    for name in names:
+        cv2.imwrite(str(folder / name), picture)
+    film = write_video(folder / "a.mp4", [corner_image()] * 2)
+    return [film, folder / "still.png", folder / "film_#.png"]
+
+
+@pytest.mark.parametrize("asked", [(0, False), (0, True), (90, False), (180, False), (270, False)])
+def test_footage_of_every_kind_is_turned_and_mirrored(
+    tmp_path: Path, asked: tuple[int, bool]
+) -> None:
+    expected = None
+    for path in files(tmp_path):
+        wanted = VideoRange(view=FootageView(*asked))
+        with open_video(path, wanted) as video:
+            frame = next(iter(video)).image_rgb
+            assert (video.width, video.height) == frame.shape[1::-1]
+            assert not [each for each in video.warnings if each.code == "range_of_image"]
+        turned = np.rot90(corner_image(), -asked[0] // 90)
+        expected = corners(np.ascontiguousarray(turned[:, ::-1] if asked[1] else turned))
+        assert corners(frame) == expected
+
+
+def varying_film(path: Path) -> Path:
+    """40 frames at 30 per second, two of them twice as early, as phones in daylight write them."""
+    write_video(path, [np.full((64, 96, 3), 5 * k, np.uint8) for k in range(40)])
+    with_time_table(path, 600, [(4, 20), (1, 10), (4, 20), (1, 40)] * 4)
+    return path
+
+
+def test_what_counts_frames_of_a_variable_rate_agrees(tmp_path: Path) -> None:
+    """Most frames are a thirtieth of a second apart, whatever rate the container guesses."""
+    with open_video(varying_film(tmp_path / "a.mp4")) as video:
+        times = [frame.timestamp_s for frame in video]
+        assert video.fps == 30
+        assert len(times) == 40
+        assert abs(video.expected_frames - 40) <= 2
+        (warning,) = video.warnings
+        assert warning.code == "variable_frame_rate"
+        assert warning.values["rate"] == pytest.approx(30)
+    with open_video(tmp_path / "a.mp4", VideoRange(end_s=times[19] + 1e-3)) as video:
+        assert abs(video.expected_frames - len(list(video))) <= 3
+
+
+def test_a_constant_rate_is_not_called_variable(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "a.mp4", [np.zeros((64, 96, 3), np.uint8)] * 20, fps=24)
+    with open_video(path) as video:
+        assert video.fps == Fraction(24)
+        assert not video.warnings
+
+
+@pytest.mark.parametrize(("stated", "speed"), [("240.000000", 8.0), ("30.0", 1.0), ("x", 1.0)])
+def test_slow_motion_is_read_from_a_phones_file(tmp_path: Path, stated: str, speed: float) -> None:
+    path = tmp_path / "a.mp4"
+    options = {"movflags": "use_metadata_tags"}
+    with av.open(str(path), "w", options=options) as container:
+        container.metadata["com.android.capture.fps"] = stated
+        stream = container.add_stream("mpeg4", rate=30)
+        stream.width, stream.height = 96, 64
+        for k in range(10):
+            image = np.full((64, 96, 3), 20 * k, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+    with open_video(path) as video:
+        assert video.recorded_speed == pytest.approx(speed)

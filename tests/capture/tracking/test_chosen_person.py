@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Who is captured: the one who moves rather than a spectator, or whom the user chose by a place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.options import parse_person
+from scope.scope_addon.capture.tracking.chosen_person import ChosenPerson, find_chosen, place_of
+from scope.scope_addon.capture.tracking.people import people_of
+from scope.scope_addon.capture.tracking.track import Track, Tracklet, make_track
+from scope.scope_addon.capture.tracking.turned_footage import needed_turn
+from scope.scope_addon.errors import UsageError
+
+TIMES = (np.arange(90) / 30).tolist()
+LIMBS = [15, 16, 27, 28]
+
+
+def person(x: float, side: float = 200.0, swing: float = 0.0, rows: range = range(90)) -> Tracklet:
+    """Somebody at x, 300 whose hands and feet swing by a share of the region's side."""
+    rng = np.random.default_rng(int(x))
+    body = rng.uniform(-0.3, 0.3, (33, 2)) * side
+    values = []
+    for row in rows:
+        points = body + [x, 300.0] + rng.normal(scale=0.003 * side, size=(33, 2))
+        points[LIMBS, 0] += swing * side * np.sin(2 * np.pi * TIMES[row])
+        values.append(np.column_stack([points, np.ones((33, 4))]).astype(np.float32))
+    centers = [np.array([x, 300.0])] * len(rows)
+    return Tracklet(list(rows), values, centers, [side] * len(rows))
+
+
+def first_x(people: list[list[Tracklet]]) -> float:
+    return float(people[0][0].centers_px[0][0])
+
+
+def test_who_moves_is_preferred_to_a_larger_spectator() -> None:
+    spectator = person(900.0, side=240.0)
+    dancer = person(200.0, side=200.0, swing=0.15)
+    assert first_x(people_of(TIMES, [spectator, dancer])) == 200.0
+
+
+def test_the_noise_of_keypoints_is_no_movement_and_size_decides() -> None:
+    assert first_x(people_of(TIMES, [person(200.0), person(900.0, side=220.0)])) == 900.0
+    walkers = [person(200.0, swing=0.2), person(900.0, side=220.0, swing=0.2)]
+    assert first_x(people_of(TIMES, walkers)) == 900.0
+
+
+def test_a_place_chooses_whoever_is_there_then() -> None:
+    people = [[person(200.0)], [person(600.0, rows=range(30, 90))], [person(900.0)]]
+    assert find_chosen(ChosenPerson(890.0, 310.0, 1.0), people, TIMES) == 2
+    assert find_chosen(ChosenPerson(600.0, 300.0, 1.0), people, TIMES) == 1
+    assert find_chosen(ChosenPerson(210.0, 290.0, None), people, TIMES) == 0
+    for k, each in enumerate(people):
+        assert find_chosen(place_of(each, TIMES), people, TIMES) == k
+
+
+def test_a_place_without_a_person_is_refused_and_says_where_people_are() -> None:
+    people = [[person(200.0)], [person(600.0, rows=range(60, 90))]]
+    with pytest.raises(
+        UsageError, match=r"nobody was found there at 0\.50 s; people are .*200,300"
+    ):
+        find_chosen(ChosenPerson(600.0, 300.0, 0.5), people, TIMES)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("640,360", ChosenPerson(640, 360, None)),
+        (" 640 , 36.5@2.5", ChosenPerson(640, 36.5, 2.5)),
+        ("1,2@01:02.5", ChosenPerson(1, 2, 62.5)),
+    ],
+)
+def test_places_are_read(text: str, place: ChosenPerson) -> None:
+    assert parse_person(text) == place
+
+
+@pytest.mark.parametrize("text", ["1", "1,2,3", "a,b", "1,2@x", "-1,2", "1,2@00:00:01:10"])
+def test_other_texts_are_no_places(text: str) -> None:
+    with pytest.raises(UsageError):
+        parse_person(text)
+
+
+def seen_turned(angles_deg: np.ndarray) -> Track:
+    """A track whose trunk points upwards, turned clockwise by these angles."""
+    tracklet = person(400.0, rows=range(len(angles_deg)))
+    for values, angle in zip(tracklet.values, np.radians(angles_deg), strict=True):
+        values[[23, 24], :2] = 400.0
+        values[[11, 12], :2] = 400.0 + 100.0 * np.array([np.sin(angle), -np.cos(angle)])
+    return make_track(list(range(len(angles_deg))), TIMES, [tracklet])
+
+
+@pytest.mark.parametrize(
+    ("angle", "turn"), [(0, 0), (90, 270), (100, 270), (-80, 90), (175, 180), (-170, 180), (50, 0)]
+)
+def test_somebody_who_lies_all_the_time_needs_a_turn_of_the_picture(angle: int, turn: int) -> None:
+    noise = np.random.default_rng(0).normal(scale=5.0, size=60)
+    assert needed_turn(seen_turned(angle + noise)) == turn
+
+
+def test_somebody_who_lies_down_or_turns_a_somersault_does_not() -> None:
+    assert needed_turn(seen_turned(np.linspace(0, 90, 90))) == 0
+    assert needed_turn(seen_turned(np.linspace(0, 360, 90))) == 0
+    assert needed_turn(seen_turned(np.full(3, 90.0))) == 0
