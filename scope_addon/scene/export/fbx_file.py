@@ -5,7 +5,8 @@ take's name.
 Unreal interprets lengths as centimetres whatever unit the file states. Blender either writes metres
 or scales every object by 100, which becomes the scale of a skeleton's root. Therefore all lengths
 in the file are multiplied and no object is scaled: vertices and shapes, translations and their
-curves, the translations in bind matrices, and the lengths of cameras.
+curves, the translations in bind matrices, and the lengths of cameras. The scale of the user's own
+objects goes into the lengths below them, see `fbx_scale.py`.
 
 Blender's exporter starts at the time of the scene's first frame, which is 1/20 s at frame 1 and 20
 frames per second, and names the take after the scene. It numbers objects at random and writes the
@@ -17,16 +18,14 @@ be enabled.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...errors import OutputError
-
-# the parser's: id, props, props_type (a letter code for each), and elems, the child nodes
-_Node = Any
+from .fbx_scale import Node, below, fold_scales, properties
 
 # The encoder's methods by the letter code of a property's type.
 _ADD = {
@@ -88,14 +87,13 @@ def correct_fbx(path: Path, take: str) -> None:
             "this Blender's FBX add-on cannot write centimetres; export .glb instead"
         ) from error
     root, version = parse_fbx.parse(str(path))
-    settings = {
-        p.props[0]: p for node in _below(root, b"GlobalSettings") for p in _properties(node)
-    }
+    settings = {p.props[0]: p for node in below(root, b"GlobalSettings") for p in properties(node)}
     factor = settings[b"UnitScaleFactor"].props[-1]  # in centimetres
     if factor != 1.0:
         for name in (b"UnitScaleFactor", b"OriginalUnitScaleFactor"):
             settings[name].props[-1] = 1.0
         _multiply_lengths(root, factor)
+    fold_scales(root)
     _start_at_zero(root)
     _name_take(root, take.encode())
     _number_objects(root)
@@ -103,99 +101,95 @@ def correct_fbx(path: Path, take: str) -> None:
     encode_bin.write(str(path), _encoded(root, encode_bin.FBXElem), version)
 
 
-def _start_at_zero(root: _Node) -> None:
+def _start_at_zero(root: Node) -> None:
     """Subtract the start of the take from the times of all keys and from the take's limits, in
     place.
     """
     stacks = [
-        node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")
+        node for objects in below(root, b"Objects") for node in below(objects, b"AnimationStack")
     ]
-    limits = [p for stack in stacks for p in _properties(stack) if p.props[0] in _LIMITS]
+    limits = [p for stack in stacks for p in properties(stack) if p.props[0] in _LIMITS]
     # The format's own ticks, as the exporter has rounded them; it omits a start at 0.
     ticks = next((limit.props[-1] for limit in limits if limit.props[0] == b"LocalStart"), 0)
-    for node in (child for objects in _below(root, b"Objects") for child in objects.elems):
-        for times in _below(node, b"KeyTime") if node.id == b"AnimationCurve" else ():
+    for node in (child for objects in below(root, b"Objects") for child in objects.elems):
+        for times in below(node, b"KeyTime") if node.id == b"AnimationCurve" else ():
             np.frombuffer(times.props[0], np.int64)[:] -= ticks
     for limit in limits:
         limit.props[-1] -= ticks
-    for take in (child for takes in _below(root, b"Takes") for child in _below(takes, b"Take")):
-        for span in _below(take, b"LocalTime", b"ReferenceTime"):
+    for take in (child for takes in below(root, b"Takes") for child in below(takes, b"Take")):
+        for span in below(take, b"LocalTime", b"ReferenceTime"):
             span.props[:] = [time - ticks for time in span.props]
 
 
-def _name_take(root: _Node, name: bytes) -> None:
+def _name_take(root: Node, name: bytes) -> None:
     """Give the only take and its animation stack a name, in place."""
     for stack in (
-        node for objects in _below(root, b"Objects") for node in _below(objects, b"AnimationStack")
+        node for objects in below(root, b"Objects") for node in below(objects, b"AnimationStack")
     ):
         stack.props[1] = name + stack.props[1][stack.props[1].index(_SEPARATOR) :]
-    for takes in _below(root, b"Takes"):
-        for current in _below(takes, b"Current"):
+    for takes in below(root, b"Takes"):
+        for current in below(takes, b"Current"):
             current.props[0] = name if current.props[0] else b""
-        for take in _below(takes, b"Take"):
+        for take in below(takes, b"Take"):
             take.props[0] = name
 
 
-def _number_objects(root: _Node) -> None:
+def _number_objects(root: Node) -> None:
     """Replace the numbers of the document and the objects by their order in the file, in place."""
     listed = [
         node
-        for top in _below(root, b"Documents", b"Objects")
+        for top in below(root, b"Documents", b"Objects")
         for node in top.elems
         if node.props_type[:1] == b"L"
     ]
     number = {node.props[0]: _FIRST_ID + place for place, node in enumerate(listed)}
-    holders: list[tuple[_Node, tuple[int, ...]]] = [(node, (0,)) for node in listed]
+    holders: list[tuple[Node, tuple[int, ...]]] = [(node, (0,)) for node in listed]
     poses = (node for node in listed if node.id == b"Pose")
     holders += [
         (n, (0,))
         for pose in poses
-        for each in _below(pose, b"PoseNode")
-        for n in _below(each, b"Node")
+        for each in below(pose, b"PoseNode")
+        for n in below(each, b"Node")
     ]
-    holders += [
-        (link, (1, 2)) for top in _below(root, b"Connections") for link in _below(top, b"C")
-    ]
+    holders += [(link, (1, 2)) for top in below(root, b"Connections") for link in below(top, b"C")]
     for node, places in holders:
         for place in places:
             node.props[place] = number.get(node.props[place], node.props[place])  # 0 is the scene
 
 
-def _set_creation_time(root: _Node) -> None:
+def _set_creation_time(root: Node) -> None:
     """Set the time of creation to a fixed one, in place."""
-    for header in _below(root, b"FBXHeaderExtension"):
-        for part in (
-            part for stamp in _below(header, b"CreationTimeStamp") for part in stamp.elems
-        ):
+    for header in below(root, b"FBXHeaderExtension"):
+        for part in (part for stamp in below(header, b"CreationTimeStamp") for part in stamp.elems):
             part.props[0] = _CREATED.get(part.id, part.props[0])
 
 
-def _multiply_lengths(root: _Node, factor: float) -> None:
+def _multiply_lengths(root: Node, factor: float) -> None:
     """Multiply all lengths in the file, in place."""
     translations = _translation_curves(root)
-    for node in (child for objects in _below(root, b"Objects") for child in objects.elems):
+    for node in (child for objects in below(root, b"Objects") for child in objects.elems):
         for holder in _length_holders(node, translations):
             _multiply(holder, factor)
         if node.id in (b"Pose", b"Deformer"):
-            for holder in (node, *_below(node, b"PoseNode")):
-                for matrix in _below(holder, *_MATRICES):
+            for holder in (node, *below(node, b"PoseNode")):
+                for matrix in below(holder, *_MATRICES):
                     _multiply(matrix, factor, _TRANSLATION)
 
 
-def _length_holders(node: _Node, translations: set[int]) -> Iterable[_Node]:
+def _length_holders(node: Node, translations: set[int]) -> Iterable[Node]:
     """Return the nodes below an object node all of whose numbers are lengths."""
     if node.id == b"Geometry":
-        return _below(node, b"Vertices")
+        return below(node, b"Vertices")
     if node.id in (b"Model", b"NodeAttribute"):
-        return (p for p in _properties(node) if p.props[0] in _LENGTHS)
+        return (p for p in properties(node) if p.props[0] in _LENGTHS)
     if node.id == b"AnimationCurveNode" and node.props[0] in translations:
-        return _properties(node)
+        return properties(node)
     if node.id == b"AnimationCurve" and node.props[0] in translations:
-        return _below(node, b"KeyValueFloat")
+        return below(node, b"KeyValueFloat")
     return ()
 
 
-def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
+def _multiply(node: Node, factor: float, only: slice = slice(None)) -> None:
     """Multiply a node's doubles, and the selected elements of its arrays of floats and doubles, in
     place.
     """
@@ -206,27 +200,19 @@ def _multiply(node: _Node, factor: float, only: slice = slice(None)) -> None:
             np.frombuffer(node.props[index], kind)[only] *= factor
 
 
-def _translation_curves(root: _Node) -> set[int]:
+def _translation_curves(root: Node) -> set[int]:
     """Return the ids of the curve nodes that animate a model's translation, and of their curves."""
     links = [
         c.props
-        for node in _below(root, b"Connections")
-        for c in _below(node, b"C")
+        for node in below(root, b"Connections")
+        for c in below(node, b"C")
         if c.props[0] == b"OP"
     ]
     nodes = {link[1] for link in links if link[3] == b"Lcl Translation"}
     return nodes | {link[1] for link in links if link[2] in nodes}
 
 
-def _properties(node: _Node) -> list[_Node]:
-    return [p for block in _below(node, b"Properties70") for p in _below(block, b"P")]
-
-
-def _below(node: _Node, *names: bytes) -> Iterator[_Node]:
-    return (child for child in node.elems if child.id in names)
-
-
-def _encoded(node: _Node, element: Any) -> Any:
+def _encoded(node: Node, element: Any) -> Any:
     """Convert a node and its children to the encoder's class ``element``."""
     out = element(node.id)
     for kind, value in zip(node.props_type.decode(), node.props, strict=True):
