@@ -13,6 +13,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -319,7 +320,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         )
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
-            written = write_outputs(outputs, result.motions, body, video, args, rig)
+            written, warnings = write_outputs(outputs, result.motions, body, video, args, rig)
+            captured = replace(result.report, warnings=[*result.report.warnings, *warnings])
             if args.overlay:
                 write_overlay(
                     args.overlay,
@@ -332,11 +334,11 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                 written.append(args.overlay)
             if args.report:
                 clip = CapturedClip(
-                    video, result.motions, body, result.report, args.command_text, options.wanted
+                    video, result.motions, body, captured, args.command_text, options.wanted
                 )
                 write_capture_page(args.report, clip, lambda i, n: progress("report", i, n))
                 written.append(args.report)
-            report = result.report.as_json() | {"outputs": [str(path) for path in written]}
+            report = captured.as_json() | {"outputs": [str(path) for path in written]}
             if args.finished_file:
                 write_finished(args.finished_file, report)
     for warning in report["warnings"]:

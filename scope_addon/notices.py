@@ -16,9 +16,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 MAX_TIMES = 4  # that are listed in a sentence
+MAX_NAMES = 6
 OTHER = "other"  # the code of a sentence that is none of ours, such as an error's message
 
-Value = str | int | float | list[float]
+Value = str | int | float | list[float] | list[str]
 Translate = Callable[[str], str]
 
 # In braces, the names of values. After a colon, how a value is written: as Python does it, or
@@ -26,6 +27,7 @@ Translate = Callable[[str], str]
 # - whose: the same before a sentence, and nothing for the only person
 # - frames: a count with its noun
 # - times: a list of times in the footage, in seconds
+# - names: a list of names, the first few of them
 # - phrase: one of the phrases below, by its key.
 SENTENCES = {
     OTHER: "{text}",
@@ -117,15 +119,14 @@ SENTENCES = {
     "lost_frame": "{lost} frame is missing in the footage",
     "lost_frames": "{lost} frames are missing in the footage",
     # a rig
-    "guessed_bones": "the bones of '{rig}' were guessed from its rest pose alone; check the result",
+    "guessed_bones": "these bones of '{rig}' were guessed from its rest pose alone: {bones:names}; "
+    "check the result",
+    "still_parts": "the bone map of '{rig}' has no bones for {parts:names}, which stay as they are "
+    "at rest; add bones for them to the map",
+    "odd_bones": "these bones of '{rig}' {reason:phrase}: {bones:names}; check the bone map",
     "face_not_retargeted": "the face was not retargeted: {reason}",
-    "blocked_bone": "'{bone}' of '{rig}' cannot follow the motion: mute the constraints or drivers "
-    "that control them, such as IK, or put the bones that control them into the list",
-    "blocked_two_bones": "'{bone}' and '{other}' of '{rig}' cannot follow the motion: mute the "
-    "constraints or drivers that control them, such as IK, or put the bones that control them into "
-    "the list",
-    "blocked_bones": "'{bone}' and {others} other bones of '{rig}' cannot follow the motion: mute "
-    "the constraints or drivers that control them, such as IK, or put the bones that control them "
+    "blocked_bones": "these bones of '{rig}' cannot follow the motion: {bones:names}; mute the "
+    "constraints or drivers that control them, such as IK, or put the bones that control them "
     "into the list",
     # an imported motion
     "other_gender": "the motion is of a {gender} body, but '{body}' is {body_gender}",
@@ -155,6 +156,11 @@ PHRASES = REASONS | {
     "below": "below",
     "footage": "footage",
     "motion": "motion",
+    # what is wrong about bones at rest
+    "segments": "differ too much in length to be one limb",
+    "upwards": "do not lead down at rest",
+    "sides": "are not equally long on both sides",
+    "lying": "do not stand upright at rest",
     # why somebody is not on the floor
     "several_floors": _SEVERAL_FLOORS,
     "estimated_heights": "either somebody is taller or smaller than estimated: give everybody's "
@@ -266,7 +272,12 @@ def _written(value: Value, spec: str, translate: Translate) -> list[str | TimeTe
     if spec == "times":
         if not isinstance(value, list):
             raise TypeError(f"times must be a list, not {value!r}")
-        return _times(value, translate)
+        return _times([float(each) for each in value], translate)
+    if spec == "names":
+        if not isinstance(value, list):
+            raise TypeError(f"names must be a list, not {value!r}")
+        listed = ", ".join(f"'{name}'" for name in value[:MAX_NAMES])
+        return [listed + (" …" if len(value) > MAX_NAMES else "")]
     return [format(value, spec)]
 
 

@@ -60,9 +60,11 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
 
     imported = import_motion(args.motion, values["body"], values["up_axis"], values["motion_rate"])
     rig = checked_rig(args, outputs, imported.motion.joint_count > len(SKELETONS[24].joint_names))
-    written = write_outputs(outputs, [imported.motion], imported.body, args.motion, args, rig)
-    for note in imported.notes:
-        print_message(f"warning: {note}")
+    motions = [imported.motion]
+    written, warnings = write_outputs(outputs, motions, imported.body, args.motion, args, rig)
+    warnings = [*imported.notes, *warnings]
+    for warning in warnings:
+        print_message(f"warning: {warning}")
     frames = len(imported.motion)
     rate = imported.motion.mocap_framerate
     if not args.json and not args.quiet:
@@ -76,6 +78,6 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
         "body": imported.body.name,
         "frames": frames,
         "frame_rate": rate,
-        **warnings_as_json(imported.notes),
+        **warnings_as_json(warnings),
         "outputs": [str(path) for path in written],
     }

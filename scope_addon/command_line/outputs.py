@@ -18,10 +18,10 @@ from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
+from ..notices import Notice
 from ..options import option
 from ..scene.export.output_paths import check_output, person_paths
 from .blender_folder import load_blender
-from .terminal import print_message
 
 if TYPE_CHECKING:
     from ..retarget.rig_source import RigSource
@@ -196,15 +196,16 @@ def write_outputs(
     video: Path,
     args: argparse.Namespace,
     rig: RigSource | None = None,
-) -> list[Path]:
-    """Write every output and return the paths of the files; bpy is loaded only if an output needs a
-    scene.
+) -> tuple[list[Path], list[Notice]]:
+    """Write every output; bpy is loaded only if an output needs a scene.
 
+    :return: the paths of the files, and warnings.
     :raises OutputError: a file cannot be written.
     """
     motion_files = [p for p in outputs if p.suffix.lower() in MOTION_SUFFIXES]
     scene_files = [p for p in outputs if p not in motion_files]
     written: list[Path] = []
+    warnings: list[Notice] = []
     for path in motion_files:
         targets = person_paths(path, len(motions))
         for target, motion in zip(targets, motions, strict=True):
@@ -228,9 +229,7 @@ def write_outputs(
         else:
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
         written += files
-        for warning in warnings:
-            print_message(f"warning: {warning}")
-    return written
+    return written, warnings
 
 
 def _footage(video: Path, args: argparse.Namespace) -> Path | None:

@@ -97,7 +97,7 @@ OUTPUT_OPTIONS = (
         Path,
         None,
         Place.COMMAND_LINE | Place.IMPORT,
-        "retarget the motion to the rig in this .blend, .fbx or .glb file",
+        "retarget the motion to the rig in this .blend, .fbx, .glb or .vrm file",
         argument=Argument(metavar="RIG"),
     ),
     Option(

@@ -83,9 +83,8 @@ def legs_at_rest(
     ]
     toed = [leg for leg, toe in enumerate(toe_of) if toe is not None]
     toes = [toe for toe in toe_of if toe is not None]
-    sizes = [np.linalg.norm(rig.tails[toe] - rig.heads[toe]) for toe in toes]
-    # The tails of imported bones may point anywhere, so the direction of the toes is taken from the
-    # foot.
+    sizes = [np.linalg.norm(rig.ends[toe] - rig.heads[toe]) for toe in toes]
+    # What toes end at may lie above or below them, so their direction is taken from the foot.
     tips = [
         feet[leg].ball * [1, 1, 0] / np.linalg.norm(feet[leg].ball[:2]) * size
         for leg, size in zip(toed, sizes, strict=True)
@@ -134,7 +133,7 @@ def _rig_foot(
 ) -> FootRest:
     """Measure the rig's foot; without a bone at the ball, its length is taken from the body's."""
     height = rig.heads[ankle, 2] - rig.floor
-    ball = AF @ ((rig.heads[toe] if toe is not None else rig.tails[ankle]) - rig.heads[ankle])
+    ball = AF @ ((rig.heads[toe] if toe is not None else rig.ends[ankle]) - rig.heads[ankle])
     length = float(np.linalg.norm(source.ball[:2]))
     share = float(np.linalg.norm(ball[:2])) / length
     if not 0.3 * scale < share < 3 * scale or ball @ source.ball < 0:

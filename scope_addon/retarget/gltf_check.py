@@ -63,6 +63,34 @@ def check_gltf(path: Path) -> None:
         ) from error
 
 
+def humanoid_table(path: Path) -> dict[str, str]:
+    """Return the bone's name of each of VRM's parts, such as ``leftUpperLeg``; empty without the
+    table of VRM 0 or 1.
+
+    :raises InputError: the table is damaged.
+    :raises OSError: the file cannot be read.
+    """
+    try:
+        gltf, _ = _read(path)
+        extensions = gltf.get("extensions", {})
+        nodes = gltf.get("nodes", [])
+        if "VRMC_vrm" in extensions:
+            entries = extensions["VRMC_vrm"]["humanoid"]["humanBones"]
+            node_of = {part: entry["node"] for part, entry in entries.items()}
+        elif "VRM" in extensions:
+            entries = extensions["VRM"]["humanoid"]["humanBones"]
+            node_of = {entry["bone"]: entry["node"] for entry in entries}
+        else:
+            return {}
+        named = {part: nodes[_natural(node)].get("name") for part, node in node_of.items()}
+        return {str(part): name for part, name in named.items() if isinstance(name, str)}
+    except _DAMAGED as error:
+        raise InputError(
+            f"{path}: the humanoid table of this avatar is damaged; export it again or choose "
+            "another"
+        ) from error
+
+
 def _read(path: Path) -> tuple[dict[str, Any], int]:
     """Return the JSON, and the size of the binary chunk in bytes."""
     check_regular(path, InputError, "rig", _LARGEST_FILE)

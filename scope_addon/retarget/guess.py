@@ -1,93 +1,178 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guessing the bone map of a rig from the names and the rest positions of its bones."""
+"""Guessing the bone map of a rig from the names and the rest positions of its bones.
+
+Names say which bones may be a part; the hierarchy decides among them: a shin descends from its
+thigh, and the trunk lies between the pelvis and the arms. What names do not give, the shape of the
+rest pose does, and what they give must be possible in it.
+"""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .bone_map import FINGERS, BoneMap
+from .bone_map import FINGERS, PHALANGES, SPINE, BoneMap
+from .bone_names import CENTRE, LIMBS, BoneName, parse_names
 from .fingers import find_fingers
+from .rest_check import faces_backwards, rest_faults
+from .rest_pose import RestPose
 
-_SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
-# Prefixes of Biped, Valve, VRoid (with C for the centre) and Character Creator.
-_PREFIXES = {"bip", "valve", "biped", "j", "c", "cc", "base", "def", "bind", "jnt"}
-_CENTRE = {
-    "pelvis": ("pelvis", "hips", "hip"),
-    "spine": ("spine", "chest", "upperchest", "torso", "abdomen", "waist"),
-    "neck": ("neck", "necktwist"),
-    "head": ("head",),
-}
-_LIMBS = {
-    "hip": ("thigh", "upleg", "upperleg", "hip"),
-    "knee": ("shin", "calf", "leg", "lowerleg", "knee"),
-    "ankle": ("ankle", "foot"),
-    # SMPL calls the toes "foot", and the foot "ankle".
-    "foot": ("toe", "toes", "toebase", "ball", "foot"),
-    "collar": ("clavicle", "collar", "shoulder"),
-    "shoulder": ("upperarm", "uparm", "arm", "shoulder"),
-    "elbow": ("forearm", "lowerarm", "elbow"),
-    "wrist": ("hand", "wrist"),
-}
-
-
-@dataclass(frozen=True)
-class RestBones:
-    """The B bones of a rig at rest, parents before children."""
-
-    names: list[str]
-    parents: NDArray[np.intp]  # (B,) indices, -1 for none
-    heads: NDArray[np.float64]  # (B, 3), world axes, z up
+_LEG = ("hip", "knee", "ankle", "foot")
+_ARM = ("collar", "shoulder", "elbow", "wrist")
+_OTHER_SIDE = {"left": "right", "right": "left"}
+# Confidence where name and geometry agree, of a name alone, of geometry alone, and of what cannot
+# be right at rest.
+_AGREED = 1.0
+_NAMED = 0.8
+SHAPED = 0.5
+IMPOSSIBLE = 0.2
+# What it costs a choice of bones for a limb to lack a part, and to have a part that does not
+# descend from the one before; names cost their places in the list of words.
+_LACKED = {part: 10.0 for part in (*_LEG, *_ARM)} | {"collar": 5.5, "foot": 5.5}
+_DETACHED = 8.0
+_PER_LEVEL = 0.01
+_FK_BONUS = 0.5
+# The humanoid table of VRM files, which other formats of avatars share.
+_VRM_LIMBS = {
+    "UpperLeg": "hip", "LowerLeg": "knee", "Foot": "ankle", "Toes": "foot",
+    "Shoulder": "collar", "UpperArm": "shoulder", "LowerArm": "elbow", "Hand": "wrist",
+}  # fmt: skip
 
 
-def tokens(name: str) -> tuple[str, str]:
-    """Return the name without prefix, side, digits and case, and its side ('left', 'right' or
-    '').
+def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
+    """Guess the most likely map: by name, and by geometry where names say nothing.
+
+    Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone, and
+    0.2 where the rest pose contradicts.
+
+    :param is_mirrored: whether the rig as a whole is, so that what its names call left is on its
+        right; where it has toes, they tell.
     """
-    words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.rsplit(":", 1)[-1])
-    words = [word.lower() for word in words]
-    while len(words) > 1 and words[0] in _PREFIXES:
-        words = words[1:]
-    side = next((_SIDES[word] for word in words if word in _SIDES), "")
-    return "".join(word for word in words if word not in _SIDES), side
-
-
-def guess(bones: RestBones) -> BoneMap:
-    """Guess the most likely map: by name, or by geometry if too few names are known.
-
-    Confidence is 1 where name and geometry agree, 0.8 for a name alone, 0.5 for geometry alone.
-    """
-    rigify = _rigify(bones)
-    named = rigify or by_name(bones)
-    shaped = by_geometry(bones)
-    shaped |= _fingers(bones, shaped)
-    if len(set(named.values())) < 8:
-        return BoneMap(shaped, dict.fromkeys(shaped, 0.5))
+    rigify = _rigify(rest.names)
+    shaped = by_geometry(rest)
+    named = rigify or by_name(rest)
+    if _is_impossible(rest, named) and not _is_impossible(rest, shaped):
+        named = {}
+    parts = named | _lacking(rest, named, shaped)
+    backwards = faces_backwards(_heads_of(rest, parts))
+    is_exchanged = backwards if backwards is not None else is_mirrored and bool(named)
+    if is_exchanged:
+        parts = {bone: other_side(part) for bone, part in parts.items()}
     if rigify is None:
-        named |= _fingers(bones, named)
-    return BoneMap(
-        named, {bone: 1.0 if shaped.get(bone) == part else 0.8 for bone, part in named.items()}
-    )
+        parts |= _fingers(rest, parts)
+    impossible = {part for fault in rest_faults(_heads_of(rest, parts)) for part in fault.parts}
+    confidence = {
+        bone: IMPOSSIBLE
+        if part in impossible
+        else SHAPED
+        if bone not in named and part.partition("_")[2] not in PHALANGES
+        else _AGREED
+        if shaped.get(bone) == part and not is_exchanged
+        else _NAMED
+        for bone, part in parts.items()
+    }
+    if not named:
+        confidence = {bone: min(each, SHAPED) for bone, each in confidence.items()}
+    return BoneMap(parts, confidence)
 
 
-def _fingers(bones: RestBones, parts: dict[str, str]) -> dict[str, str]:
+def other_side(part: str) -> str:
+    """Return the same part of the other side; the part itself if it has no side."""
+    side, _, kind = part.partition("_")
+    return f"{_OTHER_SIDE[side]}_{kind}" if side in _OTHER_SIDE else part
+
+
+def from_humanoid(table: Mapping[str, str], names: list[str]) -> BoneMap:
+    """Return the map of VRM's humanoid table.
+
+    :param table: bone of each of VRM's parts, such as ``leftUpperLeg``; others are left out.
+    :param names: bones of the rig.
+    """
+    parts: dict[str, str] = {}
+    spine = [table[part] for part in ("spine", "chest", "upperChest") if table.get(part) in names]
+    parts |= dict(zip(spine, _spread(len(spine)), strict=True))
+    parts |= {table[vrm]: part for vrm, part in _vrm_parts(table).items() if table[vrm] in names}
+    return BoneMap(parts, dict.fromkeys(parts, _AGREED))
+
+
+def _vrm_parts(table: Mapping[str, str]) -> dict[str, str]:
+    """Return the body part of each of VRM's parts that the table has, except the spine."""
+    found = {"hips": "pelvis", "neck": "neck", "head": "head"}
+    # Version 1 counts a thumb from its metacarpal, version 0 from the proximal phalanx.
+    thumb = ("Proximal", "Intermediate", "Distal")
+    if "leftThumbMetacarpal" in table or "rightThumbMetacarpal" in table:
+        thumb = ("Metacarpal", "Proximal", "Distal")
+    for side in ("left", "right"):
+        found |= {f"{side}{vrm}": f"{side}_{part}" for vrm, part in _VRM_LIMBS.items()}
+        for finger in FINGERS:
+            vrm_finger = "Little" if finger == "pinky" else finger.title()
+            phalanges = thumb if finger == "thumb" else ("Proximal", "Intermediate", "Distal")
+            found |= {
+                f"{side}{vrm_finger}{phalanx}": f"{side}_{finger}{k}"
+                for k, phalanx in enumerate(phalanges, 1)
+            }
+    return {vrm: part for vrm, part in found.items() if vrm in table}
+
+
+def _heads_of(rest: RestPose, parts: Mapping[str, str]) -> dict[str, NDArray[np.float64]]:
+    """Return the head of each part, of several bones the first."""
+    heads: dict[str, NDArray[np.float64]] = {}
+    for bone, part in parts.items():
+        heads.setdefault(part, rest.heads[rest.names.index(bone)])
+    return heads
+
+
+def _is_impossible(rest: RestPose, parts: Mapping[str, str]) -> bool:
+    """Return whether a map lacks a leg, or has parts that the rest pose contradicts."""
+    heads = _heads_of(rest, parts)
+    legs = [f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")]
+    return not all(leg in heads for leg in legs) or bool(rest_faults(heads))
+
+
+def _lacking(rest: RestPose, named: Mapping[str, str], shaped: Mapping[str, str]) -> dict[str, str]:
+    """Return the bones of limbs and trunk of which names give none, by the shape; bones that names
+    give are not used again.
+    """
+    if not named:
+        return dict(shaped)
+    kinds = set(map(_limb_of, named.values()))
+    free = {
+        bone: part
+        for bone, part in shaped.items()
+        if bone not in named and _limb_of(part) not in kinds
+    }
+    return free
+
+
+def _limb_of(part: str) -> str:
+    """Return what is either named as a whole or not: a limb of one side, or a part of the trunk."""
+    side, _, kind = part.partition("_")
+    if kind in _LEG:
+        return f"{side} leg"
+    if kind:
+        return f"{side} arm"
+    return "spine" if part in SPINE else part
+
+
+def _fingers(rest: RestPose, parts: dict[str, str]) -> dict[str, str]:
     """Find the fingers below the wrists of a map."""
     wrists = {
-        part.partition("_")[0]: bones.names.index(b)
-        for b, part in parts.items()
+        part.partition("_")[0]: rest.names.index(bone)
+        for bone, part in parts.items()
         if part.endswith("_wrist")
     }
-    return find_fingers(bones.names, bones.parents, bones.heads, wrists)
+    found = find_fingers(rest.names, rest.parents, rest.heads, wrists)
+    return {bone: part for bone, part in found.items() if bone not in parts}
 
 
-def _rigify(bones: RestBones) -> dict[str, str] | None:
+def _rigify(bones: list[str]) -> dict[str, str] | None:
     """Map Rigify's bones, whose trunk, neck and head are numbered consecutively; None for other
     rigs.
     """
-    names = set(bones.names)
+    names = set(bones)
     if {"torso", "thigh_fk.L", "spine_fk.002"} <= names:
         found = {"torso": "pelvis", "spine_fk.002": "spine1", "spine_fk.003": "spine3"}
         found |= {"neck": "neck", "head": "head"}
@@ -125,145 +210,249 @@ def _rigify(bones: RestBones) -> dict[str, str] | None:
     return {prefix + bone: part for bone, part in found.items() if prefix + bone in names}
 
 
-def by_name(bones: RestBones) -> dict[str, str]:
-    """Map the bones whose names are known; of several candidates for a part, the one nearest to the
-    root.
+def by_name(rest: RestPose) -> dict[str, str]:
+    """Map the bones whose names are known; of several candidates for a part, those that form a
+    limb, nearest to the root.
 
     :return: bone name -> body part.
     """
-    cores = [tokens(name) for name in bones.names]
-    depth = _depths(bones.parents)
-    order = sorted(range(len(cores)), key=lambda i: (depth[i], bones.names[i]))
-    found = _limbs_by_name(bones, cores, order)
-    found |= _centre_by_name(bones, cores, order)
-    thighs = [bones.names.index(b) for b, part in found.items() if part.endswith("_hip")]
-    # The pelvis is the nearest common ancestor of both legs.
-    if "pelvis" not in found.values() and len(thighs) == 2:
-        shared = [
-            i
-            for i in _ancestors(bones.parents, thighs[0])
-            if i in _ancestors(bones.parents, thighs[1])
-        ]
-        if shared:
-            found[bones.names[shared[0]]] = "pelvis"
-    return found
-
-
-def _limbs_by_name(
-    bones: RestBones, cores: list[tuple[str, str]], order: list[int]
-) -> dict[str, str]:
-    """Map arms and legs.
-
-    :param cores: the ``tokens`` of every bone.
-    :param order: the bones, nearest to the root first.
-    """
-    found: dict[str, str] = {}
+    names = parse_names(rest.names)
+    found: dict[int, str] = {}
     for side in ("left", "right"):
-        sided = {i for i in order if cores[i][1] == side}
-        # In SMPL's naming (hip, knee, ..., collar, shoulder) a shoulder is the upper arm.
-        with_collar = any(cores[i][0] in ("clavicle", "collar") for i in sided)
-        for part, words in _LIMBS.items():
-            if part == "collar" and with_collar:
-                words = words[:2]
-            for word in words:
-                first = next((i for i in order if i in sided and cores[i][0] == word), None)
-                if first is not None and bones.names[first] not in found:
-                    found[bones.names[first]] = f"{side}_{part}"
-                    break
+        for limb in (_LEG, _ARM):
+            chosen = _limb_by_name(rest, names, side, limb)
+            found |= {bone: f"{side}_{part}" for part, bone in chosen.items()}
+    found |= _trunk_by_name(rest, names, {part: bone for bone, part in found.items()})
+    return {rest.names[bone]: part for bone, part in found.items()}
+
+
+def _limb_by_name(
+    rest: RestPose, names: list[BoneName], side: str, limb: tuple[str, ...]
+) -> dict[str, int]:
+    """Choose the bones of a limb whose words fit best and that descend from each other."""
+    options: list[list[tuple[int | None, float]]] = []
+    for part in limb:
+        words = LIMBS[part]
+        known = [
+            (bone, words.index(name.core) - _FK_BONUS * name.is_fk)
+            for bone, name in enumerate(names)
+            if name.side == side and not name.is_goal and name.core in words
+        ]
+        ranked = [(bone, rank + _PER_LEVEL * len(rest.chains[bone])) for bone, rank in known]
+        nearest = sorted(ranked, key=lambda option: (option[1], rest.names[option[0]]))
+        options.append([*nearest[:5], (None, _LACKED[part])])
+
+    def cost(choice: tuple[tuple[int | None, float], ...]) -> float:
+        bones = [bone for bone, _ in choice if bone is not None]
+        if len(set(bones)) < len(bones):
+            return float("inf")
+        detached = sum(
+            not rest.is_below(lower, upper) for upper, lower in zip(bones, bones[1:], strict=False)
+        )
+        return sum(each for _, each in choice) + _DETACHED * detached
+
+    best = min(product(*options), key=cost)
+    return {part: bone for part, (bone, _) in zip(limb, best, strict=True) if bone is not None}
+
+
+def _trunk_by_name(
+    rest: RestPose, names: list[BoneName], limbs: Mapping[str, int]
+) -> dict[int, str]:
+    """Map pelvis, spine, neck and head: the pelvis carries legs and spine, the spine lies between
+    it and the arms.
+
+    :param limbs: the bone of each part of arms and legs.
+    """
+
+    def named(part: str) -> list[int]:
+        bones = [
+            bone
+            for bone, name in enumerate(names)
+            if not name.side and not name.is_goal and name.core in CENTRE[part]
+        ]
+        return sorted(bones, key=lambda bone: (len(rest.chains[bone]), rest.names[bone]))
+
+    taken = set(limbs.values())
+    thighs = [limbs[part] for part in ("left_hip", "right_hip") if part in limbs]
+    collars = [
+        limbs.get(f"{side}_collar", limbs.get(f"{side}_shoulder", -1)) for side in _OTHER_SIDE
+    ]
+    heads = [bone for bone in named("head") if bone not in taken]
+    head = heads[0] if heads else None
+    arms = [bone for bone in collars if bone >= 0]
+    spine_named = [bone for bone in named("spine") if bone not in taken]
+    below_chest = arms if len(arms) == 2 else ([head] if head is not None else spine_named[-1:])
+    if head is not None and below_chest == arms:
+        below_chest = [*arms, head]
+    chest = rest.shared(below_chest) if below_chest else None
+    pelvis = _pelvis(rest, thighs, chest, [bone for bone in named("pelvis") if bone not in taken])
+    found: dict[int, str] = {}
+    if pelvis is not None:
+        found[pelvis] = "pelvis"
+    above_pelvis = rest.chains[chest] if chest is not None else []
+    if pelvis in above_pelvis:
+        # With Biped, a bone of the spine may carry the legs, and the neck the arms: they stay still
+        # in the pelvis and in the chest.
+        carrying_legs = {bone for thigh in thighs for bone in rest.chains[thigh]}
+        carrying_arms = named("neck") if len(arms) == 2 else []
+        between = [
+            bone
+            for bone in above_pelvis[above_pelvis.index(pelvis) + 1 :]
+            if bone not in carrying_legs and bone not in carrying_arms
+        ]
+        spine = [bone for bone in between if bone in spine_named] or _distinct(rest, between)
+        if chest == head:
+            spine = [bone for bone in spine if bone != head]
+    else:  # The hierarchy of a control rig need not lead from the pelvis to the arms.
+        spine = [bone for bone in spine_named if bone != pelvis]
+    necks = [bone for bone in named("neck") if bone not in taken]
+    if not necks and head is not None and chest in rest.chains[head]:
+        chain = rest.chains[head]
+        necks = _distinct(rest, chain[chain.index(chest) + 1 : -1]) if len(arms) == 2 else []
+    necks = [bone for bone in necks if bone not in spine and bone not in above_pelvis]
+    found |= dict(zip(spine, _spread(len(spine)), strict=True))
+    found |= dict.fromkeys(necks, "neck")
+    if head is not None:
+        found[head] = "head"
     return found
 
 
-def _centre_by_name(
-    bones: RestBones, cores: list[tuple[str, str]], order: list[int]
-) -> dict[str, str]:
-    """Map pelvis, spine, neck and head; parameters as in ``_limbs_by_name``."""
-    found: dict[str, str] = {}
-    for part, words in _CENTRE.items():
-        candidates = [i for i in order if not cores[i][1] and cores[i][0] in words]
-        if part == "spine":
-            found |= {
-                bones.names[i]: name
-                for i, name in zip(candidates, _spread(len(candidates)), strict=True)
-            }
-        elif part == "neck":
-            found |= {bones.names[i]: "neck" for i in candidates}
-        elif candidates:
-            found[bones.names[candidates[0]]] = part
-    return found
+def _pelvis(rest: RestPose, thighs: list[int], chest: int | None, named: list[int]) -> int | None:
+    """Return the bone that carries legs and trunk: the first of those with the name, or else the
+    deepest that they share.
+
+    Below a bone ``hip`` that carries everything, DAZ and Character Creator have a bone ``pelvis``
+    that carries the legs alone.
+    """
+    if len(thighs) < 2:
+        return named[0] if named else None
+    for carried in ([*thighs, chest], thighs):
+        bones = [bone for bone in carried if bone is not None]
+        carrying = [bone for bone in named if all(rest.is_below(each, bone) for each in bones)]
+        if carrying:
+            return carrying[0]
+        shared = rest.shared(bones)
+        # A root at the feet carries the goals of a control rig, too.
+        if shared is not None and shared not in bones and not _is_at_feet(rest, shared, thighs):
+            return shared
+    shared = rest.shared(thighs)
+    return named[0] if named else shared if shared not in thighs else None
 
 
-def by_geometry(bones: RestBones) -> dict[str, str]:
+def _is_at_feet(rest: RestPose, bone: int, thighs: list[int]) -> bool:
+    """Return whether a bone lies in the lower quarter of the legs."""
+    low = float(rest.heads[:, 2].min())
+    hips = float(rest.heads[thighs, 2].mean())
+    return hips > low and float(rest.heads[bone, 2]) < low + 0.25 * (hips - low)
+
+
+def _distinct(rest: RestPose, bones: list[int]) -> list[int]:
+    """Return the bones without those that begin where their parent does."""
+    return [
+        bone
+        for bone in bones
+        if np.linalg.norm(rest.heads[bone] - rest.heads[rest.parents[bone]]) > 0.005 * rest.size
+    ]
+
+
+def by_geometry(rest: RestPose) -> dict[str, str]:
     """Map bones by their positions: legs end lowest on either side, arms extend farthest, the head
     is highest.
 
     :return: bone name -> body part; empty if no pair of legs is found.
     """
-    heads = bones.heads
-    parents = bones.parents
-    leaves = [i for i in range(len(parents)) if i not in set(parents.tolist())]
+    heads = rest.heads
+    leaves = [
+        bone
+        for bone, children in enumerate(rest.children)
+        if not children and not parse_names([rest.names[bone]])[0].is_goal
+    ]
     height = max(float(np.ptp(heads[:, 2])), 1e-9)
     z = (heads[:, 2] - heads[:, 2].min()) / height
     axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # The arms extend along the wider axis.
     across = heads[:, axis] - np.median(heads[:, axis])
     across = across if axis == 0 else -across
-    found: dict[str, str] = {}
     chains: dict[str, list[int]] = {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        legs = [i for i in leaves if sign * across[i] > 0.01 * height and z[i] < 0.15]
-        arms = [i for i in leaves if sign * across[i] > 0.1 * height and z[i] > 0.3]
-        if legs:
-            chains[f"{side} leg"] = _chain(
-                parents, min(legs, key=lambda i: len(_ancestors(parents, i)))
+        # Goals of IK lie at the feet as well, but on no leg.
+        legs = [
+            bone
+            for bone in leaves
+            if sign * across[bone] > 0.01 * height
+            and z[bone] < 0.15
+            and sum(sign * across[above] > 0.01 * height for above in rest.chains[bone]) >= 2
+            and any(
+                z[above] > 0.3 and sign * across[above] > 0.01 * height
+                for above in rest.chains[bone]
             )
+        ]
+        arms = [bone for bone in leaves if sign * across[bone] > 0.1 * height and z[bone] > 0.3]
+        if legs:
+            chains[f"{side} leg"] = rest.chains[min(legs, key=lambda b: len(rest.chains[b]))]
         if arms:
-            chains[f"{side} arm"] = _chain(parents, max(arms, key=lambda i: sign * across[i]))
+            # One hand's fingers, not another chain that ends at the same place.
+            farthest = max(arms, key=lambda b: sign * across[b])
+            chains[f"{side} arm"] = rest.chains[farthest]
     if not {"left leg", "right leg"} <= chains.keys():
         return {}
-    shared = [i for i in chains["left leg"] if i in chains["right leg"]]
+    shared = [bone for bone in chains["left leg"] if bone in chains["right leg"]]
     if not shared:
         return {}
-    found[bones.names[shared[-1]]] = "pelvis"
+    found = {rest.names[shared[-1]]: "pelvis"}
     for limb, chain in chains.items():
         side, kind = limb.split()
-        other = chains.get(("right " if side == "left" else "left ") + kind, shared)
-        own = [i for i in chain if i not in other]
-        parts: tuple[str, ...]
-        if kind == "leg":
-            parts = ("hip", "knee", "ankle", "foot")
-        else:
-            lengths = [
-                float(np.linalg.norm(heads[b] - heads[a]))
-                for a, b in zip(own, own[1:], strict=False)
-            ]
-            collar = len(own) > 3 and lengths[0] < 0.7 * lengths[1]
-            parts = ("collar",) * collar + ("shoulder", "elbow", "wrist")
-        found |= {bones.names[i]: f"{side}_{part}" for i, part in zip(own, parts, strict=False)}
-    top = _chain(parents, int(max(leaves, key=lambda i: z[i])))
-    trunk = [i for i in top if i not in shared]
-    arms = chains.get("left arm", [])
-    spine = [i for i in trunk if i in arms]
-    rest = [i for i in trunk if i not in arms]
-    found |= {bones.names[i]: name for i, name in zip(spine, _spread(len(spine)), strict=True)}
-    found |= {bones.names[i]: name for i, name in zip(rest, ("neck", "head"), strict=False)}
+        other = chains.get(f"{_OTHER_SIDE[side]} {kind}", shared)
+        own = [bone for bone in chain if bone not in other]
+        parts = _leg_parts(rest, own) if kind == "leg" else _arm_parts(rest, own)
+        found |= {rest.names[bone]: f"{side}_{part}" for bone, part in parts.items()}
+    top = rest.chains[max(leaves, key=lambda bone: z[bone])]
+    trunk = [bone for bone in top if bone not in shared]
+    arm = chains.get("left arm", [])
+    spine = [bone for bone in trunk if bone in arm]
+    above = [bone for bone in trunk if bone not in arm]
+    found |= dict(zip((rest.names[b] for b in spine), _spread(len(spine)), strict=True))
+    found |= dict(zip((rest.names[b] for b in above), ("neck", "head"), strict=False))
+    if faces_backwards(_heads_of(rest, found)):
+        return {bone: other_side(part) for bone, part in found.items()}
     return found
+
+
+def _leg_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
+    """Return the part of each bone of a leg: its knee is nearest to the middle, twist bones lie
+    between.
+    """
+    if len(chain) <= len(_LEG):
+        return dict(zip(chain, _LEG, strict=False))
+    steps = np.diff(rest.heads[chain], axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    falls = -steps[:, 2] > 0.6 * lengths
+    ankle = 1 + max((k for k in range(1, len(steps)) if falls[k]), default=1)
+    toe = min(ankle + 1, len(chain) - 1)
+    knee = _middle(lengths[:ankle])
+    out = {chain[0]: "hip", chain[knee]: "knee", chain[ankle]: "ankle"}
+    return out | ({chain[toe]: "foot"} if toe > ankle else {})
+
+
+def _arm_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
+    """Return the part of each bone of an arm; fingers begin where the chain branches."""
+    lengths = np.linalg.norm(np.diff(rest.heads[chain], axis=0), axis=1)
+    collar = len(chain) > 3 and lengths[0] < 0.7 * lengths[1]
+    fork = [k for k, bone in enumerate(chain) if k > collar + 1 and len(rest.children[bone]) >= 3]
+    if fork and fork[0] > collar + 2:
+        first = int(collar)
+        elbow = first + _middle(lengths[first : fork[0]])
+        found = {chain[first]: "shoulder", chain[elbow]: "elbow", chain[fork[0]]: "wrist"}
+        return ({chain[0]: "collar"} if collar else {}) | found
+    return dict(zip(chain, _ARM if collar else _ARM[1:], strict=False))
+
+
+def _middle(lengths: NDArray[np.float64]) -> int:
+    """Return the inner joint of a chain of segments that is nearest to the middle of its length."""
+    reached = np.cumsum(lengths)
+    inner = reached[:-1]
+    return 1 + int(np.argmin(np.abs(inner - reached[-1] / 2)))
 
 
 def _spread(count: int) -> list[str]:
     """Return the parts of the spine for ``count`` bones; the last is always the chest."""
     return [f"spine{int(np.ceil(3 * (k + 1) / count))}" for k in range(count)]
-
-
-def _ancestors(parents: NDArray[np.intp], i: int) -> list[int]:
-    found = []
-    while parents[i] >= 0:
-        i = int(parents[i])
-        found.append(i)
-    return found
-
-
-def _chain(parents: NDArray[np.intp], i: int) -> list[int]:
-    return [*reversed(_ancestors(parents, i)), i]
-
-
-def _depths(parents: NDArray[np.intp]) -> list[int]:
-    return [len(_ancestors(parents, i)) for i in range(len(parents))]

@@ -51,9 +51,11 @@ def rest_alignment(
     A = np.tile(np.eye(3), (len(part_of), 1, 1))
     for b, part in enumerate(part_of):
         side, _, kind = part.partition("_")
-        if kind in ("ankle", "foot"):
-            end = row.get(f"{side}_foot") if kind == "ankle" else None
-            along = F @ ((rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b])
+        if kind == "foot" and f"{side}_ankle" in row:
+            A[b] = A[row[f"{side}_ankle"]]  # Toes go on where the foot points.
+        elif kind in ("ankle", "foot"):
+            toes = row.get(f"{side}_foot") if kind == "ankle" else None
+            along = F @ ((rig.heads[toes] if toes is not None else rig.ends[b]) - rig.heads[b])
             A[b] = _heading_turn(along, rest[index[f"{side}_foot"]] - rest[index[f"{side}_ankle"]])
         elif kind in _NEXT:
             parent = int(rig.carriers[b])
@@ -63,7 +65,7 @@ def rest_alignment(
                 else np.eye(3)
             )
             end = row.get(f"{side}_{_NEXT[kind]}")
-            along = (rig.heads[end] if end is not None else rig.tails[b]) - rig.heads[b]
+            along = (rig.heads[end] if end is not None else rig.ends[b]) - rig.heads[b]
             # Zero for the last phalanges, which have no end joint: they keep the rig's angle to the
             # one before.
             wanted = rest[index.get(f"{side}_{_NEXT[kind]}", index[part])] - rest[index[part]]

@@ -5,7 +5,8 @@ first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...solver.errors import InputError
@@ -14,15 +15,16 @@ from ..untrusted.files import check_regular
 from .bone_map import BoneMap, load_bone_map
 from .expression_map import ExpressionMap, load_expression_map
 from .fbx_check import check_fbx
-from .gltf_check import check_gltf
+from .gltf_check import check_gltf, humanoid_table
 
 _LARGEST_BYTES = 4 << 30
 ROOTS = ("bone", "object", "in-place")  # Where a rig stores the root motion.
-RIG_SUFFIXES = (".blend", ".fbx", ".glb", ".gltf")
+RIG_SUFFIXES = (".blend", ".fbx", ".glb", ".gltf", ".vrm")
 _SIGNATURES = {
     ".blend": (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b"),  # plain, Zstandard, gzip
     ".fbx": (b"Kaydara FBX Binary",),
     ".glb": (b"glTF",),
+    ".vrm": (b"glTF",),  # an avatar in a .glb
 }
 
 
@@ -36,6 +38,8 @@ class RigSource:
     armature: str = ""
     bone_map: BoneMap | None = None
     expression_map: ExpressionMap | None = None
+    # Bone of each of VRM's parts, if the file says so.
+    humanoid: Mapping[str, str] = field(default_factory=dict)
 
 
 def rig_source(
@@ -67,6 +71,7 @@ def rig_source(
         armature,
         load_bone_map(bone_map) if bone_map is not None else None,
         load_expression_map(expression_map) if expression_map is not None else None,
+        humanoid_table(path) if suffix in (".vrm", ".glb", ".gltf") else {},
     )
 
 

@@ -25,7 +25,7 @@ class Skeleton:
     parents: NDArray[np.intp]  # (B,)
     carriers: NDArray[np.intp]  # (B,)
     heads: NDArray[np.float64]  # (B, 3) metres
-    tails: NDArray[np.float64]  # (B, 3) metres
+    ends: NDArray[np.float64]  # (B, 3) metres, where each bone ends; see `RestPose.end`
     rotations: NDArray[np.float64]  # (B, 3, 3) bone to world
     floor: float = 0.0  # height of the floor under the rig at rest, metres
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.retarget.guess import RestBones, by_geometry, by_name, guess, tokens
+from scope.scope_addon.retarget.bone_names import parse_name
+from scope.scope_addon.retarget.guess import by_geometry, by_name, guess, other_side
+from scope.scope_addon.retarget.rest_pose import RestPose
 
 from .naming_schemes import PARENTS, PLACES, SCHEMES, SIDED, names_of
 
 
-def bones_of(scheme: str, size: float = 1.0, drop: float = 0.0) -> tuple[RestBones, dict[str, str]]:
+def bones_of(scheme: str, size: float = 1.0, drop: float = 0.0) -> tuple[RestPose, dict[str, str]]:
     """Return the bones of a rig and the part of each; arms lowered by `drop` radians."""
     bone_of = names_of(scheme)
     heads = []
@@ -30,7 +32,7 @@ def bones_of(scheme: str, size: float = 1.0, drop: float = 0.0) -> tuple[RestBon
         parents.append(
             order.index(f"{side}_{parent}" if parent in SIDED else parent) if parent else -1
         )
-    rest = RestBones([bone_of[part] for part in order], np.array(parents), size * np.array(heads))
+    rest = RestPose([bone_of[part] for part in order], np.array(parents), size * np.array(heads))
     return rest, {bone: part for part, bone in bone_of.items()}
 
 
@@ -46,7 +48,7 @@ def test_every_part_is_found(scheme: str, size: float, drop: float) -> None:
 @pytest.mark.parametrize("scheme", sorted(set(SCHEMES) - {"nameless"}))
 def test_names_alone_are_enough(scheme: str) -> None:
     bones, part_of = bones_of(scheme)
-    assert by_name(RestBones(bones.names, bones.parents, np.zeros_like(bones.heads))) == part_of
+    assert by_name(RestPose(bones.names, bones.parents, np.zeros_like(bones.heads))) == part_of
 
 
 @pytest.mark.parametrize("order", [1, -1])
@@ -56,7 +58,7 @@ def test_shape_alone_is_enough(drop: float, order: int) -> None:
     bones, part_of = bones_of("unreal", drop=drop)
     renamed = [f"q{order * i}" for i in range(len(bones.names))]
     expected = {renamed[bones.names.index(bone)]: part for bone, part in part_of.items()}
-    assert by_geometry(RestBones(renamed, bones.parents, bones.heads)) == expected
+    assert by_geometry(RestPose(renamed, bones.parents, bones.heads)) == expected
 
 
 def test_a_short_upper_arm_is_no_collar() -> None:
@@ -74,24 +76,29 @@ def test_a_short_upper_arm_is_no_collar() -> None:
         parent = int(bones.parents[i])
         parent = int(bones.parents[parent]) if parent >= 0 and parent not in kept else parent
         parents.append(kept.index(parent) if parent >= 0 else -1)
-    found = by_geometry(RestBones([f"q{i}" for i in kept], np.array(parents), heads[kept]))
+    found = by_geometry(RestPose([f"q{i}" for i in kept], np.array(parents), heads[kept]))
     assert found == {f"q{i}": parts[i] for i in kept}
 
 
 def test_confidence_is_highest_where_names_and_shape_agree() -> None:
     bones, part_of = bones_of("unreal")
     assert set(guess(bones).confidence.values()) == {1.0}
-    heads = bones.heads * [-1.0, 1.0, 1.0]  # the sides exchanged: the shape contradicts the names
-    contradicted = guess(RestBones(bones.names, bones.parents, heads))
-    assert contradicted.parts == part_of
-    sided = {bone for bone, part in part_of.items() if part.startswith(("left", "right"))}
-    assert {contradicted.confidence[bone] for bone in sided} == {0.8}
     nameless, _ = bones_of("nameless")
     assert set(guess(nameless).confidence.values()) == {0.5}
 
 
+def test_sides_are_those_of_the_person_that_the_toes_show() -> None:
+    """Some rigs call left what lies on the left of a viewer in front of them."""
+    bones, part_of = bones_of("unreal")
+    heads = bones.heads * [-1.0, 1.0, 1.0]
+    found = guess(RestPose(bones.names, bones.parents, heads))
+    assert found.parts == {bone: other_side(part) for bone, part in part_of.items()}
+    sided = {bone for bone, part in part_of.items() if part.startswith(("left", "right"))}
+    assert {found.confidence[bone] for bone in sided} == {0.8}
+
+
 def test_what_is_no_person_has_no_map() -> None:
-    chain = RestBones(
+    chain = RestPose(
         ["a", "b", "c"], np.array([-1, 0, 1]), np.array([[0, 0, z] for z in (0.0, 1.0, 2.0)])
     )
     assert guess(chain).parts == {}
@@ -110,4 +117,5 @@ def test_what_is_no_person_has_no_map() -> None:
     ],
 )
 def test_names_are_taken_apart(name: str, core: str, side: str) -> None:
-    assert tokens(name) == (core, side)
+    found = parse_name(name)
+    assert (found.core, found.side) == (core, side)

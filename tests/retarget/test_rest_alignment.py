@@ -93,7 +93,7 @@ def test_feet_are_turned_about_the_vertical_alone() -> None:
             + [0.0, 0.0, 0.02]
         )
     splayed = Skeleton(
-        rig.names, rig.parents, rig.carriers, heads, rig.tails, rig.rotations, rig.floor
+        rig.names, rig.parents, rig.carriers, heads, rig.ends, rig.rotations, rig.floor
     )
     A, _ = aligned(splayed)
     for side, sign in (("left", 1.0), ("right", -1.0)):

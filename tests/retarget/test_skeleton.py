@@ -55,7 +55,7 @@ def test_a_bone_that_inherits_no_rotation_still_moves_with_what_carries_it() -> 
     rig = random_rig(rng, 3)
     parents = rig.parents.copy()
     parents[2] = -1
-    free = Skeleton(rig.names, parents, rig.carriers, rig.heads, rig.tails, rig.rotations)
+    free = Skeleton(rig.names, parents, rig.carriers, rig.heads, rig.ends, rig.rotations)
     wanted = exp(rng.normal(size=(FRAMES, 3, 3)))
     np.testing.assert_allclose(head_positions(free, wanted), head_positions(rig, wanted))
     np.testing.assert_allclose(

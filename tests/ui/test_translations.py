@@ -107,7 +107,9 @@ def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
 def test_every_warning_is_written_in_every_language_with_its_values(language):
     texts = {entry[ENGLISH]: entry[language] for entry in TABLE.texts}
     samples = {"who": 3, "whose": 0, "frames": 456, "times": [7.8], "phrase": "motion"}
+    samples["names"] = ["Hips"]
     shown = {"who": "3", "whose": "", "frames": "456", "times": "7.8", "phrase": texts["motion"]}
+    shown["names"] = "'Hips'"
     for code, sentence in SENTENCES.items():
         fields = {name: spec for _, name, spec, _ in string.Formatter().parse(sentence) if name}
         values = {

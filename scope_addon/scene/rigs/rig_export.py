@@ -63,8 +63,6 @@ def export_on_rig(
         for number, person in enumerate(result.people, 1):
             rig = load_rig(source, result.collection)
             bones = rig_bone_map(source, rig)
-            if number == 1 and any(c <= 0.5 for c in bones.confidence.values()):
-                warnings.append(notice("guessed_bones", rig=rig.name))
             if len(motions) > 1:
                 if travel is None:
                     travel = common_travel(

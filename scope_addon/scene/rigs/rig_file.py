@@ -15,12 +15,13 @@ import bpy
 from ....solver.errors import InputError
 from ...errors import UsageError
 from ...retarget.bone_map import PHALANGES, BoneMap
+from ...retarget.guess import from_humanoid
 from ...retarget.rig_source import RigSource
 from ..animation_data.removal import NewDatablocks
 from ..export import formats
 from ..export.export_states import temporary_scene
 from .rig_probe import at_rest, probe
-from .rig_retarget import guess_bone_map
+from .rig_retarget import usable_guess
 
 # Kinds of datablock that a file or a capture may contain, users before the datablocks that they
 # use. Scenes are removed by ``temporary_scene``.
@@ -110,20 +111,21 @@ def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
 
     :raises InputError: when it does not match the rig, or a required part could not be guessed.
     """
-    found = source.bone_map or guess_bone_map(rig)
-    missing = [name for name in found.parts if name not in rig.data.bones]
-    if missing:
-        raise InputError(
-            f"{source.path}: the bone map's '{missing[0]}' is not a bone of "
-            f"'{rig.name}'; correct the map"
-        )
+    found = source.bone_map
+    if found is None and source.humanoid:
+        found = from_humanoid(source.humanoid, [bone.name for bone in rig.data.bones])
     try:
+        if found is None or source.bone_map is None and not found.parts:
+            found = usable_guess(rig)
+        missing = [name for name in found.parts if name not in rig.data.bones]
+        if missing:
+            raise InputError(
+                f"the bone map's '{missing[0]}' is not a bone of '{rig.name}'; correct the map"
+            )
         found.check()
     except InputError as error:
-        raise InputError(
-            f"{source.path}: the bone map of '{rig.name}' could not be guessed ({error}); give one "
-            "with --bone-map"
-        ) from error
+        advice = "" if source.bone_map else "; give a map with --bone-map"
+        raise InputError(f"{source.path}: {error}{advice}") from error
     return found
 
 

@@ -19,8 +19,11 @@ from numpy.typing import NDArray
 from ....solver.errors import InputError
 from ...notices import Notice, notice
 from ...retarget.bone_map import PHALANGES
+from ...retarget.fingers import find_fingers
+from ...retarget.rest_pose import RestPose
 from ...retarget.skeleton import Skeleton
 from ..character.root_object import root_object, topmost
+from .rig_rest import rest_pose
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
 SWITCHES = ("IK_FK", "neck_follow", "head_follow")
@@ -30,6 +33,10 @@ _CARRIER_TOLERANCE = 0.02
 _MIN_RESPONSE = 0.1
 _CHECKED_FRAMES = 5
 _MAX_DEVIATION = np.radians(20)
+# The part that carries each part of a limb; hips and shoulders move with the pelvis.
+_CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}
+# Of the lowest bone from the rig's origin, as a share of the rig's size.
+_MAX_LIFT = 0.17
 
 
 def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
@@ -57,14 +64,73 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
         order.append(min(rows, key=above.__getitem__))
     parents, carriers = (_nearest(above[np.ix_(order, order)]) for above in (follows, carried))
     carriers = np.where(carriers < 0, parents, carriers)
-    matrices = rest[order]
-    ends = matrices[:, :3, 3] + matrices[:, :3, 1] * [
-        [rig.pose.bones[names[b]].length] for b in order
-    ]
     ordered = [names[b] for b in order]
+    _check_carried(rig, ordered, carriers, parts)
+    matrices = rest[order]
+    whole = rest_pose(rig, with_skin=True)
     return Skeleton(
-        ordered, parents, carriers, matrices[:, :3, 3], ends, _rotations(matrices), _floor(rig)
+        ordered,
+        parents,
+        carriers,
+        matrices[:, :3, 3],
+        _ends(whole, ordered, parts),
+        _rotations(matrices),
+        _floor(rig, whole, parts),
     )
+
+
+def _check_carried(
+    rig: bpy.types.Object, names: list[str], carriers: NDArray[np.intp], parts: dict[str, str]
+) -> None:
+    """Check that every limb moves as one piece with the pelvis; goals of IK, for example, do not.
+
+    :param carriers: (B,) the bone that each bone's head moves with, -1 for none.
+    :raises InputError: when a bone does not move with the one that should carry it.
+    """
+    bone_of = {parts[name]: index for index, name in enumerate(names)}
+    for part, bone in bone_of.items():
+        side, _, kind = part.partition("_")
+        above = f"{side}_{_CARRIED_BY[kind]}" if kind in _CARRIED_BY else "pelvis"
+        if kind not in (*_CARRIED_BY, "hip", "shoulder") or above not in bone_of:
+            continue
+        # Under a scale of three factors, what the probe sees is sheared.
+        ancestors = rig.data.bones[names[bone]].parent_recursive
+        if rig.data.bones[names[bone_of[above]]] in ancestors:
+            continue
+        carrying = bone
+        while carrying >= 0 and carrying != bone_of[above]:
+            carrying = int(carriers[carrying])
+        if carrying < 0:
+            raise InputError(
+                f"'{names[bone]}' of '{rig.name}' does not move with '{names[bone_of[above]]}', so "
+                f"they cannot be {part.replace('_', ' ')} and {above.replace('_', ' ')}; choose "
+                "other bones in the bone map"
+            )
+
+
+def _ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> NDArray[np.float64]:
+    """Return where the bones end (B, 3), metres; hands end at the knuckles of the long fingers."""
+    row = {name: index for index, name in enumerate(rest.names)}
+    wrists = {
+        part.partition("_")[0]: row[name] for name, part in parts.items() if part.endswith("_wrist")
+    }
+    phalanges = find_fingers(rest.names, rest.parents, rest.heads, wrists)
+    bone_of = {part: row[name] for name, part in parts.items()}
+    forward = np.zeros(3)
+    if {"left_hip", "right_hip"} <= bone_of.keys():
+        left = rest.heads[bone_of["left_hip"]] - rest.heads[bone_of["right_hip"]]
+        forward = np.cross(left, [0.0, 0.0, 1.0])
+        forward /= max(float(np.linalg.norm(forward)), 1e-9)
+    ends = []
+    for name in names:
+        side, _, kind = parts[name].partition("_")
+        knuckles = []
+        if kind == "wrist":
+            of_part = {part: row[bone] for bone, part in phalanges.items()}
+            long = [f"{side}_{finger}1" for finger in ("middle", "index", "ring", "pinky")]
+            knuckles = [of_part[part] for part in long if part in of_part][:1]
+        ends.append(rest.end(row[name], knuckles, forward if kind == "ankle" else None))
+    return np.array(ends).reshape(-1, 3)
 
 
 def _dependencies(
@@ -105,11 +171,14 @@ def _dependencies(
 
 def _independent(parts: dict[str, str]) -> list[list[int]]:
     """Group bones that do not move each other, such as those of both sides, to save evaluations."""
-    groups: dict[str, list[int]] = {}
+    groups: dict[tuple[str, str], list[int]] = {}
     for row, (bone, part) in enumerate(parts.items()):
-        side, _, kind = part.partition("_")
-        key = "phalanx" + kind[-1] if kind in PHALANGES else kind
-        groups.setdefault(key or bone, []).append(row)
+        kind = part.partition("_")[2]
+        # Bones of the trunk move each other, whatever their names.
+        key = ("bone", bone)
+        if kind:
+            key = ("part", "phalanx" + kind[-1] if kind in PHALANGES else kind)
+        groups.setdefault(key, []).append(row)
     return list(groups.values())
 
 
@@ -121,18 +190,21 @@ def _nearest(above: NDArray[np.bool_]) -> NDArray[np.intp]:
     return np.array([max(np.flatnonzero(row[:b]), default=-1) for b, row in enumerate(above)], int)
 
 
-def _floor(rig: bpy.types.Object) -> float:
-    """Return the height of the floor: the rig's origin if the rig rests near it, otherwise its
-    lowest bone.
+def _floor(rig: bpy.types.Object, rest: RestPose, parts: dict[str, str]) -> float:
+    """Return the height of the floor: below the soles of the feet; without skin, the rig's origin
+    if the rig rests near it, otherwise the lowest point where one of its bones begins or ends.
     """
-    deforming = [bone for bone in rig.data.bones if bone.use_deform] or rig.data.bones
-    lowest = min(
-        (rig.matrix_world @ end).z
-        for bone in deforming
-        for end in (bone.head_local, bone.tail_local)
-    )
+    feet = [
+        rest.names.index(name) for name, part in parts.items() if part.endswith(("ankle", "foot"))
+    ]
+    soles = rest.lowest_skin(feet)
+    if soles is not None:
+        return soles
+    deforming = [index for index, bone in enumerate(rig.data.bones) if bone.use_deform]
+    bones = deforming or range(len(rest.names))
+    lowest = min(min(rest.heads[bone][2], rest.end(bone)[2]) for bone in bones)
     origin = rig.matrix_world.translation.z
-    return float(origin if abs(lowest - origin) < 0.3 else lowest)
+    return float(origin if abs(lowest - origin) < _MAX_LIFT * rest.size else lowest)
 
 
 def _check_rotated(rig: bpy.types.Object, names: list[str], turned: NDArray[np.float64]) -> None:
@@ -200,14 +272,7 @@ def blocked_bones(
         cosine = (np.einsum("bij,bij->b", seen, wanted[t]) - 1) / 2
         off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
     blocked = [name for name, angle in zip(names, off, strict=True) if angle > _MAX_DEVIATION]
-    if not blocked:
-        return []
-    first, *others = blocked
-    if not others:
-        return [notice("blocked_bone", bone=first, rig=rig.name)]
-    if len(others) == 1:
-        return [notice("blocked_two_bones", bone=first, other=others[0], rig=rig.name)]
-    return [notice("blocked_bones", bone=first, others=len(others), rig=rig.name)]
+    return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
 
 
 def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:

@@ -16,10 +16,11 @@ from ....solver.errors import InputError
 from ...edit.clip import Clip
 from ...edit.root_motion import about_z, floor_trajectory
 from ...errors import UsageError
-from ...notices import Notice
-from ...retarget.bone_map import BoneMap
+from ...notices import PHRASES, Notice, notice
+from ...retarget.bone_map import SPINE, BoneMap
 from ...retarget.expression_map import ExpressionMap
-from ...retarget.guess import RestBones, guess
+from ...retarget.guess import SHAPED, guess
+from ...retarget.rest_check import rest_faults
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
 from ...retarget.transfer import Transfer, leg_ratio
@@ -45,9 +46,11 @@ from .rig_action import (
     write_action,
 )
 from .rig_probe import at_rest, blocked_bones, probe
+from .rig_rest import rest_pose
 from .rigify_ik import ik_keys
 
-_OTHER = {"left": "right", "right": "left"}
+# Whose motion is missed where a rig has no bones for them.
+_EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elbow")
 
 
 @dataclass(frozen=True)
@@ -99,28 +102,46 @@ def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
 
     :raises InputError: when the rig has no bones.
     """
-    bones = list(rig.data.bones)
-    if not bones:
-        raise InputError(f"'{rig.name}' has no bones; choose another armature as the rig")
-    names = [bone.name for bone in bones]
-    parents = np.array(
-        [names.index(bone.parent.name) if bone.parent else -1 for bone in bones], int
-    )
-    heads = np.array([rig.matrix_world @ bone.head_local for bone in bones]).reshape(-1, 3)
-    found = guess(RestBones(names, parents, heads))
-    is_by_name = max(found.confidence.values(), default=0.0) > 0.5
-    if not is_by_name or rig.matrix_world.determinant() >= 0.0:
-        return found
-    # The rig is mirrored: what its bones call left is on its right.
-    return BoneMap(
-        {bone: _other_side(part) for bone, part in found.parts.items()}, found.confidence
-    )
+    return guess(rest_pose(rig), is_mirrored=rig.matrix_world.determinant() < 0.0)
 
 
-def _other_side(part: str) -> str:
-    """Return the same part of the other side; the part itself if it has no side."""
-    side, _, kind = part.partition("_")
-    return f"{_OTHER[side]}_{kind}" if side in _OTHER else part
+def usable_guess(rig: bpy.types.Object) -> BoneMap:
+    """Guess the bone map, to be used without anybody looking at it.
+
+    :raises InputError: when the rig has no bones, or its rest pose contradicts the guess.
+    """
+    found = guess_bone_map(rig)
+    heads = {found.parts[bone.name]: bone for bone in rig.data.bones if bone.name in found.parts}
+    places = {part: np.array(rig.matrix_world @ bone.head_local) for part, bone in heads.items()}
+    for fault in rest_faults(places):
+        bones = ", ".join(f"'{heads[part].name}'" for part in fault.parts)
+        raise InputError(
+            f"the bone map of '{rig.name}' could not be guessed, because {bones} "
+            f"{PHRASES[fault.reason]}; choose the bones yourself, or put the armature upright"
+        )
+    return found
+
+
+def map_notices(rig: bpy.types.Object, skeleton: Skeleton, bone_map: BoneMap) -> list[Notice]:
+    """Return what a user should know about a bone map: guesses, parts without bones, and bones that
+    do not look like their parts.
+    """
+    notices: list[Notice] = []
+    unsure = [bone for bone, sure in bone_map.confidence.items() if sure <= SHAPED]
+    if unsure:
+        notices.append(notice("guessed_bones", rig=rig.name, bones=unsure))
+    parts = set(bone_map.parts.values())
+    still = [] if parts & set(SPINE) else ["spine"]
+    still += [part for part in _EXPECTED if part not in parts]
+    if still:
+        notices.append(notice("still_parts", rig=rig.name, parts=still))
+    heads: dict[str, NDArray[np.float64]] = {}
+    for name, head in zip(skeleton.names, skeleton.heads, strict=True):
+        heads.setdefault(bone_map.parts[name], head)
+    for fault in rest_faults(heads):
+        bones = [bone_map.bone(part) or part for part in fault.parts]
+        notices.append(notice("odd_bones", rig=rig.name, bones=bones, reason=fault.reason))
+    return notices
 
 
 def retarget(
@@ -176,7 +197,8 @@ def retarget(
             ).pose(clip)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
-            warnings = blocked_bones(rig, skeleton.names, turns, motion.rotations)
+            warnings = map_notices(rig, skeleton, bone_map)
+            warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)
             keys = [BoneKeys(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(
                 keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads)
@@ -239,9 +261,9 @@ def usable_map(
         raise UsageError(
             f"'{rig.name}' has no bone '{missing[0]}'; guess the bones again or correct the list"
         )
-    return BoneMap(
-        {bone: part for bone, part in bone_map.parts.items() if part in body.joint_names}
-    )
+    parts = {bone: part for bone, part in bone_map.parts.items() if part in body.joint_names}
+    confidence = {bone: sure for bone, sure in bone_map.confidence.items() if bone in parts}
+    return BoneMap(parts, confidence)
 
 
 def _placed(

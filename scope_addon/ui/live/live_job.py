@@ -35,7 +35,7 @@ from ...scene.live.live_body import LiveBody
 from ...scene.live.live_rig import LiveRig
 from ...scene.live.scene_before import SceneBefore, select_only
 from ...scene.local_scene import check_local
-from ...scene.rigs.rig_retarget import guess_bone_map
+from ...scene.rigs.rig_retarget import usable_guess
 from ...scene.visibility import hide
 from ...temporary import remove_abandoned
 from ...untrusted.body_file import load_body
@@ -309,7 +309,7 @@ def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:
         raise UsageError(
             f"'{settings.rig.name}' is linked; make an override of it, or switch off Rig Follows"
         )
-    bones = listed_map(settings) if len(settings.pairs) else guess_bone_map(settings.rig)
+    bones = listed_map(settings) if len(settings.pairs) else usable_guess(settings.rig)
     return LiveRig(settings.rig, body, bones, retarget_options(settings))
 
 

@@ -122,13 +122,13 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
     """
     from ...scene.animation_data.timing import scene_rate
-    from ...scene.rigs.rig_retarget import guess_bone_map, retarget
+    from ...scene.rigs.rig_retarget import retarget, usable_guess
     from ...scene.visibility import hide, show
 
     settings = context.scene.scope_retarget
     body = body_of(source)
     face = face_map(settings)
-    guessed = None if len(settings.pairs) else guess_bone_map(settings.rig)
+    guessed = None if len(settings.pairs) else usable_guess(settings.rig)
     result = retarget(
         source,
         body,

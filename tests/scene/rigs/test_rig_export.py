@@ -340,18 +340,20 @@ def shell(*arguments):
 
 
 def test_the_command_line_retargets_a_capture(tmp_path):
-    rig = save_rig(tmp_path / "rig.glb")
+    rig = save_rig(tmp_path / "rig.glb", "nameless")
     argv = ["capture", SAMPLE, "--quality", "fast", "--end", "0.2", "--json", "--retarget", rig]
     argv += ["--retarget-root", "object", "--threads", "1"]
     done = shell(*argv, "-o", tmp_path / "out.glb", "-o", tmp_path / "out.npz")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["outputs"] == [
-        str(tmp_path / "out.npz"),
-        str(tmp_path / "out.glb"),
-    ]
+    report = json.loads(done.stdout)
+    assert report["outputs"] == [str(tmp_path / "out.npz"), str(tmp_path / "out.glb")]
+    (guessed,) = (each for each in report["notices"] if each["code"] == "guessed_bones")
+    assert set(guessed["values"]["bones"]) == set(names_of("nameless").values())
+    assert sum("guessed from its rest pose" in warning for warning in report["warnings"]) == 1
+    assert done.stderr.count("guessed from its rest pose") == 1
     rigs = read(tmp_path / "out.glb")
     assert [rig.name for rig in rigs] == ["Rig0"]
-    assert set(names_of("mixamo").values()) <= set(rigs[0].data.bones.keys())
+    assert set(names_of("nameless").values()) <= set(rigs[0].data.bones.keys())
 
 
 def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):

@@ -315,7 +315,8 @@ def test_bones_blocked_by_a_constraint_are_reported(source):
     constraint.chain_count = 2
     (warning,) = map(str, run(source, rig).warnings)
     assert "'thigh_l'" in warning
-    assert "cannot follow the motion: mute the constraints" in warning
+    assert "cannot follow the motion" in warning
+    assert "mute the constraints" in warning
     constraint.mute = True
     assert run(source, rig).warnings == []
     assert direction_error(rig, bone_of, ARMS) < 1.0

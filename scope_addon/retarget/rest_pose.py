@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All bones of a rig in its rest pose: where they begin, where they really end, and what skin they
+carry.
+
+The tails of imported bones may mean nothing: glTF stores none, and other formats only where a bone
+has a child. A bone therefore ends where its children begin, or else where its skin does; its tail
+is the last resort, and only if it is plausible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Below this share of the rig's size, two heads are at the same place.
+_SAME_PLACE = 0.002
+# A tail further off the line from the parent's head than this, or longer than these multiples of
+# its length, means nothing.
+_MAX_TAIL_TURN = np.radians(60)
+_TAIL_LENGTHS = (0.05, 1.5)
+# Without any evidence, a bone goes straight on by this share of the one before: as a hand does.
+_CONTINUATION = 0.4
+# Of the way from the ankle to the tip of the foot, where toes begin.
+_BALL = 0.7
+
+
+def _no_points() -> NDArray[np.float64]:
+    return np.empty((0, 3))
+
+
+def _no_owners() -> NDArray[np.intp]:
+    return np.empty(0, np.intp)
+
+
+@dataclass(frozen=True)
+class RestPose:
+    """The B bones of a rig at rest in world axes, z up, metres; parents come before children."""
+
+    names: list[str]
+    parents: NDArray[np.intp]  # (B,) indices, -1 for none
+    heads: NDArray[np.float64]  # (B, 3)
+    tails: NDArray[np.float64] = field(default_factory=_no_points)  # (B, 3); empty if unknown
+    points: NDArray[np.float64] = field(default_factory=_no_points)  # (V, 3) vertices of the skin
+    owners: NDArray[np.intp] = field(default_factory=_no_owners)  # (V,) the bone that moves each
+
+    @cached_property
+    def size(self) -> float:
+        """The largest extent of the heads, metres."""
+        return max(float(np.ptp(self.heads, axis=0).max(initial=0.0)), 1e-9)
+
+    @cached_property
+    def children(self) -> list[list[int]]:
+        """The children of each bone."""
+        out: list[list[int]] = [[] for _ in self.names]
+        for bone, parent in enumerate(self.parents.tolist()):
+            if parent >= 0:
+                out[parent].append(bone)
+        return out
+
+    @cached_property
+    def chains(self) -> list[list[int]]:
+        """The bones from the root down to each bone, which is the last."""
+        out: list[list[int]] = []
+        for bone, parent in enumerate(self.parents.tolist()):
+            out.append([*(out[parent] if parent >= 0 else ()), bone])
+        return out
+
+    def below(self, bone: int) -> list[int]:
+        """Return all descendants of a bone."""
+        found = {bone}
+        for other, parent in enumerate(self.parents.tolist()):
+            if parent in found:
+                found.add(other)
+        return sorted(found - {bone})
+
+    def is_below(self, bone: int, ancestor: int) -> bool:
+        """Return whether a bone descends from another."""
+        return bone != ancestor and ancestor in self.chains[bone]
+
+    def shared(self, bones: Iterable[int]) -> int | None:
+        """Return the deepest bone that all of these descend from or are; None without any."""
+        chains = [self.chains[bone] for bone in bones]
+        last = None
+        for level in zip(*chains, strict=False):
+            if len(set(level)) > 1:
+                break
+            last = level[0]
+        return last
+
+    def end(
+        self,
+        bone: int,
+        knuckles: Iterable[int] = (),
+        forward: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Return where a bone ends (3,).
+
+        :param knuckles: the first bones of the long fingers, if it is a hand; the thumb tells
+            nothing of its direction.
+        :param forward: where the person looks (3,), a unit vector, if it is a foot; other bones go
+            on in the direction of the one before.
+        """
+        head = self.heads[bone]
+        known = [self.heads[k] for k in knuckles] or [
+            self.heads[child]
+            for child in self.children[bone]
+            if np.linalg.norm(self.heads[child] - head) > _SAME_PLACE * self.size
+        ]
+        if known:
+            return np.asarray(np.mean(known, axis=0))
+        owned = self.points[np.isin(self.owners, [bone, *self.below(bone)])]
+        if len(owned) and forward is not None:
+            return _ball(owned, head, forward)
+        if len(owned):
+            away = 2.0 * (owned.mean(axis=0) - head)
+            if np.linalg.norm(away) > _SAME_PLACE * self.size:
+                return np.asarray(head + away)
+        return self._end_without_skin(bone, forward)
+
+    def _end_without_skin(
+        self, bone: int, forward: NDArray[np.float64] | None
+    ) -> NDArray[np.float64]:
+        """Return the tail (3,) if it is plausible, or else a point straight on."""
+        head = self.heads[bone]
+        tail = self.tails[bone] if len(self.tails) else head
+        before = next(
+            (
+                head - self.heads[ancestor]
+                for ancestor in reversed(self.chains[bone][:-1])
+                if np.linalg.norm(head - self.heads[ancestor]) > _SAME_PLACE * self.size
+            ),
+            None,
+        )
+        if before is None:
+            return np.asarray(tail)
+        length = float(np.linalg.norm(before))
+        if forward is not None:
+            before = length * forward
+        along = tail - head
+        size = float(np.linalg.norm(along))
+        is_plausible = (
+            _TAIL_LENGTHS[0] * length < size < _TAIL_LENGTHS[1] * length
+            and along @ before > np.cos(_MAX_TAIL_TURN) * size * length
+        )
+        return np.asarray(tail if is_plausible else head + _CONTINUATION * before)
+
+    def lowest_skin(self, bones: Iterable[int]) -> float | None:
+        """Return the height of the lowest vertex of these bones and those below them, metres; None
+        without skin.
+        """
+        moved = {other for bone in bones for other in (bone, *self.below(bone))}
+        owned = self.points[np.isin(self.owners, sorted(moved)), 2]
+        return float(owned.min()) if len(owned) else None
+
+
+def _ball(
+    skin: NDArray[np.float64], ankle: NDArray[np.float64], forward: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the ball of a foot (3,), at the height of its sole.
+
+    :param skin: (V, 3) of the whole foot, from heel to toes.
+    :param forward: (3,) where the person looks; the foot may point aside.
+    """
+    along = skin @ forward
+    near, far = np.quantile(along, (1 / 3, 2 / 3))
+    direction = skin[along >= far].mean(axis=0) - skin[along <= near].mean(axis=0)
+    direction[2] = 0.0
+    direction /= max(float(np.linalg.norm(direction)), 1e-9)
+    reach = float(((skin - ankle) @ direction).max())
+    ball: NDArray[np.float64] = ankle + _BALL * reach * direction
+    ball[2] = skin[:, 2].min()
+    return ball

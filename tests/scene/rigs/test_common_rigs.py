@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigs with the names and rest poses of common tools, retargeted as they come, against the body's
+own joints.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+from scope.benchmarks.rigs.kinds import KINDS
+from scope.benchmarks.rigs.made import make_rig
+from scope.benchmarks.rigs.measured import measured
+from scope.scope_addon.retarget.rig_source import rig_source
+from scope.scope_addon.scene.build import NEW_SCENE
+from scope.scope_addon.scene.export import formats
+from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
+from scope.scope_addon.scene.rigs.rig_file import load_rig, rig_bone_map
+from scope.scope_addon.scene.rigs.rig_retarget import retarget, usable_guess
+from scope.solver.errors import InputError
+
+from ...edit.walking import BETAS, BODY, NAMES, RATE, motion_of, walk
+from ..made_rigs import captured, truth
+
+MOTION = motion_of(walk(0.5, bent=0.2))
+JOINTS = truth(MOTION)
+FRAMES = np.array([0, 7, 15])
+KIND = {kind.name: kind for kind in KINDS}
+# VRM's name of the part at each place.
+HUMANOID = {"pelvis": "hips", "spine1": "spine", "spine3": "chest", "spine4": "upperChest",
+            "neck": "neck", "head": "head"}  # fmt: skip
+HUMANOID_LIMBS = {"hip": "UpperLeg", "knee": "LowerLeg", "ankle": "Foot", "ball": "Toes",
+                  "collar": "Shoulder", "shoulder": "UpperArm", "elbow": "LowerArm",
+                  "wrist": "Hand", "thumb1": "ThumbMetacarpal", "thumb2": "ThumbProximal",
+                  "middle1": "MiddleProximal"}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_rig_follows_the_motion_and_stands_on_the_floor(kind):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    source = captured(MOTION)
+    rig = make_rig(kind)
+    bone_map = usable_guess(rig.armature)
+    result = retarget(source, BODY, BETAS, rig.armature, bone_map, RATE)
+    assert result.warnings == []
+    seen = measured(rig, JOINTS, NAMES, FRAMES)
+    assert seen["limbs"].max() < 6
+    assert seen["hands"].max() < 13
+    assert seen["trunk"].max() < 6
+    # This walk is above its floor at times, in proportion to the rig's legs.
+    expected = result.travel * lowest_of_body(source)
+    np.testing.assert_allclose(seen["lowest"], expected, atol=0.02)
+
+
+def lowest_of_body(source):
+    """Return the height of the captured mesh's lowest vertex in each frame, metres."""
+    mesh = next(child for child in source.children if child.type == "MESH")
+    heights = []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(int(frame) + 1)
+        posed = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        evaluated = posed.to_mesh()
+        heights.append(min((posed.matrix_world @ v.co).z for v in evaluated.vertices))
+        posed.to_mesh_clear()
+    return np.array(heights)
+
+
+def read_chunk(data):
+    """Return the JSON of a .glb, and what comes after it."""
+    (length,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + length]), data[20 + length :]
+
+
+def write_chunk(gltf, rest):
+    text = json.dumps(gltf).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A)
+    return head + text + rest
+
+
+@pytest.mark.parametrize("version", [0, 1])
+def test_an_avatar_is_read_by_its_humanoid_table(tmp_path, version):
+    """Its bones have names that say nothing."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    rig = make_rig(KIND["VRM, VRoid"])
+    bone_of = {}
+    expected = {}
+    for place, name in list(rig.bone_at.items()):
+        side, _, at = place.partition(" ")
+        bone = rig.armature.data.bones[name]
+        bone.name = f"node{len(bone_of)}"
+        part = HUMANOID.get(at) if side == "left" else None
+        if at in HUMANOID_LIMBS:
+            part = f"{side}{HUMANOID_LIMBS[at]}"
+            expected[bone.name] = f"{side}_{ {'ball': 'foot'}.get(at, at) }"
+        if part:
+            bone_of[part] = bone.name
+    expected |= {bone_of["hips"]: "pelvis", bone_of["neck"]: "neck", bone_of["head"]: "head"}
+    expected |= {bone_of[part]: f"spine{k}" for k, part in
+                 enumerate(("spine", "chest", "upperChest"), 1)}  # fmt: skip
+    path = tmp_path / "avatar.vrm"
+    formats.write_glb(tmp_path / "avatar.glb")
+    gltf, rest = read_chunk((tmp_path / "avatar.glb").read_bytes())
+    node_of = {node.get("name"): index for index, node in enumerate(gltf["nodes"])}
+    nodes = {part: node_of[bone] for part, bone in bone_of.items()}
+    if version == 1:
+        bones = {part: {"node": node} for part, node in nodes.items()}
+        gltf["extensions"] = {"VRMC_vrm": {"humanoid": {"humanBones": bones}}}
+    else:
+        for side in ("left", "right"):  # Version 0 has no metacarpal in a thumb.
+            nodes[f"{side}ThumbIntermediate"] = nodes.pop(f"{side}ThumbProximal")
+            nodes[f"{side}ThumbProximal"] = nodes.pop(f"{side}ThumbMetacarpal")
+        entries = [{"bone": part, "node": node} for part, node in nodes.items()]
+        gltf["extensions"] = {"VRM": {"humanoid": {"humanBones": entries}}}
+    path.write_bytes(write_chunk(gltf, rest))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    source = rig_source(path)
+    armature = load_rig(source, bpy.context.scene.collection)
+    assert rig_bone_map(source, armature).parts == expected
+
+
+def fbx_models(path):
+    """Return the node of each model of an FBX file by its name, and of each its properties."""
+    formats.enable_addon("io_scene_fbx")
+    from io_scene_fbx import parse_fbx
+
+    root, _ = parse_fbx.parse(str(path))
+    objects = next(each for each in root.elems if each.id == b"Objects")
+    models = {}
+    for model in (each for each in objects.elems if each.id == b"Model"):
+        block = next(each for each in model.elems if each.id == b"Properties70")
+        values = {entry.props[0].decode(): entry.props[4:] for entry in block.elems}
+        models[model.props[1].split(b"\0")[0].decode()] = values
+    return models
+
+
+def test_a_rig_in_centimetres_is_the_same_in_an_fbx_file_as_one_in_metres(tmp_path):
+    """Under an object of scale 0.01, as Blender imports characters from Mixamo."""
+    shapes = []
+    for unit in (1.0, 0.01):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        make_rig(replace(KIND["Mixamo"], unit=unit, fingers=""))
+        formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        out = tmp_path / "out.fbx"
+        options = RigExportOptions(replace(NEW_SCENE, name="walk"))
+        export_on_rig([MOTION], BODY, [out], rig_source(tmp_path / "rig.blend"), options)
+        models = fbx_models(out)
+        scales = [np.ravel(values.get("Lcl Scaling", [1.0] * 3)) for values in models.values()]
+        np.testing.assert_allclose(np.array(scales), 1.0, atol=1e-4)
+        at = np.array(models["mixamorig:Hips"]["Lcl Translation"])
+        assert 85 < np.linalg.norm(at) < 120  # Centimetres.
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        bpy.ops.import_scene.fbx(filepath=str(out), anim_offset=0.0)
+        (skin,) = (each for each in bpy.context.scene.objects if each.type == "MESH")
+        for frame in (0, 9):
+            bpy.context.scene.frame_set(frame)
+            posed = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            mesh = posed.to_mesh()
+            shapes.append(np.array([posed.matrix_world @ v.co for v in mesh.vertices]))
+            posed.to_mesh_clear()
+    np.testing.assert_allclose(shapes[2], shapes[0], atol=1e-4)
+    np.testing.assert_allclose(shapes[3], shapes[1], atol=1e-4)
+    assert np.abs(shapes[1] - shapes[0]).max() > 0.1
+
+
+def test_a_rig_that_lies_is_refused_in_one_sentence():
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    rig = make_rig(KIND["Mixamo"]).armature
+    rig.rotation_euler = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    with pytest.raises(InputError, match="do not stand upright at rest"):
+        usable_guess(rig)
