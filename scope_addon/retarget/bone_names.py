@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 _LATIN_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[぀-ヿ㐀-鿿々ー]+")
-_SIDES = {"l": "left", "left": "left", "lft": "left", "lf": "left"}
+_SIDES = {"l": "left", "left": "left", "lft": "left"}
 _SIDES |= {"r": "right", "right": "right", "rgt": "right", "rt": "right", "lt": "left"}
 _JAPANESE_SIDES = {"左": "left", "右": "right"}
 # Prefixes of Biped, Valve, VRoid (with C for the centre), Character Creator, Mixamo and others.
@@ -37,15 +37,28 @@ CENTRE = {
 }
 # Of several, the first that a rig has; a word may stand for different parts in different rigs.
 LIMBS = {
-    "hip": ("thigh", "upleg", "upperleg", "hip", "femur", "足", "leg"),
-    "knee": ("shin", "calf", "leg", "lowerleg", "lowleg", "knee", "tibia", "ひざ", "膝"),
+    "hip": ("thigh", "upleg", "upperleg", "legupper", "hip", "femur", "足", "leg"),
+    "knee": (
+        "shin",
+        "calf",
+        "leg",
+        "lowerleg",
+        "lowleg",
+        "leglower",
+        "knee",
+        "tibia",
+        "ひざ",
+        "膝",
+    ),
     "ankle": ("ankle", "foot", "足首"),
     # SMPL calls the toes "foot", and the foot "ankle".
     "foot": ("toe", "toes", "toebase", "ball", "foot", "つま先", "足先ex"),
-    "collar": ("clavicle", "collar", "scapula", "shoulder", "肩"),
-    "shoulder": ("upperarm", "uparm", "arm", "shldr", "shoulder", "humerus", "uarm", "腕"),
-    "elbow": ("forearm", "lowerarm", "lowarm", "elbow", "radius", "farm", "ひじ", "肘"),
-    "wrist": ("wrist", "hand", "手首"),
+    "collar": ("clavicle", "collar", "collarbone", "clav", "scapula", "shoulder", "肩"),
+    "shoulder": (
+        *("upperarm", "uparm", "armupper", "arm", "shldr", "shoulder", "humerus", "uarm", "腕"),
+    ),
+    "elbow": ("forearm", "lowerarm", "lowarm", "armlower", "elbow", "radius", "farm", "ひじ", "肘"),
+    "wrist": ("wrist", "hand", "手首", "palm"),
 }
 _LIMB_WORDS = {word for words in LIMBS.values() for word in words}
 

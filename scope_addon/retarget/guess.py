@@ -31,10 +31,17 @@ SHAPED = 0.5
 IMPOSSIBLE = 0.2
 # What it costs a choice of bones for a limb to lack a part, and to have a part that does not
 # descend from the one before; names cost their places in the list of words.
-_LACKED = {part: 10.0 for part in (*_LEG, *_ARM)} | {"collar": 5.5, "foot": 5.5}
+_LACKED = {part: 10.0 for part in (*_LEG, *_ARM)} | {"collar": 8.0, "foot": 8.0}
+_PER_WORD = 0.5
 _DETACHED = 8.0
 _PER_LEVEL = 0.01
 _FK_BONUS = 0.5
+# By shape, a collar is shorter than this share of the arm after it.
+_MAX_COLLAR = 0.4
+# Bones are at one place if their distance is below this share of the rig's size.
+_NEAR = 0.005
+# The tip of a head is above it by more than this multiple of the neck's bones.
+_TIP_LENGTH = 1.4
 # The humanoid table of VRM files, which other formats of avatars share.
 _VRM_LIMBS = {
     "UpperLeg": "hip", "LowerLeg": "knee", "Foot": "ankle", "Toes": "foot",
@@ -56,7 +63,7 @@ def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
     named = rigify or by_name(rest)
     if _is_impossible(rest, named) and not _is_impossible(rest, shaped):
         named = {}
-    parts = named | _lacking(rest, named, shaped)
+    parts = named | _lacking(named, shaped)
     backwards = faces_backwards(_heads_of(rest, parts))
     is_exchanged = backwards if backwards is not None else is_mirrored and bool(named)
     if is_exchanged:
@@ -132,19 +139,27 @@ def _is_impossible(rest: RestPose, parts: Mapping[str, str]) -> bool:
     return not all(leg in heads for leg in legs) or bool(rest_faults(heads))
 
 
-def _lacking(rest: RestPose, named: Mapping[str, str], shaped: Mapping[str, str]) -> dict[str, str]:
-    """Return the bones of limbs and trunk of which names give none, by the shape; bones that names
-    give are not used again.
+def _lacking(named: Mapping[str, str], shaped: Mapping[str, str]) -> dict[str, str]:
+    """Return the bones, by the shape, of parts of which names give none: of whole limbs, and beside
+    parts for which names and shape have the same bone.
     """
     if not named:
         return dict(shaped)
-    kinds = set(map(_limb_of, named.values()))
-    free = {
-        bone: part
-        for bone, part in shaped.items()
-        if bone not in named and _limb_of(part) not in kinds
-    }
-    return free
+    limbs = set(map(_limb_of, named.values()))
+    agreed = {part for bone, part in named.items() if shaped.get(bone) == part}
+    found = {}
+    for bone, part in shaped.items():
+        if bone in named or part in named.values():
+            continue
+        side, _, kind = part.partition("_")
+        limb = _LEG if kind in _LEG else _ARM
+        beside = set()
+        if kind:
+            place = limb.index(kind)
+            beside = {f"{side}_{each}" for each in limb[max(place - 1, 0) : place + 2]}
+        if _limb_of(part) not in limbs or beside & agreed:
+            found[bone] = part
+    return found
 
 
 def _limb_of(part: str) -> str:
@@ -234,7 +249,7 @@ def _limb_by_name(
     for part in limb:
         words = LIMBS[part]
         known = [
-            (bone, words.index(name.core) - _FK_BONUS * name.is_fk)
+            (bone, _PER_WORD * words.index(name.core) - _FK_BONUS * name.is_fk)
             for bone, name in enumerate(names)
             if name.side == side and not name.is_goal and name.core in words
         ]
@@ -351,7 +366,8 @@ def _distinct(rest: RestPose, bones: list[int]) -> list[int]:
     return [
         bone
         for bone in bones
-        if np.linalg.norm(rest.heads[bone] - rest.heads[rest.parents[bone]]) > 0.005 * rest.size
+        if rest.parents[bone] < 0
+        or np.linalg.norm(rest.heads[bone] - rest.heads[rest.parents[bone]]) > _NEAR * rest.size
     ]
 
 
@@ -398,23 +414,35 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
     shared = [bone for bone in chains["left leg"] if bone in chains["right leg"]]
     if not shared:
         return {}
-    found = {rest.names[shared[-1]]: "pelvis"}
+    central = [bone for bone in range(len(z)) if abs(across[bone]) < 0.1 * height]
+    top = rest.chains[max(central or leaves, key=lambda bone: z[bone])]
+    carrying = [bone for bone in shared if bone in top]
+    found = {rest.names[carrying[-1] if carrying else shared[-1]]: "pelvis"}
     for limb, chain in chains.items():
         side, kind = limb.split()
         other = chains.get(f"{_OTHER_SIDE[side]} {kind}", shared)
-        own = [bone for bone in chain if bone not in other]
+        own = _distinct(rest, [bone for bone in chain if bone not in other])
         parts = _leg_parts(rest, own) if kind == "leg" else _arm_parts(rest, own)
         found |= {rest.names[bone]: f"{side}_{part}" for bone, part in parts.items()}
-    top = rest.chains[max(leaves, key=lambda bone: z[bone])]
     trunk = [bone for bone in top if bone not in shared]
     arm = chains.get("left arm", [])
     spine = [bone for bone in trunk if bone in arm]
     above = [bone for bone in trunk if bone not in arm]
     found |= dict(zip((rest.names[b] for b in spine), _spread(len(spine)), strict=True))
-    found |= dict(zip((rest.names[b] for b in above), ("neck", "head"), strict=False))
+    found |= {rest.names[bone]: part for bone, part in _neck_parts(rest, above).items()}
     if faces_backwards(_heads_of(rest, found)):
         return {bone: other_side(part) for bone, part in found.items()}
     return found
+
+
+def _neck_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
+    """Return the parts of the bones from the chest up: the last is the head, or else the tip of the
+    head, far above it.
+    """
+    lengths = np.linalg.norm(np.diff(rest.heads[chain], axis=0), axis=1)
+    if len(chain) > 2 and lengths[-1] > _TIP_LENGTH * lengths[:-1].max():
+        chain = chain[:-1]
+    return dict.fromkeys(chain[:-1], "neck") | dict.fromkeys(chain[-1:], "head")
 
 
 def _leg_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
@@ -434,16 +462,23 @@ def _leg_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
 
 
 def _arm_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
-    """Return the part of each bone of an arm; fingers begin where the chain branches."""
+    """Return the part of each bone of an arm; fingers begin where the chain branches, and twist
+    bones may lie between.
+    """
     lengths = np.linalg.norm(np.diff(rest.heads[chain], axis=0), axis=1)
-    collar = len(chain) > 3 and lengths[0] < 0.7 * lengths[1]
-    fork = [k for k, bone in enumerate(chain) if k > collar + 1 and len(rest.children[bone]) >= 3]
-    if fork and fork[0] > collar + 2:
-        first = int(collar)
-        elbow = first + _middle(lengths[first : fork[0]])
-        found = {chain[first]: "shoulder", chain[elbow]: "elbow", chain[fork[0]]: "wrist"}
-        return ({chain[0]: "collar"} if collar else {}) | found
-    return dict(zip(chain, _ARM if collar else _ARM[1:], strict=False))
+    has_collar = len(chain) > 3 and lengths[0] < _MAX_COLLAR * lengths[1:].sum()
+    collar = {chain[0]: "collar"} if has_collar else {}
+    first = len(collar)
+    forks = [k for k in range(first + 2, len(chain)) if len(rest.children[chain[k]]) >= 3]
+    # Beyond the wrist there is less than an upper arm, unless twist bones were counted.
+    beyond = lengths[first + 2 :].sum()
+    wrist = forks[0] if forks else first + 2
+    if not forks and beyond > lengths[first : first + 2].max():
+        wrist = len(chain) - 1
+    if wrist >= len(chain):
+        return collar | dict(zip(chain[first:], _ARM[1:], strict=False))
+    elbow = first + _middle(lengths[first:wrist])
+    return collar | {chain[first]: "shoulder", chain[elbow]: "elbow", chain[wrist]: "wrist"}
 
 
 def _middle(lengths: NDArray[np.float64]) -> int:

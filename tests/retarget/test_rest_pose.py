@@ -12,7 +12,7 @@ from scope.scope_addon.retarget.rest_pose import RestPose
 NAMES = ["forearm", "hand", "thumb", "index", "middle"]
 PARENTS = np.array([-1, 0, 1, 1, 1])
 HEADS = np.array([[0, 0, 1], [0.3, 0, 1], [0.33, -0.05, 1], [0.4, -0.02, 1], [0.4, 0, 1]], float)
-UP = HEADS + [0, 0, 40]
+UP = HEADS + np.array([0.0, 0.0, 40.0])
 
 
 def test_a_bone_ends_where_its_only_child_begins() -> None:
