@@ -63,6 +63,8 @@ def rest_faults(heads: Mapping[str, NDArray[np.float64]]) -> list[Fault]:
 def faces_backwards(heads: Mapping[str, NDArray[np.float64]]) -> bool | None:
     """Return whether the toes of both feet point to where the back should be: then the sides are
     confused. None without toes.
+
+    :param heads: (3,) of each part at rest, z up.
     """
     needed = [f"{side}_{part}" for side in _SIDES for part in ("hip", "ankle", "foot")]
     if not all(part in heads for part in needed):
