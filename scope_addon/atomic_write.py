@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import itertools
 import os
 import stat
 from collections.abc import Iterator, Mapping
@@ -73,6 +74,33 @@ def complete_file(target: Path, durable: bool = True, mode: int | None = None) -
             os.replace(temporary, target)
     finally:
         discard(temporary)
+
+
+def create_new(path: Path) -> Path:
+    """Create an empty file that nothing else has had, and return its path: ``path``, or where that
+    is taken ``NAME 2``, ``NAME 3``, ….
+
+    For what grows under a name of its own, until it is complete, and is kept by a kill.
+
+    :raises OSError: it cannot be created.
+    """
+    for number in itertools.count(1):
+        other = path if number == 1 else path.with_stem(f"{path.stem} {number}")
+        with contextlib.suppress(FileExistsError):
+            os.close(os.open(other, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            return other
+    raise AssertionError("there are more numbers")
+
+
+def finish(temporary: Path, target: Path) -> None:
+    """Give a complete file its name, once its content is on the disk.
+
+    :raises OSError: the disk refuses the content, or the file cannot be renamed.
+    :raises OutputError: ``target`` exists and is not a regular file.
+    """
+    target = resolve_link(target)
+    _sync(temporary)
+    replace_durably(temporary, target)
 
 
 def _sync(path: Path) -> None:

@@ -71,10 +71,10 @@ from .footage import is_url, json_text
 from .installed import CAPTURE, check_installed
 from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
-from .job.private_folder import lasting_folder
 from .job.unfinished import unfinished_capture
 from .options.capture import OFF
 from .parent import end_with_parent
+from .private_folder import lasting_folder
 from .scene.export.output_paths import SUFFIXES
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"

@@ -21,7 +21,7 @@ from ...solver.errors import InputError, ScopeError
 from ..errors import OutputError, UsageError
 from ..footage import is_url
 from ..job.batch import REPORT_NAME
-from ..job.private_folder import lasting_folder
+from ..private_folder import lasting_folder
 from ..temporary import hold, is_abandoned, release
 from .staging import TOKEN
 

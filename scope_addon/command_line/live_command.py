@@ -10,8 +10,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...solver.errors import ScopeError
 from ..counts import counted
-from ..errors import UsageError
+from ..errors import NoPersonError, UsageError, system_error_message
 from ..installed import CAPTURE, check_installed, check_live
 from ..options import Place
 from ..options.body_choice import chosen_body
@@ -19,10 +20,13 @@ from ..scene.export.output_paths import person_paths
 from .arguments import add_options, values_in_range
 from .memory_limit import check_memory_limit
 from .outputs import MOTION_SUFFIXES, check_outputs
+from .signals import interrupted
 from .terminal import ProgressLine, print_message
 
 if TYPE_CHECKING:
     from ...solver.body import Body
+    from ..live.outputs.footage import Footage
+    from ..live.outputs.people_recording import PeopleRecording
     from ..live.outputs.preview_page import PreviewPage
     from ..live.run import LiveOptions, Output
 
@@ -33,7 +37,7 @@ def add_live(parser: argparse.ArgumentParser) -> None:
         "source",
         metavar="SOURCE",
         help="camera number or device, stream (rtsp://, http://, ...), or video, which is played "
-        "in real time",
+        "in real time; or NAME.recording, which a killed capture has left, to finish it",
     )
     add_options(parser, Place.LIVE)
     parser.set_defaults(run=run_live_command)
@@ -54,39 +58,126 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     options = _checked(values)
     check_outputs(_paths(values), vars(args), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
+    from ..live.outputs.unfinished import is_recording
+
+    report = (
+        _finish_recording(Path(args.source), values["record"])
+        if is_recording(args.source)
+        else _capture(args, values, options)
+    )
+    if not args.json:
+        print_message(_summary(report))
+    return report
+
+
+def _capture(
+    args: argparse.Namespace, values: Mapping[str, Any], options: LiveOptions
+) -> dict[str, Any]:
+    """Capture until the source ends or Ctrl-C, and return the report.
+
+    :raises ScopeError: the source cannot be read, or an output failed.
+    """
     from ..live.outputs.footage import Footage
-    from ..live.outputs.people_recording import PeopleRecording
+    from ..live.outputs.people_recording import Keep, PeopleRecording
+    from ..live.outputs.unfinished import SUFFIX, is_unfinished, unfinished_video
     from ..live.run import Listeners, run_live
     from ..live.sources import open_source
     from ..untrusted.body_file import load_body
 
     source = open_source(args.source)
-    body = load_body(chosen_body(values))
+    name = chosen_body(values)
+    body = load_body(name)
     with ExitStack() as stack:
         outputs = _outputs(values, body, stack)
-        recording = PeopleRecording(_paths(values), body, source) if values["record"] else None
-        footage = (
-            stack.enter_context(Footage(values["keep_footage"], source.fps))
-            if values["keep_footage"]
-            else None
-        )
+        footage = Footage(values["keep_footage"], source.fps) if values["keep_footage"] else None
+        if footage and (left := unfinished_video(values["keep_footage"])).exists():
+            print_message(f"{left} has the images of an earlier capture that was killed")
+        recording = None
+        if values["record"]:
+            file = values["record"].with_suffix(SUFFIX)
+            if is_unfinished(file):
+                print_message(f"{file} has a recording that is not finished: scope live {file}")
+            keep = Keep(
+                file, name, print_message, lambda: str((footage and footage.unfinished) or "")
+            )
+            recording = PeopleRecording(_paths(values), body, source, keep=keep)
         page = _preview(body, stack) if values["preview"] else None
         line = stack.enter_context(ProgressLine(sys.stderr, show=not args.quiet))
         with_camera = [output for output in (recording, page) if output]
         begin = _each([output.begin for output in with_camera])
         receive = _each([each for each in (footage and footage.add, page and page.receive) if each])
         listeners = Listeners(print_message, lambda state: line.write(str(state)), begin, receive)
-        report = run_live(source, body, options, [*outputs, *with_camera], listeners)
-        saved = [footage.save()] if footage else []
-        if footage and footage.missing:
-            print_message(
-                f"{footage.missing} in {values['keep_footage']}, since the computer was too busy"
-            )
-    saved = [*(recording.save() if recording else []), *saved]
-    report["outputs"] = [str(path) for path in saved if path]
-    if not args.json:
-        print_message(_summary(report))
+        try:
+            report = run_live(source, body, options, [*outputs, *with_camera], listeners)
+        except BaseException as error:
+            is_saved = _save_after_failure(recording, footage)
+            if isinstance(error, KeyboardInterrupt) and is_saved:
+                raise KeyboardInterrupt("what was recorded is written") from None
+            raise
+    report["outputs"] = [str(path) for path in _save(recording, footage)]
     return report
+
+
+def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Path]:
+    """Write what was recorded, the one even if the other fails, and return the files.
+
+    :raises ScopeError: one is not where it should be; says where it is.
+    """
+    with ExitStack() as stack:
+        video = []
+        if footage is not None:
+            # Runs at the end, also after an error of the recording's.
+            stack.callback(lambda: video.append(footage.save()))
+        with interrupted(recording.whereabouts if recording else ""):
+            motions = recording.save() if recording is not None else []
+    if footage is not None and footage.missing:
+        print_message(f"{footage.missing} in {video[0]}, since the computer was too busy")
+    return [*motions, *(path for path in video if path)]
+
+
+def _save_after_failure(recording: PeopleRecording | None, footage: Footage | None) -> bool:
+    """Write what was recorded before a failure, which is what the command then tells last; return
+    whether there was anything.
+    """
+    try:
+        saved = _save(recording, footage)
+        for path in saved:
+            print_message(f"wrote {path}, with everything until the capture ended")
+        return bool(saved)
+    except NoPersonError:
+        return False
+    except ScopeError as error:
+        print_message(str(error))
+    except (OSError, MemoryError) as error:
+        print_message(system_error_message(error))
+    return True
+
+
+def _finish_recording(journal: Path, record: Path | None) -> dict[str, Any]:
+    """Write the motion files of a recording that was not finished, and return the report.
+
+    :param record: as the option gives it; None: beside the recording.
+    :raises ScopeError: it cannot be read, or a file cannot be written.
+    """
+    from ..live.outputs.people_recording import unfinished_recording
+    from ..live.outputs.unfinished import remove_recording
+
+    def paths(people: int) -> list[Path]:
+        chosen = person_paths(record or journal.with_suffix(".npz"), people, separate=True)
+        if record is None and (existing := [path for path in chosen if path.exists()]):
+            raise UsageError(f"{existing[0]} exists; give another name with --record")
+        return chosen
+
+    recording, about = unfinished_recording(journal, paths)
+    saved = recording.save()
+    remove_recording(journal)
+    if about.footage and Path(about.footage).is_file():
+        print_message(f"its images are in {about.footage}")
+    return {
+        "source": about.source,
+        "seconds": round(recording.seconds, 2),
+        "outputs": [str(path) for path in saved],
+    }
 
 
 def _list_formats(source: str, *, quiet: bool) -> dict[str, Any]:
@@ -193,6 +284,10 @@ def _preview(body: Body, stack: ExitStack) -> PreviewPage:
 
 
 def _summary(report: Mapping[str, Any]) -> str:
+    if "latency_ms" not in report:  # of a recording that was not finished
+        return f"{report['seconds']:g} s of {report['source']}" + "".join(
+            f"; wrote {path}" for path in report["outputs"]
+        )
     latency = report["latency_ms"]
     return (
         f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency "

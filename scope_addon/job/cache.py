@@ -4,6 +4,7 @@
 - ``captures/<key>/report.json``, ``person1.npz``, …: a finished capture
 - ``jobs/<name>/``: a capture that is being written; it is moved to ``captures`` when it is complete
 - ``unfinished/<name>/``: what a capture that was cancelled or killed had found, see `unfinished`
+- ``recordings/``: of live captures, while they run. Clearing keeps it, and a kill leaves it
 - ``kernels/``: the machine code that was compiled here. Clearing keeps it, except for that of
     replaced versions
 - ``times.json``: how long the stages of the last captures took, see `progress`. Clearing keeps it
@@ -22,10 +23,23 @@ from typing import Any, NamedTuple
 from ..temporary import discard, new_folder, own_entries, remove
 
 REPORT = "report.json"
+RECORDINGS = "recordings"
 # a folder of scope_addon/machine_code/code_folders.py, less its program
 _VERSION = re.compile(r"\w+-[0-9a-f]{8}-[0-9a-f]{12}")
 # What is ours in a folder that the user chooses, and that may have others of these names.
 _KEY = re.compile("[0-9a-f]{32}")
+
+
+def cache_of(job_folder: Path) -> Path | None:
+    """Return the cache folder that a job's folder lies in; None if it lies elsewhere, as in
+    tests.
+    """
+    return job_folder.parents[1] if job_folder.parent.name == "jobs" else None
+
+
+def recordings_of(job_folder: Path) -> Path:
+    """Return the folder for the recording of a live capture while it runs."""
+    return (cache_of(job_folder) or job_folder) / RECORDINGS
 
 
 class CachedCapture(NamedTuple):
@@ -67,6 +81,22 @@ class Cache:
         with suppress(OSError):
             os.utime(folder)  # mark as used, so that it is pruned last
         return CachedCapture(motions, content["report"])
+
+    def recordings(self) -> list[Path]:
+        """Return the growing files of recordings here and in the user's own folder, where they are
+        written if the disk of this one is full; the newest first in each.
+        """
+        from ..live.outputs.unfinished import recordings_in
+        from ..private_folder import lasting_folder
+
+        folders = dict.fromkeys([self.root, lasting_folder() or self.root])
+        return [path for folder in folders for path in recordings_in(folder / RECORDINGS)]
+
+    def unfinished_recordings(self) -> list[Path]:
+        """Return those of `recordings` whose process has ended."""
+        from ..live.outputs.unfinished import is_unfinished
+
+        return [path for path in self.recordings() if is_unfinished(path)]
 
     def new_job_folder(self) -> Path:
         """Create an empty folder for the files of a worker, and remove abandoned ones.

@@ -18,6 +18,7 @@ from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
 from ..parent import end_with_parent
 from ..temporary import discard, remove
+from .cache import cache_of
 from .live.commands import Commands
 from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
@@ -120,7 +121,7 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     from ..untrusted.body_file import load_body
     from .preview import PreviewWriter
 
-    with unfinished_capture(_caches(job_folder), Path(request.footage)) as unfinished:
+    with unfinished_capture(cache_of(job_folder), Path(request.footage)) as unfinished:
         with PreviewWriter(job_folder, reporter.send) as watch:
             body = load_body(request.values["body"])
             options = capture_options(request.values)
@@ -132,13 +133,6 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
         for name, motion in zip(names, result.motions, strict=True):
             motion.save(job_folder / name)
     reporter.send("result", motions=names, report=result.report.as_json())
-
-
-def _caches(job_folder: Path) -> Path | None:
-    """Return the cache folder that a job's folder lies in; None if it lies elsewhere, as in
-    tests.
-    """
-    return job_folder.parents[1] if job_folder.parent.name == "jobs" else None
 
 
 def main(job_folder: Path) -> NoReturn:

@@ -142,7 +142,7 @@ def user_folder() -> Path:
     """Return a folder that upgrades keep; one among the user's caches if Scope is not enabled as an
     extension.
     """
-    from ..job.private_folder import private_folder
+    from ..private_folder import private_folder
 
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, create=True))

@@ -9,6 +9,7 @@ import io
 import json
 import shutil
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -46,6 +47,16 @@ def read_reply(path: Path) -> None:
         if message and message["event"] == "preview":
             assert (path.parent / message["file"]).parent == path.parent
             assert 0 < 4 * message["width"] * message["height"] < 1 << 27
+
+
+def read_recording(path: Path) -> None:
+    from scope.scope_addon.live.outputs.journal import fingerprint, read_about, read_records
+    from scope.scope_addon.untrusted.body_file import load_body
+
+    about = read_about(path)
+    body = load_body("scope")
+    records = read_records(path, replace(about, fingerprint=fingerprint(body)), body)
+    assert all(np.isfinite(pose.rotations).all() for pose, _ in records)
 
 
 def read_live_reply(path: Path) -> None:
@@ -213,6 +224,24 @@ def live_replies(_: Path) -> list[bytes]:
     }
     status |= {"dropped": 3, "received": 90, "recorded_s": 2.5}
     return _lines([pose, status, {"event": "notice", "text": "interrupted"}, {"event": "ended"}])
+
+
+def recordings(folder: Path) -> list[bytes]:
+    from scope.scope_addon.capture.camera.intrinsics import Camera
+    from scope.scope_addon.live.outputs.journal import About, Journal, fingerprint
+    from scope.scope_addon.untrusted.body_file import load_body
+
+    from ..live.outputs.test_vmc import pose_of
+
+    body = load_body("scope")
+    about = About("scope", fingerprint(body), "fake", "30", (64, 48), (3, 0.5), 1)
+    journal = Journal(folder / "seed.recording", about, body, print)
+    for k in range(3):
+        pose = replace(pose_of(body), index=k, timestamp_s=k / 30)
+        journal.add(pose, Camera(np.eye(3), np.zeros(5), "given"))
+    journal.close()
+    assert journal.path is not None
+    return [journal.path.read_bytes()]
 
 
 def answers(_: Path) -> list[bytes]:

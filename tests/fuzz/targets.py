@@ -339,6 +339,7 @@ TARGETS = {
     "reply": Target(own.read_reply, (".json",), own.replies),
     "request": Target(own.read_request, (".json",), own.requests),
     "answer": Target(own.read_answer, (".bin",), own.answers),
+    "recording": Target(own.read_recording, (".recording",), own.recordings),
     "live_reply": Target(own.read_live_reply, (".json",), own.live_replies),
     "expression_map": Target(own.read_expression_map, (".json",), own.expression_maps),
     "description": Target(own.read_description, (".json",), own.descriptions),

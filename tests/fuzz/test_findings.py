@@ -527,7 +527,7 @@ def test_the_run_that_compiles_rounds_as_later_ones(tmp_path: Path) -> None:
     assert python(LOADED, tmp_path, NUMBA_CACHE_DIR=cache).stdout == "True 1 1\n"
 
 
-FOLDER = "from scope.scope_addon.job.private_folder import private_folder; print(private_folder())"
+FOLDER = "from scope.scope_addon.private_folder import private_folder; print(private_folder())"
 
 
 @linux

@@ -58,7 +58,7 @@ def recorded(body, live, frames, tmp_path_factory):
     recording.begin(people.sessions[0], (width, height))
     for pose in [*poses[:20], *poses[22:]]:  # two frames were dropped
         recording.send(pose, 0.0)
-    recording.save()
+    recording.result().save(path)
     return Motion.load(path)
 
 

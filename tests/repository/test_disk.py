@@ -28,7 +28,7 @@ WRITES = {
     # folders
     "scope_addon/temporary.py",
     "scope_addon/machine_code/code_files.py",
-    "scope_addon/job/private_folder.py",
+    "scope_addon/private_folder.py",
     "scope_addon/job/cache.py",
     "scope_addon/job/batch.py",
     "scope_addon/job/clips/task.py",
@@ -40,6 +40,8 @@ WRITES = {
     "scope_addon/cluster/staging.py",
     "scope_addon/cluster/worker.py",
     "scope_addon/ui/warm_up.py",
+    # a recording that grows
+    "scope_addon/live/outputs/journal.py",
     # the content of temporary files
     "scope_addon/capture/media/file_names.py",
     "scope_addon/capture/overlay/overlay_video.py",

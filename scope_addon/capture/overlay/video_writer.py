@@ -24,6 +24,13 @@ _CODECS = (("libx264", {"preset": "veryfast", "crf": "20", "bf": "0"}), ("mpeg4"
 _LARGEST = 65535  # of numerator and denominator of MPEG-4's clock
 # Ticks per second, about as many as MPEG-4's clock can have, for images whose times are given.
 _TICKS = 60000
+# A file that can be read up to its last second at any time, and is an ordinary one when it is
+# closed. FFmpeg cannot do that before 7.1.
+_GROWING = {
+    "movflags": "hybrid_fragmented",
+    "frag_duration": "1000000",  # microseconds
+    "flush_packets": "1",  # nothing waits in memory for more
+}
 
 
 class VideoWriter:
@@ -33,11 +40,21 @@ class VideoWriter:
     :raises OutputError: PyAV is not installed, or the file cannot be written.
     """
 
-    def __init__(self, temporary: Path, fps: Fraction, width: int, height: int, path: Path) -> None:
+    def __init__(
+        self,
+        temporary: Path,
+        fps: Fraction,
+        width: int,
+        height: int,
+        path: Path,
+        *,
+        growing: bool = False,
+    ) -> None:
         """Open the file.
 
         :param width: in pixels, even; ``height`` likewise.
         :param path: the name to use in messages.
+        :param growing: whether what a killed process leaves of the file can be read.
         """
         try:
             import av
@@ -54,7 +71,10 @@ class VideoWriter:
         self._name = ExitStack()
         try:
             name = self._name.enter_context(utf8_name(temporary))
-            self._container: av.container.OutputContainer = av.open(name, "w")
+            options = _GROWING if growing else {}
+            self._container: av.container.OutputContainer = av.open(
+                name, "w", container_options=options
+            )
         except self._failures as error:
             self._name.close()
             raise self._refused() from error

@@ -6,18 +6,20 @@ for it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ....solver.errors import ScopeError
 from ...capture_report import warnings_as_json
+from ...errors import system_error_message
 from ...live.outputs.footage import Footage
-from ...live.outputs.people_recording import PeopleRecording
+from ...live.outputs.people_recording import Keep, PeopleRecording, unfinished_recording
 from ...live.outputs.pose_values import values
+from ...live.outputs.unfinished import SUFFIX, is_recording
 from ...live.run import Listeners, LiveOptions, LiveProgress, run_live
 from ...live.sources import Picture, Source, open_source
 from ...notices import OTHER, Notice, notice
+from ..cache import recordings_of
 from .commands import Commands
 from .request import LiveRequest
 
@@ -41,36 +43,82 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     from ...untrusted.body_file import load_body
 
     chosen = request.values
+    if is_recording(request.source):
+        _finish_recording(Path(request.source), job_folder, send)
+        return
     source = open_source(request.source, online=request.online)
     body = load_body(chosen["body"])
     options = LiveOptions.of(chosen)
     clock = Clock()
     clock.stopped = commands.stopped
-    with ExitStack() as stack:
-        kept = chosen["keep_footage"]
-        footage = stack.enter_context(Footage(Path(kept), source.fps)) if kept else None
-        paths = [job_folder / MOTION.format(number + 1) for number in range(options.people)]
-        recorder = _Recorder(paths, body, source, commands, footage)
-        listeners = Listeners(
-            lambda text: send("notice", text=text),
-            lambda state: send("status", **_status(state, recorder)),
-            recorder.begin,
-            recorder.receive,
-        )
+    kept = chosen["keep_footage"]
+    footage = Footage(Path(kept), source.fps) if kept else None
+    paths = motion_files(job_folder, options.people)
+    keep = Keep(
+        recordings_of(job_folder) / f"{job_folder.name}{SUFFIX}",
+        str(chosen["body"]),
+        lambda text: send("notice", text=text),
+        lambda: str((footage and footage.unfinished) or ""),
+    )
+    recorder = _Recorder(paths, body, source, commands, footage, keep)
+    listeners = Listeners(
+        lambda text: send("notice", text=text),
+        lambda state: send("status", **_status(state, recorder)),
+        recorder.begin,
+        recorder.receive,
+    )
+    warnings: list[Notice] = []
+    poses_per_second = 0.0
+    try:
         report = run_live(source, body, options, (recorder, _Sender(send)), listeners, clock)
-        recording = recorder.recording
-        if recording is None:
-            send("ended")
-            return
-        saved = recording.save()
-        warnings = save_footage(footage) if footage else []
+        poses_per_second = report["poses_per_second"]
+    except (ScopeError, OSError, MemoryError) as error:
+        if recorder.recording is None:
+            raise
+        text = str(error) if isinstance(error, ScopeError) else system_error_message(error)
+        warnings.append(notice(OTHER, text=f"{text}; the recording ends there"))
+    finally:
+        warnings += save_footage(footage) if footage else []
+    if recorder.recording is None:
+        send("ended")
+        return
+    _send_recording(recorder.recording, poses_per_second, warnings, send)
+
+
+def _send_recording(
+    recording: PeopleRecording, poses_per_second: float, warnings: list[Notice], send: Send
+) -> None:
+    """Write the motion files of a recording, and send its result.
+
+    :raises ScopeError: nobody was seen in it, or a file cannot be written.
+    """
+    saved = recording.save()
     camera = recording.camera
     facts = {
         "camera": camera.source if camera else "",
-        "fps": {"total": report["poses_per_second"]},
+        "fps": {"total": poses_per_second},
         **warnings_as_json(warnings),
     }
     send("result", motions=[path.name for path in saved], report=facts)
+
+
+def _finish_recording(journal: Path, job_folder: Path, send: Send) -> None:
+    """Send the result of a recording that was not finished; its file stays.
+
+    :raises ScopeError: it cannot be read, or a file cannot be written.
+    """
+    recording, about = unfinished_recording(
+        journal, lambda people: motion_files(job_folder, people)
+    )
+    warnings = []
+    if about.footage and Path(about.footage).is_file():
+        warnings.append(notice(OTHER, text=f"the images are in {about.footage}"))
+    _send_recording(recording, 0.0, warnings, send)
+
+
+def motion_files(job_folder: Path, people: int) -> list[Path]:
+    """Return the motion files of some people."""
+    return [job_folder / MOTION.format(number + 1) for number in range(people)]
 
 
 def save_footage(footage: Footage) -> list[Notice]:
@@ -104,8 +152,10 @@ class _Recorder:
         source: Source,
         commands: Commands,
         footage: Footage | None = None,
+        keep: Keep | None = None,
     ) -> None:
         self._footage = footage
+        self._keep = keep
         self._paths = paths
         self._body = body
         self._source = source
@@ -124,7 +174,11 @@ class _Recorder:
         if self.recording is None and self._is_due(pose) and self._people is not None:
             # A file keeps its times, so that its pictures and the poses belong together.
             self.recording = PeopleRecording(
-                self._paths, self._body, self._source, from_zero=not self._source.ends
+                self._paths,
+                self._body,
+                self._source,
+                from_zero=not self._source.ends,
+                keep=self._keep,
             )
             self.recording.origin = self._footage.origin if self._footage is not None else None
             self.recording.begin(*self._people)

@@ -4,40 +4,41 @@ captured afterwards.
 
 Every picture that comes is written, also those that the capture drops, at the time at which it
 came. A thread encodes them; if it is too slow, pictures are left out, but neither source nor
-capture waits. The file is complete or absent.
+capture waits. The file grows beside its final name, ``NAME.unfinished.mp4``, and can be read
+whatever ends the capture; it gets its name when it is whole.
 """
 
 from __future__ import annotations
 
 import queue
 import threading
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 
 from ....solver.errors import ScopeError
-from ...atomic_write import atomic_path, reason
+from ...atomic_write import create_new, finish, reason
 from ...capture.overlay.video_writer import VideoWriter
 from ...counts import counted
 from ...errors import OutputError
+from ...temporary import remove
 from ..sources import Picture
+from .unfinished import unfinished_video
 
 _WAITING = 16  # pictures; at 720p, 44 MB
 
 
 class Footage:
-    """A context in which a video is written; `save` ends it, and leaving it otherwise writes
-    nothing.
-    """
+    """A video that is being written; `save` ends it."""
 
     def __init__(self, path: Path, fps: Fraction) -> None:
         self._path = path
         self._fps = fps
         self.origin: tuple[int, float] | None = None  # number and time of the first picture
         self.lost = 0  # pictures that were left out
+        self.unfinished: Path | None = None  # the growing file
         self._size: tuple[int, ...] = ()
         self._waiting: queue.Queue[Picture | None] = queue.Queue(_WAITING)
-        self._is_wanted = True
         self._problem = ""
         self._thread = threading.Thread(target=self._run, name="scope-live-footage", daemon=True)
 
@@ -46,7 +47,14 @@ class Footage:
         if self.origin is None:
             self._size = picture.image_rgb.shape
             self.origin = picture.index, picture.timestamp_s
-            self._thread.start()
+            try:
+                self.unfinished = create_new(unfinished_video(self._path))
+            except OSError as error:
+                self._problem = f"cannot write {self._path}: {reason(error)}"
+            else:
+                self._thread.start()
+        if self._problem:
+            return
         try:
             if picture.image_rgb.shape != self._size:  # after a reconnection; a video has one size
                 raise queue.Full
@@ -64,52 +72,53 @@ class Footage:
     def save(self) -> Path | None:
         """Finish the file; None if no picture came.
 
-        :raises OutputError: it cannot be written.
+        :raises OutputError: it cannot be written; says where the pictures until then are.
         """
         if self.origin is None:
             return None
-        self._end()
-        if self._problem:
-            raise OutputError(self._problem)
-        return self._path
-
-    def __enter__(self) -> Footage:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, value: object, trace: TracebackType | None
-    ) -> None:
-        self._is_wanted = False
-        if self.origin is not None:
-            self._end()
-
-    def _end(self) -> None:
         while self._thread.is_alive():  # a full queue empties, unless writing has failed
-            try:
+            with suppress(queue.Full):
                 self._waiting.put(None, timeout=0.1)
                 break
-            except queue.Full:
-                continue
-        self._thread.join()
+        if self.unfinished is not None:
+            self._thread.join()
+        if not self._problem and self.unfinished is not None:
+            try:
+                finish(self.unfinished, self._path)
+            except OSError as error:
+                self._problem = f"cannot write {self._path}: {reason(error)}"
+        if self._problem:
+            raise OutputError(self._problem + self._kept())
+        self.unfinished = None
+        return self._path
+
+    def _kept(self) -> str:
+        """Say where the pictures are that were written; remove a file without any."""
+        if self.unfinished is None:
+            return ""
+        if self.unfinished.stat().st_size == 0:
+            remove(self.unfinished)
+            return ""
+        return f"; the images until then are in {self.unfinished}"
 
     def _run(self) -> None:
         try:
-            with atomic_path(self._path) as temporary:
-                self._write(temporary)
+            self._write()
         except ScopeError as error:
             self._problem = str(error)
         except OSError as error:
-            self._problem = f"cannot write {self._path} ({reason(error)})"
+            self._problem = f"cannot write {self._path}: {reason(error)}"
 
-    def _write(self, temporary: Path) -> None:
+    def _write(self) -> None:
         # as the encoder needs it
         height = self._size[0] // 2 * 2
         width = self._size[1] // 2 * 2
         assert self.origin is not None
-        with VideoWriter(temporary, self._fps, width, height, self._path) as writer:
-            while (picture := self._waiting.get()) is not None and self._is_wanted:
+        assert self.unfinished is not None
+        with VideoWriter(
+            self.unfinished, self._fps, width, height, self._path, growing=True
+        ) as writer:
+            while (picture := self._waiting.get()) is not None:
                 writer.write(
                     picture.image_rgb[:height, :width], picture.timestamp_s - self.origin[1]
                 )
-            if not self._is_wanted:
-                raise OutputError(f"{self._path} is not written, since the capture failed")

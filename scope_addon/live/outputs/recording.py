@@ -9,8 +9,9 @@ little in the first seconds, so that `world_from_camera` does, too; the shape is
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,24 +28,42 @@ from ...capture.world.placement import RawMotion, place_track
 from ...errors import NoPersonError
 from ...motion import Motion
 from ..pose import LivePose, Presence
-from ..session import LiveSession
 from ..smoothing import DELAY_S
-from ..sources import Source
 from .frame_poses import at_frames, in_last_shape
+
+
+class Recorded(Protocol):
+    """What a recording has to know of its source."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def fps(self) -> Fraction:
+        """Its frames per second."""
+
+
+class WithCamera(Protocol):
+    """Where a recording's camera comes from, as from a `LiveSession`."""
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera as it is known now."""
 
 
 class Recording:
     """Keeps every pose, some 3 kB each."""
 
-    def __init__(self, path: Path, body: Body, source: Source) -> None:
-        self._path = path
+    def __init__(self, path: Path, body: Body, source: Recorded) -> None:
+        self.path = path
         self._body = body
         self._source = source
         self._poses: list[LivePose] = []
-        self._session: LiveSession | None = None
+        self._session: WithCamera | None = None
         self._size = (1, 1)
 
-    def begin(self, session: LiveSession, size: tuple[int, int]) -> None:
+    def begin(self, session: WithCamera, size: tuple[int, int]) -> None:
         """Note where the poses come from."""
         self._session = session
         self._size = size
@@ -54,12 +73,11 @@ class Recording:
         if pose.presence is Presence.SEEN:
             self._poses.append(pose)
 
-    def save(self, origin: tuple[int, float] | None = None) -> Path:
-        """Write the motion file.
+    def result(self, origin: tuple[int, float] | None = None) -> Motion:
+        """Return the motion to write.
 
         :param origin: the frame number and time that become 0; None: they are those of the source.
         :raises NoPersonError: nobody was seen.
-        :raises OutputError: the file cannot be written.
         """
         if not self._poses or self._session is None or self._session.camera is None:
             raise NoPersonError(
@@ -71,8 +89,7 @@ class Recording:
         if origin is not None:
             motion.frames -= origin[0]
             motion.timestamps -= origin[1]
-        motion.save(self._path)
-        return self._path
+        return motion
 
     @property
     def first(self) -> tuple[int, float] | None:

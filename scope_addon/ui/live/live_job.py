@@ -26,6 +26,8 @@ from ...job.live.cameras import camera_source
 from ...job.live.process import PRESENCES, LiveProcess, ShownPose
 from ...job.live.request import LiveRequest
 from ...job.process import START_SCRIPT
+from ...live.outputs.journal import read_about
+from ...live.outputs.unfinished import remove_recording, unfinished_video
 from ...notices import OTHER, Notice, notice
 from ...options import Place, options_at
 from ...options.body_choice import chosen_body
@@ -37,7 +39,7 @@ from ...scene.live.scene_before import SceneBefore, select_only
 from ...scene.local_scene import check_local
 from ...scene.rigs.rig_retarget import usable_guess
 from ...scene.visibility import hide
-from ...temporary import remove_abandoned
+from ...temporary import remove
 from ...untrusted.body_file import load_body
 from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
 from ..preferences import cache
@@ -67,24 +69,30 @@ class LiveStatus:
 class LiveJob:
     """A live capture for one scene, with the current settings of the scene."""
 
-    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
+    def __init__(
+        self, scene: bpy.types.Scene, python: Sequence[str] = (), unfinished: Path | None = None
+    ) -> None:
         """Start the process.
 
         :param python: its interpreter and arguments; if empty, Blender's own.
+        :param unfinished: file of a recording that is to be finished; None: capture.
         :raises ScopeError: a setting is invalid, or the process cannot be started.
         """
         check_local(scene)
         self.status = LiveStatus()
-        self.recording = self.finishing = self.cancelled = False
+        self.cancelled = False
+        self._unfinished = unfinished
+        self.recording = self.finishing = unfinished is not None
         self._record_at_s: float | None = None  # while a countdown runs
         self.warnings: list[Notice] = []  # of the retargeting of a recording
         self.poses = 0  # shown so far
         self._scene_uid = scene.session_uid
-        self._request = live_request(scene)
-        self._is_stream = scene.scope_live.source == "STREAM"
+        self._request = live_request(scene) if unfinished is None else finishing_request(unfinished)
+        self._is_stream = self._request.online
         # the video of a recording, if it is wanted
         self._kept = self._request.values["keep_footage"]
-        self._footage = self._request.source if scene.scope_live.source == "FILE" else ""
+        is_file = unfinished is None and scene.scope_live.source == "FILE"
+        self._footage = self._request.source if is_file else ""
         self._scene_body = load_body(self._request.values["body"])
         names = [
             f"Live {number + 1}" if number else "Live"
@@ -92,16 +100,17 @@ class LiveJob:
         ]
         self._bodies = [LiveBody(scene, name, self._scene_body) for name in names]
         self._before = SceneBefore()
-        self._rig = live_rig(scene, self._scene_body) if scene.scope_live.with_rig else None
+        follows = scene.scope_live.with_rig and unfinished is None
+        self._rig = live_rig(scene, self._scene_body) if follows else None
         self._result: dict[str, Any] | None = None  # the recording's message
         self._last_pose_s = self._notice_s = self._stopped_s = self._result_s = time.monotonic()
         # whether the last step, or one before, created the body
         self.created = self._was_created = False
         # Blender 4.2 has no such attribute; its Python is isolated as well.
         python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
-        folders = cache()
+        self._cache = cache()
         self._worker = LiveProcess(
-            self._request, folders.new_job_folder(), folders.kernels, python, START_SCRIPT
+            self._request, self._cache.new_job_folder(), self._cache.kernels, python, START_SCRIPT
         )
 
     @property
@@ -156,7 +165,16 @@ class LiveJob:
             self._worker.close()
 
     def cancel(self) -> None:
-        """End the process, and remove what was created."""
+        """End the process, and remove what was created and recorded."""
+        self._end()
+        for path in self._cache.recordings():
+            if path.stem == self._worker.job_folder.name:
+                remove_recording(path)
+        if self._kept:
+            remove(unfinished_video(Path(self._kept)))
+
+    def _end(self) -> None:
+        """End the process, and remove what was created. What was recorded stays on the disk."""
         self.cancelled = True
         self.close()
         self._remove_bodies()
@@ -165,10 +183,8 @@ class LiveJob:
         self._before.restore()
 
     def close(self) -> None:
-        """End the process in any state, without leaving a file behind; the scene stays as it is."""
+        """End the process in any state; the scene stays as it is, and a recording on the disk."""
         self._worker.close()
-        if self._kept:
-            remove_abandoned(Path(self._kept).parent)
 
     def step(self) -> bool:
         """Continue as far as possible without waiting; return False at the end.
@@ -178,7 +194,7 @@ class LiveJob:
         try:
             return self._step()
         except BaseException:
-            self.cancel()
+            self._end()
             raise
 
     def _step(self) -> bool:
@@ -293,6 +309,16 @@ class LiveJob:
             except ScopeError as error:  # the recording is there, and can be retargeted later
                 self.warnings = [notice(OTHER, text=str(error))]
         self._worker.close()
+        if self._unfinished is not None:
+            remove_recording(self._unfinished)
+
+
+def finishing_request(unfinished: Path) -> LiveRequest:
+    """Make the request to finish a recording.
+
+    :raises InputError: its file is none of a recording.
+    """
+    return LiveRequest(str(unfinished), body=read_about(unfinished).body)
 
 
 def live_rig(scene: bpy.types.Scene, body: Body) -> LiveRig:

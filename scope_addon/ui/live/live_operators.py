@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from .. import warm_up
 from ..capture.capture_operators import state as capture_state
 from ..capture.job_operator import JobOperator
+from ..preferences import cache
 from ..reporting import tip_, warning_text
 from ..view.sidebar import redraw_sidebars
 from ..view.view_operators import frame_selected, hide_startup_cube
@@ -25,11 +28,9 @@ def end_live() -> None:
     stream_logins.forget()
 
 
-class SCOPE_OT_live(JobOperator):
-    """Make a captured body follow the person in front of the camera until the capture is stopped"""
+class _LiveOperator(JobOperator):
+    """An operator that runs a live job. Not registered"""
 
-    bl_idname = "scope.live"
-    bl_label = "Start"
     bl_options = {"UNDO"}
 
     timer_s = 1 / 60  # poses come at half of this rate
@@ -66,10 +67,14 @@ class SCOPE_OT_live(JobOperator):
         camera_formats.end()  # the camera is needed
         warm_up.stop()  # its processor time is the capture's; what it has compiled is kept
         try:
-            state.job = LiveJob(context.scene)
+            state.job = LiveJob(context.scene, unfinished=self.unfinished_recording())
         except (ScopeError, OSError) as error:
             return self.fail(error)
         return True
+
+    def unfinished_recording(self) -> Path | None:
+        """Return the file of a recording that is to be finished; None: capture."""
+        return None
 
     def step(self, context: bpy.types.Context) -> set[str] | None:
         """Advance the job; return None while it is running, and then the operator's outcome."""
@@ -124,6 +129,29 @@ class SCOPE_OT_live(JobOperator):
         if self._played:
             stop_scene(context)
         return super().end(context, outcome)
+
+
+class SCOPE_OT_live(_LiveOperator):
+    """Make a captured body follow the person in front of the camera until the capture is stopped"""
+
+    bl_idname = "scope.live"
+    bl_label = "Start"
+
+
+class SCOPE_OT_finish_recording(_LiveOperator):
+    """Write the newest recording of a live capture that did not end by itself, as keyframes"""
+
+    bl_idname = "scope.finish_recording"
+    bl_label = "Finish Recording"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require that nothing is running, and that there is a recording."""
+        return super().poll(context) and bool(cache().unfinished_recordings())
+
+    def unfinished_recording(self) -> Path | None:
+        """Return the newest recording that was not finished."""
+        return cache().unfinished_recordings()[0]
 
 
 class _RunningOperator(bpy.types.Operator):
@@ -229,4 +257,10 @@ def redraw_viewports() -> None:
                 region.tag_redraw()
 
 
-CLASSES = (SCOPE_OT_live, SCOPE_OT_record_live, SCOPE_OT_stop_live, SCOPE_OT_cancel_live)
+CLASSES = (
+    SCOPE_OT_live,
+    SCOPE_OT_finish_recording,
+    SCOPE_OT_record_live,
+    SCOPE_OT_stop_live,
+    SCOPE_OT_cancel_live,
+)

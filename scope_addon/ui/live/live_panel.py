@@ -7,6 +7,7 @@ import bpy
 
 from ..capture.capture_panel import Tab, draw_text
 from ..files.file_field import draw_file
+from ..preferences import cache
 from ..reporting import iface_
 from . import camera_formats
 from .live_state import state
@@ -52,6 +53,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
         row.scale_y = 1.6
         if job is None:
             row.operator("scope.live", icon="PLAY")
+            _draw_unfinished(context, layout)
         else:
             text = "Recording" if job.recording else str(job.countdown_s or "Record")
             row.operator(
@@ -65,6 +67,14 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
             _draw_status(context, layout)
         if state.message and state.scene_uid == context.scene.session_uid:
             draw_text(context, layout.box(), state.message, "ERROR")
+
+
+def _draw_unfinished(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """Say that a recording was not finished, and offer to."""
+    if cache().unfinished_recordings():
+        box = layout.box()
+        draw_text(context, box, iface_("A recording was not finished"), "ERROR")
+        box.operator("scope.finish_recording")
 
 
 def _draw_rig(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -3,6 +3,8 @@
 failure ends it.
 """
 
+import os
+import signal
 import sys
 import textwrap
 import time
@@ -18,6 +20,7 @@ from scope.scope_addon.job.messages import WorkerFailedError
 from scope.scope_addon.scene.animation_data.actions import fcurves
 from scope.scope_addon.ui.live import live_job
 from scope.scope_addon.ui.live.live_job import LiveJob, live_request
+from scope.scope_addon.ui.preferences import cache
 
 from ...job.processes import runs, wait_for
 from ...scene.made_rigs import build_rig
@@ -42,7 +45,7 @@ def live(tmp_path, monkeypatch, standing):
     settings.source = "FILE"
     settings.file = str(tmp_path / "walk.mp4")
 
-    def start(body):
+    def start(body, **options):
         # one each: a process may not have read its own yet
         script = tmp_path / f"fake_live_{len(jobs)}.py"
         monkeypatch.setattr(live_job, "START_SCRIPT", script)
@@ -71,7 +74,7 @@ def live(tmp_path, monkeypatch, standing):
             """)
             + textwrap.dedent(body)
         )
-        jobs.append(LiveJob(bpy.context.scene, [sys.executable]))
+        jobs.append(LiveJob(bpy.context.scene, [sys.executable], **options))
         return jobs[-1]
 
     yield start
@@ -223,24 +226,82 @@ def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch)
     assert bpy.context.scene.scope.result.footage == str(kept)
 
 
-def test_cancelling_leaves_nothing_of_the_footage(live, tmp_path, monkeypatch):
+RECORDS = """
+    sys.path.insert(0, {root!r})
+    from pathlib import Path
+    from scope.scope_addon.job.cache import recordings_of
+    from scope.scope_addon.live.outputs.unfinished import SUFFIX, lock_of
+    from scope.scope_addon.temporary import hold
+    path = recordings_of(Path(folder)) / (os.path.basename(folder) + SUFFIX)
+    path.parent.mkdir(exist_ok=True)
+    about = dict(body="scope", fingerprint=1, source="fake", fps="30", size=[64, 48], people=1)
+    path.write_text(json.dumps(about | {{"origin": None}}) + "\\n")
+    hold(lock_of(path))
+    pose(1); receive(); receive()
+"""
+ROOT = str(Path(live_job.__file__).resolve().parents[4])
+
+
+@pytest.fixture
+def recordings():
+    """Return a function that lists what recordings the cache has, and leave none."""
+
+    def found():
+        return list(cache().root.glob("recordings/*"))
+
+    yield found
+    for path in found():
+        path.unlink()
+
+
+def test_cancelling_leaves_nothing_that_was_recorded(live, tmp_path, monkeypatch, recordings):
     (tmp_path / "takes").mkdir()
-    monkeypatch.setattr(live_job, "kept_footage", lambda scene: tmp_path / "takes" / "take.mp4")
+    kept = tmp_path / "takes" / "take.mp4"
+    monkeypatch.setattr(live_job, "kept_footage", lambda scene: kept)
     settings = bpy.context.scene.scope_live
     settings.source = "CAMERA"
     settings.keep_footage = True
-    root = str(Path(live_job.__file__).resolve().parents[4])
-    job = live(f"""
-        sys.path.insert(0, {root!r})
-        from pathlib import Path
-        from scope.scope_addon.atomic_write import atomic_path
-        with atomic_path(Path(request["keep_footage"])):
-            pose(1); receive(); receive()
-    """)
+    job = live(RECORDS.format(root=ROOT))
     until(job, lambda: job.has_body)
-    assert len(list((tmp_path / "takes").iterdir())) == 2  # the file and its lock
+    (tmp_path / "takes" / "take.unfinished.mp4").touch()  # as `Footage` does
+    assert len(recordings()) == 2  # with its lock
     job.cancel()
     assert not list((tmp_path / "takes").iterdir())
+    assert not recordings()
+
+
+@pytest.mark.parametrize("end", ["another file is opened", "the process is killed"])
+def test_a_recording_whose_capture_did_not_end_by_itself_is_finished_later(live, recordings, end):
+    job = live(RECORDS.format(root=ROOT))
+    until(job, lambda: job.has_body)
+    job.record()
+    assert cache().unfinished_recordings() == []  # it is running
+    if end == "another file is opened":
+        job.close()
+    else:
+        os.kill(job.worker.pid, signal.SIGKILL)
+        with pytest.raises(WorkerFailedError):
+            to_end(job)
+    (left,) = cache().unfinished_recordings()
+    assert len(recordings()) == 2
+    assert bpy.ops.scope.finish_recording.poll()
+    code = f'assert (request["live"], request["body"]) == ({str(left)!r}, "scope"); finish()'
+    again = live(code, unfinished=left)
+    to_end(again)
+    assert bpy.context.scene.scope.capture is not None
+    assert recordings() == []
+    assert not bpy.ops.scope.finish_recording.poll()
+
+
+def test_a_recording_that_cannot_be_finished_stays(live, recordings):
+    job = live(RECORDS.format(root=ROOT))
+    until(job, lambda: job.has_body)
+    job.close()
+    (left,) = cache().unfinished_recordings()
+    again = live('send("error", message="its body has changed")', unfinished=left)
+    with pytest.raises(WorkerFailedError, match="its body has changed"):
+        to_end(again)
+    assert cache().unfinished_recordings() == [left]
 
 
 def test_footage_is_kept_beside_a_saved_file_only(tmp_path):

@@ -4,12 +4,11 @@
 import os
 import stat
 import sys
-import tempfile
 
 import pytest
-from scope.scope_addon.job.private_folder import private_folder
+from scope.scope_addon.private_folder import private_folder
 
-from ..required import package
+from .required import package
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="with the folders of Linux")
 
@@ -17,7 +16,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="with the folder
 @pytest.fixture
 def caches(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     private_folder.cache_clear()
     yield tmp_path / "caches"
     private_folder.cache_clear()

@@ -9,7 +9,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
-from ..temporary import new_folder
+from .temporary import new_folder
 
 _NAME = "scope-mocap"
 
