@@ -30,7 +30,7 @@ def add_import(parser: argparse.ArgumentParser) -> None:
         "motion",
         type=path_argument,
         metavar="MOTION",
-        help=".npz motion of Scope, AMASS or another SMPL-based tool",
+        help="motion of Scope, AMASS, or an SMPL-based tracker: .npz, .npy, .pkl or .pt",
     )
     parser.add_argument(
         "-o",
@@ -56,17 +56,19 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     check_blender(outputs)
     values = values_in_range(args, Place.IMPORT)
     # Imported here, so that errors in the arguments are printed immediately.
-    from ..smpl_import.convert import import_motion
+    from ..smpl_import.convert import import_motions
 
-    imported = import_motion(args.motion, values["body"], values["up_axis"], values["motion_rate"])
-    rig = checked_rig(args, outputs, imported.motion.joint_count > len(SKELETONS[24].joint_names))
-    motions = [imported.motion]
-    written, warnings = write_outputs(outputs, motions, imported.body, args.motion, args, rig)
-    warnings = [*imported.notes, *warnings]
+    people = import_motions(args.motion, values["body"], values["up_axis"], values["motion_rate"])
+    motions = [person.motion for person in people]
+    body = people[0].body
+    rig = checked_rig(args, outputs, motions[0].joint_count > len(SKELETONS[24].joint_names))
+    written, warnings = write_outputs(outputs, motions, body, args.motion, args, rig)
+    notes = dict.fromkeys(note for person in people for note in person.notes)
+    warnings = [*notes, *warnings]
     for warning in warnings:
         print_message(f"warning: {warning}")
-    frames = len(imported.motion)
-    rate = imported.motion.mocap_framerate
+    frames = max(map(len, motions))
+    rate = motions[0].mocap_framerate
     if not args.json and not args.quiet:
         print(
             f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote "
@@ -75,7 +77,8 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
         )
     return {
         "source": str(args.motion),
-        "body": imported.body.name,
+        "body": body.name,
+        "people": len(people),
         "frames": frames,
         "frame_rate": rate,
         **warnings_as_json(warnings),

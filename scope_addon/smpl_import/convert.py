@@ -27,7 +27,7 @@ from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
 from ..notices import Notice, notice
 from ..untrusted.body_file import load_body
 from ..untrusted.files import npz_keys
-from .layouts import SmplMotion, read_smpl_motion
+from .layouts import SmplMotion, read_smpl_motions
 
 DEFAULT_RATE = 30.0  # frames per second
 # by the axis that points up
@@ -46,8 +46,11 @@ class Imported:
     notes: list[Notice] = field(default_factory=list)
 
 
-def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float = 0.0) -> Imported:
-    """Read a motion file: our own, or an SMPL-style one of another tool.
+def import_motions(
+    path: Path, body: str = "scope", up: str = "auto", rate: float = 0.0
+) -> list[Imported]:
+    """Read a motion file: our own, or an SMPL-style one of another tool, which may be of several
+    people, each on the same body.
 
     :param body: ``scope``, the built-in body, with fingers if the motion has them; ``scope_h``; or
         a body's file.
@@ -66,16 +69,17 @@ def import_motion(path: Path, body: str = "scope", up: str = "auto", rate: float
         own = Motion.load(path)
         chosen = own.body_model if body == "scope" else body
         if body != "scope" or chosen in BUILT_IN:
-            return _own(own, load_body(chosen), path)
-    source = read_smpl_motion(path)
+            return [_own(own, load_body(chosen), path)]
+    sources = read_smpl_motions(path)
     built_in = (
-        source.body_model
-        if source.body_model in BUILT_IN
+        sources[0].body_model
+        if sources[0].body_model in BUILT_IN
         else "scope_h"
-        if source.has_fingers
+        if any(source.has_fingers for source in sources)
         else "scope"
     )
-    return convert(source, load_body(built_in if body == "scope" else body), path, up, rate)
+    loaded = load_body(built_in if body == "scope" else body)
+    return [convert(source, loaded, path, up, rate) for source in sources]
 
 
 def _own(motion: Motion, body: Body, path: Path) -> Imported:

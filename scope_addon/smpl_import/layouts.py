@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading SMPL-style .npz files: the names that other tools give to rotations, translation, shape
+"""Reading SMPL-style motions: the names that other tools give to rotations, translation, shape
 and frame rate.
 
-Rotations may be axis-angle vectors, (T, 3J) or (T, J, 3), or matrices, (T, J, 3, 3); for all joints
-in one array, or the root, the body and the hands in several. The files may come from anyone: only
-the arrays below are read, nothing is unpickled, and the first thing that is wrong is named.
+Rotations may be axis-angle vectors, (T, 3J) or (T, J, 3), matrices, (T, J, 3, 3), the first two
+columns or rows of these, (T, J, 6), or quaternions, (T, J, 4); for all joints in one array, or the
+root, the body and the hands in several. Trackers save a table for each person, and of each one in
+the world and one in camera axes: the world's is read. The files may come from anyone: they are read
+by `untrusted.tables`, and the first thing that is wrong is named.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,8 +24,10 @@ from ...solver.rotations import log
 from ...solver.smpl_family import FACE_JOINTS, HAND_ORDER, SKELETONS, gender_of
 from ..errors import MotionFileError
 from ..kinematics.frame_blocks import by_blocks
-from ..untrusted.files import read_npz
+from ..untrusted.tables import read_tables
 
+MAX_PEOPLE = 100  # of one file
+_LISTED = 8  # names of a table's content in a message
 MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
 _MAX_BETAS = 400
 _LARGEST_RATE = 10_000.0
@@ -40,14 +44,16 @@ _ALL_JOINTS = (
     "fullpose",
     "full_pose",
     "thetas",
+    "pred_rotmat",
+    "pred_pose",
 )
 _ROOT = ("root_orient", "global_orient")
 _BODY = ("pose_body", "body_pose")
 _HANDS = ("pose_hand", "hand_pose")
 _LEFT_HAND = ("left_hand_pose",)
 _RIGHT_HAND = ("right_hand_pose",)
-_TRANS = ("trans_world", "trans", "transl", "smpl_trans", "translation")
-_BETAS = ("betas", "beta", "smpl_betas", "shape")
+_TRANS = ("trans_world", "trans", "transl", "smpl_trans", "translation", "pred_trans")
+_BETAS = ("betas", "beta", "smpl_betas", "shape", "pred_shape")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "frame_rate", "framerate", "fps")
 _SCALE = ("smpl_scaling",)  # AIST++: by which smpl_trans is to be divided
 _GENDER = "gender"
@@ -106,13 +112,61 @@ class SmplMotion:
         return bool((np.abs(self.poses[:, these]) > 1e-6).any())
 
 
-def read_smpl_motion(path: Path) -> SmplMotion:
-    """Read an SMPL-style motion from a .npz file.
+def read_smpl_motions(path: Path) -> list[SmplMotion]:
+    """Read the SMPL-style motions of a file, one for each person.
 
     :raises MotionFileError: the file cannot be read, has no poses, or one of its arrays cannot be
         used.
     """
-    return smpl_motion(read_npz(path, MotionFileError, "motion file", wanted=_READ), path)
+    tables = read_tables(path, MotionFileError, "motion file", _READ)
+    found = list(_motion_tables(tables, ()))
+    if not found:
+        raise MotionFileError(
+            f"{path} holds no SMPL-style motion: it needs poses, or root_orient and pose_body, or "
+            f"global_orient and body_pose; it holds {_contents(tables)}; choose another file"
+        )
+    rank = min(_rank(names) for names, _ in found)
+    best = [arrays for names, arrays in found if _rank(names) == rank]
+    return [smpl_motion(arrays, path) for arrays in best[:MAX_PEOPLE]]
+
+
+def _motion_tables(
+    table: Mapping[str, Any], names: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], dict[str, NDArray[Any]]]]:
+    """Generate the tables with the rotations of a body, each with the names on the way to it.
+
+    A table has the single numbers and texts, such as a frame rate, of those around it.
+    """
+    arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray)}
+    if _first(arrays, _ALL_JOINTS) or (_first(arrays, _ROOT) and _first(arrays, _BODY)):
+        yield names, arrays
+        return
+    shared = {key: value for key, value in arrays.items() if value.size == 1}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            for inner, motion in _motion_tables(value, (*names, key)):
+                yield inner, shared | motion
+
+
+def _rank(names: tuple[str, ...]) -> tuple[int, int]:
+    """Return the order in which tables are preferred: in the world, then in axes that the name does
+    not say, then of the camera; among these, the outermost.
+    """
+    text = "/".join(names).lower()
+    if "global" in text or "world" in text:
+        return 0, len(names)
+    return (2 if "cam" in text else 1), len(names)
+
+
+def _contents(tables: Mapping[str, Any]) -> str:
+    """Name what a file holds, for a message."""
+    listed = []
+    for key, value in list(tables.items())[:_LISTED]:
+        inner = f"{{{', '.join(list(value)[:_LISTED])}}}" if isinstance(value, dict) else ""
+        shape = str(value.shape) if isinstance(value, np.ndarray) else ""
+        listed.append(f"{key} {inner or shape}".strip()[:120])
+    more = len(tables) - len(listed)
+    return ", ".join(listed) + (f" and {more} more" if more > 0 else "") or "nothing"
 
 
 def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
@@ -128,6 +182,8 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
     position = None
     if trans is not None:
         position = _numbers(arrays[trans], trans, path)
+        if position.shape == (count, 1, 3):
+            position = position[:, 0]
         if position.shape != (count, 3):
             raise MotionFileError(
                 f"{path}: {trans} must have shape ({count}, 3), as the poses, not {position.shape}"
@@ -172,7 +228,7 @@ def _poses(
         return (
             skeleton.joint_names if skeleton else BODY_JOINTS,
             poses,
-            "y" if key.startswith("smpl_") else "z",
+            "y" if key.startswith("smpl_") else "camera" if key.startswith("pred_") else "z",
         )
     if root is None or body is None:
         raise MotionFileError(
@@ -235,11 +291,53 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float
         return values.reshape(len(values), -1, 3).astype(np.float32)
     if values.ndim == 3 and values.shape[2] == 3 and values.shape[1]:
         return values.astype(np.float32)
+    if values.ndim == 3 and values.shape[2] in (4, 6) and values.shape[1]:
+        to_matrices = _from_quaternions if values.shape[2] == 4 else _from_six
+        return by_blocks(
+            lambda block: (_logarithms(to_matrices(block, name, path), name, path),), values
+        )[0]
     raise MotionFileError(
         f"{path}: {name} has shape {array.shape}, but must hold one person's axis-angle vectors, "
         "(frames, 3 x joints), "
-        "or rotation matrices, (frames, joints, 3, 3)"
+        "rotation matrices, (frames, joints, 3, 3), two of their columns or rows, (frames, joints, "
+        "6), or quaternions, (frames, joints, 4)"
     )
+
+
+def _from_quaternions(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
+    """Return the matrices (T, J, 3, 3) of quaternions (T, J, 4), w first or last: joints are
+    nearer to rest than to half a turn, so w is the larger one of the two.
+    """
+    if np.abs(values[..., 3]).mean() > np.abs(values[..., 0]).mean():
+        values = np.roll(values, 1, axis=-1)
+    length = np.linalg.norm(values, axis=-1, keepdims=True)
+    if np.abs(length - 1.0).max() > _ORTHONORMAL:
+        raise MotionFileError(f"{path}: {name} holds quaternions that are not of length 1")
+    w, x, y, z = np.moveaxis(values / length, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _from_six(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
+    """Return the matrices (T, J, 3, 3) of six numbers (T, J, 6): the first two rows one after the
+    other, as PyTorch3D has them, or the first two columns row by row, as HMR has them. Only one of
+    them has two vectors of length 1 at right angles.
+    """
+    in_rows = values.reshape(*values.shape[:-1], 2, 3)
+    in_columns = np.swapaxes(values.reshape(*values.shape[:-1], 3, 2), -1, -2)
+
+    def deviation(pairs: NDArray[np.float64]) -> float:
+        gram = pairs @ np.swapaxes(pairs, -1, -2)
+        return float(np.abs(gram - np.eye(2)).mean())
+
+    is_rows = deviation(in_rows) <= deviation(in_columns)
+    first, second = np.moveaxis(in_rows if is_rows else in_columns, -2, 0)
+    matrices = np.stack([first, second, np.cross(first, second)], axis=-2)
+    return matrices if is_rows else np.swapaxes(matrices, -1, -2)
 
 
 def _logarithms(matrices: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float32]:

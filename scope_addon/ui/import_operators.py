@@ -38,7 +38,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
     )
-    filter_glob: StringProperty(default="*.npz", options={"HIDDEN", "SKIP_SAVE"})
+    filter_glob: StringProperty(default="*.npz;*.npy;*.pkl;*.pt", options={"HIDDEN", "SKIP_SAVE"})
     up_axis: blender_property(option("up_axis"), {})
     motion_rate: blender_property(option("motion_rate"), {})
     body: blender_property(option("body"), {})
@@ -62,18 +62,20 @@ class SCOPE_OT_import_motion(ReportingOperator):
         :raises UsageError: no file was chosen.
         """
         from ..scene.animation_data.transaction import all_or_nothing
-        from ..smpl_import.convert import import_motion
+        from ..smpl_import.convert import import_motions
 
         body = self._body(context)
         paths = self._paths()
         found = [
-            import_motion(path, body, self.up_axis.lower(), self.motion_rate) for path in paths
+            (path, imported)
+            for path in paths
+            for imported in import_motions(path, body, self.up_axis.lower(), self.motion_rate)
         ]
         with all_or_nothing(context.scene):
-            for path, imported in zip(paths, found, strict=True):
+            for path, imported in found:
                 _build(context.scene, path, imported, self._build_options(context.scene))
         show_new_capture(context)
-        notes = list(dict.fromkeys(note for imported in found for note in imported.notes))
+        notes = list(dict.fromkeys(note for _, imported in found for note in imported.notes))
         if notes:
             self.report({"WARNING"}, sentence("; ".join(note.text(iface_) for note in notes)))
             return ""

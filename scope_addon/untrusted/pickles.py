@@ -136,6 +136,11 @@ _NDARRAY = Global(_refuse)
 _OBJECT = Global(_refuse)
 
 
+def is_array_class(kind: object) -> bool:
+    """Return whether a value is the stand-in of numpy's array class."""
+    return kind is _NDARRAY
+
+
 def _reconstruct(kind: object, *_: object) -> PickledArray:
     if kind is not _NDARRAY:
         _refuse()
@@ -188,7 +193,7 @@ def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> 
         raise ModelFileError("it holds a numpy array without a type")
     if not isinstance(raw, bytes):
         raise ModelFileError("it holds an array of Python objects; only numbers and text are read")
-    if not _is_shape(shape):
+    if not is_shape(shape):
         raise ModelFileError("it holds a numpy array with an impossible shape")
     expected = math.prod(shape) * dtype.dtype.itemsize
     if expected != len(raw):
@@ -200,7 +205,8 @@ def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> 
     return np.frombuffer(raw, dtype.dtype).reshape(shape, order="F" if is_fortran else "C")
 
 
-def _is_shape(shape: object) -> TypeGuard[tuple[int, ...]]:
+def is_shape(shape: object) -> TypeGuard[tuple[int, ...]]:
+    """Return whether a value is the shape of an array: numbers from 0."""
     return (
         isinstance(shape, tuple)
         and len(shape) <= 32
@@ -241,7 +247,7 @@ def _selected(state: dict[str, Any], depth: int) -> NDArray[Any]:
         raise ModelFileError("it holds a chumpy slice without numbers")
     index = _indices(to_array(state.get("idxs"), depth).ravel(), flat.size)
     shape = state.get("preferred_shape") or index.shape
-    if not _is_shape(shape) or math.prod(shape) != index.size:
+    if not is_shape(shape) or math.prod(shape) != index.size:
         raise ModelFileError("it holds a chumpy slice with an impossible shape")
     return flat[index].reshape(shape)
 
@@ -256,7 +262,7 @@ def _dense(kind: str, state: dict[str, Any], depth: int) -> NDArray[np.float64]:
     ):
         raise ModelFileError("it holds a sparse matrix without a shape")
     rows, columns = shape = tuple(int(n) for n in shape)
-    if not _is_shape(shape) or max(shape) > LARGEST_DENSE or rows * columns > LARGEST_DENSE:
+    if not is_shape(shape) or max(shape) > LARGEST_DENSE or rows * columns > LARGEST_DENSE:
         raise ModelFileError("it holds a sparse matrix of a negative size, or too large for a body")
     data = to_array(state.get("data"), depth)
     if data.ndim != 1 or data.dtype.kind not in "biuf":
@@ -300,14 +306,14 @@ def _indices(index: NDArray[Any], size: int) -> NDArray[np.intp]:
 LARGEST_FILE = 1 << 30  # bytes; the largest official SMPL-X pickle has half of it
 MAX_OPCODES = 200_000  # official files need a few thousand
 
-_UNREADABLE: tuple[type[Exception], ...] = (
+UNREADABLE_PICKLE: tuple[type[Exception], ...] = (
     pickle.UnpicklingError,
     EOFError,
     AttributeError,
     ValueError,
     TypeError,
 )
-_UNREADABLE += (LookupError, OverflowError, struct.error, MemoryError)
+UNREADABLE_PICKLE += (LookupError, OverflowError, struct.error, MemoryError)
 _REFUSED = {
     pickle.PERSID,
     pickle.BINPERSID,
@@ -340,12 +346,12 @@ def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
             f"{path} is larger than {LARGEST_FILE >> 20} MiB, too large for {what}"
         )
     try:
-        result = _BodyUnpickler(data).load()
+        result = BodyUnpickler(data).load()
     except ModelFileError as cause:
         raise ModelFileError(
             f"{path} cannot be used as {what}: {cause}; get it from its publisher again"
         ) from None
-    except _UNREADABLE as cause:
+    except UNREADABLE_PICKLE as cause:
         raise ModelFileError(
             f"{path} is not a readable pickle ({in_one_line(cause)}); download it again"
         ) from cause
@@ -356,7 +362,7 @@ def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
     return result
 
 
-class _BodyUnpickler(pickle._Unpickler):
+class BodyUnpickler(pickle._Unpickler):
     """Keeps tables to plain keys, drops sets, and counts what it does."""
 
     stack: list[Any]
@@ -366,7 +372,7 @@ class _BodyUnpickler(pickle._Unpickler):
 
     def __init__(self, data: bytes) -> None:
         super().__init__(io.BytesIO(data), encoding="bytes")
-        self.dispatch = _Handlers(_HANDLERS)  # type: ignore[misc,assignment]
+        self.dispatch = Handlers(HANDLERS)  # type: ignore[misc,assignment]
         self._recodable = len(data)
 
     def find_class(self, module: str, name: str) -> Any:
@@ -436,16 +442,22 @@ class _BodyUnpickler(pickle._Unpickler):
         self.append(Discarded())
 
 
-class _Handlers(dict[int, Callable[[Any], object]]):
+class Handlers(dict[int, Callable[[Any], object]]):
     """What to do at each opcode; asking counts, because the unpickler asks once for each."""
 
     _count = 0
 
+    def __init__(
+        self, handlers: dict[int, Callable[[Any], object]], most: int = MAX_OPCODES
+    ) -> None:
+        super().__init__(handlers)
+        self._most = most
+
     def __getitem__(self, opcode: int) -> Callable[[Any], object]:
         self._count += 1
-        if self._count > MAX_OPCODES:
+        if self._count > self._most:
             raise ModelFileError(
-                f"it has more than {MAX_OPCODES} pickle instructions, too many for such a file"
+                f"it has more than {self._most} pickle instructions, too many for such a file"
             )
         return super().__getitem__(opcode)
 
@@ -455,7 +467,7 @@ class _Handlers(dict[int, Callable[[Any], object]]):
         )
 
 
-_HANDLERS: dict[int, Callable[[Any], object]] = {
+HANDLERS: dict[int, Callable[[Any], object]] = {
     **{
         code: handler
         for code, handler in pickle._Unpickler.dispatch.items()
@@ -463,10 +475,10 @@ _HANDLERS: dict[int, Callable[[Any], object]] = {
     },
     # a frame is read opcode by opcode, like the rest
     pickle.FRAME[0]: lambda unpickler: unpickler.read(8),
-    pickle.BYTEARRAY8[0]: _BodyUnpickler.load_bytearray8,
+    pickle.BYTEARRAY8[0]: BodyUnpickler.load_bytearray8,
     pickle.EMPTY_SET[0]: lambda unpickler: unpickler.append(Discarded()),
-    pickle.FROZENSET[0]: _BodyUnpickler.load_frozenset,
-    pickle.DICT[0]: _BodyUnpickler.load_dict,
-    pickle.SETITEM[0]: _BodyUnpickler.load_setitem,
+    pickle.FROZENSET[0]: BodyUnpickler.load_frozenset,
+    pickle.DICT[0]: BodyUnpickler.load_dict,
+    pickle.SETITEM[0]: BodyUnpickler.load_setitem,
     pickle.SETITEMS[0]: lambda unpickler: unpickler.set_items(unpickler.pop_mark()),
 }

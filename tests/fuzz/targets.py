@@ -79,9 +79,9 @@ def _load_motion(path: Path) -> None:
 
 
 def _import_smpl_motion(path: Path) -> None:
-    from scope.scope_addon.smpl_import.convert import import_motion
+    from scope.scope_addon.smpl_import.convert import import_motions
 
-    import_motion(path)
+    import_motions(path)
 
 
 def _read_calibration(path: Path) -> None:

@@ -5,12 +5,13 @@ floor, z up.
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, UsageError
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.smpl_import.convert import DEFAULT_RATE, convert, import_motion
+from scope.scope_addon.smpl_import.convert import DEFAULT_RATE, Imported, convert, import_motions
 from scope.scope_addon.smpl_import.layouts import smpl_motion
 from scope.solver.rotations import exp, log
 
@@ -25,6 +26,12 @@ R_FILE_WORLD = {
     "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
     "camera": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
 }
+
+
+def import_motion(path: Path, **arguments: Any) -> Imported:
+    """The only person of a file."""
+    (imported,) = import_motions(path, **arguments)
+    return imported
 
 
 def in_file(axis: str, height: float = 0.0) -> dict[str, np.ndarray]:
