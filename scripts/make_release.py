@@ -191,7 +191,7 @@ def listing_text(manifest: dict[str, Any], readme: str, notes: str) -> str:
     parts = [part.partition("\n") for part in re.split(r"^## ", readme, flags=re.M)]
     described = [f"### {title}\n{text.rstrip()}\n" for title, _, text in parts if title in SECTIONS]
     permissions = [f"- {name}: {reason}" for name, reason in manifest["permissions"].items()]
-    return "\n".join(
+    text = "\n".join(
         [
             f"# {manifest['name']}\n",
             f"Tagline: {manifest['tagline']}\n",
@@ -206,6 +206,8 @@ def listing_text(manifest: dict[str, Any], readme: str, notes: str) -> str:
             notes.replace("### ", "#### "),
         ]
     )
+    # Files of the repository cannot be linked from there.
+    return re.sub(r"\[([^]]+)\]\((?![a-z]+:)[^)]*\)", r"\1", text)
 
 
 def write_picture(source: Path, target: Path) -> None:

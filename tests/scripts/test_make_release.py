@@ -122,6 +122,7 @@ def test_the_listing_has_every_text_that_the_platform_asks_for(release):
     for section in release.SECTIONS:
         assert f"### {section}\n" in text
     assert "- Notes." in text
+    assert "](" not in re.sub(r"\]\(https?://", "", text)
 
 
 def test_pictures_have_the_size_of_the_platform(release, tmp_path):
