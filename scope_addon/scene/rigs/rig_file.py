@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
+from mathutils import Matrix
 
 from ....solver.errors import InputError
 from ...errors import UsageError
@@ -39,7 +40,11 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
     """
     path = source.path
-    loaded = _append(path) if path.suffix.lower() == ".blend" else _import(path)
+    unit = 1.0  # Importers convert to metres.
+    if path.suffix.lower() == ".blend":
+        loaded, unit = _append(path)
+    else:
+        loaded = _import(path)
     rig = _choose(path, [obj for obj in loaded if obj.type == "ARMATURE"], source.armature)
     _check_finite(path, rig)
     keep = with_meshes(rig, loaded)
@@ -48,6 +53,8 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
             other.objects.unlink(obj)
     rig.data.pose_position = "POSE"
     for obj in keep:
+        if obj.parent is None:
+            obj.matrix_basis = Matrix.Scale(unit, 4) @ obj.matrix_basis
         collection.objects.link(obj)
         obj.hide_viewport = obj.hide_render = False
         _remove_animation(obj)
@@ -139,15 +146,26 @@ def temporary_datablocks() -> Iterator[None]:
         new.remove()
 
 
-def _append(path: Path) -> list[bpy.types.Object]:
+def _append(path: Path) -> tuple[list[bpy.types.Object], float]:
+    """Return the objects of a .blend file, and the metres that a length of 1 stands for in it.
+
+    :raises InputError: when Blender cannot read the file.
+    """
     try:
         with formats.quiet(), bpy.data.libraries.load(str(path), link=False) as (there, here):
             here.objects = list(there.objects)
+            here.scenes = list(there.scenes)
     except (OSError, RuntimeError) as error:
         raise InputError(
             f"{path}: Blender cannot read this file; save it again or choose another"
         ) from error
-    return [obj for obj in here.objects if obj is not None]
+    scenes = [scene for scene in here.scenes if scene is not None]
+    # A file has one unit as a rule; of several, none is known to be the rig's.
+    units = {scene.unit_settings.scale_length for scene in scenes}
+    for scene in scenes:
+        bpy.data.scenes.remove(scene)
+    unit = units.pop() if len(units) == 1 else 1.0
+    return [obj for obj in here.objects if obj is not None], unit
 
 
 def _import(path: Path) -> list[bpy.types.Object]:

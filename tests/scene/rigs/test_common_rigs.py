@@ -168,6 +168,23 @@ def test_a_rig_in_centimetres_is_the_same_in_an_fbx_file_as_one_in_metres(tmp_pa
     assert np.abs(shapes[1] - shapes[0]).max() > 0.1
 
 
+def test_a_file_in_centimetres_gives_a_person_of_the_right_size(tmp_path):
+    """The unit of its scene says that a length of 1 is a centimetre; no object is scaled."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    rig = make_rig(replace(KIND["Unity humanoid"], unit=0.01))
+    for obj in (rig.armature, *rig.skins):
+        if obj.parent is None:
+            obj.scale = (1.0, 1.0, 1.0)
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scenes = len(bpy.data.scenes)
+    armature = load_rig(rig_source(tmp_path / "rig.blend"), bpy.context.scene.collection)
+    heights = [(armature.matrix_world @ bone.head_local).z for bone in armature.data.bones]
+    assert 1.4 < max(heights) < 1.8
+    assert len(bpy.data.scenes) == scenes
+
+
 def test_a_rig_that_lies_is_refused_in_one_sentence():
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     rig = make_rig(KIND["Mixamo"]).armature
