@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.motion import Motion
+from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
-from ...solver.loaders.body_file import load_body
 from .kinds import KINDS
 from .made import MadeRig
 from .measured import bone_heads, figures, joints_of, skin_vertices
