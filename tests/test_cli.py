@@ -71,6 +71,7 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "-o", "{tmp}"], 2, "suffix"),
         (["capture", "", "-o", "{tmp}/a.npz"], 2, "VIDEO: the path is empty"),
         (["capture", "-o", ""], 2, "--output: the path is empty"),
+        (["capture", "https://a.b/c.mp4"], 2, "https://a.b/c.mp4 is an address"),
         (["capture", "--overlay", "", "-o", "{tmp}/a.npz"], 2, "--overlay: the path is empty"),
         (["capture", "--calibration=", "-o", "{tmp}/a.npz"], 2, "--calibration: the path is empty"),
         (["capture", "--retarget", "", "-o", "{tmp}/a.glb"], 2, "--retarget: the path is empty"),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ..errors import UsageError
+from ..footage import is_url
 from ..options import OPTIONS, Option, Place, options_at
 from ..options.body_choice import chosen_body
 
@@ -24,11 +25,15 @@ _LONGEST_SHOWN = 60  # characters of a value in a message
 def path_argument(text: str) -> Path:
     """Convert an argument to a path.
 
-    :raises ArgumentTypeError: it is empty, as an unset variable of the shell is; it would mean the
-        current folder.
+    :raises ArgumentTypeError: it is empty, as an unset variable of the shell is, which would mean
+        the current folder; or an address.
     """
     if not text:
         raise argparse.ArgumentTypeError("the path is empty; give a file or folder")
+    if is_url(text):  # of which a path would lose a slash
+        raise argparse.ArgumentTypeError(
+            f"{text} is an address, and files are needed here; download it first"
+        )
     return Path(text)
 
 

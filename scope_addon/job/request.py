@@ -93,7 +93,9 @@ class JobRequest(LineRequest):
             for option in options
             if option.value_type is Path or option.name == "body"
         ]
-        for path in map(Path, filter(None, named)):
+        # the camera's name after a calibration's file is among the values
+        files = [str(name).partition(".toml#") for name in filter(None, named)]
+        for path in (Path(name + (".toml" if sign else "")) for name, sign, _ in files):
             # a network's description lies next to it
             for file in dict.fromkeys((path, path.with_suffix(".json"))):
                 if file.is_file():  # the worker reports a missing file

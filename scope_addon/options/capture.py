@@ -364,7 +364,11 @@ class CaptureDeclaration:
         _EVERYWHERE | _LIVE,
         "JSON file with OpenCV intrinsics (3x3), optionally dist (five values) and size (width, "
         "height)",
-        argument=Argument(metavar="FILE", help="JSON file with intrinsics, dist and size"),
+        argument=Argument(
+            metavar="FILE",
+            help="JSON file with intrinsics, dist and size, or TOML file of Pose2Sim or Caliscope, "
+            "of several cameras FILE.toml#CAMERA",
+        ),
         blender=Property(
             "calibration_file",
             "Calibration",

@@ -21,6 +21,8 @@ from ..untrusted.files import check_regular
 
 _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+# Of compressed meshes; Blender reads Draco's.
+_UNREADABLE_EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _LARGEST_JSON = 200_000_000
 _LARGEST_FILE = 2 << 30
 _MAX_ELEMENTS = 50_000_000  # Of an accessor without data: its elements are all zero.
@@ -45,6 +47,12 @@ def check_gltf(path: Path) -> None:
     """
     try:
         gltf, binary_bytes = _read(path)
+        for extension in gltf.get("extensionsRequired", ()):
+            if extension in _UNREADABLE_EXTENSIONS:
+                raise InputError(
+                    f"{path} is compressed with {extension}, which Blender cannot read; export it "
+                    "without this compression, or unpack it with gltf-transform"
+                )
         buffers = [_buffer_bytes(path, buffer, binary_bytes) for buffer in gltf.get("buffers", ())]
         for image in gltf.get("images", ()):
             if "uri" in image:

@@ -165,7 +165,10 @@ def show_footage(
     camera.data.show_background_images = True
     undistorted = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES else _show_video
     show = _show_clip if motion.dist.any() else undistorted
-    size, warnings = show(camera.data, background, path, motion, frames)
+    try:
+        size, warnings = show(camera.data, background, path, motion, frames)
+    except RuntimeError:  # also where a name has a backslash, which Blender takes for a slash
+        size, warnings = (0, 0), []
     if not min(size):
         return [notice("undecodable_footage", footage=path.name)]
     captured_width, captured_height = motion.view.size(*motion.image_size.tolist())

@@ -346,7 +346,7 @@ def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
             f"{path} is larger than {LARGEST_FILE >> 20} MiB, too large for {what}"
         )
     try:
-        result = BodyUnpickler(data).load()
+        result = _BodyUnpickler(data).load()
     except ModelFileError as cause:
         raise ModelFileError(
             f"{path} cannot be used as {what}: {cause}; get it from its publisher again"
@@ -362,7 +362,7 @@ def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
     return result
 
 
-class BodyUnpickler(pickle._Unpickler):
+class _BodyUnpickler(pickle._Unpickler):
     """Keeps tables to plain keys, drops sets, and counts what it does."""
 
     stack: list[Any]
@@ -372,7 +372,7 @@ class BodyUnpickler(pickle._Unpickler):
 
     def __init__(self, data: bytes) -> None:
         super().__init__(io.BytesIO(data), encoding="bytes")
-        self.dispatch = Handlers(HANDLERS)  # type: ignore[misc,assignment]
+        self.dispatch = _Handlers(HANDLERS)  # type: ignore[misc,assignment]
         self._recodable = len(data)
 
     def find_class(self, module: str, name: str) -> Any:
@@ -442,7 +442,7 @@ class BodyUnpickler(pickle._Unpickler):
         self.append(Discarded())
 
 
-class Handlers(dict[int, Callable[[Any], object]]):
+class _Handlers(dict[int, Callable[[Any], object]]):
     """What to do at each opcode; asking counts, because the unpickler asks once for each."""
 
     _count = 0
@@ -475,10 +475,10 @@ HANDLERS: dict[int, Callable[[Any], object]] = {
     },
     # a frame is read opcode by opcode, like the rest
     pickle.FRAME[0]: lambda unpickler: unpickler.read(8),
-    pickle.BYTEARRAY8[0]: BodyUnpickler.load_bytearray8,
+    pickle.BYTEARRAY8[0]: _BodyUnpickler.load_bytearray8,
     pickle.EMPTY_SET[0]: lambda unpickler: unpickler.append(Discarded()),
-    pickle.FROZENSET[0]: BodyUnpickler.load_frozenset,
-    pickle.DICT[0]: BodyUnpickler.load_dict,
-    pickle.SETITEM[0]: BodyUnpickler.load_setitem,
+    pickle.FROZENSET[0]: _BodyUnpickler.load_frozenset,
+    pickle.DICT[0]: _BodyUnpickler.load_dict,
+    pickle.SETITEM[0]: _BodyUnpickler.load_setitem,
     pickle.SETITEMS[0]: lambda unpickler: unpickler.set_items(unpickler.pop_mark()),
 }

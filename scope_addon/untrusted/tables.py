@@ -26,11 +26,11 @@ from .files import LARGEST_BYTES, UNREADABLE, check_regular, in_one_line, read_n
 from .pickles import (
     HANDLERS,
     UNREADABLE_PICKLE,
-    BodyUnpickler,
     Global,
-    Handlers,
     PickledArray,
     PickledDtype,
+    _BodyUnpickler,
+    _Handlers,
     is_array_class,
     is_shape,
     to_array,
@@ -144,7 +144,7 @@ def _of_stream(path: Path) -> Any:
             raise ModelFileError("it holds a single array without a name")
         return _Plain().convert(_unpickled(stream.read()))
     if data.startswith(_ZIP):
-        raise zipfile.BadZipFile("the archive is incomplete")
+        zipfile.ZipFile(path).close()  # which says what is wrong with it
     if data.startswith(_ZLIB):
         unpacker = zlib.decompressobj()
         data = unpacker.decompress(data, _LARGEST_PICKLE)
@@ -250,7 +250,7 @@ def _rebuild_tensor(
     return made
 
 
-class _TableUnpickler(BodyUnpickler):
+class _TableUnpickler(_BodyUnpickler):
     """Knows the stand-ins above as well.
 
     :param storage_bytes: returns the bytes of a tensor's storage, by its key; None: there are none.
@@ -262,7 +262,7 @@ class _TableUnpickler(BodyUnpickler):
             pickle.BUILD[0]: _TableUnpickler._build,
             pickle.BINPERSID[0]: _TableUnpickler._storage,
         }
-        self.dispatch = Handlers(handlers, MAX_OPCODES)  # type: ignore[misc,assignment]
+        self.dispatch = _Handlers(handlers, MAX_OPCODES)  # type: ignore[misc,assignment]
         self._storage_bytes = storage_bytes
         self._storages: dict[str, _Storage] = {}
 

@@ -139,3 +139,15 @@ def test_random_damage_never_gives_a_traceback(tmp_path):
         except InputError:
             refused += 1
     assert refused > 200
+
+
+@pytest.mark.parametrize("extension", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
+def test_a_compression_that_blender_does_not_read_is_named(tmp_path, extension):
+    """Its buffers have no data without the extension, but the file is not damaged."""
+    path = tmp_path / "rig.gltf"
+    buffers = [{"byteLength": 100, "extensions": {extension: {"fallback": True}}}]
+    gltf = {"extensionsRequired": [extension], "buffers": buffers}
+    path.write_text(json.dumps(gltf))
+    with pytest.raises(InputError, match=f"is compressed with {extension}") as caught:
+        check_gltf(path)
+    assert "damaged" not in str(caught.value)

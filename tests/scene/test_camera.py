@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+import os
 from pathlib import Path
 
 import bpy
@@ -426,3 +427,12 @@ def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(
     u, v = shows @ [2 * 8.5 / 64 - 1, 1 - 2 * 4.5 / 48]
     assert (u + 1) / 2 * size[0] == pytest.approx(column + 0.5, abs=1e-3)
     assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=1e-3)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a backslash separates folders there")
+def test_footage_whose_name_has_a_backslash_is_not_shown_and_said(body, make_motion, clip):
+    """Blender takes it for a slash."""
+    path = clip.rename(clip.with_name("back\\slash.mp4"))
+    motion = make_motion(body, 5, image_size=(64, 48))
+    result = build_scene([motion], body, footage=path, options=NEW_SCENE)
+    assert [warning.code for warning in result.warnings] == ["undecodable_footage"]

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A user's camera calibration: a JSON file with OpenCV's camera matrix and distortion, for footage
-of any size.
+of any size; or a TOML file with a table for each camera, as Pose2Sim and Caliscope write them.
 
     {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3],
      "size": [width, height]}
+
+In TOML, ``calibration.toml#cam_1`` names the camera, which is only needed if there are several.
 
 Keys that describe the lens are never ignored, and impossible values are refused, because a wrong
 lens gives a wrong person. Other keys, such as a name or a date, are allowed.
@@ -14,6 +16,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +26,7 @@ import numpy as np
 from ....solver.errors import InputError
 from ...arrays import Float64Array
 from ...json_file import read_json_object
+from ...untrusted.files import check_regular, in_one_line
 
 _FORMAT = (
     'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], '
@@ -30,8 +34,8 @@ _FORMAT = (
 )
 # The name in our files, and the names that OpenCV's examples and other programs use.
 _NAMES = {
-    "intrinsics": ("intrinsics", "camera_matrix", "K"),
-    "dist": ("dist", "dist_coeffs", "distortion", "distortion_coefficients"),
+    "intrinsics": ("intrinsics", "camera_matrix", "matrix", "K"),
+    "dist": ("dist", "dist_coeffs", "distortion", "distortions", "distortion_coefficients"),
     "size": ("size", "image_size"),
 }
 # Other keys that describe the lens or the picture, by words in them or as a whole.
@@ -51,6 +55,7 @@ _LARGEST_TANGENTIAL = 0.5
 _LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
 _LARGEST_SIDE = 1e6
+_LARGEST_TOML = 1 << 20  # bytes
 _SIZE_TOLERANCE_PX = 1.0  # for sizes that were rounded
 
 
@@ -121,17 +126,62 @@ class Calibration:
 
 
 def read_calibration(path: Path) -> Calibration:
-    """Read a calibration from a JSON file.
+    """Read a calibration from a JSON or TOML file.
 
-    :raises InputError: the file cannot be read, or holds an unknown key or an impossible value.
+    :param path: of TOML, the camera's name may follow after a #.
+    :raises InputError: the file cannot be read, or holds an unknown key or an impossible value; or
+        it has several cameras, and none or another one is named.
     """
-    values = _by_our_names(path, read_json_object(path, InputError, "calibration", _FORMAT))
+    file, camera = calibration_file(path)
+    if file.suffix.lower() == ".toml":
+        content = _toml_camera(file, camera)
+    else:
+        content = read_json_object(path, InputError, "calibration", _FORMAT)
+    values = _by_our_names(path, content)
     if "intrinsics" not in values:
         raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_FORMAT}')
     intrinsics = _intrinsics(path, values["intrinsics"])
     return Calibration(
         path, intrinsics, _distortion(path, values.get("dist")), _size(path, values.get("size"))
     )
+
+
+def calibration_file(path: Path) -> tuple[Path, str]:
+    """Return the file of a calibration, and the name of the camera in it, which may be empty."""
+    file, _, camera = str(path).partition(".toml#")
+    return (Path(f"{file}.toml"), camera) if camera else (path, "")
+
+
+def _toml_camera(path: Path, camera: str) -> dict[str, Any]:
+    """Return the lens of a camera of a TOML file; what concerns its place is left out.
+
+    :raises InputError: the file cannot be read, or does not say which camera it is.
+    """
+    check_regular(path, InputError, "calibration", _LARGEST_TOML)
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(f"{path} does not exist; check the path") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not a TOML file ({in_one_line(error)})") from error
+    cameras = {
+        name: table
+        for name, table in tables.items()
+        if isinstance(table, dict) and any(key in table for key in _NAMES["intrinsics"])
+    }
+    names = ", ".join(cameras) or "none"
+    if camera and camera not in cameras:
+        raise InputError(f"{path} has no camera {camera!r}; its cameras are {names}")
+    if not camera and len(cameras) != 1:
+        raise InputError(
+            f"{path} has the cameras {names}: name the one that filmed the clip, as in "
+            f"{path.name}#{next(iter(cameras), 'camera')}"
+        )
+    table = cameras[camera or next(iter(cameras))]
+    if table.get("fisheye"):
+        raise InputError(f"{path}: fisheye lenses are not supported; undistort the video first")
+    known = [name for names in _NAMES.values() for name in names]
+    return {key: value for key, value in table.items() if key in known}
 
 
 def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:

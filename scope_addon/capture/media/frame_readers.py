@@ -133,15 +133,20 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
 
 
 def _film(path: Path, container: InputContainer) -> av.VideoStream:
-    """Return the first stream of images that is not the picture of a cover, as files of music have.
+    """Return the stream of moving images: of several, the largest one, for the others are previews.
+
+    The picture of a cover, as files of music have, is none of them.
 
     :raises VideoError: there is none that can be decoded, or its images are too large or too long.
     """
     from av.stream import Disposition
 
-    film = next(
-        (s for s in container.streams.video if not s.disposition & Disposition.attached_pic), None
-    )
+    def rank(stream: av.VideoStream) -> tuple[bool, int, bool]:
+        is_default = bool(stream.disposition & Disposition.default)
+        return stream.frames != 1, (stream.width or 0) * (stream.height or 0), is_default
+
+    films = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]
+    film = max(films, key=rank, default=None)  # the first of equal ones
     if film is None and container.streams.audio:
         raise VideoError(f"{path} contains only audio; choose the file with the video")
     if film is None or not film.codec_context:

@@ -95,3 +95,27 @@ def test_slow_motion_is_read_from_a_phones_file(tmp_path: Path, stated: str, spe
         container.mux(stream.encode())
     with open_video(path) as video:
         assert video.recorded_speed == pytest.approx(speed)
+
+
+@pytest.mark.parametrize("sizes", [[(96, 64), (192, 128)], [(192, 128), (96, 64)]])
+def test_the_largest_of_several_films_is_read(tmp_path: Path, sizes: list[tuple[int, int]]) -> None:
+    """The others are previews, also where they come first and are marked as the default."""
+    path = tmp_path / "a.mp4"
+    with av.open(str(path), "w") as container:
+        streams = []
+        for width, height in sizes:
+            stream = container.add_stream("mpeg4", rate=30)
+            stream.width, stream.height = width, height
+            streams.append(stream)
+        for _ in range(5):
+            for stream in streams:
+                level = stream.width  # tells the films apart
+                image = np.full((stream.height, stream.width, 3), level, np.uint8)
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        for stream in streams:
+            container.mux(stream.encode())
+    with open_video(path) as video:
+        frames = [frame.image_rgb for frame in video]
+    assert len(frames) == 5
+    assert frames[0].shape == (128, 192, 3)
+    assert abs(float(frames[0].mean()) - 192) < 8
