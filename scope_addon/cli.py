@@ -314,21 +314,30 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         if found := window_report(args, video, options, progress):
             return found
-        unfinished = stack.enter_context(unfinished_capture(lasting_folder(), video))
-        result = capture(
-            video, body, options, progress, observe_frames=lasting(unfinished, args.windows_folder)
+        unfinished = stack.enter_context(
+            unfinished_capture(lasting_folder(), video, options.wanted.fps is not None)
         )
+        footage = unfinished.footage
+        result = capture(
+            video,
+            body,
+            options,
+            footage.watched(progress),
+            observe_frames=lasting(unfinished.folder, args.windows_folder),
+        )
+        footage.check()
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
             written, warnings = write_outputs(outputs, result.motions, body, video, args, rig)
-            captured = replace(result.report, warnings=[*result.report.warnings, *warnings])
+            warnings = [*result.report.warnings, *unfinished.warnings, *warnings]
+            captured = replace(result.report, warnings=warnings)
             if args.overlay:
                 write_overlay(
                     args.overlay,
                     video,
                     result.motions,
                     body,
-                    progress=lambda i, n: progress("overlay", i, n),
+                    progress=footage.watched(lambda i, n: progress("overlay", i, n), to_end=True),
                     wanted=options.wanted,
                 )
                 written.append(args.overlay)
@@ -336,8 +345,13 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                 clip = CapturedClip(
                     video, result.motions, body, captured, args.command_text, options.wanted
                 )
-                write_capture_page(args.report, clip, lambda i, n: progress("report", i, n))
+                write_capture_page(
+                    args.report,
+                    clip,
+                    footage.watched(lambda i, n: progress("report", i, n), to_end=True),
+                )
                 written.append(args.report)
+            footage.check()
             report = captured.as_json() | {"outputs": [str(path) for path in written]}
             if args.finished_file:
                 write_finished(args.finished_file, report)

@@ -34,6 +34,10 @@ class VideoError(InputError):
     """A video or image cannot be opened or decoded."""
 
 
+class ChangedFootageError(VideoError):
+    """The footage was changed while it was read."""
+
+
 class OfflineError(VideoError):
     """A stream, while Blender is not to go online."""
 

@@ -34,6 +34,8 @@ SENTENCES = {
     # footage
     "assumed_frame_rate": "{footage}: images have no frame rate, so 30 frames per second were "
     "assumed; set another with --fps on the command line",
+    "changed_footage": "{footage} has been changed since a capture of it was stopped, so that one "
+    "was not continued, and everything was captured anew",
     "range_of_image": "{footage} is a single image: a start, an end or a frame rate has no effect",
     "first_of_animation": "{footage} is an animation of {images} images, and only the first was "
     "captured; convert it to an .mp4 or a .gif to capture all of them",

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+from ..content import add_content
 from ..errors import SetupError, UsageError
 from ..options import Place, options_at
 
@@ -20,8 +21,8 @@ WARM_UP = json.dumps({"warm_up": True})
 # the sample do not.
 _DECIDES = {"solver": (".py",), "scope_addon": (".py",), "assets": (".onnx", ".npz", ".json")}
 _DECIDE_NOTHING = ("scope_addon/ui", "assets/sample")
-# hashed at the beginning and end of the footage; reading gigabytes would block the window
-_SAMPLE_BYTES = 1 << 20
+# of footage, of which a larger file is sampled; reading gigabytes would block the window
+_MOST_BYTES = 1 << 25
 
 
 class LineRequest:
@@ -124,13 +125,9 @@ def checked_values(values: Mapping[str, Any], place: Place) -> dict[str, Any]:
 
 
 def _add_file(digest: hashlib._Hash, path: Path) -> None:
-    """Add name, size, modification time, first and last megabyte."""
-    status = path.stat()
-    digest.update(os.fsencode(path.name) + f" {status.st_size} {status.st_mtime_ns}".encode())
-    with path.open("rb") as file:
-        digest.update(file.read(_SAMPLE_BYTES))
-        file.seek(max(0, status.st_size - _SAMPLE_BYTES))
-        digest.update(file.read(_SAMPLE_BYTES))
+    """Add name, modification time, and content, of a large file samples."""
+    digest.update(os.fsencode(path.name) + f" {path.stat().st_mtime_ns}".encode())
+    add_content(digest, path, _MOST_BYTES)
 
 
 def code_version(root: Path) -> str:

@@ -13,49 +13,90 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
-from ..errors import NoPersonError
+from ..errors import ChangedFootageError, NoPersonError
+from ..notices import Notice, notice
 from ..temporary import own_entries, remove, remove_if_empty
 from .request import code_version
+from .watched_footage import WatchedFootage
 
 FOLDER = "unfinished"
-_FOLDER_NAME = re.compile("[0-9a-f]{32}")
+_HASH = 32  # letters of a hash in a name
+_FOLDER_NAME = re.compile("[0-9a-f]{32}-[0-9a-f]{32}")
 ROOT = Path(__file__).resolve().parents[2]
 _ABANDONED_S = 7 * 24 * 3600.0
 _LARGEST = 2 << 30  # bytes of all captures
 _RUNNING_S = 600.0  # within which a running capture has written
 
 
+class UnfinishedCapture(NamedTuple):
+    """A capture in progress.
+
+    :param folder: with what an earlier one had found, if it was stopped; None: nothing is kept.
+    :param footage: as it was when the capture began.
+    :param warnings: what is to be said of earlier captures.
+    """
+
+    folder: Path | None
+    footage: WatchedFootage
+    warnings: list[Notice]
+
+
 @contextmanager
-def unfinished_capture(root: Path | None, footage: Path) -> Iterator[Path | None]:
+def unfinished_capture(
+    root: Path | None, path: Path, rate_given: bool = False
+) -> Iterator[UnfinishedCapture]:
     """Give the folder of a capture, and remove it when the capture is finished, or has found
     nobody.
 
-    The folder is made by whoever first writes to it. It stays if the block is left by another
-    exception.
+    It is that of this program and of the footage's content, so that nothing is continued with other
+    images than those with which it began; what is left of others is removed. The folder is made by
+    whoever first writes to it. It stays if the block is left by another exception.
 
     :param root: folder of caches; None: nothing is to be kept.
+    :param path: of the footage.
+    :param rate_given: see `WatchedFootage`.
     """
-    if root is None:
-        yield None
+    footage = WatchedFootage(path, rate_given)
+    folder = None if root is None else _folder(root, path, footage)
+    if root is None or folder is None:
+        yield UnfinishedCapture(None, footage, [])
         return
     _remove_old(root)
-    folder = root / FOLDER / _name(footage)
+    former = _folders_of_other_content(folder)
+    for each in former:
+        remove(each)
+    warnings = [notice("changed_footage", footage=path.name)] if former else []
     try:
-        yield folder
-    except NoPersonError:
+        yield UnfinishedCapture(folder, footage, warnings)
+    except (NoPersonError, ChangedFootageError):
         _remove(folder)
         raise
     _remove(folder)
 
 
-def _name(footage: Path) -> str:
-    """Return a name for a capture of this footage with this program."""
-    described = [os.path.realpath(footage), code_version(ROOT)]
-    with suppress(OSError):
-        status = footage.stat()
-        described += [str(status.st_size), str(status.st_mtime_ns)]
-    return hashlib.sha256(json.dumps(described).encode()).hexdigest()[:32]
+def _folder(root: Path, path: Path, footage: WatchedFootage) -> Path | None:
+    """Return the folder of a capture of this footage with this program; None if the footage cannot
+    be read.
+    """
+    where = json.dumps([os.path.realpath(path), code_version(ROOT)])
+    try:
+        content = footage.content()
+    except OSError:
+        return None
+    name = hashlib.sha256(where.encode()).hexdigest()[:_HASH]
+    return root / FOLDER / f"{name}-{content[:_HASH]}"
+
+
+def _folders_of_other_content(folder: Path) -> list[Path]:
+    """Return what is left of captures of the same name, whose footage was another one."""
+    begin = folder.name[: _HASH + 1]
+    return [
+        each
+        for each in own_entries(folder.parent, _FOLDER_NAME)
+        if each.name.startswith(begin) and each.name != folder.name
+    ]
 
 
 def unfinished_captures(root: Path) -> list[Path]:

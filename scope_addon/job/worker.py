@@ -10,6 +10,7 @@ import os
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, NoReturn
 
@@ -126,13 +127,21 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
             body = load_body(request.values["body"])
             options = capture_options(request.values)
             result = capture(
-                request.footage, body, options, reporter.progress, watch, lasting(unfinished)
+                request.footage,
+                body,
+                options,
+                unfinished.footage.watched(reporter.progress),
+                watch,
+                lasting(unfinished.folder),
             )
+        unfinished.footage.check()
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):
             motion.save(job_folder / name)
-    reporter.send("result", motions=names, report=result.report.as_json())
+        warnings = [*result.report.warnings, *unfinished.warnings]
+    report = replace(result.report, warnings=warnings)
+    reporter.send("result", motions=names, report=report.as_json())
 
 
 def main(job_folder: Path) -> NoReturn:

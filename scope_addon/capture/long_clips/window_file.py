@@ -22,6 +22,7 @@ from ....solver.errors import InputError, ScopeError
 from ...arrays import Uint8Array
 from ...atomic_write import write_npz
 from ...capture_report import warnings_as_json
+from ...content import add_content
 from ...notices import Notice, notices_of
 from ...untrusted.files import read_members
 from ..camera.background_record import BackgroundRecord
@@ -75,6 +76,7 @@ _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
 }
 Arrays = dict[str, NDArray[Any]]
 LARGEST = 1 << 30  # bytes of the windows that are kept of one capture
+_MOST_BYTES = 1 << 28  # of a network; a larger one is sampled
 _UNIMPORTANT = ("threads",)  # options with which the result is the same, bit for bit
 
 
@@ -373,9 +375,10 @@ def _digest(options: CaptureOptions) -> str:
 
 
 def _state(path: Path) -> str:
-    """Return what changes with a file."""
+    """Return what changes with a file and its content."""
+    digest = hashlib.sha256()
     try:
-        status = path.stat()
-        return f"{path.resolve()} {status.st_size} {status.st_mtime_ns}"
+        add_content(digest, path, _MOST_BYTES)
     except OSError:
         return ""
+    return digest.hexdigest()

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Footage that must stay the same while it is read, from the first picture of a capture to the last
+one of its overlay.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ...solver.errors import ScopeError
+from ..capture.media.image_sequence import find_sequence
+from ..content import add_content, state_of
+from ..errors import ChangedFootageError
+
+_INTERVAL_S = 2.0  # between two looks at the files
+# Of which the content is read; more of a video, or of all pictures together, is sampled.
+_MOST_BYTES = 1 << 30
+_LEAST_BYTES = 1 << 16  # of each picture
+
+
+class WatchedFootage:
+    """The files of a video or a sequence, as they were at the beginning.
+
+    :param rate_given: whether the user has given a frame rate, so that a picture begins a sequence.
+    """
+
+    def __init__(self, path: Path, rate_given: bool = False) -> None:
+        self._path = path
+        self._rate_given = rate_given
+        self._states = {file: state_of(file) for file in self._files()}
+        self._grows = self._ends()
+        self._looked_s = time.monotonic()
+
+    def content(self) -> str:
+        """Return a hash of the names and contents of the files.
+
+        :raises OSError: one cannot be read.
+        """
+        digest = hashlib.sha256()
+        most_bytes = max(_LEAST_BYTES, _MOST_BYTES // max(1, len(self._states)))
+        for file in self._states:
+            digest.update(repr(file.name).encode())
+            add_content(digest, file, most_bytes)
+        return digest.hexdigest()
+
+    def check(self) -> None:
+        """Compare the files with what they were. A video to which was only added is the same: what
+        is read of it is what was there.
+
+        :raises ChangedFootageError: a file was replaced, changed, added or removed.
+        """
+        self._looked_s = time.monotonic()
+        files = self._files()
+        changed = [file for file in files if state_of(file) != self._states.get(file)]
+        if self._has_grown():
+            return
+        if changed or len(files) != len(self._states):
+            which = changed[0] if changed else self._path
+            raise ChangedFootageError(
+                f"{which} was changed while it was read, so the results would mix both; "
+                "capture again"
+            )
+
+    def watched(self, progress: Callable[..., None], to_end: bool = False) -> Callable[..., None]:
+        """Return a function that reports progress, and looks at the files from time to time.
+
+        :param to_end: also when the number of what is done reaches that of all.
+        """
+
+        def report(*values: Any) -> None:
+            is_last = to_end and values[-2] >= values[-1]
+            if is_last or time.monotonic() - self._looked_s > _INTERVAL_S:
+                self.check()
+            progress(*values)
+
+        return report
+
+    def _files(self) -> list[Path]:
+        try:
+            sequence = find_sequence(self._path, self._rate_given)
+        except (ScopeError, OSError):
+            return []  # which the capture says
+        if sequence is not None:
+            return list(sequence.paths)
+        return [self._path] if self._path.is_file() else []
+
+    def _ends(self) -> bytes:
+        """Return a hash of the first and last bytes of a video as it was."""
+        if len(self._states) != 1:
+            return b""
+        digest = hashlib.sha256()
+        ((file, state),) = self._states.items()
+        try:
+            with file.open("rb") as stream:
+                size = min(_LEAST_BYTES, state[2])
+                digest.update(stream.read(size))
+                stream.seek(state[2] - size)
+                digest.update(stream.read(size))
+        except (OSError, IndexError):
+            return b""
+        return digest.digest()
+
+    def _has_grown(self) -> bool:
+        """Return whether a video is longer than it was, and the same up to its former end."""
+        if len(self._states) != 1:
+            return False
+        ((file, before),) = self._states.items()
+        now = state_of(file)
+        is_longer = len(before) == len(now) and now[:2] == before[:2] and now[2:3] > before[2:3]
+        return is_longer and self._grows != b"" and self._ends() == self._grows
