@@ -48,6 +48,7 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     the report.
 
     :raises ScopeError: an argument is invalid, the source cannot be read, or an output failed.
+    :raises KeyboardInterrupt: a second signal came; says what is written.
     """
     check_live()
     values = values_in_range(args, Place.LIVE)
@@ -76,6 +77,7 @@ def _capture(
     """Capture until the source ends or Ctrl-C, and return the report.
 
     :raises ScopeError: the source cannot be read, or an output failed.
+    :raises KeyboardInterrupt: a second signal came; says what is written.
     """
     from ..live.outputs.footage import Footage
     from ..live.outputs.people_recording import Keep, PeopleRecording
