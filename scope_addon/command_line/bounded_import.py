@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ..capture.perception.adapters.network_server import used_bytes
 from ..errors import FAILED
+from ..scene.budget import BASE_BYTES
 from ..temporary import discard_all
 
 _INTERVAL_S = 0.1
@@ -23,7 +24,6 @@ _INTERVAL_S = 0.1
 # byte.
 BASE_S = 30.0
 S_PER_MB = 1.0
-BASE_BYTES = 2 << 30
 BYTES_PER_BYTE = 20
 
 

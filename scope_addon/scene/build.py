@@ -25,6 +25,7 @@ from . import camera
 from .animation_data import timing
 from .animation_data.actions import Channels
 from .animation_data.transaction import all_or_nothing
+from .budget import check_content, check_last_frame
 from .character import (
     animation,
     armature,
@@ -216,6 +217,7 @@ def _build_person(
     vertices = body_mesh.rest_vertices_world(drawn, rest.lift, motion.betas if baked else None)
     mesh = body_mesh.build_mesh(f"{label}_body", drawn, vertices, collection)
     frames = timing.key_frames(motion.timestamps, rate, options.start_frame)
+    check_last_frame(frames[-1])
     shaped = body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
     bone_display.show_bones(rig, body, rest, shaped)
     action = bpy.data.actions.new(label)
@@ -288,7 +290,8 @@ def _select(people: list[Person]) -> None:
 
 
 def _check(motion: Motion, body: Body) -> None:
-    """Check that a motion has the body's joints and shape coefficients, and finite numbers.
+    """Check that a motion has the body's joints and shape coefficients, finite numbers, and no more
+    frames than its content explains.
 
     :raises MotionFileError: when it has not.
     """
@@ -298,3 +301,4 @@ def _check(motion: Motion, body: Body) -> None:
             raise MotionFileError(
                 f"the motion's {name} contain NaN or infinity; capture the video again"
             )
+    check_content(motion)

@@ -30,6 +30,8 @@ from ..tracking.track import Tracklet
 
 WARM_UP_S = 1.5
 MAX_WINDOWS = 10_000
+# In a window, on average: otherwise frames far apart would have a window, and a file, each.
+_LEAST_FRAMES = 24
 _TOLERANCE_S = 1e-6  # of a frame's time, as in decoding
 
 
@@ -58,13 +60,16 @@ class Window:
 
 
 def plan_windows(video: Video, window_s: float) -> list[Window]:
-    """Return the windows of the chosen range; a single one where it is shorter than two of them.
+    """Return the windows of the chosen range; a single one where it is shorter than two of them, or
+    has few frames.
 
     The last window has whatever is left, also of footage that is longer than its container says.
     """
     start_s = video.wanted.start_s
     length_s = video.expected_frames / float(video.fps)
     count = max(1, min(int(length_s / window_s + 1e-9), MAX_WINDOWS))
+    if count > 1 and video.wanted.fps is None:
+        count = max(1, min(count, video.most_frames // _LEAST_FRAMES))
     begins = [start_s + k * window_s for k in range(count)]
     ends = [*begins[1:], math.inf]
     warm_up_s = min(WARM_UP_S, window_s / 2)

@@ -383,6 +383,19 @@ class PyavReader:
         self._container.close()
 
 
+def count_frames(path: Path) -> int:
+    """Return how many frames a video file has, without decoding them; 0 if it cannot be read."""
+    failure, container = _open_with_pyav(path)
+    if container is None:
+        return 0
+    try:
+        with container:
+            stream = _film(path, container)
+            return sum(1 for packet in container.demux(stream) if packet.size)
+    except (failure, VideoError):
+        return 0
+
+
 def exact_fps(fps: float) -> Fraction | None:
     """Convert a float frame rate to the rational that it stands for; None if it is not a rate (0,
     NaN, 90000).

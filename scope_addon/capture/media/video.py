@@ -33,6 +33,7 @@ from .frame import Frame
 from .frame_readers import (
     DEFAULT_FPS,
     PyavReader,
+    count_frames,
     estimate_fps,
     exact_fps,
     next_time,
@@ -50,6 +51,8 @@ cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _VARYING = Fraction(2, 100)  # of the rate, by which the average differs where it varies
 _SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
+# Of a frame; a fifth of what videos of calls and surveillance have at their lowest quality.
+_LEAST_BYTES = 100
 _QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
@@ -103,6 +106,18 @@ class Video:
         start = Fraction(self.wanted.start_s)
         end = Fraction(min(self.wanted.end_s, float(length)))
         return max(1, round((min(end, length) - start) * min(self.fps, self.average_fps)))
+
+    @property
+    def most_frames(self) -> int:
+        """Number of frames that an iteration yields at most: what the container says, or, where its
+        bytes can hardly hold so many, what is counted in it. A few bytes can claim years.
+        """
+        expected = self.expected_frames
+        if self._sequence is not None or self._bytes is None:
+            return expected
+        if self._bytes >= _LEAST_BYTES * expected:
+            return expected
+        return max(1, min(expected, count_frames(self.path)))
 
     def __iter__(self) -> Iterator[Frame]:
         if self._still is not None:

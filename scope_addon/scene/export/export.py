@@ -25,6 +25,7 @@ from ...motion import Motion
 from ...notices import Notice
 from ...temporary import remove
 from ..animation_data import actions
+from ..budget import check_samples
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
 from ..character.bone_display import remove_if_unused
 from ..packed_motion import motion_texts, pack_motion
@@ -171,6 +172,8 @@ def _write_one(
             raise UsageError(
                 f"cannot write {path.name}: the capture's armature is not in a scene; capture again"
             )
+        if suffix != ".blend":  # which has keys alone
+            check_samples(scene, rigs, _most_keys(rigs, scene))
         writers = {
             ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig, options.bvh_unit),
             ".glb": lambda temporary: formats.write_glb(temporary, options.camera, take),
@@ -179,6 +182,16 @@ def _write_one(
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }
         _write(path, writers[suffix])
+
+
+def _most_keys(rigs: Sequence[bpy.types.Object], scene: bpy.types.Scene) -> int:
+    """Return the most keys that a channel of a rig has; of a rig with NLA strips, those of a scene
+    with a key on every frame.
+    """
+    if any(actions.nla_strips(rig) for rig in rigs):
+        return scene.frame_end - scene.frame_start + 1
+    curves = [curve for rig in rigs for curve in actions.fcurves(rig)]
+    return max((len(curve.keyframe_points) for curve in curves), default=0)
 
 
 def export_motions(

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import av
+import numpy as np
 import pytest
 from scope.scope_addon.capture.long_clips.windows import plan_windows
-from scope.scope_addon.capture.media.video import Video
+from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import WINDOW_S
 
@@ -46,3 +49,24 @@ def test_windows_begin_where_the_range_does() -> None:
 def test_short_windows_do_not_warm_up_before_the_one_before() -> None:
     windows = plan_windows(video(10), 1.0)
     assert all(b.anchor_s > a.begin_s for a, b in zip(windows, windows[1:], strict=False))
+
+
+@pytest.mark.parametrize("suffix", ["mkv", "mp4"])
+@pytest.mark.parametrize(("frames", "days", "most"), [(12, 127, 1), (60, 127, 2), (60, 0.01, 2)])
+def test_windows_are_planned_by_frames_not_by_the_time_that_they_span(
+    tmp_path: Path, suffix: str, frames: int, days: float, most: int
+) -> None:
+    """Each has a file and trackers of its own."""
+    path = tmp_path / f"rare.{suffix}"
+    with av.open(path, "w") as container:
+        stream: Any = container.add_stream("mjpeg", rate=30)
+        stream.width = stream.height = 64
+        stream.pix_fmt = "yuvj420p"
+        for number in range(frames):
+            image = np.full((64, 64, 3), number, np.uint8)
+            for packet in stream.encode(av.VideoFrame.from_ndarray(image)):
+                packet.time_base = Fraction(1, 1000)
+                packet.pts = packet.dts = round(number * days * 86_400_000 / (frames - 1))
+                container.mux(packet)
+    with open_video(path) as video:
+        assert 1 <= len(plan_windows(video, WINDOW_S)) <= most

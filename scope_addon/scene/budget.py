@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much memory Blender may need for a file: a base, and more for each byte of content.
+
+A few bytes of a file can claim hours of motion, years between two frames, or a rig of endless
+arrays. Files of real captures and rigs need far less than what is permitted here.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import MotionFileError, OutputError
+
+if TYPE_CHECKING:
+    import bpy
+
+    from ..motion import Motion
+
+BASE_BYTES = 2 << 30
+LAST_FRAME = 1_048_574  # of a scene, which Blender does not let it exceed
+_BYTES_PER_BONE = 2900  # of a frame, by the exporter of .glb; the others need less
+_BYTES_PER_BYTE = 1000  # of compressed content; captures need 300, from 100 to 400
+_SAMPLES_PER_KEY = 5  # of a scene whose rate is higher than the footage's
+
+
+def check_content(motion: Motion) -> None:
+    """Refuse a motion whose keyframes would need far more memory than its content explains.
+
+    :raises MotionFileError: it is one.
+    """
+    needed_bytes = len(motion) * motion.joint_count * _BYTES_PER_BONE
+    if needed_bytes <= BASE_BYTES:
+        return
+    content = zlib.compress(np.concatenate([motion.poses, motion.trans], axis=1).tobytes(), 1)
+    if needed_bytes > BASE_BYTES + _BYTES_PER_BYTE * len(content):
+        raise MotionFileError(
+            f"the motion has {len(motion)} frames, but hardly any movement; as keyframes it would "
+            f"need {needed_bytes / 1e9:.0f} GB of memory: cut it, or write an .npz"
+        )
+
+
+def check_last_frame(frame: float) -> None:
+    """Refuse a motion that ends after the last frame that Blender has.
+
+    :raises MotionFileError: it does.
+    """
+    if frame > LAST_FRAME:
+        raise MotionFileError(
+            f"the motion ends at frame {frame:.0f} of the scene, but Blender has only "
+            f"{LAST_FRAME}: choose a shorter range of the footage, or write an .npz"
+        )
+
+
+def check_samples(scene: bpy.types.Scene, rigs: Sequence[bpy.types.Object], keys: int) -> None:
+    """Refuse to sample far more frames of a scene than have keys, if that needs much memory.
+
+    :param keys: most keys of one channel of the rigs.
+    :raises OutputError: there are too many.
+    """
+    frames = scene.frame_end - scene.frame_start + 1
+    bones = sum(len(rig.data.bones) for rig in rigs)
+    needed_bytes = frames * bones * _BYTES_PER_BONE
+    if needed_bytes > BASE_BYTES and frames > _SAMPLES_PER_KEY * keys:
+        raise OutputError(
+            f"{keys} keyframes are spread over {frames} frames, each of which the file would have; "
+            f"that would need {needed_bytes / 1e9:.0f} GB of memory: choose a shorter range of the "
+            "footage, or write an .npz or a .blend"
+        )

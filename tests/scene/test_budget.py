@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small file that claims much is refused with one sentence, within the memory of a small motion;
+what real captures need is permitted.
+"""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import MotionFileError, OutputError
+from scope.scope_addon.scene.budget import check_content, check_last_frame
+from scope.scope_addon.scene.export.export import export_motions
+from scope.solver.body import Body
+
+from ..made_motion import made_motion
+
+MOST_BYTES = 2 << 30
+
+
+def amass(path: Path, frames: int, **arrays: Any) -> Path:
+    """A motion file as other tools write it, of a body that does not move."""
+    zeros = {"poses": np.zeros((frames, 72), np.float32), "trans": np.zeros((frames, 3))}
+    np.savez_compressed(
+        path, **zeros | arrays, betas=np.zeros(10), mocap_framerate=60.0, gender="neutral"
+    )
+    return path
+
+
+def limit_memory() -> None:
+    resource.setrlimit(resource.RLIMIT_DATA, (MOST_BYTES, MOST_BYTES))
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "scope.scope_addon", *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, preexec_fn=limit_memory
+    )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="measures memory with a limit of Linux")
+def test_an_hour_of_zeros_is_refused(tmp_path: Path) -> None:
+    """Before Blender has a key of it, so for every format."""
+    motion = amass(tmp_path / "zeros.npz", 60_000)
+    assert motion.stat().st_size < 40_000
+    done = run("import", motion, "-o", tmp_path / "out.glb")
+    assert done.returncode == 1
+    assert "hardly any movement" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["zeros.npz"]
+
+
+class Capture:
+    """What a capture has: measured positions, whose last bits are noise."""
+
+    joint_count = 24
+
+    def __init__(self, frames: int, noise_rad: float) -> None:
+        random = np.random.default_rng(0)
+        self.poses = (random.normal(size=(frames, 72)) * noise_rad).astype(np.float32)
+        self.trans = np.zeros((frames, 3), np.float32)
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+
+def test_hours_of_a_real_motion_are_permitted() -> None:
+    check_content(Capture(40_000, 1e-3))  # type: ignore[arg-type]
+    check_content(Capture(20_000, 0.0))  # type: ignore[arg-type]
+    with pytest.raises(MotionFileError, match="40000 frames, but hardly any movement"):
+        check_content(Capture(40_000, 0.0))  # type: ignore[arg-type]
+
+
+def test_frames_after_the_last_one_of_blender_are_refused() -> None:
+    check_last_frame(1_048_574.0)
+    with pytest.raises(MotionFileError, match="Blender has only 1048574"):
+        check_last_frame(1_048_575.0)
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".glb", ".fbx", ".usdc"])
+def test_few_keys_over_many_frames_are_refused_before_they_are_sampled(
+    body: Body, tmp_path: Path, suffix: str
+) -> None:
+    motion = made_motion(body, np.zeros((12, 72)), np.zeros((12, 3)))
+    motion.timestamps[:] = np.linspace(0.0, 20_000.0, len(motion))
+    with pytest.raises(OutputError, match="12 keyframes are spread over [0-9]{6} frames"):
+        export_motions([motion], body, tmp_path / f"out{suffix}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_motion_that_blender_has_no_frames_for_is_refused(body: Body, tmp_path: Path) -> None:
+    motion = made_motion(body, np.zeros((12, 72)), np.zeros((12, 3)))
+    motion.timestamps[:] = np.linspace(0.0, 127 * 86_400.0, len(motion))
+    with pytest.raises(MotionFileError, match="Blender has only 1048574"):
+        export_motions([motion], body, tmp_path / "out.blend")
