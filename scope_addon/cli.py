@@ -67,7 +67,7 @@ from .errors import (
     lacks_memory,
     system_error_message,
 )
-from .footage import is_url, json_text
+from .footage import display_text, is_url, json_text
 from .installed import CAPTURE, check_installed
 from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
@@ -246,13 +246,13 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
                 _print_report(report, stdout)
         return int(report.get("exit_status", 0))
     except ScopeError as error:
-        print(f"scope: {error}", file=sys.stderr)
+        print_message(str(error))
         return exit_status(error)
     except KeyboardInterrupt as stop:
-        print(f"scope: stopped; {str(stop) or 'nothing was written'}", file=sys.stderr)
+        print_message(f"stopped; {str(stop) or 'nothing was written'}")
         return 130
     except (OSError, MemoryError) as error:
-        print(f"scope: {system_error_message(error)}", file=sys.stderr)
+        print_message(system_error_message(error))
         return FAILED
     except Exception as error:
         if os.environ.get("SCOPE_TRACEBACK"):
@@ -262,7 +262,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
             if lacks_memory(error)
             else internal_error_message(error)
         )
-        print(f"scope: {text}", file=sys.stderr)
+        print_message(text)
         return FAILED
 
 
@@ -358,7 +358,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     for warning in report["warnings"]:
         print_message(f"warning: {warning}")
     if not args.json:
-        print(summary(report), file=sys.stderr)
+        print(display_text(summary(report)), file=sys.stderr)
     return report
 
 

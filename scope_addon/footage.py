@@ -41,6 +41,14 @@ FOOTAGE_SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
 # of an image, 134 million: more than footage has; a few bytes of a file can declare any number
 MAX_PIXELS = 1 << 27
 LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+# An address in a text, to the end of a word: a password may have any character but a space.
+# Taken for a path, it has a single slash; a drive of Windows has one letter.
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://?")
+_ADDRESS = re.compile(rf"{_SCHEME.pattern}[^\s'\"<>)]+")
+_HOST = re.compile(r"(\[[^]]*\]|[^/?#@:]*)(:\d+)?([/?#]|$)")
+_AFTER_PATH = re.compile(r"[?#;&]")
+# Control characters, ends of lines, and marks of the direction of writing.
+_UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 NUMBER_SIGN = re.compile(r"#+|%0?\d*d")  # stands for the number in a pattern of names
 
 
@@ -112,8 +120,39 @@ def is_url(text: object) -> bool:
     return isinstance(text, str) and "://" in text
 
 
-def display_text(path: str | Path) -> str:
-    """Return a path as text for people and other programs: bytes that are not UTF-8 become U+FFFD.
+def display_text(foreign: str | Path) -> str:
+    """Return a name or message in one line, as people may see it.
+
+    Each character that moves the cursor, ends the line or turns the direction of writing becomes
+    U+FFFD, and so do bytes that are not UTF-8: names may have them, and could otherwise forge a
+    message or hide a part of one. Of addresses, only what `display_address` leaves is shown.
+    """
+    text = _ADDRESS.sub(lambda found: display_address(found[0]), unicode_text(foreign))
+    return _UNSHOWN.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def display_address(address: str) -> str:
+    """Return an address without what it may have of a secret: name and password before the host,
+    whatever characters these have, and all after the path.
+    """
+    found = _SCHEME.match(address)
+    if found is None:
+        return address
+    rest = address[found.end() :]
+    public = rest.rpartition("@")[2] if has_login(rest) else rest
+    return found[0] + _AFTER_PATH.split(public, maxsplit=1)[0]
+
+
+def has_login(rest: str) -> bool:
+    """Return whether an address has a name or password; it may have an ``@`` in its path.
+
+    :param rest: of the address, after ``://``.
+    """
+    return "@" in rest and not _HOST.match(rest)
+
+
+def unicode_text(path: str | Path) -> str:
+    """Return a path as text for other programs: bytes that are not UTF-8 become U+FFFD.
 
     Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with
     them can name a file, but cannot be printed, or be part of JSON or of Blender's names.
@@ -122,11 +161,11 @@ def display_text(path: str | Path) -> str:
 
 
 def json_text(value: object, indent: int | None = None) -> str:
-    """Return JSON in ASCII, in which file names are as in `display_text`."""
+    """Return JSON in ASCII, in which file names are as in `unicode_text`."""
     import json  # here, because Blender loads this module when it starts
 
     return json.dumps(
-        json.loads(display_text(json.dumps(value, ensure_ascii=False))), indent=indent
+        json.loads(unicode_text(json.dumps(value, ensure_ascii=False))), indent=indent
     )
 
 

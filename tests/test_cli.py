@@ -346,3 +346,23 @@ def test_the_start_loads_no_library_that_only_a_capture_needs():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_names_and_addresses_reach_a_terminal_without_what_could_forge_or_betray(tmp_path, capsys):
+    """Whatever the command, and whether it is a message, a warning or an error."""
+    hostile = "\x1b[2K\nscope: wrote all.npz\u202e"
+    commands = [
+        ["capture", str(tmp_path / f"{hostile}.mp4")],
+        ["capture", "rtsp://me:SECRET@camera/x"],
+        ["import", str(tmp_path / f"{hostile}.npz")],
+        ["import", str(tmp_path / "none.npz"), "-o", str(tmp_path / f"{hostile}.glb")],
+        ["batch", str(tmp_path / hostile), "--out", str(tmp_path / "out")],
+        ["live", str(tmp_path / f"{hostile}.mp4")],
+        ["live", "rtsp://me:SECRET@127.0.0.1:1/x?token=SECRET", "--reconnect", "0"],
+    ]
+    for command in commands:
+        assert main(command) != 0
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1, command
+        assert said.rstrip("\n").isprintable()
+        assert "SECRET" not in said

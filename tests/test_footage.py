@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.footage import (
+    display_address,
     display_text,
     is_sequence,
     is_url,
@@ -83,3 +84,40 @@ def test_names_that_are_no_text_can_be_shown() -> None:
     text = json_text({odd: [odd, "é", 1.5, None]})
     assert text.isascii()
     assert json.loads(text) == {display_text(odd): [display_text(odd), "é", 1.5, None]}
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "rtsp://me:SECRET@camera/x",
+        "rtsp://me:SEC@RET@camera/x",
+        "rtsp://me:SEC/RET@camera/x",
+        "rtsp://me:SEC?RET@camera/x",
+        "rtsp://me:SEC#R@E/T@camera/x",
+        "rtsp://SECRET@camera/x",
+        "rtsp://camera/x?token=SECRET",
+        "rtsp://me:SECRET@camera/x?token=SECRET#SECRET",
+        "rtsp://camera/x;pw=SECRET",
+    ],
+)
+def test_an_address_is_shown_without_its_secrets(address: str) -> None:
+    assert display_address(address) == "rtsp://camera/x"
+    shown = display_text(f"{address} cannot be opened ('{address}')")
+    assert shown == "rtsp://camera/x cannot be opened ('rtsp://camera/x')"
+
+
+@pytest.mark.parametrize(
+    "text", ["/takes/a@b?c.mp4", "rtsp://camera:554/a@b", "http://[::1]:80/a", "s3://takes/a", ""]
+)
+def test_other_texts_are_shown_as_they_are(text: str) -> None:
+    assert display_address(text) == text
+    assert display_text(text) == text
+
+
+def test_a_name_cannot_end_a_line_move_the_cursor_or_turn_the_text() -> None:
+    hostile = "a\nscope: wrote b\r\x1b[2K\x1b]0;c\x07\x7f\x9b2J\u2028\u202e4pm.\u2066\u200f\u061c"
+    shown = display_text(hostile)
+    assert len(shown) == len(hostile)
+    assert shown.isprintable()
+    assert shown.replace("\N{REPLACEMENT CHARACTER}", "") == "ascope: wrote b[2K]0;c2J4pm."
+    assert display_text("ขา क्षेत्र 👩‍🚀 e\u0301.mp4") == "ขา क्षेत्र 👩‍🚀 e\u0301.mp4"

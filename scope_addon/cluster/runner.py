@@ -21,7 +21,7 @@ from distributed import Client, Future
 
 from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
-from ..footage import is_url
+from ..footage import display_address, is_url
 from ..job.batch import ROOT
 from ..job.clips.task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
@@ -125,7 +125,7 @@ class DaskRunner:
 
     def report(self) -> dict[str, Any]:
         """See `Runner.report`."""
-        return {"folder": self._folder, **self._workers.report()}
+        return {"folder": display_address(self._folder), **self._workers.report()}
 
     def report_written(self, file: Path) -> None:
         """See `Runner.report_written`.

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ..capture.perception.adapters.network_server import used_bytes
 from ..errors import FAILED
+from ..footage import display_text
 from ..scene.budget import BASE_BYTES
 from ..temporary import discard_all
 
@@ -36,6 +37,8 @@ def bounded_import(path: Path) -> Iterator[None]:
     longest_s = BASE_S + S_PER_MB * size / 1e6
     most_bytes = BASE_BYTES + BYTES_PER_BYTE * size
     done = threading.Event()
+    # While Blender imports, the descriptor 2 leads nowhere.
+    messages = os.dup(2)
     at_start = used_bytes()
 
     def watch() -> None:
@@ -43,12 +46,14 @@ def bounded_import(path: Path) -> Iterator[None]:
         while not done.wait(_INTERVAL_S):
             if time.monotonic() > end:
                 _stop(
-                    f"{path}: Blender did not finish importing this file within {longest_s:.0f} s"
+                    messages,
+                    f"{path}: Blender did not finish importing this file within {longest_s:.0f} s",
                 )
             if used_bytes() - at_start > most_bytes:
                 _stop(
+                    messages,
                     f"{path}: importing this file takes more than {most_bytes / 1e9:.1f} GB of "
-                    "memory"
+                    "memory",
                 )
 
     watcher = threading.Thread(target=watch, name="scope-import", daemon=True)
@@ -58,11 +63,15 @@ def bounded_import(path: Path) -> Iterator[None]:
     finally:
         done.set()
         watcher.join()
+        os.close(messages)
 
 
-def _stop(what: str) -> None:
+def _stop(messages: int, what: str) -> None:
+    """Say in one line why the process ends, and end it.
+
+    :param messages: open file.
+    """
     discard_all()
-    os.write(
-        2, f"scope: {what}; export it again or choose another\n".encode("utf-8", "surrogateescape")
-    )
+    text = display_text(f"scope: {what}; export it again or choose another")
+    os.write(messages, f"{text}\n".encode())
     os._exit(FAILED)

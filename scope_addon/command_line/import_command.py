@@ -10,6 +10,7 @@ from typing import Any
 from ...solver.smpl_family import SKELETONS
 from ..capture_report import warnings_as_json
 from ..counts import counted
+from ..footage import display_text
 from ..options import Place
 from ..scene.export.output_paths import SUFFIXES
 from .arguments import add_options, path_argument, values_in_range
@@ -70,11 +71,8 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     frames = max(map(len, motions))
     rate = motions[0].mocap_framerate
     if not args.json and not args.quiet:
-        print(
-            f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote "
-            f"{', '.join(map(str, written))}",
-            file=sys.stderr,
-        )
+        names = display_text(", ".join(map(str, written)))
+        print(f"{counted(frames, 'frame')} at {rate:g} frames/s; wrote {names}", file=sys.stderr)
     return {
         "source": str(args.motion),
         "body": body.name,

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Self, TextIO
 
+from ..footage import display_text
 from . import signals
 
 _CLEAR_LINE = "\r\x1b[K"
@@ -18,7 +19,7 @@ _CLEAR_LINE = "\r\x1b[K"
 def print_message(text: str) -> None:
     """Print a message on a separate line, even if a progress bar is shown."""
     clear = _CLEAR_LINE if sys.stderr.isatty() else ""
-    print(f"{clear}scope: {text}", file=sys.stderr, flush=True)
+    print(f"{clear}scope: {display_text(text)}", file=sys.stderr, flush=True)
 
 
 def open_standard_streams() -> None:
@@ -55,7 +56,7 @@ class ProgressLine:
         if signals.received:
             raise KeyboardInterrupt
         if self._show:
-            self._stream.write(f"{_CLEAR_LINE}{text[:100]}")
+            self._stream.write(f"{_CLEAR_LINE}{display_text(text)[:100]}")
             self._stream.flush()
 
     def __enter__(self) -> Self:

@@ -18,7 +18,7 @@ from ..capture.media.video_range import FootageRange
 from ..capture_report import Report
 from ..counts import counted
 from ..errors import OutputError
-from ..footage import display_text
+from ..footage import unicode_text
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from ..notices import REASONS, Notice, TimeText
@@ -69,7 +69,7 @@ def write_capture_page(path: Path, clip: CapturedClip, progress: Progress | None
     """
     rows = shown_rows(clip.motions)
     pictures = overlay_pictures(clip.video, clip.motions, clip.body, rows, clip.wanted, progress)
-    content = display_text(capture_page(clip, rows, pictures)).encode()
+    content = unicode_text(capture_page(clip, rows, pictures)).encode()
     try:
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)

@@ -62,7 +62,7 @@ class Capture:
 
     def __init__(self, frames: int, noise_rad: float) -> None:
         random = np.random.default_rng(0)
-        self.poses = (random.normal(size=(frames, 72)) * noise_rad).astype(np.float32)
+        self.poses = (np.abs(random.normal(size=(frames, 72))) * noise_rad).astype(np.float32)
         self.trans = np.zeros((frames, 3), np.float32)
 
     def __len__(self) -> int:

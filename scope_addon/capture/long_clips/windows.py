@@ -31,7 +31,7 @@ from ..tracking.track import Tracklet
 WARM_UP_S = 1.5
 MAX_WINDOWS = 10_000
 # In a window, on average: otherwise frames far apart would have a window, and a file, each.
-_LEAST_FRAMES = 24
+_LEAST_FRAMES = 4
 _TOLERANCE_S = 1e-6  # of a frame's time, as in decoding
 
 

@@ -94,7 +94,7 @@ def ask_for_formats(text: str) -> Camera:
     """
     source = camera_source(text)
     if source is None:
-        said = "a stream" if "://" in text else text  # whose address may contain a password
+        said = "a stream" if "://" in text else text
         raise UsageError(f"{said} is not a camera; give its number, 0 for the first")
     with temporary_folder("formats") as folder:
         process = FormatsProcess(source, folder, [sys.executable])

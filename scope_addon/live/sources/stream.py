@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from ...capture.media.frame_readers import orientation, rgb, upright
 from ...capture.media.image_size import check_size
 from ...errors import VideoError
+from ...footage import display_address
 from ..clock import Clock
 from .damage import Damage
 from .source import DEFAULT_FPS, Picture
@@ -47,9 +47,8 @@ class StreamSource:
     ends = False
 
     def __init__(self, url: str) -> None:
-        # without a password
         self._url = url
-        self.name = re.sub(r"//[^/@]*@", "//", url)
+        self.name = display_address(url)
         self.fps = DEFAULT_FPS
         self.focal_35mm: float | None = None
 

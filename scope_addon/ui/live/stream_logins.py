@@ -5,23 +5,36 @@ from __future__ import annotations
 
 import re
 
-_logins: dict[str, str] = {}  # by the address without it
+from ...footage import display_address, has_login
+
+_addresses: dict[str, str] = {}  # whole ones, by what is left of them without their secrets
+_SECRET = re.compile(r"[?#;&][^=]*(auth|key|login|pass|pw|secret|sig|token|user)[^=]*=", re.I)
 
 
 def take_login(address: str) -> str:
-    """Return an address without name and password, and remember these."""
-    found = re.fullmatch(r"([A-Za-z][\w+.-]*://)([^/?#]*@)(.*)", address.strip(), re.S)
-    if not found:
+    """Return an address without names, passwords and keys, and remember the whole one."""
+    whole = address.strip()
+    scheme, separator, public = whole.partition("://")
+    if not separator:
         return address
-    _logins[found[1] + found[3]] = found[2]
-    return found[1] + found[3]
+    if has_login(public):
+        place, mark, query = public.partition("?")
+        is_before = "@" in place  # a password may have a question mark
+        public = place.rpartition("@")[2] + mark + query if is_before else public.rpartition("@")[2]
+    public = f"{scheme}://{public}"
+    if _SECRET.search(public):
+        public = display_address(public)
+    if public == whole:
+        return address
+    _addresses[public] = whole
+    return public
 
 
 def with_login(address: str) -> str:
-    """Return an address with the name and password that were taken out of it."""
-    return address.replace("://", f"://{_logins.get(address, '')}", 1)
+    """Return an address with what was taken out of it."""
+    return _addresses.get(address, address)
 
 
 def forget() -> None:
     """Forget all of them."""
-    _logins.clear()
+    _addresses.clear()

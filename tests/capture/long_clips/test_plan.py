@@ -52,7 +52,7 @@ def test_short_windows_do_not_warm_up_before_the_one_before() -> None:
 
 
 @pytest.mark.parametrize("suffix", ["mkv", "mp4"])
-@pytest.mark.parametrize(("frames", "days", "most"), [(12, 127, 1), (60, 127, 2), (60, 0.01, 2)])
+@pytest.mark.parametrize(("frames", "days", "most"), [(12, 127, 3), (60, 127, 15), (60, 0.01, 15)])
 def test_windows_are_planned_by_frames_not_by_the_time_that_they_span(
     tmp_path: Path, suffix: str, frames: int, days: float, most: int
 ) -> None:

@@ -10,6 +10,11 @@ from scope.scope_addon.ui.live.stream_logins import forget, take_login, with_log
     [
         ("rtsp://me:a@b@camera:554/x", "rtsp://camera:554/x"),
         ("http://me@camera", "http://camera"),
+        ("rtsp://me:a/b@camera/x", "rtsp://camera/x"),
+        ("rtsp://me:a@b/c@camera/x", "rtsp://camera/x"),
+        ("rtsp://me:a?b@camera/x", "rtsp://camera/x"),
+        ("http://camera/x?channel=1&token=a", "http://camera/x"),
+        ("http://camera/x;Password=a", "http://camera/x"),
         (" https://:pw@[::1]:80/video?x=a@b ", "https://[::1]:80/video?x=a@b"),
     ],
 )
@@ -21,7 +26,8 @@ def test_a_login_is_taken_out_and_put_in_again(typed, kept):
 
 
 @pytest.mark.parametrize(
-    "address", ["", "rtsp://camera/a@b", "http://camera?x=a@b", "udp://@", "not an address"]
+    "address",
+    ["", "rtsp://camera:554/a@b", "http://camera?x=a@b", "udp://@", "not an address"],
 )
 def test_an_address_without_a_login_is_kept(address):
     taken = take_login(address)
