@@ -9,7 +9,6 @@ import resource
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,11 +22,15 @@ from ..made_motion import made_motion
 MOST_BYTES = 2 << 30
 
 
-def amass(path: Path, frames: int, **arrays: Any) -> Path:
+def amass(path: Path, frames: int) -> Path:
     """A motion file as other tools write it, of a body that does not move."""
-    zeros = {"poses": np.zeros((frames, 72), np.float32), "trans": np.zeros((frames, 3))}
     np.savez_compressed(
-        path, **zeros | arrays, betas=np.zeros(10), mocap_framerate=60.0, gender="neutral"
+        path,
+        poses=np.zeros((frames, 72), np.float32),
+        trans=np.zeros((frames, 3)),
+        betas=np.zeros(10),
+        mocap_framerate=60.0,
+        gender="neutral",
     )
     return path
 

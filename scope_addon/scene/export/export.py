@@ -190,8 +190,8 @@ def _most_keys(rigs: Sequence[bpy.types.Object], scene: bpy.types.Scene) -> int:
     """
     if any(actions.nla_strips(rig) for rig in rigs):
         return scene.frame_end - scene.frame_start + 1
-    curves = [curve for rig in rigs for curve in actions.fcurves(rig)]
-    return max((len(curve.keyframe_points) for curve in curves), default=0)
+    keys = [len(curve.keyframe_points) for rig in rigs for curve in actions.fcurves(rig)]
+    return max(keys, default=0)
 
 
 def export_motions(
