@@ -160,6 +160,18 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
     :param fingers: whether the motion has fingers.
     :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
     """
+    if args.skeleton != option("skeleton").default:
+        named = [path for path in outputs if path.suffix.lower() not in (".npz", ".blend")]
+        if args.retarget is not None:
+            raise UsageError(
+                "--skeleton names the bones of Scope's own body, and a rig keeps its own: give "
+                "either --skeleton or --retarget"
+            )
+        if not named:
+            raise UsageError(
+                "--skeleton needs an output whose bones it can name, such as -o OUT.fbx; motion "
+                "files and .blend files keep Scope's names"
+            )
     if args.retarget is None:
         given = {
             "--bone-map": args.bone_map,
@@ -220,7 +232,9 @@ def write_outputs(
         options = replace(NEW_SCENE, name=display_text(stem_of(video)), shape=args.shape_keys)
         if not motions[0].image_size.any():  # imported, and never seen by a camera
             options = replace(options, resolution="keep", active_camera=False, with_camera=False)
-        separate = ExportOptions(separate=args.file_per_person, bvh_unit=args.bvh_unit)
+        separate = ExportOptions(
+            separate=args.file_per_person, bvh_unit=args.bvh_unit, skeleton=args.skeleton
+        )
         if rig is not None:
             from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
 

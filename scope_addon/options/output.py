@@ -32,6 +32,13 @@ BVH_UNITS = (
     Choice("cm", "Centimetres", "One unit is a centimetre, as most tools expect", 0),
     Choice("m", "Metres", "One unit is a metre", 1),
 )
+SKELETONS = (
+    Choice("scope", "Scope", "The names of the body's joints", 0),
+    Choice("mixamo", "Mixamo", "Names of Mixamo's characters", 1),
+    Choice("ue5", "Unreal 5", "Names of Unreal's mannequins", 2),
+    Choice("vrm", "VRM", "Names of VRM's humanoid table", 3),
+    Choice("unity", "Unity", "Names of Unity's humanoid table", 4),
+)
 FRAME_RATES = (
     Choice(
         "auto",
@@ -84,6 +91,15 @@ OUTPUT_OPTIONS = (
         "unit of length in .bvh files",
         choices=BVH_UNITS,
         blender=Property(label="Unit"),
+    ),
+    Option(
+        "skeleton",
+        str,
+        "scope",
+        Place.COMMAND_LINE | Place.IMPORT,
+        "names of the bones of Scope's own body in .glb, .fbx, .bvh and .usdc files; the rest pose "
+        "is a T-pose",
+        choices=SKELETONS,
     ),
     Option(
         "file_per_person",

@@ -36,8 +36,8 @@ FLAGS = """
 --quality --people --person --start --end --rotate --mirror --crop --fps --speed --body --hands
 --face --height --focal-mm --fov --calibration
 --no-smoothing
---uneven-ground --shape-keys --bvh-unit --file-per-person --retarget --rig-object --bone-map
---expression-map
+--uneven-ground --shape-keys --bvh-unit --skeleton --file-per-person --retarget --rig-object
+--bone-map --expression-map
 --retarget-root --detector --keypoints --provider --threads --json --quiet
 """.split()
 EXTRA = Option(

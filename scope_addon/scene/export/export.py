@@ -44,6 +44,7 @@ from .export_states import (
     unit_of_captures,
 )
 from .output_paths import check_output, person_paths
+from .skeleton_names import OWN, SKELETONS, renamed_bones
 
 SHAPES = ("auto", "keys", "baked")
 
@@ -60,17 +61,22 @@ class ExportOptions:
     shape: str = "auto"
     separate: bool = False  # one file per person, also in formats that can hold several
     bvh_unit: str = "cm"  # of the lengths in .bvh: "cm" or "m"
+    skeleton: str = OWN  # whose names the bones have, in all formats but .blend
     take: str = ""  # name of the animation; empty: the capture's
     unit: float = 0.0  # metres that a length of 1 stands for; 0: as ``unit_of_captures`` says
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises UsageError: when ``shape`` or ``bvh_unit`` is unknown.
+        :raises UsageError: when ``shape``, ``skeleton`` or ``bvh_unit`` is unknown.
         """
         if self.bvh_unit not in UNITS_PER_METRE:
             raise UsageError(
                 f"bvh_unit must be one of {', '.join(UNITS_PER_METRE)}, but is '{self.bvh_unit}'"
+            )
+        if self.skeleton not in SKELETONS:
+            raise UsageError(
+                f"skeleton must be one of {', '.join(SKELETONS)}, but is '{self.skeleton}'"
             )
         if self.shape not in SHAPES:
             raise UsageError(f"shape must be one of {', '.join(SHAPES)}, but is '{self.shape}'")
@@ -152,6 +158,8 @@ def _write_one(
     is_in_metres = by_scene or abs(unit - 1.0) < 1e-6
     with (
         out_of_edit_mode(collections),
+        # A .blend file goes on as a capture, whose bones are known by their names.
+        renamed_bones(rigs, OWN if suffix == ".blend" else options.skeleton),
         # keeps hidden objects as they are
         nullcontext() if suffix == ".blend" else all_evaluated(collections),
         scene_of(collections, rigs, options.camera, unit if by_scene else 1.0) as scene,
