@@ -39,6 +39,7 @@ class Report:
     reprojection_px: float = 0.0
     iterations: float = 0.0
     cuts_s: Sequence[float] = ()
+    views: Sequence[Mapping[str, Any]] = ()  # of several cameras, each one's clock and place
     warnings: Sequence[Notice] = ()
 
     def as_json(self) -> dict[str, Any]:

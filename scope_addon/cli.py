@@ -72,6 +72,7 @@ from .installed import CAPTURE, check_installed
 from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.unfinished import unfinished_capture
+from .job.watched_footage import WatchedFootage
 from .options.capture import OFF
 from .parent import end_with_parent
 from .private_folder import lasting_folder
@@ -140,6 +141,13 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         type=path_argument,
         metavar="VIDEO",
         help="video, image, or numbered images as a folder or walk_####.png (default: a sample)",
+    )
+    capture.add_argument(
+        "views",
+        nargs="*",
+        type=path_argument,
+        metavar="VIEW",
+        help="further videos of the same moment, of other cameras; all must stand still",
     )
     capture.add_argument(
         "-o",
@@ -308,24 +316,29 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .capture.long_clips.windowed_clip import lasting
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
+    from .capture.several_views.capture_views import capture_views
     from .report.capture_page import CapturedClip, write_capture_page
 
     with ExitStack() as stack:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         if found := window_report(args, video, options, progress):
             return found
-        unfinished = stack.enter_context(
-            unfinished_capture(lasting_folder(), video, options.wanted.fps is not None)
-        )
+        rate_given = options.wanted.fps is not None
+        # What several cameras show is not continued after a kill.
+        folder = None if args.views else lasting_folder()
+        unfinished = stack.enter_context(unfinished_capture(folder, video, rate_given))
         footage = unfinished.footage
-        result = capture(
-            video,
-            body,
-            options,
-            footage.watched(progress),
-            observe_frames=lasting(unfinished.folder, args.windows_folder),
-        )
-        footage.check()
+        views = [WatchedFootage(path, rate_given) for path in args.views]
+        watched = footage.watched(progress)
+        for view in views:
+            watched = view.watched(watched)
+        if args.views:
+            result = capture_views([video, *args.views], body, options, watched)
+        else:
+            observe_frames = lasting(unfinished.folder, args.windows_folder)
+            result = capture(video, body, options, watched, observe_frames=observe_frames)
+        for each in (footage, *views):
+            each.check()
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
             written, warnings = write_outputs(outputs, result.motions, body, video, args, rig)

@@ -63,6 +63,16 @@ SENTENCES = {
     "networks run on the CPU",
     "provider_failed": "{provider} cannot run the networks ({reason}); they run on the CPU instead",
     "too_many_threads": "{threads} threads were requested, but there are only {cores} cores",
+    # several cameras
+    "view_without_place": "{footage} was not used: nobody in it moves like the person of the first "
+    "video for a second; all videos must show the same moment",
+    "uncertain_offset": "{footage}: another offset than {offset_s:.2f} s between the clocks of the "
+    "cameras would fit nearly as well; clap once at the beginning, or move irregularly",
+    "weak_place": "{footage}: the angle between this camera and the first one is known to "
+    "{degrees:.0f} degrees only; walk around, so that you fill more of both images",
+    "not_in_view": "{footage} does not show {person:who}, or was not recognized",
+    "view_contradicts": "{footage} contradicts the other cameras about {person:who} {times:times}, "
+    "and was left out there",
     # the captured people
     "cuts": "{footage} cuts to another scene {times:times}: capture each scene separately, with a "
     "start and end time",

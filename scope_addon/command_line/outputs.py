@@ -65,6 +65,7 @@ def _is_shipped(folder: Path) -> bool:
 
 # Arguments and options that name footage, or another file to read.
 FOOTAGE = ("video", "source")
+VIEWS = "views"
 OTHER_INPUTS = (
     *("motion", "body", "calibration", "retarget", "bone_map", "expression_map"),
     *("detector", "keypoints"),
@@ -78,8 +79,8 @@ def files_to_read(values: Mapping[str, Any]) -> list[Path]:
     :param values: of arguments and options, by their names.
     """
     files: list[Path] = []
-    for name in FOOTAGE:
-        value = values.get(name)
+    footage = [values.get(name) for name in FOOTAGE]
+    for value in [*footage, *values.get(VIEWS, ())]:
         if value is not None and not is_url(value):
             files += files_of_footage(Path(value))
     for name in OTHER_INPUTS:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....solver import Body, Floor, Measurements, Priors, Weights, default_priors
+from ....solver import Body, Floor, Measurements, Priors, View, Weights, default_priors
 from ....solver.body_file import CHILD_BELOW_M
-from ...arrays import FloatArray, IndexArray
+from ...arrays import Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
@@ -24,6 +24,8 @@ from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_stature, with_unknown_stature
 from .weights import WEIGHTS, joint_weights
 
+# The weight of lifted directions where several cameras see a person, divided by their number.
+DIRECTIONS_OF_VIEWS = 0.5
 SHAPE_CERTAINTY = 1e6  # information (1/σ² per coefficient) that fixes the shape once it is known
 
 
@@ -56,6 +58,28 @@ class Stance:
 
 
 @dataclass(frozen=True)
+class OtherView:
+    """The same person in another camera that does not move, at the times of the track's frames."""
+
+    measurer: Measurer
+    pixels: FloatArray  # (T, J, 2) keypoints without lens distortion
+    confidence: FloatArray  # (T, J) 0..1; 0 where the camera does not see the person
+    lifted: Lifted
+    R_camera_first: Float64Array  # (3, 3)
+    t_camera_first: Float64Array  # (3,) metres
+
+    def sees(self, k: int) -> bool:
+        """Whether the camera sees the person in frame ``k``."""
+        return bool(self.confidence[k].max() > 0.0)
+
+    def measure(self, k: int) -> Measurements:
+        """Return what the camera measures of the body in frame ``k``, in its own axes."""
+        points = self.lifted.points[k]
+        sigma = self.lifted.sigma_along[k]
+        return self.measurer.measure(self.pixels[k], self.confidence[k], points, sigma)
+
+
+@dataclass(frozen=True)
 class PreparedTrack:
     """What every pass over a track needs, computed once: undistorted keypoints, the lifter's
     points, priors.
@@ -78,6 +102,29 @@ class PreparedTrack:
     is_stature_given: bool = False  # by the user
     # In each frame's camera; the body's last keypoints are then its contact points.
     stance: Stance | None = None
+    others: tuple[OtherView, ...] = ()  # the same person in other cameras
+
+    def views(self, k: int, measured: Measurements) -> list[View]:
+        """Return what all cameras measured of frame ``k``, each in its own axes.
+
+        Where another camera sees the person, depth follows from both: the lifted points, and the
+        pelvis as it follows from the floor, are left out, and directions weigh less.
+
+        :param measured: what the track's own camera measured.
+        """
+        seen = [other for other in self.others if other.sees(k)]
+        if not seen:
+            return [View(measured)]
+        share = DIRECTIONS_OF_VIEWS / (len(seen) + 1)
+        own = replace(_without_depth(measured, share), pose_priors=None)
+        if not self.track.seen[k]:
+            own = replace(own, keypoints2d=None, orientation_field=None)
+        return [View(own)] + [
+            View(
+                _without_depth(other.measure(k), share), other.R_camera_first, other.t_camera_first
+            )
+            for other in seen
+        ]
 
     def measure(self, k: int, root_cam: FloatArray | None = None) -> Measurements:
         """Return the measurements of the body in frame ``k``.
@@ -132,9 +179,18 @@ class PreparedTrack:
         K = self.measurer.intrinsics
         body = whole if self.body is self.whole_body else without_fingers(whole)
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
-        measurer = Measurer(body, K)
+        others = tuple(
+            replace(other, measurer=Measurer(body, other.measurer.intrinsics))
+            for other in self.others
+        )
         return replace(
-            self, body=body, whole_body=whole, measurer=measurer, hand_measurer=hands, stance=stance
+            self,
+            body=body,
+            whole_body=whole,
+            measurer=Measurer(body, K),
+            hand_measurer=hands,
+            stance=stance,
+            others=others,
         )
 
     def with_height(self, height_m: float, sigma_m: float) -> PreparedTrack:
@@ -148,6 +204,14 @@ class PreparedTrack:
         return replace(
             self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY
         )
+
+
+def _without_depth(measured: Measurements, share: float) -> Measurements:
+    """Return measurements without lifted points, and with directions of less weight."""
+    field = measured.orientation_field
+    if field is not None:
+        field = replace(field, confidence=share * np.asarray(field.confidence))
+    return replace(measured, keypoints3d=None, orientation_field=field)
 
 
 def prepare_track(

@@ -153,10 +153,17 @@ def solve(
     :param tracks: the most prominent person's first.
     :param heights_m: known statures of the first people, metres.
     """
-    people = prepare(shot, tracks, progress, heights_m)
+    return solve_people(shot, prepare(shot, tracks, progress, heights_m), len(heights_m))
+
+
+def solve_people(shot: Shot, people: Sequence[Person], known: int) -> Solved:
+    """Fit prepared people, the most prominent one first; see `solve`.
+
+    :param known: of how many people, the first ones, the stature is known.
+    """
     for person in people:
         person.fit_alone()
-    resize_people(shot, people, len(heights_m))
+    resize_people(shot, people, known)
     shot = replace(shot, path=find_camera_path(shot, people[0]))
     iterations = people[0].fit.iterations
     if not shot.is_still:

@@ -91,7 +91,9 @@ class _Clip:
         quadratic, robust = motion_priors(body, times)
         window = ClipWindow.of(self._prepared, self._path, frames, self._start.betas)
         found = window.fit(every, [self._state(k) for k in frames], quadratic)
-        better = search_limbs(body, window, found, quadratic)
+        # Several cameras tell the two poses apart.
+        alone = not self._prepared.others
+        better = search_limbs(body, window, found, quadratic) if alone else None
         if better is not None:
             found = window.fit(every, better, quadratic)
         resting = window.with_resting_places(found)

@@ -169,6 +169,9 @@ class ClipWindow:
         measured = self.measured[rows]
         frames = self.frames[rows]
         path = self.path
+        if self.prepared.others:
+            prepared = self.prepared
+            return [prepared.views(k, each) for k, each in zip(frames, measured, strict=True)]
         if path.is_static:
             return measured
         R = np.swapaxes(path.R_first_camera[frames], 1, 2)

@@ -1,0 +1,494 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cameras, clocks, bones and keypoints of a clip as one problem (bundle adjustment).
+
+    minimize  sum over k, n of c rho(|r_kn|^2 / sigma^2) + priors
+              + sum over frames, bones of rho(log(|X_a - X_b| / L_ab)^2 (M_ab / sigma_L)^2),
+    r_kn = s_k pi(R_k X_n + t_k) - x_kn(t_n + tau_k)
+
+over the keypoints X_n in the first camera's axes, the lengths L of bones, which are the same in all
+frames and on both sides (M: the mean body's), and of each camera k its pose R_k, t_k
+(R_camera_first), the scale s_k of its focal length and the offset tau_k of its clock. x_kn are rays
+between frames, by linear interpolation, c is the confidence, rho(s) = log(1 + s). The first camera
+has R = 1, t = 0, tau = 0.
+
+A person who fills a small part of two images hardly shows perspective there, and two such images do
+not tell the angle between their cameras (Koenderink and van Doorn 1991). Lengths that do not change
+while the body moves do. Their prior, an adult's bones, gives the whole its size.
+
+The points of a frame depend on no other frame's, so they are eliminated from the normal equations
+(Schur complement), and a dense system of 8 unknowns a camera and one a bone is left.
+
+Sources: Triggs et al. 2000, Bundle adjustment - a modern synthesis; Albl et al. 2017 for the
+offsets of unsynchronized cameras, whose points move linearly between frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....solver.rotations import exp
+from ...arrays import BoolArray, Float64Array
+from .seen_person import BONE_ENDS, BONE_OF_ROW, BONE_STARTS, MIN_CONFIDENCE, SeenPerson
+
+KEYPOINT_SIGMA = 0.004  # of a keypoint, normalized image coordinates
+# Of a bone's length in one frame: networks place hips and shoulders by 1 to 3 cm differently from
+# the front and from the side.
+BONE_SIGMA_M = 0.02
+BONE_PRIOR = 0.07  # relative deviation of a length from the mean body's
+# A network's errors are alike in neighbouring frames and keypoints, so that this share of them
+# counts against priors. With 0.1, focal lengths of two phones that are known to 3 and 20 % end 2
+# and 8 % off, with all of them 13 and 11 %; with 0.01, offsets get worse.
+_INDEPENDENT = 0.03
+_UNKNOWNS = 8  # of a camera: rotation 3, position 3, logarithm of the focal scale, offset
+_FOCAL = 6
+_CLOCK = 7
+_CLOCK_SIGMA_S = 0.1  # of the offset that the bundle starts from
+_STEPS = 60
+_TOLERANCE = 1e-4  # relative decrease of the cost
+NEAREST_M = 0.2  # the least distance of a keypoint from a camera
+
+
+@dataclass(frozen=True)
+class CameraPlace:
+    """Where a camera is, in the first camera's axes, and its clock and focal length."""
+
+    R_camera_first: Float64Array  # (3, 3)
+    t_camera_first: Float64Array  # (3,) metres
+    log_focal: float = 0.0  # of the true focal length over the assumed one
+    offset_s: float = 0.0  # its clock less the first camera's
+    # Standard deviations of the two, and of the pose: rotation in radians, position in metres.
+    focal_sigma: float = 0.0
+    offset_sigma_s: float = 0.0
+    rotation_sigma: float = 0.0
+    position_sigma_m: float = 0.0
+
+    @classmethod
+    def first(cls) -> CameraPlace:
+        """Return the place of the first camera."""
+        return cls(np.eye(3), np.zeros(3))
+
+    def of(self, points: Float64Array) -> Float64Array:
+        """Return points (..., 3) of the first camera's axes in this camera's."""
+        moved: Float64Array = points @ self.R_camera_first.T + self.t_camera_first
+        return moved
+
+    @property
+    def center(self) -> Float64Array:
+        """The camera in the first camera's axes, metres."""
+        center: Float64Array = -self.R_camera_first.T @ self.t_camera_first
+        return center
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Adjusted cameras, and the keypoints (N, n, 3) at times (N,) of the first camera's clock."""
+
+    cameras: list[CameraPlace]
+    lengths: Float64Array  # (B,) of the bones, metres
+    times: Float64Array
+    points: Float64Array
+    known: BoolArray  # (N, n) whether at least two cameras see the keypoint
+    # (V, N, n) distances from the rays, in standard deviations of a keypoint; NaN: not seen
+    residuals: Float64Array
+    cost: float
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """All that is adjusted."""
+
+    cameras: list[CameraPlace]
+    lengths: Float64Array
+    points: Float64Array
+
+    def moved(self, step: Float64Array, points: Float64Array) -> _Unknowns:
+        """Return them after a step of cameras and lengths, and one of the points."""
+        count = len(self.cameras)
+        of_cameras = step[: count * _UNKNOWNS].reshape(count, _UNKNOWNS)
+        return _Unknowns(
+            [_moved(place, own) for place, own in zip(self.cameras, of_cameras, strict=True)],
+            self.lengths * np.exp(step[count * _UNKNOWNS :]),
+            self.points + points,
+        )
+
+
+def adjust(
+    people: Sequence[SeenPerson],
+    cameras: Sequence[CameraPlace],
+    times: Float64Array,
+    focal_sigma: Sequence[float],
+    mean_lengths: Float64Array,
+    size_sigma: float = BONE_PRIOR,
+) -> Bundle:
+    """Adjust cameras to what they see of one person.
+
+    :param people: the person as each of the V cameras sees them.
+    :param cameras: where to start; the first one is at the origin.
+    :param times: (N,) of the first camera's clock, seconds.
+    :param focal_sigma: (V,) relative errors of the focal lengths; 0: they are known.
+    :param mean_lengths: (B,) the bones of the mean body, or of one of the person's stature, metres.
+    """
+    problem = _Problem(people, times, list(cameras), focal_sigma, mean_lengths, size_sigma)
+    start = triangulate(*problem.observed(cameras), cameras)
+    now = _Unknowns(list(cameras), mean_lengths.copy(), start)
+    damping = 1e-3
+    cost = problem.cost(now)
+    for _ in range(_STEPS):
+        system = problem.linearize(now)
+        for _ in range(8):
+            after = now.moved(*system.solve(damping))
+            cost_after = problem.cost(after)
+            if cost_after < cost:
+                break
+            damping *= 10.0
+        else:
+            break
+        gain = (cost - cost_after) / max(cost, 1e-12)
+        now = after
+        cost = cost_after
+        damping = max(damping * 0.2, 1e-9)
+        if gain < _TOLERANCE:
+            break
+    return problem.result(now, cost)
+
+
+def triangulate(
+    rays: Float64Array, confidence: Float64Array, cameras: Sequence[CameraPlace]
+) -> Float64Array:
+    """Return the points (..., 3), first camera's axes, that are nearest to the rays of all cameras.
+
+    :param rays: (V, ..., 2) normalized image coordinates. :param confidence: (V, ...).
+    """
+    A = np.zeros((*confidence.shape[1:], 3, 3))
+    b = np.zeros((*confidence.shape[1:], 3))
+    for ray, weight, camera in zip(rays, confidence, cameras, strict=True):
+        line = np.concatenate(
+            [ray / np.exp(camera.log_focal), np.ones((*ray.shape[:-1], 1))], axis=-1
+        )
+        line = line / np.linalg.norm(line, axis=-1, keepdims=True) @ camera.R_camera_first
+        across = np.eye(3) - line[..., :, None] * line[..., None, :]
+        across = across * weight[..., None, None]
+        A += across
+        b += across @ camera.center
+    A += 1e-9 * np.eye(3)
+    points: Float64Array = np.linalg.solve(A, b[..., None])[..., 0]
+    return points
+
+
+def _moved(place: CameraPlace, step: Float64Array) -> CameraPlace:
+    turn = exp(step[:3])
+    return replace(
+        place,
+        R_camera_first=turn @ place.R_camera_first,
+        t_camera_first=turn @ place.t_camera_first + step[3:6],
+        log_focal=place.log_focal + float(step[_FOCAL]),
+        offset_s=place.offset_s + float(step[_CLOCK]),
+    )
+
+
+@dataclass
+class _System:
+    """The normal equations: of cameras and lengths (G, G), of each frame's points (N, 3n, 3n), and
+    between them (N, G, 3n).
+    """
+
+    H_global: Float64Array
+    g_global: Float64Array
+    H_points: Float64Array
+    g_points: Float64Array
+    coupling: Float64Array
+    is_free: BoolArray  # (G,)
+
+    def solve(self, damping: float) -> tuple[Float64Array, Float64Array]:
+        """Return the steps of cameras and lengths (G,) and of points (N, n, 3)."""
+        S, reduced, from_global, alone = self._reduced(damping)
+        free = self.is_free
+        step = np.zeros(len(free))
+        step[free] = np.linalg.solve(S[np.ix_(free, free)], -reduced[free])
+        points = -(alone + from_global @ step)
+        return step, points.reshape(len(points), -1, 3)
+
+    def sigmas(self) -> Float64Array:
+        """Return the (G,) standard deviations of cameras and lengths."""
+        S, *_ = self._reduced(1e-9)
+        free = self.is_free
+        variance = np.zeros(len(free))
+        variance[free] = np.diag(np.linalg.pinv(S[np.ix_(free, free)], rcond=1e-12))
+        sigmas: Float64Array = np.sqrt(np.maximum(variance, 0.0) / _INDEPENDENT)
+        return sigmas
+
+    def _reduced(
+        self, damping: float
+    ) -> tuple[Float64Array, Float64Array, Float64Array, Float64Array]:
+        """Return the Schur complement and its gradient, and the points' steps: by step of a global
+        unknown (N, 3n, G), and alone (N, 3n).
+        """
+        diagonal = np.einsum("nii->ni", self.H_points)
+        damped = self.H_points.copy()
+        np.einsum("nii->ni", damped)[:] += damping * diagonal + 1e-6
+        both = np.concatenate([np.swapaxes(self.coupling, 1, 2), self.g_points[:, :, None]], axis=2)
+        solved = np.linalg.solve(damped, both)
+        from_global = solved[:, :, :-1]
+        alone = solved[:, :, -1]
+        size = len(self.g_global)
+        rows = np.swapaxes(self.coupling, 0, 1).reshape(size, -1)
+        S = self.H_global + damping * np.diag(np.diag(self.H_global))
+        S = S - rows @ from_global.reshape(-1, size)
+        return S, self.g_global - rows @ alone.ravel(), from_global, alone
+
+
+class _Problem:
+    """What is given of a bundle."""
+
+    def __init__(
+        self,
+        people: Sequence[SeenPerson],
+        times: Float64Array,
+        start: list[CameraPlace],
+        focal_sigma: Sequence[float],
+        mean_lengths: Float64Array,
+        size_sigma: float,
+    ) -> None:
+        self.people = people
+        self.times = times
+        self.start = start
+        self.focal_sigma = focal_sigma
+        self.mean_lengths = mean_lengths
+        self.size_sigma = size_sigma
+        of_cameras = np.ones((len(people), _UNKNOWNS), bool)
+        of_cameras[0, :_FOCAL] = False
+        of_cameras[0, _CLOCK] = False
+        of_cameras[:, _FOCAL] = np.asarray(focal_sigma) > 0
+        self.is_free = np.append(of_cameras.ravel(), np.ones(len(mean_lengths), bool))
+
+    def observed(self, places: Sequence[CameraPlace]) -> tuple[Float64Array, Float64Array]:
+        """Return rays (V, N, n, 2) and their confidence (V, N, n) at the cameras' own times; a
+        keypoint that fewer than two cameras see has none.
+        """
+        at = [
+            person.at(self.times + place.offset_s)
+            for person, place in zip(self.people, places, strict=True)
+        ]
+        rays = np.array([each.rays for each in at])
+        confidence = np.array([each.confidence for each in at])
+        confidence[confidence < MIN_CONFIDENCE] = 0.0
+        confidence *= (confidence > 0).sum(axis=0) >= 2
+        return rays, confidence
+
+    def cost(self, now: _Unknowns) -> float:
+        """Return the sum of all terms."""
+        rays, confidence = self.observed(now.cameras)
+        total = self._prior_cost(now)
+        for ray, weight, place in zip(rays, confidence, now.cameras, strict=True):
+            residual, depth = _residual(ray, place, now.points)
+            square = np.square(residual).sum(axis=-1) / KEYPOINT_SIGMA**2
+            square = np.where(depth > NEAREST_M, square, 1e4)
+            total += float((weight * np.log1p(square)).sum())
+        known = (confidence > 0).any(axis=0)
+        stretch = self._stretch(now)[0]
+        weight = (known[:, BONE_STARTS] & known[:, BONE_ENDS]).astype(float)
+        return total + float((weight * np.log1p(np.square(stretch / BONE_SIGMA_M))).sum())
+
+    def _prior_cost(self, now: _Unknowns) -> float:
+        lengths = np.log(now.lengths / self.mean_lengths) / self.size_sigma
+        total = float(np.square(lengths).sum())
+        for place, start, sigma in zip(now.cameras, self.start, self.focal_sigma, strict=True):
+            total += ((place.offset_s - start.offset_s) / _CLOCK_SIGMA_S) ** 2
+            if sigma > 0:
+                total += (place.log_focal / sigma) ** 2
+        return total / _INDEPENDENT
+
+    def linearize(self, now: _Unknowns) -> _System:
+        """Return the normal equations, by iterated weights."""
+        N, n = now.points.shape[:2]
+        size = len(self.is_free)
+        rays, confidence = self.observed(now.cameras)
+        H_global = np.zeros((size, size))
+        g_global = np.zeros(size)
+        H_points = np.zeros((N, n, 3, n, 3))
+        g_points = np.zeros((N, n, 3))
+        coupling = np.zeros((N, size, n, 3))
+        flat = now.points.reshape(-1, 3)
+        each = np.arange(n)
+        for v, place in enumerate(now.cameras):
+            own = slice(v * _UNKNOWNS, (v + 1) * _UNKNOWNS)
+            speed = self._speed(v, place).reshape(-1, 2)
+            residual, depth = _residual(rays[v].reshape(-1, 2), place, flat)
+            square = np.square(residual).sum(axis=-1) / KEYPOINT_SIGMA**2
+            weight = (
+                confidence[v].ravel() * (depth > NEAREST_M) / (1.0 + square) / KEYPOINT_SIGMA**2
+            )
+            J_point, J_camera = _derivatives(place, flat, speed)
+            weighted_camera = J_camera * weight[:, None, None]
+            weighted_point = J_point * weight[:, None, None]
+            H_global[own, own] += np.einsum("mri,mrj->ij", weighted_camera, J_camera)
+            g_global[own] += np.einsum("mri,mr->i", weighted_camera, residual)
+            block = np.swapaxes(weighted_point, 1, 2) @ J_point
+            H_points[:, each, :, each, :] += np.swapaxes(block.reshape(N, n, 3, 3), 0, 1)
+            g_points += np.einsum("mrp,mr->mp", weighted_point, residual).reshape(N, n, 3)
+            between = np.swapaxes(weighted_camera, 1, 2) @ J_point
+            coupling[:, own] += np.swapaxes(between.reshape(N, n, _UNKNOWNS, 3), 1, 2)
+        known = (confidence > 0).any(axis=0)
+        self._add_bones(now, known, H_global, g_global)
+        self._add_bones_to_points(now, known, H_points, g_points, coupling)
+        self._add_priors(now, H_global, g_global)
+        return _System(
+            H_global,
+            g_global,
+            H_points.reshape(N, 3 * n, 3 * n),
+            g_points.reshape(N, 3 * n),
+            coupling.reshape(N, size, 3 * n),
+            self.is_free,
+        )
+
+    def _stretch(self, now: _Unknowns) -> tuple[Float64Array, Float64Array]:
+        """Return by how much bones are too long (N, rows), metres of the mean body, and the
+        derivative (N, rows, 3) by the position of their ends.
+        """
+        bones = now.points[:, BONE_ENDS] - now.points[:, BONE_STARTS]
+        length = np.maximum(np.linalg.norm(bones, axis=-1), 1e-3)
+        mean = self.mean_lengths[BONE_OF_ROW]
+        stretch = mean * np.log(length / now.lengths[BONE_OF_ROW])
+        return stretch, mean[:, None] * bones / np.square(length)[..., None]
+
+    def _bone_weight(self, stretch: Float64Array, known: BoolArray) -> Float64Array:
+        both = known[:, BONE_STARTS] & known[:, BONE_ENDS]
+        weight: Float64Array = both / (1.0 + np.square(stretch / BONE_SIGMA_M)) / BONE_SIGMA_M**2
+        return weight
+
+    def _add_bones(
+        self, now: _Unknowns, known: BoolArray, H_global: Float64Array, g_global: Float64Array
+    ) -> None:
+        """Add what bones say about their lengths."""
+        stretch, _ = self._stretch(now)
+        weight = self._bone_weight(stretch, known)
+        at = len(now.cameras) * _UNKNOWNS + BONE_OF_ROW
+        mean = self.mean_lengths[BONE_OF_ROW]
+        np.add.at(H_global, (at, at), weight.sum(axis=0) * mean**2)
+        np.add.at(g_global, at, -(weight * stretch).sum(axis=0) * mean)
+
+    def _add_bones_to_points(
+        self,
+        now: _Unknowns,
+        known: BoolArray,
+        H_points: Float64Array,
+        g_points: Float64Array,
+        coupling: Float64Array,
+    ) -> None:
+        """Add what bones say about the points at their ends."""
+        stretch, gradient = self._stretch(now)
+        weight = self._bone_weight(stretch, known)
+        for row, (start, end) in enumerate(zip(BONE_STARTS, BONE_ENDS, strict=True)):
+            u = gradient[:, row]
+            mean = self.mean_lengths[BONE_OF_ROW[row]]
+            w = weight[:, row, None]
+            block = w[..., None] * u[:, :, None] * u[:, None, :]
+            H_points[:, start, :, start] += block
+            H_points[:, end, :, end] += block
+            H_points[:, start, :, end] -= block
+            H_points[:, end, :, start] -= block
+            pull = w * stretch[:, row, None] * u
+            g_points[:, end] += pull
+            g_points[:, start] -= pull
+            at = len(now.cameras) * _UNKNOWNS + BONE_OF_ROW[row]
+            coupling[:, at, end] -= mean * w * u
+            coupling[:, at, start] += mean * w * u
+
+    def _add_priors(self, now: _Unknowns, H_global: Float64Array, g_global: Float64Array) -> None:
+        diagonal = np.zeros(len(g_global))
+        pull = np.zeros(len(g_global))
+        for v, (place, start) in enumerate(zip(now.cameras, self.start, strict=True)):
+            clock = v * _UNKNOWNS + _CLOCK
+            diagonal[clock] = 1.0 / _CLOCK_SIGMA_S**2
+            pull[clock] = place.offset_s - start.offset_s
+            if self.focal_sigma[v] > 0:
+                focal = v * _UNKNOWNS + _FOCAL
+                diagonal[focal] = 1.0 / self.focal_sigma[v] ** 2
+                pull[focal] = place.log_focal
+        lengths = slice(len(now.cameras) * _UNKNOWNS, None)
+        diagonal[lengths] = 1.0 / self.size_sigma**2
+        pull[lengths] = np.log(now.lengths / self.mean_lengths)
+        H_global += np.diag(diagonal) / _INDEPENDENT
+        g_global += diagonal * pull / _INDEPENDENT
+
+    def _speed(self, v: int, place: CameraPlace) -> Float64Array:
+        """Return how fast rays (N, n, 2) move, 1/s."""
+        half = 1.0 / 120.0
+        times = self.times + place.offset_s
+        later = self.people[v].at(times + half)
+        earlier = self.people[v].at(times - half)
+        both = (later.seen & earlier.seen)[:, None, None]
+        speed: Float64Array = np.where(both, (later.rays - earlier.rays) / (2.0 * half), 0.0)
+        return speed
+
+    def result(self, now: _Unknowns, cost: float) -> Bundle:
+        """Return cameras with their deviations, and points with their residuals."""
+        count = len(now.cameras)
+        sigmas = self.linearize(now).sigmas()[: count * _UNKNOWNS].reshape(count, _UNKNOWNS)
+        rays, confidence = self.observed(now.cameras)
+        residuals = np.array(
+            [
+                np.where(
+                    weight > 0,
+                    np.linalg.norm(_residual(ray, place, now.points)[0], axis=-1),
+                    np.nan,
+                )
+                for ray, weight, place in zip(rays, confidence, now.cameras, strict=True)
+            ]
+        )
+        cameras = [
+            replace(
+                place,
+                rotation_sigma=float(np.linalg.norm(sigma[:3])),
+                position_sigma_m=float(np.linalg.norm(sigma[3:6])),
+                focal_sigma=float(sigma[_FOCAL]),
+                offset_sigma_s=float(sigma[_CLOCK]),
+            )
+            for place, sigma in zip(now.cameras, sigmas, strict=True)
+        ]
+        known = (confidence > 0).sum(axis=0) >= 2
+        return Bundle(
+            cameras, now.lengths, self.times, now.points, known, residuals / KEYPOINT_SIGMA, cost
+        )
+
+
+def _residual(
+    rays: Float64Array, place: CameraPlace, points: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return the residuals (..., 2) of points, and their depths (...,)."""
+    seen = place.of(points)
+    depth = np.maximum(seen[..., 2], 1e-3)
+    image = np.exp(place.log_focal) * seen[..., :2] / depth[..., None]
+    return image - rays, seen[..., 2]
+
+
+def _derivatives(
+    place: CameraPlace, points: Float64Array, speed: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return the derivatives of the residuals by the points (M, 2, 3) and by the camera (M, 2, 8).
+
+    A step w of the rotation moves a point y in the camera's axes to exp(w) y, so it adds w x y.
+    """
+    seen = place.of(points)
+    depth = np.maximum(seen[:, 2], 1e-3)
+    scale = np.exp(place.log_focal)
+    J_seen = np.zeros((len(points), 2, 3))
+    J_seen[:, 0, 0] = scale / depth
+    J_seen[:, 1, 1] = scale / depth
+    J_seen[:, :, 2] = -scale * seen[:, :2] / np.square(depth)[:, None]
+    x, y, z = seen.T
+    zero = np.zeros_like(x)
+    # The matrix of w -> w x y.
+    turned = np.empty((len(points), 3, 3))
+    turned[:, 0] = np.stack([zero, z, -y], axis=1)
+    turned[:, 1] = np.stack([-z, zero, x], axis=1)
+    turned[:, 2] = np.stack([y, -x, zero], axis=1)
+    J_camera = np.zeros((len(points), 2, _UNKNOWNS))
+    J_camera[:, :, :3] = J_seen @ turned
+    J_camera[:, :, 3:6] = J_seen
+    J_camera[:, :, _FOCAL] = scale * seen[:, :2] / depth[:, None]
+    J_camera[:, :, _CLOCK] = -speed
+    return J_seen @ place.R_camera_first, J_camera

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One person's motion from several cameras: as from one, with the measurements of all.
+
+Depth, lean and lengths follow from the cameras together. Floor and balance, which tell them for one
+camera, only say when feet rest, and where.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ....solver import MotionFit, MotionPrior, State, fit_motion
+from ...arrays import Float64Array, IndexArray
+from ...kinematics.single_precision import to_single_precision
+from ..camera.intrinsics import Camera
+from ..fitting.frame_measurements import Measurer
+from ..fitting.frame_sequence import FittedTrack
+from ..fitting.prepared_track import OtherView, PreparedTrack, lift
+from ..fitting.stature import stature_sigma
+from ..fitting.weights import ROBUST, clip_stages, motion_priors
+from ..stages.clock import Progress
+from ..stages.solve import Person
+from ..tracking.track import Track
+from ..world.assemble import Shot
+from ..world.placement import PlacedTrack
+from ..world.stance import stance_on_ground
+from .bundle import CameraPlace
+from .seen_person import LONGEST_GAP_S
+
+
+def with_focal_scale(camera: Camera, place: CameraPlace) -> Camera:
+    """Return a camera with the focal length that several cameras agree on."""
+    intrinsics = camera.intrinsics.copy()
+    intrinsics[[0, 1], [0, 1]] *= np.exp(place.log_focal)
+    return replace(camera, intrinsics=intrinsics)
+
+
+def track_at(track: Track, times: Float64Array) -> Track:
+    """Return a track at other times (n,) of its own clock: keypoints by linear interpolation, the
+    rest of the nearest frame, and nothing of hands, face and masks.
+    """
+    own = np.asarray(track.times, float)
+    after = np.clip(np.searchsorted(own, times), 1, max(len(own) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(own) - 1)
+    gap = own[after] - own[before]
+    share = (times - own[before]) / np.maximum(gap, 1e-9)
+    seen = track.seen[before] & track.seen[after] & (gap <= LONGEST_GAP_S)
+    seen &= (share >= -1e-9) & (share <= 1.0 + 1e-9)
+    share = np.clip(share, 0.0, 1.0)
+    pixels = (1.0 - share[:, None, None]) * track.keypoints_px[before]
+    pixels = pixels + share[:, None, None] * track.keypoints_px[after]
+    nearest = np.where(share < 0.5, before, after)
+    confidence = np.minimum(track.confidence[before], track.confidence[after]) * seen[:, None]
+    return Track(
+        frames=np.arange(len(times)),
+        times=times,
+        seen=seen,
+        keypoints_px=pixels,
+        confidence=confidence,
+        world_landmarks=track.world_landmarks[nearest] * seen[:, None, None],
+        acquired=track.acquired[nearest] & seen,
+    )
+
+
+def other_view(
+    prepared: PreparedTrack, track: Track, camera: Camera, place: CameraPlace
+) -> OtherView:
+    """Return what another camera sees of a prepared track's person.
+
+    :param track: that camera's, by its own clock.
+    :param camera: with its true focal length.
+    """
+    times = np.asarray(prepared.track.times, float)
+    at = track_at(track, times + place.offset_s)
+    measurer = Measurer(prepared.body, camera.intrinsics)
+    pixels = camera.undistort(at.keypoints_px)
+    lifted = lift(measurer, at, pixels)
+    return OtherView(
+        measurer, pixels, at.confidence, lifted, place.R_camera_first, place.t_camera_first
+    )
+
+
+class PersonInViews(Person):
+    """One person on the way from the tracks of several cameras to a motion."""
+
+    def __init__(
+        self,
+        shot: Shot,
+        track: Track,
+        others: Sequence[tuple[Track, Camera, CameraPlace]],
+        height_m: float | None,
+        progress: Progress,
+    ) -> None:
+        """Lift all tracks to 3D.
+
+        :param track: of the first camera, which `shot` describes.
+        :param others: of each other camera that shows the person, the track, the camera with its
+            true focal length, and its place.
+        """
+        super().__init__(shot, track, height_m, progress)
+        views = tuple(other_view(self.prepared, *other) for other in others)
+        self.prepared = replace(self.prepared, others=views)
+
+    def fit_alone(self) -> None:
+        """Fit one shape and all frames to what all cameras see."""
+        if not self.prepared.others:
+            super().fit_alone()
+            return
+        self._progress("finding the shape", 0, 0)
+        self.fit = to_single_precision(fit_views(self.prepared))
+
+    def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: Float64Array) -> None:
+        """Add when feet rest, and the floor. Distance, lean and shape stay as cameras saw them."""
+        if not self.prepared.others:
+            super().ground(shot, placed, T_floor_camera)
+            return
+        stance = stance_on_ground(placed, T_floor_camera)
+        upright = np.broadcast_to(np.eye(3), stance.turn.shape)
+        seen = replace(stance, root_cam=np.asarray(self.fit.t_camera_root, float), turn=upright)
+        self.prepared = self.prepared.with_stance(seen, self.fit.betas)
+
+    def _fit_frames_alone(self) -> FittedTrack:
+        if not self.prepared.others:
+            return super()._fit_frames_alone()
+        raw = to_single_precision(fit_views_alone(self.prepared, self.fit))
+        sigma_m = self.fit.joint_sigma_m
+        return replace(raw, joint_sigma_m=sigma_m, height_sigma_m=self.fit.height_sigma_m)
+
+
+def fit_views(prepared: PreparedTrack) -> FittedTrack:
+    """Fit all frames and one shape to what all cameras see; in the first camera's axes."""
+    frames = _seen_frames(prepared)
+    times = prepared.track.times[frames]
+    quadratic, _ = motion_priors(prepared.body, times)
+    # A network misplaces a keypoint in the same way in every frame, so that the shape's prior
+    # counts once for each of them.
+    weights = replace(prepared.weights, shape=prepared.weights.shape * len(frames))
+    found = fit_motion(
+        prepared.body,
+        [prepared.views(k, prepared.measure(k)) for k in frames],
+        times,
+        priors=prepared.priors,
+        options=replace(ROBUST, stages=clip_stages(weights)),
+        motion=quadratic,
+    )
+    information = found.beta_information / weights.shape
+    sigma = stature_sigma(prepared.body, found.beta, information, prepared.is_stature_given)
+    return replace(_fitted(prepared, frames, found), height_sigma_m=sigma)
+
+
+def fit_views_alone(prepared: PreparedTrack, start: FittedTrack) -> FittedTrack:
+    """Fit every frame alone to what all cameras see, from its state in another motion."""
+    frames = np.flatnonzero(start.valid)
+    states = [
+        State(start.rotations[k, 0], start.t_camera_root[k], start.rotations[k, 1:], start.betas)
+        for k in frames
+    ]
+    found = fit_motion(
+        prepared.body,
+        [prepared.views(k, prepared.measure_all(k)) for k in frames],
+        prepared.track.times[frames],
+        init=states,
+        priors=prepared.priors,
+        options=replace(ROBUST, stages=clip_stages(prepared.weights)),
+        motion=MotionPrior(joints=0.0, root_rotation=0.0, root_position=0.0, contact=0.0),
+        shape=start.betas,
+    )
+    return _fitted(prepared, frames, found)
+
+
+def _seen_frames(prepared: PreparedTrack) -> IndexArray:
+    """Return the frames in which some camera sees the person."""
+    seen = np.array(
+        [
+            prepared.track.seen[k] or any(other.sees(k) for other in prepared.others)
+            for k in range(len(prepared.track))
+        ]
+    )
+    return np.flatnonzero(seen)
+
+
+def _fitted(prepared: PreparedTrack, frames: IndexArray, found: MotionFit) -> FittedTrack:
+    """Return the fit of some frames as that of all; the others repeat the one before."""
+    T = len(prepared.track)
+    valid = np.zeros(T, bool)
+    valid[frames] = True
+    row = np.maximum(np.searchsorted(frames, np.arange(T), side="right") - 1, 0)
+    rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
+    root = np.array([state.t_camera_root for state in found.states])
+    confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
+    for other in prepared.others:
+        confidence = np.maximum(confidence, other.measurer.joint_confidence(other.confidence))
+    return FittedTrack(
+        rotations=rotations[row],
+        t_camera_root=root[row],
+        betas=found.beta,
+        valid=valid,
+        joint_confidence=confidence * valid[:, None],
+        iterations=float(found.iterations),
+    )

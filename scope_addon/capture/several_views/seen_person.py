@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One person as one camera sees them: what synchronization and calibration need of a track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import BoolArray, Float64Array
+from ..camera.intrinsics import Camera
+from ..fitting.frame_measurements import place
+from ..fitting.prepared_track import PreparedTrack
+from ..perception.landmark_network import KEYPOINT_NAMES
+
+# Names of keypoints that are the same places of a body from all sides: not hands, which are small,
+# nor the face, which is hidden from behind.
+NAMES = [
+    f"{side}_{name}"
+    for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "heel", "foot_index")
+    for side in ("left", "right")
+]
+KEYPOINTS = np.array([KEYPOINT_NAMES.index(name) for name in NAMES])
+# What keeps its length while the body moves; the trunk does so only roughly.
+BONES = (
+    ("shoulder", "elbow"),
+    ("elbow", "wrist"),
+    ("hip", "knee"),
+    ("knee", "ankle"),
+    ("ankle", "heel"),
+    ("ankle", "foot_index"),
+    ("shoulder", "hip"),
+)
+_ACROSS = ("shoulder", "hip")  # and from left to right
+BONE_COUNT = len(BONES) + len(_ACROSS)
+_ROWS = [
+    (NAMES.index(f"{side}_{a}"), NAMES.index(f"{side}_{b}"), bone)
+    for bone, (a, b) in enumerate(BONES)
+    for side in ("left", "right")
+] + [
+    (NAMES.index(f"left_{name}"), NAMES.index(f"right_{name}"), len(BONES) + k)
+    for k, name in enumerate(_ACROSS)
+]
+# Rows of bones: both ends, as numbers of `KEYPOINTS`, and the bone's own number.
+BONE_STARTS, BONE_ENDS, BONE_OF_ROW = (np.array(column) for column in zip(*_ROWS, strict=True))
+MIN_CONFIDENCE = 0.3  # of a keypoint that counts
+LONGEST_GAP_S = 0.12  # between two frames between which keypoints are interpolated
+
+
+@dataclass(frozen=True)
+class SeenPerson:
+    """A person in T frames of a camera, by the clock of its file. n keypoints, see `KEYPOINTS`."""
+
+    times: Float64Array  # (T,) seconds, increasing
+    seen: BoolArray  # (T,)
+    rays: Float64Array  # (T, n, 2) normalized image coordinates, without lens distortion
+    confidence: Float64Array  # (T, n) 0..1
+    points: Float64Array  # (T, n, 3) lifted keypoints, hip-centred, camera axes, metres
+    root: Float64Array  # (T, 3) the middle of the hips, camera, metres: uncertain along z
+
+    def at(self, times: Float64Array) -> SeenPerson:
+        """Return the person at other times (n,), by linear interpolation between frames.
+
+        Times before the first frame, after the last one, in gaps of more than `LONGEST_GAP_S`, or
+        beside a frame in which the person is not seen are those of an unseen person.
+        """
+        after = np.clip(np.searchsorted(self.times, times), 1, max(len(self.times) - 1, 1))
+        before = after - 1
+        after = np.minimum(after, len(self.times) - 1)
+        gap = self.times[after] - self.times[before]
+        share = (times - self.times[before]) / np.maximum(gap, 1e-9)
+        seen = self.seen[before] & self.seen[after] & (gap <= LONGEST_GAP_S)
+        seen &= (share >= -1e-9) & (share <= 1 + 1e-9)
+        share = np.clip(share, 0.0, 1.0)
+
+        def mixed(values: Float64Array) -> Float64Array:
+            weight = share.reshape(-1, *[1] * (values.ndim - 1))
+            both: Float64Array = (1.0 - weight) * values[before] + weight * values[after]
+            return both
+
+        confidence = np.minimum(self.confidence[before], self.confidence[after]) * seen[:, None]
+        return SeenPerson(
+            times, seen, mixed(self.rays), confidence, mixed(self.points), mixed(self.root)
+        )
+
+
+def bone_lengths(keypoints: Float64Array) -> Float64Array:
+    """Return the lengths (B,) of the bones of a body at rest, with keypoints (n, 3) in metres."""
+    rows = np.linalg.norm(keypoints[BONE_ENDS] - keypoints[BONE_STARTS], axis=1)
+    return np.array([rows[BONE_OF_ROW == bone].mean() for bone in range(BONE_COUNT)])
+
+
+def seen_person(prepared: PreparedTrack, camera: Camera) -> SeenPerson:
+    """Return what a camera sees of a person, of a lifted track."""
+    track = prepared.track
+    rays = camera.rays(track.keypoints_px)[..., :2]
+    confidence = track.confidence * track.seen[:, None]
+    points = np.asarray(prepared.lifted.points, float)
+    root = np.array([place(points[k], rays[k], confidence[k]) for k in range(len(track))])
+    return SeenPerson(
+        np.asarray(track.times, float),
+        track.seen,
+        np.asarray(rays[:, KEYPOINTS], float),
+        np.asarray(confidence[:, KEYPOINTS], float),
+        points[:, KEYPOINTS],
+        root,
+    )

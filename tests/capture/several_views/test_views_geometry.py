@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clocks, cameras and people of several views: made scenes whose truth is exact."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
+from scope.scope_addon.capture.several_views import bundle
+from scope.scope_addon.capture.several_views.bundle import CameraPlace, adjust
+from scope.scope_addon.capture.several_views.calibrate import (
+    calibrate,
+    contradicting_spans,
+    same_people,
+)
+from scope.scope_addon.capture.several_views.seen_person import (
+    KEYPOINTS,
+    SeenPerson,
+    bone_lengths,
+)
+from scope.scope_addon.capture.several_views.synchronize import offset_between
+from scope.solver import load_body, rotations
+
+SECONDS = 4.0
+
+
+@cache
+def moving_points(seed=0, center=(0.0, 0.0, 4.0)):
+    """Return a function of time that gives the keypoints (n, 3) of somebody who waves and steps, in
+    the first camera's axes.
+    """
+    body = with_keypoint_offsets(load_body("scope"))
+    at = body.keypoint_set("blazepose")
+    indices = [at[KEYPOINT_NAMES[k]] for k in KEYPOINTS]
+    rng = np.random.default_rng(seed)
+    names = [f"{side}_{name}" for side in ("left", "right") for name in ("shoulder", "hip")]
+    names += [f"{side}_{name}" for side in ("left", "right") for name in ("elbow", "knee")]
+    parts = [body.joint_names.index(name) for name in names]
+    amplitude = rng.uniform(-0.6, 0.6, (len(parts), 3, 3))
+    phase = rng.uniform(0, 2 * np.pi, (len(parts), 3, 3))
+    speed = np.array([1.1, 2.3, 4.1])
+
+    def points(time_s):
+        omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+        wave = np.sin(speed * time_s + phase)
+        for part, vector in zip(parts, (amplitude * wave).sum(axis=2), strict=True):
+            omega[part] = rotations.exp(0.5 * vector)
+        turn = rotations.exp(np.array([0.0, 0.5 * np.sin(0.9 * time_s), 0.0]))
+        omega[0] = rotations.exp(np.array([np.pi, 0.0, 0.0])) @ turn
+        walk = np.array([0.4 * np.sin(0.8 * time_s), 0.0, 0.4 * np.cos(1.1 * time_s)])
+        root = np.asarray(center) + walk
+        R, t = body.forward_kinematics(omega, root - body.rest_joints()[0])
+        return body.keypoints(R, t, which=indices)
+
+    return points
+
+
+@cache
+def mean_lengths():
+    body = with_keypoint_offsets(load_body("scope"))
+    at = body.keypoint_set("blazepose")
+    indices = [at[KEYPOINT_NAMES[k]] for k in KEYPOINTS]
+    identity = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    return bone_lengths(body.keypoints(identity, body.rest_joints(), which=indices))
+
+
+def beside(degrees, distance_m=4.0):
+    """Return the place of a camera that looks at the person from so many degrees to the side."""
+    R = rotations.exp(np.array([0.0, np.radians(degrees), 0.0]))
+    middle = np.array([0.0, 0.0, 4.0])
+    return CameraPlace(R, np.array([0.0, 0.0, distance_m]) - R @ middle)
+
+
+def seen(place, points, rate, noise=0.001, lean_deg=8.0, seed=1, start_s=0.0):
+    """Return what a camera sees, whose clock is ``place.offset_s`` ahead; its lifted body leans."""
+    rng = np.random.default_rng(seed)
+    own = start_s + np.arange(int(SECONDS * rate)) / rate
+    inside = np.array([place.of(points(time_s - place.offset_s)) for time_s in own])
+    rays = np.exp(place.log_focal) * inside[..., :2] / inside[..., 2:]
+    rays = rays + rng.normal(0.0, noise, rays.shape)
+    root = inside[:, 6:8].mean(axis=1)
+    lean = rotations.exp(np.array([np.radians(lean_deg), 0.0, 0.0]))
+    lifted = (inside - root[:, None]) @ lean.T
+    far = root * rng.normal(1.0, 0.02, (len(own), 1))
+    everything = np.ones(rays.shape[:2])
+    return SeenPerson(own, np.ones(len(own), bool), rays, everything, lifted, far)
+
+
+def angle_deg(R, R_true):
+    return float(np.degrees(np.linalg.norm(rotations.log(R @ R_true.T))))
+
+
+@pytest.mark.parametrize(("offset_s", "rate"), [(0.0, 30.0), (0.73, 60.0), (-1.21, 24.0)])
+def test_offset_of_clocks(offset_s, rate):
+    points = moving_points()
+    first = seen(CameraPlace.first(), points, 30.0)
+    place = replace(beside(60.0), offset_s=offset_s)
+    second = seen(place, points, rate, seed=2)
+    found = offset_between(first, second, 3.0)
+    assert found.seconds == pytest.approx(offset_s, abs=0.05)
+    assert found.is_certain
+
+
+def test_offset_of_somebody_who_stands_still_is_uncertain():
+    still = moving_points()(0.0)
+    first = seen(CameraPlace.first(), lambda _: still, 30.0)
+    second = seen(beside(60.0), lambda _: still, 30.0, seed=2)
+    assert not offset_between(first, second, 3.0).is_certain
+
+
+def test_gradient_is_that_of_the_cost():
+    points = moving_points()
+    people = [seen(CameraPlace.first(), points, 30.0), seen(beside(70.0), points, 30.0)]
+    places = [CameraPlace.first(), replace(beside(65.0), log_focal=0.05, offset_s=0.01)]
+    times = people[0].times[10:40:10]
+    problem = bundle._Problem(people, times, places, [0.1, 0.1], 1.1 * mean_lengths(), 0.07)
+    rng = np.random.default_rng(0)
+    start = np.array([points(time_s) for time_s in times]) + rng.normal(0, 0.03, (3, 16, 3))
+    now = bundle._Unknowns(places, mean_lengths(), start)
+    system = problem.linearize(now)
+    free = np.flatnonzero(problem.is_free)
+    # Rays are linear between frames, so that their speed is not a derivative at a frame.
+    for k in free[(free >= 16) | (free % 8 != 7)]:
+        step = np.zeros(len(problem.is_free))
+        step[k] = 1e-6
+        nothing = np.zeros_like(start)
+        rise = problem.cost(now.moved(step, nothing)) - problem.cost(now.moved(-step, nothing))
+        assert rise / 4e-6 == pytest.approx(system.g_global[k], rel=1e-4, abs=1e-2)
+    direction = rng.normal(size=start.shape)
+    nothing = np.zeros(len(problem.is_free))
+    rise = problem.cost(now.moved(nothing, 1e-6 * direction))
+    rise -= problem.cost(now.moved(nothing, -1e-6 * direction))
+    slope = (system.g_points.reshape(start.shape) * direction).sum()
+    assert rise / 4e-6 == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize("degrees", [45.0, 100.0])
+def test_cameras_are_found_from_the_people(degrees):
+    points = moving_points()
+    truth = replace(beside(degrees, 5.0), offset_s=0.42, log_focal=0.08)
+    people = [[seen(CameraPlace.first(), points, 30.0)], [seen(truth, points, 59.94, seed=2)]]
+    found = calibrate(people, [0.0, 0.2], mean_lengths(), [None, None])
+    place = found.places[1]
+    assert angle_deg(place.R_camera_first, truth.R_camera_first) < 1.0
+    assert place.offset_s == pytest.approx(0.42, abs=0.008)
+    assert place.log_focal == pytest.approx(0.08, abs=0.03)
+    baseline = place.center @ truth.center
+    baseline /= np.linalg.norm(place.center) * np.linalg.norm(truth.center)
+    assert np.degrees(np.arccos(min(baseline, 1.0))) < 2.0
+    assert np.linalg.norm(place.center) == pytest.approx(np.linalg.norm(truth.center), rel=0.03)
+
+
+def test_lengths_of_bones_tell_the_angle_between_distant_cameras():
+    """Without them, cameras that hardly see perspective stay where they started."""
+    points = moving_points()
+    truth = beside(60.0, 12.0)
+    far = replace(CameraPlace.first(), t_camera_first=np.array([0.0, 0.0, 8.0]))
+    people = [seen(far, points, 30.0, noise=0.0003), seen(truth, points, 30.0, noise=0.0003)]
+    R_second_first = truth.R_camera_first @ far.R_camera_first.T
+    t_second_first = truth.t_camera_first - R_second_first @ far.t_camera_first
+    middle = np.array([0.0, 0.0, 12.0])
+    R = rotations.exp(np.array([0.0, np.radians(12.0), 0.0])) @ R_second_first
+    t = R_second_first @ middle + t_second_first - R @ middle
+    start = [CameraPlace.first(), CameraPlace(R, t)]
+    times = people[0].times[::2]
+    found = adjust(people, start, times, [0.0, 0.0], mean_lengths()).cameras[1]
+    assert angle_deg(found.R_camera_first, R_second_first) < 1.5
+
+
+def test_people_are_recognized_by_where_they_are():
+    left, right = moving_points(0), moving_points(3, (0.9, 0.0, 4.5))
+    truth = replace(beside(70.0), offset_s=0.2)
+    first = [seen(CameraPlace.first(), each, 30.0) for each in (left, right)]
+    second = [seen(truth, each, 30.0, seed=5) for each in (right, left)]
+    people = [first, second]
+    found = calibrate(people, [0.0, 0.0], mean_lengths(), [None, None])
+    assert found.main == [0, 1]
+    assert same_people(people, found) == [[0, 1], [1, 0]]
+
+
+def test_somebody_else_is_nobody_in_the_other_camera():
+    left, right = moving_points(0), moving_points(3, (0.9, 0.0, 4.5))
+    truth = beside(70.0)
+    people = [
+        [seen(CameraPlace.first(), each, 30.0) for each in (left, right)],
+        [seen(truth, left, 30.0, seed=5)],
+    ]
+    found = calibrate(people, [0.0, 0.0], mean_lengths(), [None, 0.0])
+    assert same_people(people, found) == [[0, 0], [1, None]]
+
+
+def test_a_camera_that_shows_another_moment_contradicts_for_that_time():
+    points = moving_points()
+    places = [CameraPlace.first(), beside(60.0), beside(-60.0)]
+    people = [seen(place, points, 30.0, seed=k) for k, place in enumerate(places)]
+    wrong = people[2].rays.copy()
+    wrong[45:80] += 0.15
+    people[2] = replace(people[2], rays=wrong)
+    spans = contradicting_spans(people, places)
+    assert spans[:2] == [[], []]
+    ((start, end),) = spans[2]
+    assert start == pytest.approx(1.5, abs=0.1)
+    assert end == pytest.approx(79 / 30, abs=0.1)
