@@ -66,7 +66,7 @@ SENTENCES = {
     # several cameras
     "view_without_place": "{footage} was not used: nobody in it moves like the person of the first "
     "video for a second; all videos must show the same moment",
-    "uncertain_offset": "{footage}: another offset than {offset_s:.2f} s between the clocks of the "
+    "uncertain_offset": "{footage}: another offset than {offset_s:.1f} s between the clocks of the "
     "cameras would fit nearly as well; clap once at the beginning, or move irregularly",
     "weak_place": "{footage}: the angle between this camera and the first one is known to "
     "{degrees:.0f} degrees only; walk around, so that you fill more of both images",

@@ -100,9 +100,9 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (
-            ["capture", str(SAMPLE), "second.mp4"],
-            2,
-            "second.mp4 (see scope capture --help; use scope batch",
+            ["capture", str(SAMPLE), "second.mp4", "-o", "{tmp}/a.npz"],
+            1,
+            "second.mp4",
         ),
         (["capture", "--frobnicate"], 2, "--frobnicate (see scope capture --help)"),
         (["capture", "--threads", "-2", "-o", "{tmp}/a.npz"], 2, "--threads"),

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 from collections import Counter
 from dataclasses import fields
 from pathlib import Path
@@ -382,6 +383,8 @@ def session() -> list:
 @pytest.mark.parametrize("words", session())
 def test_the_captures_of_the_readme_are_run(words, folder):
     (folder / "walk.mp4").symlink_to(SAMPLE)
+    for name in ("left.mp4", "right.mp4"):
+        shutil.copy(SAMPLE, folder / name)
     assert main([*words, "--quality", "fast", "--end", "0.2", "--quiet"]) == 0
     written = [
         word for before, word in zip(words, words[1:], strict=False) if before in ("-o", "--report")

@@ -77,7 +77,7 @@ def capture_views(
     :raises CancelledError: raised by ``progress`` itself, passed on.
     """
     check_options(body, options)
-    _check_count(paths)
+    _check_paths(paths, options)
     clock = StageClock()
     views = [_observe_view(Path(path), body, options, clock, progress, watch) for path in paths]
     with clock.stage("solver"):
@@ -106,7 +106,12 @@ def capture_views(
     return Capture(motions, replace(report, views=about, warnings=warnings))
 
 
-def _check_count(paths: Sequence[str | Path]) -> None:
+def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
+    """Check all videos before the first one is observed.
+
+    :raises UsageError: there are too few or too many, or one was given twice.
+    :raises VideoError: footage cannot be read.
+    """
     if not 2 <= len(paths) <= MOST_VIEWS:
         raise UsageError(
             f"several cameras are 2 to {MOST_VIEWS} videos of the same moment, but {len(paths)} "
@@ -118,6 +123,8 @@ def _check_count(paths: Sequence[str | Path]) -> None:
         if real in seen:
             raise UsageError(f"{path} was given twice; each camera has a video of its own")
         seen.add(real)
+        with open_video(Path(path), options.wanted):
+            pass
 
 
 def _observe_view(
