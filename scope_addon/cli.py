@@ -71,8 +71,6 @@ from .footage import display_text, is_url, json_text
 from .installed import CAPTURE, check_installed
 from .job.clips.finished import FINISHED_FILE, write_finished
 from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
-from .job.unfinished import unfinished_capture
-from .job.watched_footage import WatchedFootage
 from .options.capture import OFF
 from .parent import end_with_parent
 from .private_folder import lasting_folder
@@ -317,6 +315,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture
     from .capture.several_views.capture_views import capture_views
+    from .job.unfinished import unfinished_capture
+    from .job.watched_footage import WatchedFootage
     from .report.capture_page import CapturedClip, write_capture_page
 
     with ExitStack() as stack:
