@@ -204,9 +204,10 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
     builder = with_empty_wheels
     assert run(builder, monkeypatch, "--website", "https://example.com/scope") == 0
     archives = sorted(p.name for p in builder.DIST.glob("*.zip"))
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
     blenders = ("blender_4.2_before_5.1", "blender_5.1")
     platforms = ("linux_x64", "macos_arm64", "windows_x64")
-    assert archives == sorted(f"scope-0.1.0-{b}-{p}.zip" for b in blenders for p in platforms)
+    assert archives == sorted(f"scope-{version}-{b}-{p}.zip" for b in blenders for p in platforms)
     assert "6 zips listed" in capsys.readouterr().out
     archive = builder.DIST / archives[0]
     target = builder.Target("linux-x64", "3.11")
@@ -342,3 +343,18 @@ def test_no_shipped_module_uses_the_network_or_has_the_metadata_of_an_old_add_on
             assert not network & {name.split(".")[0] for name in names}, module
             if isinstance(node, ast.Name) and node.id == "bl_info":
                 raise AssertionError(f"{module} has the metadata of an old add-on")
+
+
+@pytest.mark.parametrize("possible", [True, False])
+def test_the_compiled_solver_can_be_made_alone_for_another_computer(
+    with_empty_wheels, monkeypatch, possible
+):
+    builder = with_empty_wheels
+    made = []
+    monkeypatch.setattr(
+        builder, "add_kernels", lambda *arguments: made.append(arguments[1:3]) or possible
+    )
+    status = run(builder, monkeypatch, "windows-x64", "--python", "3.13", "--kernels-only")
+    assert status == (0 if possible else 1)
+    assert made == [("windows-x64", "3.13")]
+    assert not builder.DIST.exists()
