@@ -71,11 +71,25 @@ class RestPose:
 
     def below(self, bone: int) -> list[int]:
         """Return all descendants of a bone."""
-        found = {bone}
-        for other, parent in enumerate(self.parents.tolist()):
-            if parent in found:
-                found.add(other)
-        return sorted(found - {bone})
+        found: list[int] = []
+        left = list(self.children[bone])
+        while left:
+            found.append(left.pop())
+            left += self.children[found[-1]]
+        return sorted(found)
+
+    @cached_property
+    def _rows_by_owner(self) -> dict[int, NDArray[np.intp]]:
+        """The rows of the points that each bone moves, if it moves any."""
+        rows = np.argsort(self.owners, kind="stable")
+        owners, starts = np.unique(self.owners[rows], return_index=True)
+        groups = np.split(rows, starts[1:]) if len(rows) else []
+        return dict(zip(owners.tolist(), groups, strict=True))
+
+    def points_of(self, bones: Iterable[int]) -> NDArray[np.float64]:
+        """Return the points that these bones move (V', 3), in the order of all points."""
+        rows = [self._rows_by_owner[bone] for bone in bones if bone in self._rows_by_owner]
+        return self.points[np.sort(np.concatenate(rows))] if rows else self.points[:0]
 
     def is_below(self, bone: int, ancestor: int) -> bool:
         """Return whether a bone descends from another."""
@@ -112,7 +126,7 @@ class RestPose:
         ]
         if known:
             return np.asarray(np.mean(known, axis=0))
-        owned = self.points[np.isin(self.owners, [bone, *self.below(bone)])]
+        owned = self.points_of([bone, *self.below(bone)])
         if len(owned) and forward is not None:
             return _ball(owned, head, forward)
         if len(owned):
@@ -153,7 +167,7 @@ class RestPose:
         without skin.
         """
         moved = {other for bone in bones for other in (bone, *self.below(bone))}
-        owned = self.points[np.isin(self.owners, sorted(moved)), 2]
+        owned = self.points_of(moved)[:, 2]
         return float(owned.min()) if len(owned) else None
 
 

@@ -87,3 +87,35 @@ def test_toes_tell_where_the_front_is() -> None:
     assert faces_backwards(standing(**behind)) is True
     without = {part: head for part, head in standing().items() if not part.endswith("foot")}
     assert faces_backwards(without) is None
+
+
+def test_ten_thousand_bones_are_looked_at_once_each(monkeypatch):
+    """Not once for each of them, which took a minute."""
+    count = 10_000
+    parents = np.array([-1, *range(count // 2), *[0] * (count // 2 - 1)])
+    heads = np.zeros((count, 3))
+    heads[:, 2] = np.arange(count) / count
+    looked = []
+    real = RestPose.children.func
+    children = real(RestPose([""] * count, parents, heads))
+
+    class Counted(list):
+        def __getitem__(self, bone):
+            looked.append(bone)
+            return super().__getitem__(bone)
+
+    rest = RestPose([""] * count, parents, heads)
+    monkeypatch.setitem(rest.__dict__, "children", Counted(children))
+    below = [rest.below(bone) for bone in range(count // 2 + 1, count)]
+    assert all(not found for found in below)
+    assert len(looked) <= 2 * count
+    assert rest.below(count // 2 - 10) == list(range(count // 2 - 9, count // 2 + 1))
+
+
+def test_points_of_bones_are_those_whose_owner_they_are_in_their_order():
+    random = np.random.default_rng(1)
+    owners = random.integers(0, 50, 400)
+    points = random.normal(size=(400, 3))
+    rest = RestPose([""] * 60, np.full(60, -1), np.zeros((60, 3)), points=points, owners=owners)
+    for bones in ([3], [7, 2, 55], [59], range(60)):
+        assert np.array_equal(rest.points_of(bones), points[np.isin(owners, list(bones))])
