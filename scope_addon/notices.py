@@ -103,6 +103,9 @@ SENTENCES = {
     "under_floor": "{footage}: a foot of {person:who} is up to {depth_cm:.0f} cm under the floor "
     "in {under} of {total:frames}",
     "review": "{person:whose}{reason:phrase}",
+    "implausible": "{footage}, {times:times}: {person:whose}{reason:phrase}",
+    "bent_knees": "{footage}: no knee of {person:who} is ever straight while standing or walking; "
+    "check the knees from the side, and give the person's height and the lens if they are known",
     # the scene
     "no_expressions": "the body '{body}' has no expressions, so it does not show the face, which "
     "is in the motion file; the built-in bodies do",
@@ -158,6 +161,9 @@ REASONS = {
     "far": "the body is far from the footage: check these frames",
     "unsure": "low confidence: check these frames",
     "floor": "a foot is under the floor",
+    "swing": "a hand or foot swings through in depth: check these frames from the side",
+    "lean": "leans farther than anybody can stand: check these frames from the side",
+    "floating": "floats above the floor: check these frames",
 }
 _SEVERAL_FLOORS = (
     "the clip has more than one floor: capture the part that matters, with a start and end time, "

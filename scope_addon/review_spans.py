@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Spans of frames that should be reviewed: filled in, far from the footage, unsure, or under the
-floor. Numpy only.
+"""Spans of frames that should be reviewed: filled in, far from the footage, unsure, not plausible,
+or under the floor. Numpy only.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..solver.names import BODY_JOINTS
 from .motion import Motion
+from .plausibility import implausible
 
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 FAR_SHARE = 0.03
@@ -36,13 +37,13 @@ def find_review_spans(
 
     :param gap_s: spans of the same reason that are less than this many seconds apart are merged.
     :param under_floor: (T,) frames in which a foot is under the floor; None: not known.
-    :return: the spans of each reason in turn, in chronological order; apart from the floor, a frame
-        has at most one reason.
+    :return: the spans of each reason in turn, in chronological order; of not seen, far and unsure,
+        a frame has at most one.
     """
     unseen = ~motion.valid
     far = ~unseen & (motion.residual_px > FAR_SHARE * motion.image_size.max())
     unsure = ~unseen & ~far & (body_confidence(motion) < LOW_CONFIDENCE)
-    masks = {"unseen": unseen, "far": far, "unsure": unsure}
+    masks = {"unseen": unseen, "far": far, "unsure": unsure, **implausible(motion)}
     if under_floor is not None:
         masks["floor"] = under_floor
     return [

@@ -38,6 +38,9 @@ _SHORT = {
     "far": "far from the footage",
     "unsure": "low confidence",
     "floor": "under the floor",
+    "swing": "limb swings",
+    "lean": "leans",
+    "floating": "floats",
     "warned": "warning",
 }
 _MAX_SPANS = 60  # that the page lists

@@ -18,6 +18,7 @@ from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, s
 from ...motion import Motion
 from ...notices import Notice, Value, notice
 from ...options.capture import ON
+from ...plausibility import has_bent_knees, implausible
 from ..media.video import Video
 from ..options import CaptureOptions
 from ..world.world_frame import LINES, UP_DEVIATIONS_DEG
@@ -100,10 +101,26 @@ def capture_warnings(
             )
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
             warnings.append(notice("unseen_legs", footage=name, person=person))
+        warnings += _plausibility_warnings(name, person, motion)
         if options.hands == ON and not any(hand_frames(motion).values()):
             warnings.append(notice("no_hands", footage=name, person=person))
         if options.face and not face_frames(motion).get("face_frames"):
             warnings.append(notice("no_face", footage=name, person=person))
+    return warnings
+
+
+def _plausibility_warnings(name: str, person: int, motion: Motion) -> list[Notice]:
+    """List when a person does what nobody can do; see `plausibility`."""
+    warnings = []
+    for reason, frames in implausible(motion).items():
+        begins = np.flatnonzero(np.diff(np.concatenate([[0], frames.astype(int)])) == 1)
+        if len(begins):
+            times = motion.footage_times_s[begins].tolist()
+            warnings.append(
+                notice("implausible", footage=name, person=person, reason=reason, times=times)
+            )
+    if has_bent_knees(motion):
+        warnings.append(notice("bent_knees", footage=name, person=person))
     return warnings
 
 

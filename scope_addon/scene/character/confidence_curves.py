@@ -31,7 +31,15 @@ _DESCRIPTIONS = {
     SIGMA: "Standard deviation of the position of this bone's joint, in centimetres",
     CONTACT: "Probability that this end of the foot rests on the floor",
 }
-MARKER_NAMES = {"unseen": "not seen", "far": "check", "unsure": "unsure", "floor": "under floor"}
+MARKER_NAMES = {
+    "unseen": "not seen",
+    "far": "check",
+    "unsure": "unsure",
+    "floor": "under floor",
+    "swing": "limb swings",
+    "lean": "leans",
+    "floating": "floats",
+}
 _MAX_MARKERS = 40  # more would clutter the timeline
 _GAP_S = 0.5  # spans closer than this share a marker
 

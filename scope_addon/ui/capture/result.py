@@ -54,7 +54,8 @@ def show_result(
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
     for warning in report.warnings:
-        add_warning(shown, warning)
+        if warning.code != "implausible":  # its frames are among the spans
+            add_warning(shown, warning)
     for index, person in enumerate(result.people, 1):
         number = 0 if len(result.people) == 1 else index
         spans = review_spans(person.motion, person.frames, person.under_floor)
