@@ -20,9 +20,11 @@ from scope.solver.errors import ScopeError
 
 from ..machine_code.small_package import make_package
 from ..made_motion import made_motion
-from .system_calls import FULL, KILL, NO_MEMORY
+from .system_calls import CUT, FULL, KILL, KILL_PARENT, NO_MEMORY
 
-ACTIONS = (KILL, FULL, NO_MEMORY)
+ACTIONS = (KILL, FULL, NO_MEMORY, CUT)
+# of commands that start processes
+PARENTS = (*ACTIONS, KILL_PARENT)
 SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample" / "sample.mp4"
 SCOPE = "scope.scope_addon"
 PROGRAM = "scope.tests.fuzz.programs"
@@ -140,6 +142,7 @@ COMMANDS = (
         ("out/a.npz", "out/b.npz", "out/scope-batch.json"),
         ("still", "clips"),
         _is_same_or_report,
+        actions=PARENTS,
         tells=False,
     ),
     Command(
@@ -203,6 +206,7 @@ COMMANDS = (
         ("out/live.npz", "out/live.mp4"),
         ("short",),
         _can_be_read,
+        tells=False,  # also where the recording is
     ),
     Command(
         "panel",  # the button, with the worker, its messages and the cache
@@ -211,6 +215,7 @@ COMMANDS = (
         (f"{CACHE}/captures/*/*",),
         ("still",),
         _is_same_or_can_be_read,
+        actions=PARENTS,
         replaces=False,
     ),
     Command(
@@ -220,6 +225,7 @@ COMMANDS = (
         ("out/recorded.npz",),
         ("short",),
         _can_be_read,
+        actions=PARENTS,
     ),
     Command(
         # two captures are kept, the older one is removed, since there is no space for both

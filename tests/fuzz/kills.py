@@ -15,26 +15,36 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 
-from .commands import ACTIONS, CACHE, COMMANDS, INPUTS, Command
-from .system_calls import KILL, Traced, traced
+from scope.scope_addon.footage import FOOTAGE_SUFFIXES
+
+from .commands import CACHE, COMMANDS, INPUTS, PARENTS, Command
+from .disks import DISKS, Disk, new_disk, problem_with
+from .system_calls import CUT, KILL, KILL_PARENT, Traced, traced
 
 OLD = b"an earlier result"
+LONGEST_S = 10.0  # that a process may last after its parent
 REMOVALS = ("unlink", "rmdir")  # what could not be removed, the next run removes
 FOLDERS = ("in", "out", "tmp", "clips", "home")
 # what a command that failed continues with, and then removes
 UNFINISHED = "home/scope-mocap/unfinished/"
 SEEN = ("out", "tmp", "home")  # folders in which nothing may be left
 # may be empty
-KEPT_FOLDERS = ("scope-mocap", "cache", "captures", "jobs", "kernels", "new", "unfinished")
+KEPT_FOLDERS = (
+    *("scope-mocap", "cache", "captures", "jobs", "kernels", "new", "unfinished", "recordings"),
+)
+# What a live capture that was killed leaves on purpose, until the user finishes it.
+RECORDED = re.compile(r".*\.recording(\.lock)?|.*\.unfinished( \d+)?\.mp4")
 
 
 class Workplace:
     """A folder with what a command needs, in which it runs again and again."""
 
-    def __init__(self, folder: Path, command: Command) -> None:
+    def __init__(self, folder: Path, command: Command, disk: Disk | None = None) -> None:
         self._folder = folder.resolve()
+        self._disk = disk
         self._command = command
         self._whole = dict[str, bytes]()
         for name in FOLDERS:
@@ -62,7 +72,8 @@ class Workplace:
         here = os.getcwd()
         os.chdir(self._folder)
         try:
-            return traced(command, self._folder, n, action, environment)
+            image = None if self._disk is None else self._disk.image
+            return traced(command, self._folder, n, action, environment, image)
         finally:
             os.chdir(here)
 
@@ -73,12 +84,19 @@ class Workplace:
         :raises AssertionError: something is not as it should be.
         """
         self._put_old_files()
+        if self._disk is not None:
+            self._disk.sync()
         ended = self._run(n, action)
         if len(ended.calls) < n:
             return False
         at = f"after {action} at call {n}, {ended.calls[n - 1]}"
+        if self._disk is not None:
+            self._disk.restart()
         self._check_files(at)
-        if action != KILL:
+        if action == KILL_PARENT:
+            assert ended.seconds < LONGEST_S, f"{at}: a process lasted {ended.seconds:.1f} s"
+            assert not self._footage(), f"{at}: {self._footage()} were left"
+        if action not in (KILL, CUT, KILL_PARENT):
             self._check_end(ended, at)
             left = [
                 name
@@ -88,6 +106,24 @@ class Workplace:
             if not ended.calls[n - 1].startswith(REMOVALS):
                 assert not left, f"{at}: {left} were left"
         return True
+
+    def check_what_was_said_to_be_there(self) -> None:
+        """Cut the power after the command has ended well.
+
+        :raises AssertionError: a result is not whole.
+        """
+        assert self._disk is not None
+        self._put_old_files()
+        ended = self._run(0, CUT)
+        assert ended.status == 0, ended.stderr
+        self._disk.cut()
+        for name in self._whole:
+            assert self._is_whole(name), f"{name} after a power cut after the end"
+
+    def _footage(self) -> list[str]:
+        """Return the images and videos in the folders for temporary files."""
+        found = [path for path in (self._folder / "tmp").rglob("*") if path.is_file()]
+        return [path.name for path in found if path.suffix.lower() in FOOTAGE_SUFFIXES]
 
     def state(self) -> object:
         """Return what the next run finds, apart from random names and the contents of leftovers."""
@@ -156,6 +192,7 @@ class Workplace:
         """
         found = [path for name in SEEN for path in (self._folder / name).rglob("*")]
         found = [path for path in found if self._folder / CACHE / "captures" not in path.parents]
+        found = [path for path in found if RECORDED.fullmatch(path.name) is None]
         files = [
             path
             for path in found
@@ -174,7 +211,7 @@ def _may_be_empty(path: Path) -> bool:
 
 
 def check_command(
-    command: Command, action: str, calls: Iterable[int] | None = None
+    command: Command, action: str, calls: Iterable[int] | None = None, kind: str = "ext4"
 ) -> tuple[int, list[str]]:
     """Run a command with a fault at each of its calls, again after each kill that leaves something
     else.
@@ -182,10 +219,17 @@ def check_command(
     At the end, it runs once more without a fault, unless that was the last thing it did.
 
     :param calls: only these; negative ones count from the last.
+    :param kind: of the disk whose power is cut, see `DISKS`.
     :return: how many faults there were, and what was not as it should be.
     """
-    with tempfile.TemporaryDirectory(prefix="scope-faults-") as folder:
-        place = Workplace(Path(folder), command)
+    with ExitStack() as stack:
+        disk = None if action != CUT else stack.enter_context(new_disk(kind))
+        folder = (
+            Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="scope-faults-")))
+            if disk is None
+            else disk.folder
+        )
+        place = Workplace(folder, command, disk)
         count = place.prepare()
         numbers = (
             itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
@@ -202,12 +246,17 @@ def check_command(
             except AssertionError as error:
                 problems.append(str(error))
             done += 1
-            if (action == KILL or place.leftovers()) and (
+            if (action in (KILL, CUT, KILL_PARENT) or place.leftovers()) and (
                 command.continues or place.state() not in seen
             ):
                 seen.add(place.state())
                 problems += place.problems_of_next_run(f"after {action} at call {n}")
                 ran_again = True
+        if disk is not None:
+            try:
+                place.check_what_was_said_to_be_there()
+            except AssertionError as error:
+                problems.append(str(error))
         if not ran_again:
             problems += place.problems_of_next_run(f"after all faults of {action}")
         return done, problems
@@ -220,8 +269,8 @@ def chosen(names: list[str]) -> list[tuple[Command, str]]:
     :raises SystemExit: there is no command and no fault of a name.
     """
     commands = [command for command in COMMANDS if command.name in names] or list(COMMANDS)
-    actions = [action for action in ACTIONS if action in names] or list(ACTIONS)
-    known = {*(command.name for command in COMMANDS), *ACTIONS}
+    actions = [action for action in PARENTS if action in names] or list(PARENTS)
+    known = {*(command.name for command in COMMANDS), *PARENTS}
     if unknown := sorted(set(names) - known):
         sys.exit(
             f"fuzz: no command or fault {', '.join(unknown)}; there are {', '.join(sorted(known))}"
@@ -235,15 +284,17 @@ def main(names: list[str]) -> int:
     """Run all commands with all faults, or those named; return the exit status."""
     failed = False
     for command, action in chosen(names):
-        start = time.monotonic()
-        count, problems = check_command(command, action)
-        print(
-            f"{command.name}, {action}: {count} faults in {time.monotonic() - start:.0f} s",
-            flush=True,
-        )
-        for problem in problems:
-            print(f"    {problem}", flush=True)
-        failed = failed or bool(problems)
+        for kind in DISKS if action == CUT else ("",):
+            what = f"{command.name}, {action} {kind}".rstrip()
+            if kind and (problem := problem_with(kind)):
+                print(f"{what}: not tried, since {problem}", flush=True)
+                continue
+            start = time.monotonic()
+            count, problems = check_command(command, action, kind=kind)
+            print(f"{what}: {count} faults in {time.monotonic() - start:.0f} s", flush=True)
+            for problem in problems:
+                print(f"    {problem}", flush=True)
+            failed = failed or bool(problems)
     return int(failed)
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run a command, and at its n-th system call of a kind kill it or let the call fail. Linux on
-x86-64 only.
+"""Run a command, and at its n-th system call of a kind kill it, or the process that has started it,
+cut the power, or let the call fail. Linux on x86-64 only.
 
 ``python system_calls.py PLAN COMMAND…`` prints what happened as JSON on its last line. It imports
 nothing of Scope and is a process of its own, because whoever traces has to wait for every child.
@@ -18,6 +18,7 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,6 +26,8 @@ AVAILABLE = sys.platform == "linux" and platform.machine() == "x86_64"
 KILL = "kill"
 FULL = "full"
 NO_MEMORY = "no memory"
+KILL_PARENT = "kill parent"
+CUT = "power cut"
 # ENOSPC, ENOMEM
 _DISK_FULL = 28
 _LACK_OF_MEMORY = 12
@@ -79,24 +82,40 @@ class Traced(NamedTuple):
 
     :param calls: name and path of each call that counted.
     :param status: exit status of the command; negative: the signal that ended it.
+    :param seconds: from the n-th call until the last process had ended.
     """
 
     calls: list[str]
     status: int
     stdout: str
     stderr: str
+    seconds: float
 
 
 def traced(
-    command: list[str], folder: Path, n: int, action: str, environment: dict[str, str] | None = None
+    command: list[str],
+    folder: Path,
+    n: int,
+    action: str,
+    environment: dict[str, str] | None = None,
+    disk: Path | None = None,
 ) -> Traced:
     """Run a command and do something at its n-th call.
 
     :param folder: only writes to files below it count.
     :param action: ``KILL`` or ``FULL`` (the n-th write fails: no space left), or ``NO_MEMORY`` (the
-        n-th allocation of at least 1 MiB fails).
+        n-th allocation of at least 1 MiB fails); ``KILL_PARENT``: the command itself is killed, and
+        the processes that it has started are not; ``CUT``: the disk stays as it is.
+    :param disk: image of the disk in which the folder lies, for ``CUT``; it is copied beside it.
     """
-    plan = json.dumps({"folder": os.path.realpath(folder), "n": n, "action": action})
+    plan = json.dumps(
+        {
+            "folder": os.path.realpath(folder),
+            "n": n,
+            "action": action,
+            "disk": None if disk is None else str(disk),
+        }
+    )
     done = subprocess.run(
         [sys.executable, __file__, plan, *command],
         capture_output=True,
@@ -109,7 +128,9 @@ def traced(
     if done.returncode or not last.startswith("{"):
         raise RuntimeError(f"the tracer failed: {done.stdout}{done.stderr}")
     result: dict[str, Any] = json.loads(last)
-    return Traced(result["calls"], result["status"], "\n".join(lines), done.stderr)
+    return Traced(
+        result["calls"], result["status"], "\n".join(lines), done.stderr, result["seconds"]
+    )
 
 
 class _Tracer:
@@ -119,6 +140,9 @@ class _Tracer:
         self._folder = plan["folder"]
         self._n = plan["n"]
         self._action = plan["action"]
+        self._disk = plan["disk"]
+        self._child = 0
+        self._acted_s = time.monotonic()
         self._libc = ctypes.CDLL(None, use_errno=True)
         self._libc.ptrace.argtypes = [
             ctypes.c_long,
@@ -130,7 +154,7 @@ class _Tracer:
 
     def run(self, command: list[str]) -> int:
         """Run the command and return its exit status; negative: the signal that ended it."""
-        child = os.fork()
+        self._child = child = os.fork()
         if child == 0:
             self._libc.ptrace(_TRACEME, 0, None, None)
             os.kill(os.getpid(), signal.SIGSTOP)
@@ -187,8 +211,12 @@ class _Tracer:
         self.calls.append(name)
         if len(self.calls) != self._n:
             return
-        if self._action == KILL:
-            os.kill(_process_of(thread), signal.SIGKILL)
+        self._acted_s = time.monotonic()
+        if self._action == CUT:
+            copy_disk(self._disk)
+        if self._action in (KILL, CUT, KILL_PARENT):
+            is_parent = self._action == KILL_PARENT
+            os.kill(self._child if is_parent else _process_of(thread), signal.SIGKILL)
             return
         registers[_ORIG_RAX] = 2**64 - 1  # no call
         registers[_RAX] = 2**64 - (_LACK_OF_MEMORY if self._action == NO_MEMORY else _DISK_FULL)
@@ -221,6 +249,11 @@ class _Tracer:
         return f"{name} {path}" if path.startswith(self._folder + os.sep) else None
 
 
+def copy_disk(disk: str) -> None:
+    """Copy the image of a disk as it is: with what the file system has written to it so far."""
+    subprocess.run(["cp", "--sparse=always", disk, f"{disk}.cut"], check=True)
+
+
 def _text(thread: int, address: int) -> str:
     """Return the text at an address of another process."""
     with open(f"/proc/{thread}/mem", "rb", buffering=0) as memory:
@@ -240,4 +273,6 @@ def _process_of(thread: int) -> int:
 if __name__ == "__main__":
     tracer = _Tracer(json.loads(sys.argv[1]))
     ended = tracer.run(sys.argv[2:])
-    print("\n" + json.dumps({"calls": tracer.calls, "status": ended}), flush=True)
+    seconds = time.monotonic() - tracer._acted_s
+    found = {"calls": tracer.calls, "status": ended, "seconds": seconds}
+    print("\n" + json.dumps(found), flush=True)

@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from .disks import new_disk, problem_with
 from .kills import COMMANDS, check_command, chosen
-from .system_calls import AVAILABLE, FULL, KILL, NO_MEMORY, traced
+from .system_calls import AVAILABLE, CUT, FULL, KILL, NO_MEMORY, traced
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Linux on x86-64")
 BY_NAME = {command.name: command for command in COMMANDS}
@@ -33,6 +35,35 @@ def test_files_are_old_or_whole_and_the_next_run_is_good(
     name: str, action: str, calls: tuple[int, ...]
 ) -> None:
     assert check_command(BY_NAME[name], action, calls) == (len(calls), [])
+
+
+def test_a_power_cut_leaves_old_or_whole_files_and_keeps_what_was_said_to_be_there() -> None:
+    """A small command at its last steps; every command, step and file system by --faults."""
+    if problem := problem_with("ext4"):
+        pytest.skip(problem)
+    assert check_command(BY_NAME["npz"], CUT, (-3, -2)) == (2, [])
+
+
+WITHOUT_SYNC = """
+import os, sys
+with open(sys.argv[1] + ".new", "w") as file:
+    file.write("whole")
+os.replace(sys.argv[1] + ".new", sys.argv[1])
+"""
+
+
+def test_a_file_that_is_not_synced_is_lost_by_a_power_cut() -> None:
+    """Otherwise the test above would find nothing."""
+    if problem := problem_with("ext4"):
+        pytest.skip(problem)
+    with new_disk("ext4") as disk:
+        path = disk.folder / "file"
+        path.write_text("old")
+        disk.sync()
+        subprocess.run([sys.executable, "-c", WITHOUT_SYNC, str(path)], check=True)
+        assert path.read_text() == "whole"
+        disk.cut()
+        assert path.read_text() != "whole"
 
 
 def test_several_commands_and_faults_can_be_named() -> None:
