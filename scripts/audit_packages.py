@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+import tomllib
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from typing import Any
 
 REGISTRY = "https://pypi.org/pypi"
 LOCKS = Path(__file__).parent / "requirements"
+ADVISORIES = Path(__file__).parent / "advisories.toml"
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 Ask = Callable[[str], Any]
 
@@ -74,8 +76,21 @@ def _sentence(entry: dict[str, Any]) -> str:
     )
 
 
+def print_advisories() -> None:
+    """Print what is known of the libraries inside the packages, and whether it can be reached."""
+    table = tomllib.loads(ADVISORIES.read_text("utf-8"))
+    print(f"inside the packages, as of {table['as_of']}:")
+    for library in table["library"]:
+        reach = "reachable" if library["reachable"] else "out of reach"
+        print(
+            f"  {library['project']} {library['found']} in {library['package']}: "
+            f"{', '.join(library['advisories'])} (fixed in {library['fixed_in']}); {reach}: "
+            f"{library['because']}"
+        )
+
+
 def main(ask: Ask = ask) -> int:
-    """Print what is known; return the exit status."""
+    """Print what is known; return the exit status, which is about the packages alone."""
     found = False
     unknown = False
     for name, version in sorted(locked_versions()):
@@ -96,6 +111,7 @@ def main(ask: Ask = ask) -> int:
                 f"{name} {version}{newer}: "
                 f"{'; '.join(known) if known else 'no known vulnerability'}"
             )
+    print_advisories()
     return 1 if found else 2 if unknown else 0
 
 
