@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ..machine_code.kernel_count import kernel_count
 from ..temporary import discard, new_folder
 from .preferences import PACKAGE, cache, preferences
 from .reporting import iface_
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     import subprocess
 
 ROOT = Path(__file__).resolve().parents[2]
-KERNELS = 77  # that a capture and its preview compile
 _DELAY_S = 3.0
 _INTERVAL_S = 1.0
 _REQUEST = b'{"warm_up": true}\n'
@@ -126,7 +126,7 @@ def stop() -> None:
 def draw(layout: bpy.types.UILayout) -> None:
     """Show the progress while the solver is being compiled."""
     if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
-        share = min(1.0, compiled / KERNELS)
+        share = min(1.0, compiled / kernel_count())
         text = iface_(
             "Compiling the solver in the background, {percent:.0f} %", percent=100 * share
         )

@@ -6,6 +6,7 @@ who waits is told. With numba's own cache, and with the extension's.
 import os
 
 import pytest
+from scope.scope_addon.machine_code.kernel_count import kernel_count
 
 from .small_package import make_package
 
@@ -90,3 +91,11 @@ def test_without_a_place_for_code_a_solver_alone_works(run_code, tmp_path):
     (tmp_path / "file").touch()
     variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
     assert run_code(RUN, tmp_path, variables).stdout.split() == ["1.0", "0"]
+
+
+def test_kernels_are_counted_in_the_sources_of_both_packages(tmp_path):
+    kernels = "\n@kernel\ndef first():\n    pass\n\n\n@kernel\ndef second():\n    pass\n"
+    for package, source in (("solver", kernels), ("scope_addon/capture", "import kernel\n")):
+        (tmp_path / package).mkdir(parents=True)
+        (tmp_path / package / "module.py").write_text(source)
+    assert kernel_count(tmp_path) == 2

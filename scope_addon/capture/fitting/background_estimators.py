@@ -26,7 +26,6 @@ from ..perception.observation import Observation
 from .focal_length import FocalFits, camera_by_edges, camera_by_fits
 from .live_body import LiveBody
 
-KERNELS = 85  # that fitting a clip compiles
 _POLLING_INTERVAL_S = 0.2
 # For the background and the edges; the solver has a thread of its own, as compiling must not delay
 # them.

@@ -17,13 +17,14 @@ import numpy as np
 from ....solver.body import Body
 from ...arrays import Float64Array, Uint8Array
 from ...errors import NoPersonError, VideoError
+from ...machine_code.kernel_count import kernel_count
 from ...notices import Notice, notice
 from ...options.capture import AUTO, LARGEST, OFF
 from ..camera.background_record import BackgroundRecord, CameraMotion
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
-from ..fitting.background_estimators import KERNELS, BackgroundEstimators
+from ..fitting.background_estimators import BackgroundEstimators
 from ..fitting.focal_length import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.frame import AutoExposure, Frame
@@ -318,7 +319,7 @@ def observe(
         if not observed.timestamps:
             raise no_frames_error(video)
         background.wait_for_solver(
-            lambda done: listeners.progress(COMPILING, min(done, KERNELS), KERNELS)
+            lambda done: listeners.progress(COMPILING, min(done, kernel_count()), kernel_count())
         )
         with clock.stage("solver"):
             footage = _footage(job, observed)
