@@ -45,7 +45,6 @@ ASSETS = {
 _NAMESPACE = uuid.UUID("5a3bb3f0-6b5e-4a5c-9d0e-0f3c5a9b1d27")
 _EXTENSION_MODULE = re.compile(r"(\.(abi3|cpython-[\w-]+)\.so|\.pyd)$")
 _SHORT = {"opencv-contrib-python-headless": "opencv"}  # in THIRD_PARTY.md
-_ROW = r"^\| ([^|]+) \| ([^|]+) \| ((?:\S+ [LMW]+(?:, )?)+) \|$"  # of the table of libraries there
 _LIBRARY = re.compile(r"^(?P<name>.+?)\.(so|dylib|dll)(?P<end>[.\d]*)$")
 
 

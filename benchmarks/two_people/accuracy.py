@@ -36,7 +36,6 @@ from ..report import table
 from . import truth as truths
 from .footage import FOLDER, extract, load_cameras
 
-STATURE_M = {"man": 1.72, "woman": 1.40}  # as the package's Config.toml says
 SHOWN = {
     "coverage": "found",
     "mpjpe_root": "MPJPE-root mm",
