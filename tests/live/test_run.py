@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A running capture whose source changes."""
+"""A running capture whose source changes.
+
+Rates and latencies of poses that come at known times.
+"""
 
 import threading
 from types import SimpleNamespace
@@ -9,10 +12,13 @@ import pytest
 from scope.scope_addon.live.outputs.people_recording import PeopleRecording
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.run import Listeners, LiveOptions, run_live
+from scope.scope_addon.live.statistics import Statistics
 
 from .fake_source import FakeClock, FakeSource
 
 WIDE = np.zeros((96, 160, 3), np.uint8)
+
+
 TALL = np.zeros((160, 96, 3), np.uint8)
 
 
@@ -68,3 +74,33 @@ def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):
     recording.send(pose(0, 2.0), 0.0)
     recording.send(pose(1, 2.0), 0.0)
     assert (recording.seconds, recording.camera) == (0.5, "first")
+
+
+def test_rates_are_poses_per_second_since_the_first_and_recently() -> None:
+    statistics = Statistics()
+    times = np.concatenate([np.arange(0, 10, 0.1), np.arange(10, 20.001, 0.05)]) + 100.0
+    for time_s in times:
+        statistics.add(time_s - 0.08, time_s)
+    assert statistics.poses == len(times)
+    assert statistics.rate == pytest.approx((len(times) - 1) / 20.0)
+    assert statistics.recent_rate == pytest.approx(20.0)
+
+
+def test_latencies_are_the_median_and_what_one_in_twenty_exceeds() -> None:
+    statistics = Statistics()
+    for k in range(1, 101):
+        assert statistics.add(k - 0.001 * k, float(k)) == pytest.approx(k, rel=1e-9)
+    assert statistics.latency_ms() == pytest.approx((50.5, 95.05))
+
+
+def test_before_the_second_pose_there_is_no_rate() -> None:
+    statistics = Statistics()
+    assert (statistics.rate, statistics.recent_rate, statistics.latency_ms()) == (
+        0.0,
+        0.0,
+        (0.0, 0.0),
+    )
+    statistics.add(1.0, 1.5)
+    assert (statistics.rate, statistics.recent_rate, statistics.poses) == (0.0, 0.0, 1)
+    statistics.add(1.0, 1.5)  # of another person, at the same time
+    assert (statistics.rate, statistics.recent_rate) == (0.0, 0.0)

@@ -1,22 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A .blend file that carries its motions: saved, appended, linked, duplicated, renamed, deleted,
 undone, hostile.
+
+A capture that was built before, as tests append it, is as one that is built.
+
+Nothing is added to a scene that is linked from another file.
 """
+
+from __future__ import annotations
 
 import io
 import zipfile
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+import scope
 from scope.scope_addon.errors import MotionFileError, UsageError
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.transaction import all_or_nothing
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.export.export import export_motions
+from scope.scope_addon.scene.footage_strip import add_footage_strips
 from scope.scope_addon.scene.packed_motion import MOTION, pack_motion, stored_motion
 
+from ..edit.walking import motion_of, walk
 from .conftest import dance
+from .made_rigs import captured
 
 
 @pytest.fixture
@@ -206,3 +217,51 @@ def test_a_text_that_is_no_name_of_a_file_is_no_motion():
         armature["scope_motion"] = text
         with pytest.raises(UsageError, match="stored neither in"):
             stored_motion(armature)
+
+
+def state(armature):
+    action = armature.animation_data.action
+    scene = bpy.context.scene
+    return {
+        "objects": sorted((each.name, each.type, each.select_get()) for each in bpy.data.objects),
+        "action": (action.name, action.use_fake_user, action.users, tuple(action.frame_range)),
+        "libraries": len(bpy.data.libraries),
+        "frames": (scene.frame_start, scene.frame_end, scene.frame_current),
+        "camera": scene.camera and scene.camera.name,
+        "collections": sorted(each.name for each in scene.collection.children),
+    }
+
+
+def test_an_appended_capture_is_as_a_built_one():
+    motion = motion_of(walk(0.7))
+    built = state(captured(motion))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert state(captured(motion)) == built
+
+
+SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
+
+
+@pytest.fixture
+def linked(tmp_path):
+    """A scene of another file, shown in the window."""
+    path = str(tmp_path / "other.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    with bpy.data.libraries.load(path, link=True) as (there, here):
+        here.scenes = list(there.scenes)
+    bpy.context.window.scene = here.scenes[0]
+    return here.scenes[0]
+
+
+def test_a_motion_is_not_built_in_a_linked_scene(linked, body, make_motion):
+    before = [len(blocks) for blocks in (bpy.data.objects, bpy.data.collections, bpy.data.actions)]
+    with pytest.raises(UsageError, match=r"the scene is linked from .*other\.blend"):
+        build_scene([make_motion(body, 12)], body)
+    assert [
+        len(blocks) for blocks in (bpy.data.objects, bpy.data.collections, bpy.data.actions)
+    ] == before
+
+
+def test_no_strip_is_added_to_a_linked_scene(linked):
+    with pytest.raises(UsageError, match=r"use a scene of this file"):
+        add_footage_strips(linked, SAMPLE, 1.0)

@@ -1,16 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each measure by hand on a few points, and against implementations that share nothing with it."""
+"""Each measure by hand on a few points, and against implementations that share nothing with it.
+
+Scores of made captures: exact ones have no error, people are told apart, frames and people that
+lack are counted.
+
+The joints of protocols lie where anatomy has them, on the built-in body and in the published
+orders.
+
+Published rows belong to protocols, to measures that these take, and name their source.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.benchmarks.evaluation import metrics
+from scope.benchmarks.evaluation import joint_sets, metrics
+from scope.benchmarks.evaluation import scores as module
+from scope.benchmarks.evaluation.clips import Clip, Person, Truth
+from scope.benchmarks.evaluation.joint_sets import SMPL24
+from scope.benchmarks.evaluation.protocols import MEASURES, PROTOCOLS
+from scope.benchmarks.evaluation.published import PUBLISHED
+from scope.benchmarks.evaluation.subjects import MeasuredJoints, PosedBody
 from scope.solver.rotations import exp
 
+from ...made_motion import made_motion
+from .made_data import K
+
 RNG = np.random.default_rng(0)
+
+
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
@@ -152,3 +174,162 @@ def test_a_clip_of_one_frame_has_no_measures_of_motion():
         metrics.acceleration_error(one, one, 30.0).shape == metrics.jitter(one, 30.0).shape == (0,)
     )
     assert metrics.w_mpjpe(one, one) == pytest.approx([0.0], abs=1e-9)
+
+
+COUNT = 12
+
+
+def walking(body, x=0.0, seed=0):
+    """Someone who moves sideways, 4 m in front of the camera."""
+    rng = np.random.default_rng(seed)
+    poses = np.cumsum(rng.normal(scale=0.02, size=(COUNT, 3 * (body.K + 1))), axis=0)
+    trans = np.stack([x + 0.05 * np.arange(COUNT), np.zeros(COUNT), np.zeros(COUNT)], axis=1)
+    motion = made_motion(body, poses, trans)
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, :3] = exp(np.array([-np.pi / 2, 0, 0])).T @ np.eye(3)
+    world_from_camera[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    world_from_camera[:3, 3] = [0, -4, 1]
+    motion = replace(
+        motion, world_from_camera=np.tile(world_from_camera, (COUNT, 1, 1)), intrinsics=K
+    )
+    joints = PosedBody.of_motion(body, motion).joints(body.joint_names)
+    return replace(motion, joints_cam=joints.astype(np.float32))
+
+
+def person(body, motion, name="a", rows=None):
+    rows = np.arange(COUNT) if rows is None else rows
+    world = PosedBody.of_motion(body, motion, in_world=True)
+    return Person(name, rows, PosedBody.of_motion(body, motion).select(rows), world.select(rows))
+
+
+def clip(alone=True, rate=30.0):
+    return Clip("clip", [Path("a.jpg")], rate, ("rich",), lambda: None, alone)
+
+
+def test_an_exact_capture_has_no_error(body):
+    motion = walking(body)
+    found = module.score_clip(
+        clip(), Truth([person(body, motion)]), body, [motion], PROTOCOLS["rich"]
+    )
+    means = found.means()
+    assert set(means) == {
+        "mpjpe",
+        "pa_mpjpe",
+        "mpvpe",
+        "acceleration",
+        "wa_mpjpe",
+        "w_mpjpe",
+        "rte",
+        "jitter",
+        "foot_slide",
+    }
+    for key in ("mpjpe", "pa_mpjpe", "mpvpe", "acceleration", "wa_mpjpe", "w_mpjpe", "rte"):
+        assert means[key] == pytest.approx(0, abs=1e-6), key
+    assert means["jitter"] > 0.01  # of the captured motion alone
+    assert (found.frames, found.seen, found.people, found.missed) == (COUNT, COUNT, 1, 0)
+
+
+def test_errors_are_those_of_the_joints_that_differ(body):
+    motion = walking(body)
+    true = person(body, motion)
+    joints = true.camera.joints(SMPL24)
+    joints[:, SMPL24.index("left_wrist")] += [0.0, 0.024, 0.032]  # 40 mm
+    measured = replace(true, camera=MeasuredJoints(SMPL24, joints))
+    means = module.score_clip(clip(), Truth([measured]), body, [motion], PROTOCOLS["3dpw"]).means()
+    assert means["mpjpe"] == pytest.approx(40 / 24, rel=1e-4)
+    # squares are least, so that one large error becomes many small ones
+    assert 0 < means["pa_mpjpe"] < 40 / 24 * 4
+    assert means["pck_50"] == pytest.approx(100)
+    assert "mpvpe" not in means  # there is no mesh of the truth
+
+
+def test_a_step_between_frames_and_a_late_start_are_matched_by_number(body):
+    motion = walking(body)
+    rows = np.array([0, 5, 10])
+    late = replace(
+        motion,
+        joint_sigma_m=None,
+        joint_sigma_depth_m=None,
+        **{
+            key: getattr(motion, key)[3:]
+            for key in ("poses", "trans", "poses_raw", "trans_raw", "frames", "valid")
+        },
+        **{
+            key: getattr(motion, key)[3:]
+            for key in ("timestamps", "joints_cam", "keypoints2d", "joint_confidence")
+        },
+        **{
+            key: getattr(motion, key)[3:]
+            for key in ("world_from_camera", "foot_contact", "residual_px")
+        },
+    )
+    found = module.score_clip(
+        clip(), Truth([person(body, motion, rows=rows)]), body, [late], PROTOCOLS["h36m-p1"]
+    )
+    assert found.means()["mpjpe"] == pytest.approx(0, abs=1e-4)
+    assert (found.frames, found.seen) == (3, 2)
+
+
+def test_people_are_told_apart_by_the_image(body):
+    left = walking(body, -0.8, 1)
+    right = walking(body, 0.8, 2)
+    truth = Truth([person(body, left), person(body, right, "b")], K)
+    assert module.assign(clip(alone=False), truth, [right, left]) == [left, right]
+    assert module.assign(clip(alone=False), truth, [right]) == [None, right]
+    found = module.score_clip(clip(alone=False), truth, body, [right], PROTOCOLS["bedlam"])
+    assert (found.people, found.missed, found.frames, found.seen) == (2, 1, 2 * COUNT, COUNT)
+    assert found.means()["mpjpe"] == pytest.approx(0, abs=1e-4)
+
+
+def test_means_are_over_frames_not_clips():
+    scores = module.Scores({"mpjpe": [np.array([1.0, 1.0, 1.0])]})
+    other = module.Scores({"mpjpe": [np.array([5.0])]})
+    scores.add(other)
+    assert scores.means() == {"mpjpe": 2.0}
+    scores.add(module.Scores({"mpjpe": [np.array([np.nan])]}))
+    assert scores.means() == {"mpjpe": 2.0}
+
+
+@pytest.fixture
+def at_rest(body):
+    def place(*names):
+        parts, offsets = joint_sets.on_body(body, names, np.zeros(body.P))
+        return body.rest_joints()[parts] + offsets
+
+    return place
+
+
+def test_every_joint_of_every_protocol_is_on_the_body(at_rest):
+    for protocol in PROTOCOLS.values():
+        assert at_rest(*protocol.joints, *protocol.root).shape == (
+            len(protocol.joints) + len(protocol.root),
+            3,
+        )
+        assert set(protocol.pck_joints) <= set(protocol.joints)
+        assert set(protocol.measures) <= set(MEASURES)
+
+
+@pytest.mark.parametrize(
+    "names", [joint_sets.LSP14, joint_sets.REGRESSED17, joint_sets.TEST_3DHP, joint_sets.H36M32]
+)
+def test_left_is_left(at_rest, names):
+    for name, point in zip(names, at_rest(*names), strict=True):
+        side = name.split("_")[0]
+        assert np.sign(np.round(point[0], 2)) == {"left": 1, "right": -1}.get(side, 0), name
+
+
+def test_the_orders_are_those_of_the_published_tables():
+    """Numbers as SPIN's constants.py has them: LSP's joints by their rows in J_regressor_h36m."""
+    rows = [6, 5, 4, 1, 2, 3, 16, 15, 14, 11, 12, 13, 8, 10]
+    assert [joint_sets.REGRESSED17[row] for row in rows] == list(joint_sets.LSP14)
+    by_data_set = [11, 6, 7, 8, 1, 2, 3, 12, 24, 14, 15, 17, 18, 19, 25, 26, 27]
+    assert [joint_sets.H36M32[name] for name in joint_sets.REGRESSED17] == by_data_set
+
+
+def test_every_row_has_a_source_and_figures_of_its_protocol():
+    for name, rows in PUBLISHED.items():
+        for row in rows:
+            assert len(row.source) > 20, row
+            assert row.figures, row
+            assert set(row.figures) <= set(PROTOCOLS[name].measures), row
+            assert row.figures.get("pa_mpjpe", 0) < row.figures.get("mpjpe", 1e9), row

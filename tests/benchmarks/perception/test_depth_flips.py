@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Depth flips that were put in by hand, and a body whose arm is bent in single frames."""
+"""Depth flips that were put in by hand, and a body whose arm is bent in single frames.
+
+The figures of the faces' benchmark, on weights made by hand.
+
+The measure of silhouettes: figures by hand, and a body drawn into a rotated region where its
+projection lies.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +16,9 @@ from scope.benchmarks.perception.depth_flips import (
     count_flips,
     out_of_plane_deg,
 )
+from scope.benchmarks.perception.faces import BLINKS, closures
+from scope.benchmarks.perception.outline import overlap
+from scope.solver.names import EXPRESSIONS
 
 RATE = 10.0
 
@@ -41,3 +50,38 @@ def test_a_flip_counts_as_brief_if_it_begins_and_ends_within_the_clip():
 def test_a_bone_crosses_the_image_plane_by_its_true_angles():
     assert counted([20, 20, 20, -20], [20, 0, -20, -20]) == DepthFlips(1, 1, 3, 1, 1)
     assert counted([20, -20, 20], [20, 10, 20]) == DepthFlips(0, 0, 2, 0, 0)
+
+
+def blinks(*starts):
+    out = np.zeros((60, len(EXPRESSIONS)))
+    for start in starts:
+        out[start : start + 3, BLINKS] = 0.9
+    return out
+
+
+@pytest.mark.parametrize(
+    ("found", "figures"),
+    [
+        ((10, 40), {"closed_found": 1.0, "closed_false": 0.0, "closed_frames": 0.0}),
+        ((11, 38), {"closed_found": 1.0, "closed_false": 0.0, "closed_frames": 1.5}),
+        ((10, 25), {"closed_found": 0.5, "closed_false": 0.5, "closed_frames": 0.0}),
+    ],
+)
+def test_closures_are_matched_in_time(found, figures):
+    assert closures(blinks(*found), blinks(10, 40), np.zeros(60, int)) == figures
+
+
+def test_figures_of_two_rectangles() -> None:
+    """The body covers 6 x 4 pixels, the mask 6 x 8, of which 2 columns lie outside the image; 12
+    are common.
+    """
+    shape = np.ones((256, 256), np.uint8)
+    mask = np.zeros((256, 256), bool)
+    shape[10:16, 20:24] = 2
+    mask[10:16, 22:30] = True
+    shape[:, 28:] = 0
+    found = overlap(shape, mask)
+    assert found == pytest.approx(
+        {"iou": 12 / (24 + 36 - 12), "body_outside": 0.5, "mask_outside": 1 - 12 / 36}
+    )
+    assert overlap(shape, np.zeros_like(mask)) is None

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The decoder: upright images with square pixels, how long a video is shown, and skipping."""
+"""The decoder: upright images with square pixels, how long a video is shown, and skipping.
+
+Exact frame rates from the rounded ones that containers and OpenCV give.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,14 @@ import av
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media import image_size
-from scope.scope_addon.capture.media.frame_readers import PyavReader, upright
+from scope.scope_addon.capture.media.frame_readers import PyavReader, exact_fps, upright
 from scope.scope_addon.errors import VideoError
 
 from .made_video import with_time_table, write_video
 
 COUNT = 24
+
+
 FPS = 12.0
 
 
@@ -160,3 +165,21 @@ def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):
     with closing(PyavReader(path)) as reader:
         images = [image for _, image in iter(reader.read, None)]
     assert len(images) == 60
+
+
+@pytest.mark.parametrize(
+    ("fps", "expected"),
+    [
+        (30000 / 1001, Fraction(30000, 1001)),
+        (29.97, Fraction(2997, 100)),
+        (29.9701, Fraction(30000, 1001)),
+        (23.97602, Fraction(24000, 1001)),
+        (12.5, Fraction(25, 2)),
+        (29.8, Fraction(149, 5)),
+        (0.0, None),
+        (float("nan"), None),
+        (90000.0, None),
+    ],
+)
+def test_exact_fps(fps, expected):
+    assert exact_fps(fps) == expected

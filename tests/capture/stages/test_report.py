@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the report says of a face, counted by hand, and of the up direction."""
+"""What the report says of a face, counted by hand, and of the up direction.
+
+What a report says of feet that are not on the floor, for motions whose heights are known.
+"""
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.stages import report
 from scope.scope_addon.capture.stages.report import face_frames, up_warnings
 from scope.scope_addon.capture.world.world_frame import BODIES, LINES
-from scope.solver import load_body
+from scope.solver import load_body, rotations
 
 from ...made_motion import made_face, made_motion
 
 T = 300
+
+
 RATE = 30.0
 
 
@@ -57,3 +63,90 @@ def test_a_still_without_edges_says_that_up_is_a_guess():
     assert "11 degrees" in warning
     assert up_warnings("a.jpg", LINES, is_still=True) == []
     assert up_warnings("a.mp4", BODIES, is_still=False) == []
+
+
+def standing(body, height, raw=None):
+    """Three seconds of a person at rest, the lowest vertex at ``height`` (90,) metres, contact
+    certain.
+    """
+    poses = np.zeros((90, body.K + 1, 3))
+    poses[:, 0] = [np.pi / 2, 0, 0]
+    R, t = body.forward_kinematics(rotations.exp(poses[0]), np.zeros(3))
+    on_floor = np.array([0.0, 0.0, -body.skin(R, t)[:, 2].min()])
+    trans, trans_raw = (
+        on_floor + np.asarray(h)[:, None] * [0, 0, 1]
+        for h in (height, height if raw is None else raw)
+    )
+    before = poses if raw is None else poses + 1e-3 * np.array([0.0, 0, 1])
+    given = {
+        "poses_raw": before.reshape(90, -1),
+        "trans_raw": trans_raw,
+        "foot_contact": np.full((90, 4), 0.95),
+    }
+    return made_motion(body, poses, trans, **given)
+
+
+def from_second(second, height):
+    return np.where(np.arange(90) >= 30 * second, height, 0.0)
+
+
+def floor_warnings(*arguments) -> list[str]:
+    return list(map(str, report.floor_warnings(*arguments)))
+
+
+def test_nothing_is_said_of_somebody_on_the_floor(body):
+    assert floor_warnings("a.mp4", body, [standing(body, np.full(90, -0.008))]) == []
+
+
+@pytest.mark.parametrize(("height", "where"), [(-1.5, "1.5 m below"), (0.8, "0.8 m above")])
+def test_another_floor(body, height, where):
+    found = floor_warnings("a.mp4", body, [standing(body, from_second(2, height))])
+    assert found == [
+        f"a.mp4: the person stands up to {where} the floor at 2.0 s, so the clip has more than one "
+        "floor: capture the "
+        "part that matters, with a start and end time, or with uneven ground"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "cause"),
+    [(0, "give everybody's height"), (1, "give everybody's height"), (2, "in another order")],
+)
+def test_somebody_off_the_floor_of_another_all_the_time_may_have_another_size(body, given, cause):
+    low = standing(body, np.zeros(90))
+    other = standing(body, np.full(90, 0.5))
+    (found,) = floor_warnings("a.mp4", body, [low, other], given)
+    assert found.startswith(
+        "a.mp4: person 2 stands up to 0.5 m above the floor at 0.0 s, so either "
+    )
+    assert cause in found
+    assert found.endswith(
+        "or the clip has more than one floor: capture the part that matters, with a start and end "
+        "time, or with uneven "
+        "ground"
+    )
+
+
+def test_somebody_who_changes_floors_has_no_other_size(body):
+    (found,) = floor_warnings(
+        "a.mp4", body, [standing(body, np.zeros(90)), standing(body, from_second(2, -1.5))]
+    )
+    assert found.startswith(
+        "a.mp4: person 2 stands up to 1.5 m below the floor at 2.0 s, so the clip has more than one"
+    )
+
+
+@pytest.mark.parametrize(("height", "where"), [(-0.18, "18 cm below"), (0.15, "15 cm above")])
+def test_a_step_that_was_levelled(body, height, where):
+    motion = standing(body, np.zeros(90), raw=from_second(1, height))
+    motion.foot_contact[29] = 0.0
+    found = floor_warnings("a.mp4", body, [standing(body, np.zeros(90)), motion])
+    assert len(found) == 1
+    assert f"the feet of person 2 rest {where} the floor at 1.0 s, as on a step" in found[0]
+
+
+def test_feet_that_are_still_under_the_floor(body):
+    height = np.zeros(90)
+    height[10:17] = -0.05
+    found = floor_warnings("a.mp4", body, [standing(body, height)])
+    assert found == ["a.mp4: a foot of the person is up to 5 cm under the floor in 7 of 90 frames"]

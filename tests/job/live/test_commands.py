@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Commands arrive in any pieces; nothing else is one."""
+"""Commands arrive in any pieces; nothing else is one.
+
+The request of a live capture as one line, told from that of other footage.
+"""
 
 import pytest
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.live.commands import RECORD, STOP, Commands
+from scope.scope_addon.job.live.request import LiveRequest
+from scope.scope_addon.job.request import WARM_UP, JobRequest
 
 
 @pytest.mark.parametrize("size", [1, 3, 100])
@@ -23,3 +29,33 @@ def test_what_is_no_command_does_nothing_and_is_not_kept():
     assert not commands.recording.is_set()
     assert not commands.stopped.is_set()
     assert len(commands._unfinished) < 10_000
+
+
+def test_a_request_is_sent_as_one_line():
+    request = LiveRequest("a\nb.mp4", online=True, heights_m=(1.8,), calibration="lens.json")
+    text = request.to_json()
+    assert "\n" not in text
+    assert LiveRequest.is_in(text)
+    read = LiveRequest.from_json(text)
+    assert (read.source, read.online, read.values) == (request.source, True, request.values)
+    assert read.values["live_quality"] == "fast"
+
+
+def test_other_requests_are_none():
+    for text in (WARM_UP, JobRequest("live").to_json(), "", "[]"):
+        assert not LiveRequest.is_in(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"live": 3}',
+        '{"live": "0", "online": 1}',
+        '{"live": "0", "vmc": "1.2.3.4:5"}',
+        '{"live": "0", "threads": "x"}',
+    ]
+    + ['{"live": "0"', "[]", "", "[" * 100_000],
+)
+def test_an_invalid_request_is_an_error(text):
+    with pytest.raises(UsageError):
+        LiveRequest.from_json(text)

@@ -1,19 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Held feet of a person whose motion is known, seen with errors of the distance."""
+"""Held feet of a person whose motion is known, seen with errors of the distance.
+
+What a body stands on draws its feet to where they rest, and keeps them above the floor.
+
+An offset that changes abruptly is shown without a jump.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.standing import line_of_sight
 from scope.scope_addon.live.causal_fit import FittedFrame
 from scope.scope_addon.live.feet.hold import FootHold
-from scope.scope_addon.live.feet.support import AFTER_A_PAUSE
+from scope.scope_addon.live.feet.support import AFTER_A_PAUSE, Support
+from scope.scope_addon.live.feet.transition import Transition
+from scope.solver import Floor, FootContacts, Measurements
 from scope.solver.rotations import exp
 
 from ...kinematics.posed_people import stepping_person
 
 LEFT = slice(0, 2)
+
+
 RIGHT = slice(2, 4)
 
 
@@ -166,3 +177,94 @@ def test_a_foot_that_is_held_where_the_image_does_not_show_it_is_let_go():
     assert min(away_m[:10]) > 0.5
     assert max(away_m[-10:]) < 0.03
     assert feet.is_holding
+
+
+POINTS = np.arange(6) + 40
+
+
+SUPPORT = Support(
+    places=np.arange(18.0).reshape(6, 3),
+    rests=np.array([0.9, 0.8, 0.0, 0.1, 0.2, 0.0]),
+    on_floor=np.array([0.7, 0.6, 0.0, 0.1, 0.0, 0.0]),
+    not_below=np.array([0.5, 0.4, 0.3, 0.2, 0.1, 0.0]),
+    stands=0.75,
+    floor_normal=np.array([0.0, -0.8, -0.6]),
+    floor_offset=-1.25,
+)
+
+
+def test_a_frame_gets_the_places_and_the_floor_and_keeps_the_rest() -> None:
+    given = Measurements(intrinsics=np.diag([900.0, 900.0, 1.0]))
+    found = SUPPORT.added_to(given, POINTS)
+    assert given.floor is None
+    assert found.intrinsics is given.intrinsics
+    assert isinstance(found.foot_contacts, FootContacts)
+    assert isinstance(found.floor, Floor)
+    np.testing.assert_array_equal(found.foot_contacts.indices, POINTS)
+    np.testing.assert_array_equal(found.foot_contacts.points, SUPPORT.places)
+    np.testing.assert_array_equal(found.foot_contacts.probability, SUPPORT.rests)
+    np.testing.assert_array_equal(found.floor.indices, POINTS)
+    np.testing.assert_array_equal(found.floor.normal, SUPPORT.floor_normal)
+    np.testing.assert_array_equal(found.floor.contact, SUPPORT.on_floor)
+    assert found.floor.below is not None
+    np.testing.assert_array_equal(found.floor.below, SUPPORT.not_below)
+    assert found.floor.offset == SUPPORT.floor_offset
+
+
+def test_after_a_pause_only_the_floor_is_left_and_weakly_as_far_as_somebody_stood_on_it() -> None:
+    left = SUPPORT.after_a_pause()
+    assert not left.rests.any()
+    assert not left.on_floor.any()
+    np.testing.assert_allclose(left.not_below, AFTER_A_PAUSE * 0.75)
+    np.testing.assert_array_equal(left.floor_normal, SUPPORT.floor_normal)
+    assert SUPPORT.rests.any()
+    assert not replace(SUPPORT, stands=0.0).after_a_pause().not_below.any()
+
+
+STEP_S = 1 / 600
+
+
+def shown_after_change(at: int, count: int = 400) -> np.ndarray:
+    """Return what is shown (count, 3) of an offset that moves at 0.5 m/s, and is 0 from a frame
+    on.
+    """
+    transition = Transition(2, 6.0)
+    shown = []
+    where = np.array([True, False])
+    for k in range(count):
+        before, now = (
+            np.array([[0.5 * j * STEP_S, 0.0, 0.0], [1.0, 1.0, 1.0]]) for j in (k - 1, k)
+        )
+        zero = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]])
+        if k == at:
+            transition.change(where, (before, now), (zero, zero), STEP_S)
+        transition.advance(STEP_S)
+        assert not transition.remainder[1].any()
+        shown.append((now if k < at else zero)[0] + transition.remainder[0])
+    return np.array(shown)
+
+
+def test_position_velocity_and_acceleration_continue() -> None:
+    shown = shown_after_change(at=100)[:, 0]
+    velocity = np.diff(shown) / STEP_S
+    acceleration = np.diff(velocity) / STEP_S
+    assert np.abs(velocity[90:102] - 0.5).max() < 0.05  # as if nothing had changed
+    # 30000 m/s² if the offset jumped, 300 if the velocity did
+    assert np.abs(acceleration[90:99]).max() < 5.0
+
+
+def test_the_remainder_dies_away() -> None:
+    assert np.abs(shown_after_change(at=100)[300:]).max() < 1e-3
+
+
+def test_the_course_does_not_depend_on_the_frame_rate() -> None:
+    coarse = Transition(1, 6.0)
+    fine = Transition(1, 6.0)
+    one = np.array([[1.0, 2.0, 3.0]])
+    zero = np.zeros((1, 3))
+    for each in (coarse, fine):
+        each.change(np.array([True]), (0.9 * one, one), (zero, zero), 0.05)
+    coarse.advance(0.1)
+    for _ in range(10):
+        fine.advance(0.01)
+    np.testing.assert_allclose(coarse.remainder, fine.remainder, atol=1e-12)

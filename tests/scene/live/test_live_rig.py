@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A rig that follows is posed as the same frame of a retargeted capture, and can be given its pose
 back.
+
+Selection, mode and hidden objects are as they were.
 """
 
 import bpy
@@ -10,6 +12,7 @@ from mathutils import Matrix
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.live import live_rig
 from scope.scope_addon.scene.live.live_rig import LiveRig
+from scope.scope_addon.scene.live.scene_before import SceneBefore
 from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.solver.rotations import exp, quaternion_from_matrix
 
@@ -97,3 +100,39 @@ def test_the_proportions_follow_the_shape_but_not_at_every_pose(monkeypatch):
     assert second is not first
     now[0] += 1.0
     assert live._transfer_of(tall + 0.01) is second  # too little
+
+
+def test_what_changed_is_restored_and_what_is_gone_is_left_out():
+    for name in ("a", "b", "c"):
+        bpy.ops.object.armature_add()
+        bpy.context.object.name = name
+    objects = bpy.data.objects
+    objects["b"].select_set(True)
+    objects["a"].hide_set(True)
+    bpy.ops.object.mode_set(mode="POSE")  # of c, which is active
+    before = SceneBefore()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    objects["a"].hide_set(False)
+    objects["c"].select_set(False)
+    bpy.context.view_layer.objects.active = objects["a"]
+    bpy.data.objects.remove(objects["b"])
+    before.restore()
+    assert bpy.context.view_layer.objects.active.name == "c"
+    assert bpy.context.object.mode == "POSE"
+    assert objects["a"].hide_get()
+    assert objects["c"].select_get()
+
+
+def test_another_scene_is_left_alone():
+    first = bpy.context.scene
+    other = bpy.data.scenes.new("other")
+    before = SceneBefore()
+    window = bpy.context.window_manager.windows[0]
+    hidden = bpy.data.objects.new("hidden", None)
+    other.collection.objects.link(hidden)
+    hidden.hide_set(True, view_layer=other.view_layers[0])
+    with bpy.context.temp_override(window=window):
+        window.scene = other
+        before.restore()
+        assert hidden.hide_get(view_layer=other.view_layers[0])
+        window.scene = first

@@ -7,7 +7,7 @@ from scope.tools.mocap.position_sets import LAYOUTS, load_set
 from scope.tools.mocap.straight_legs import knee_flexions
 
 from ...required import missing
-from .test_mocap_new_performers import standing
+from .test_new_performers import standing
 
 T = 60
 LEGS = tuple(f"{s}_{j}" for s in ("left", "right") for j in ("hip", "knee", "ankle"))

@@ -1,23 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Corrections through Blender's operators, checked in the evaluated scene."""
+"""Corrections through Blender's operators, checked in the evaluated scene.
+
+What was corrected is on the rig that the motion is retargeted to, and in the files that are
+exported.
+
+Pins in frames in which the person was not seen, and where the footage has no frames.
+"""
+
+from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
+from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.foot_skin import foot_heights
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.packed_motion import pack_motion, stored_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.scope_addon.ui.pins.correction_operators import last_pin_warnings
 
 from ...edit.walking import BETAS, BODY, NAMES, motion_of, walk
 from ...scene import made_rigs
+from ...scene.exported import read_back
 from ...scene.made_rigs import captured
 
 FRAME = 46  # of the scene; the footage's frame 45, as the capture starts at frame 1
+
+
 WRIST = NAMES.index("left_wrist")
+
+
 ANKLE = NAMES.index("right_ankle")
 
 
@@ -142,6 +157,8 @@ CORRECTIONS = {
     "foot": lambda _: bpy.ops.scope.foot_stands(start=FRAME - 4, end=FRAME + 4, foot="right"),
     "sides": lambda _: bpy.ops.scope.exchange_sides(start=FRAME - 8, end=FRAME + 2),
 }
+
+
 EDITS = {
     "captured": lambda: None,
     "reduced": lambda: bpy.ops.scope.reduce_keys(degrees=2.0),
@@ -352,3 +369,163 @@ def test_a_failure_changes_nothing(rig, monkeypatch):
     assert bpy.context.scene.frame_current == FRAME
     for curve, now in keys(rig).items():
         np.testing.assert_array_equal(now, before[curve])
+
+
+STANDS = (40, 47)  # the left foot swings in these frames
+
+
+EXCHANGED = (12, 18)
+
+
+RIG_ANKLE = NAMES.index("left_ankle")
+
+
+FRAMES = (*range(EXCHANGED[0], EXCHANGED[1] + 1), *range(STANDS[0], STANDS[1] + 1))
+
+
+SUFFIXES = {"GLB": "glb", "FBX": "fbx", "BVH": "bvh"}
+
+
+@pytest.fixture
+def retargeted_rig(tmp_path):
+    """A captured walk, with its motion file."""
+    armature = captured(motion := motion_of(walk(3.0)))
+    motion.save(tmp_path / "person1.npz")
+    armature["scope_motion"] = str(tmp_path / "person1.npz")
+    armature["scope_body_file"] = "scope"
+    return armature
+
+
+def directions(places, side):
+    """(T, 3) unit vectors along a thigh."""
+    hip, knee = (NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee"))
+    along = places[:, knee] - places[:, hip]
+    return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def correct(armature):
+    """Exchange the sides, let a foot stand, put it on the floor and pin a wrist; return what is
+    then true.
+    """
+    scene = bpy.context.scene
+    before = made_rigs.seen(armature, NAMES, FRAMES)
+    bpy.ops.scope.exchange_sides(start=EXCHANGED[0], end=EXCHANGED[1])
+    bpy.ops.scope.foot_stands(start=STANDS[0], end=STANDS[1], foot="left")
+    scene.frame_set(FRAME)
+    bpy.ops.scope.floor_here(foot="left")
+    target = made_rigs.seen(armature, NAMES, [FRAME])[0, WRIST] + [0.1, 0.05, 0.15]
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=target)
+    return before, target
+
+
+def check(places, before, target):
+    """Check joints (T, K+1, 3) of `FRAMES` against what was corrected, and that it was wrong
+    before.
+    """
+    at = FRAMES.index(FRAME)
+    span = slice(len(FRAMES) - (STANDS[1] - STANDS[0] + 1), None)
+    assert np.linalg.norm(places[at, WRIST] - target) < 0.01
+    assert np.linalg.norm(before[at, WRIST] - target) > 0.1
+    assert np.ptp(places[span, RIG_ANKLE], axis=0).max() < 0.005
+    assert np.ptp(before[span, RIG_ANKLE], axis=0).max() > 0.05
+    middle = slice(2, EXCHANGED[1] - EXCHANGED[0] - 1)
+    ours = directions(places, "left")[middle]
+    theirs = directions(before, "right")[middle]
+    # A left thigh turned like a right one: the body's knees lie 5 mm outside the line from hip to
+    # ankle.
+    assert np.abs(ours - theirs).max() < 0.03
+    assert np.abs(ours - directions(before, "left")[middle]).max() > 0.1
+
+
+def test_the_rig_that_the_motion_is_retargeted_to_is_corrected(retargeted_rig):
+    before, target = correct(retargeted_rig)
+    names = [f"mixamorig:{name}" for name in NAMES]
+    own = made_rigs.renamed(retargeted_rig, dict(zip(NAMES, names, strict=True)))
+    settings = bpy.context.scene.scope_retarget
+    # the bones, without what keeps feet of other rigs on the floor
+    settings.rig = own
+    settings.feet = False
+    bpy.ops.scope.guess_bones()
+    bpy.context.view_layer.objects.active = retargeted_rig
+    bpy.ops.scope.retarget()
+    check(made_rigs.seen(own, names, FRAMES), before, target)
+    settings.feet = True
+    bpy.context.view_layer.objects.active = retargeted_rig
+    bpy.ops.scope.retarget()
+    check(made_rigs.seen(own, names, FRAMES), before, target)
+
+
+@pytest.mark.parametrize("kind", SUFFIXES)
+def test_exported_files_are_corrected(retargeted_rig, tmp_path, kind):
+    before, target = correct(retargeted_rig)
+    bpy.context.view_layer.objects.active = retargeted_rig
+    path = tmp_path / f"walk.{SUFFIXES[kind]}"
+    bpy.ops.scope.export(filepath=str(path), format=kind, which="ALL")
+    first = read_back(path)
+    (imported,) = (o for o in bpy.data.objects if o.type == "ARMATURE")
+    check(
+        made_rigs.seen(imported, NAMES, [round(first) + frame - 1 for frame in FRAMES]),
+        before,
+        target,
+    )
+
+
+def test_the_exported_motion_file_is_corrected(retargeted_rig, tmp_path):
+    correct(retargeted_rig)
+    bpy.ops.scope.export(filepath=str(tmp_path / "walk.npz"), format="NPZ", which="ALL")
+    with np.load(tmp_path / "walk.npz") as file:
+        kinds = {
+            key: len(file[key])
+            for key in ("pin_frames", "contact_spans", "exchange_spans", "floor_heights")
+        }
+    assert kinds == dict.fromkeys(kinds, 1)
+
+
+GAPS_FRAMES = range(1, 92)  # of the scene
+
+
+def pinned(motion, frame):
+    """Pin the left wrist of a capture in a scene frame; return the armature, the target, and all
+    joints before.
+    """
+    armature = captured(motion)
+    pack_motion(armature, motion.to_bytes())
+    armature["scope_body_file"] = "scope"
+    before = made_rigs.seen(armature, NAMES, GAPS_FRAMES)
+    target = before[frame - 1, NAMES.index("left_wrist")] + [0.1, 0.05, 0.1]
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=frame, location=target)
+    return armature, target, before
+
+
+def test_a_pin_in_frames_in_which_the_person_was_not_seen_is_met():
+    motion = motion_of(walk(3.0))
+    hidden = np.arange(len(motion.valid))[30:60]
+    motion.valid[hidden] = False
+    motion.joint_confidence[hidden] = 0.0
+    motion.residual_px[hidden] = np.nan
+    armature, target, before = pinned(motion, 46)
+    after = made_rigs.seen(armature, NAMES, GAPS_FRAMES)
+    assert np.linalg.norm(after[45, NAMES.index("left_wrist")] - target) < 0.01
+    far = np.abs(np.arange(1, 92) - 46) > 0.4 * 30
+    np.testing.assert_allclose(after[far], before[far], atol=1e-6)
+    assert not stored_motion(armature).valid[hidden].any()  # a pin does not make them seen
+
+
+def test_a_pin_in_a_gap_of_the_footage_is_refused_and_one_at_its_edge_is_met():
+    whole = walk(3.0)
+    rows = np.r_[0:31, 60:91]  # as numbered images of which some are missing
+    clip = Clip(whole.times[rows], whole.rotations[rows], whole.root[rows])
+    motion = replace(motion_of(clip), frames=rows)
+    with pytest.raises(
+        RuntimeError,
+        match="Frame 46 is in a gap of the captured motion of 'walk', where the footage",
+    ):
+        pinned(motion, 46)
+    (armature,) = (obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    assert listed_corrections(armature) == []
+    before = made_rigs.seen(armature, NAMES, GAPS_FRAMES)
+    target = before[30, NAMES.index("left_wrist")] + [0.1, 0.05, 0.1]
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=31, location=target)
+    after = made_rigs.seen(armature, NAMES, GAPS_FRAMES)
+    assert np.linalg.norm(after[30, NAMES.index("left_wrist")] - target) < 0.01
+    np.testing.assert_allclose(after[60:], before[60:], atol=1e-6)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Retargeting to a rig whose bones move the face, as a user runs it."""
+"""Retargeting to a rig whose bones move the face, as a user runs it.
+
+The bone list leaves out what all names of a rig begin with, so that the rest has room.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import build_scene
+from scope.scope_addon.ui.retarget.bone_list import common_prefix
 
 from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face
@@ -119,3 +123,19 @@ def test_a_map_that_cannot_be_used_changes_nothing(settings):
     with pytest.raises(RuntimeError, match="'grin', which is not an expression"):
         bpy.ops.scope.retarget()
     assert settings.rig.animation_data is None
+
+
+@pytest.mark.parametrize(
+    ("bones", "prefix"),
+    [
+        (["mixamorig:Hips", "mixamorig:LeftHand", "mixamorig:LeftHandPinky3"], "mixamorig:"),
+        (["CC_Base_Hip", "CC_Base_Head"], "CC_Base_"),
+        (["Bip01 Pelvis", "Bip01 L Hand"], "Bip01 "),
+        (["spine_fk", "spine_fk.001", "upper_arm_fk.L"], ""),
+        (["LeftArm", "LeftLeg"], ""),
+        (["mixamorig:Hips"], ""),
+        ([], ""),
+    ],
+)
+def test_the_common_prefix_ends_at_a_separator(bones, prefix):
+    assert common_prefix(bones) == prefix

@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all types of detectors share: the JSON beside the network, unknown graphs, and values that
 are not finite.
+
+Letterboxing there and back, and non-maximum suppression of more boxes than a network should
+have.
+
+Outputs of each kind of detector. YOLOX: boxes in pixels or relative to their cells. YOLOv8: a
+column per box. YOLOv4: boxes as fractions of the stretched image, and scores, in either order.
+A graph that has already suppressed all but the best boxes. MMDeploy's detectors, whose
+normalization only their JSON says.
 """
 
 from __future__ import annotations
@@ -10,11 +18,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.adapters.box_detector import BoxDetector
+from scope.scope_addon.capture.perception.adapters.box_detector import (
+    BORDER,
+    MAX_BOXES,
+    BoxDetector,
+    Boxes,
+    suppress,
+)
+from scope.scope_addon.capture.perception.letterbox import fit_in
 from scope.solver.errors import ModelFileError
 
 from ...small_graphs import fixed
-from .person_in_picture import CELLS, HEIGHT, IMAGE, WIDTH, yolox_rows
+from .person_in_picture import (
+    CELLS,
+    COLUMNS,
+    HEIGHT,
+    IMAGE,
+    PERSON,
+    WIDTH,
+    assert_finds_the_person,
+    center_size,
+    in_picture,
+    yolox_rows,
+)
 
 
 def test_the_json_takes_precedence(tmp_path: Path) -> None:
@@ -47,3 +73,108 @@ def test_nan_and_infinity_are_ignored(tmp_path: Path, value: float) -> None:
     scores = [found.score for found in detector.detect(IMAGE)]
     assert len(scores) > 0  # the person, whom they do not hide
     assert np.isfinite(scores).all()
+
+
+def test_the_letterbox_maps_back_to_the_image() -> None:
+    image = np.zeros((251, 333, 3), np.uint8)
+    image[100:111, 200:211] = 255  # its middle: pixel 105, 205
+    for settings in (
+        {"centered": True},
+        {"centered": False},
+        {"centered": False, "stretched": True},
+    ):
+        look = fit_in(image, WIDTH, HEIGHT, border=BORDER, **settings)
+        assert look.picture_rgb.shape == (HEIGHT, WIDTH, 3)
+        heat = np.where(look.picture_rgb[..., 0] > 114, look.picture_rgb[..., 0] - 114.0, 0)
+        inside = heat[2:-2, 2:-2]
+        y, x = (np.indices(inside.shape) * inside).sum(axis=(1, 2)) / inside.sum() + 2.5
+        np.testing.assert_allclose(look.to_image(np.array([x, y])), [205, 105], atol=0.5)
+
+
+def test_of_millions_of_boxes_only_the_best_are_compared() -> None:
+    """All of a million, which lie apart, would take hours."""
+    corners = np.stack(
+        [np.arange(1e6), np.zeros(10**6), np.arange(1e6) + 0.5, np.ones(10**6)], axis=1
+    )
+    kept = suppress(Boxes(corners, np.linspace(0.5, 1.0, 1_000_000)), 0.4)
+    assert len(kept.scores) == MAX_BOXES
+    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(10**6 - MAX_BOXES, 10**6)[::-1])
+
+
+@pytest.mark.parametrize("classes", [1, 80])
+def test_yolox_decoded(tmp_path: Path, classes: int) -> None:
+    rows, _ = yolox_rows(classes)
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), "yolox"
+    )
+
+
+def test_yolox_raw(tmp_path: Path) -> None:
+    rows, _ = yolox_rows(80)
+    raw = rows.copy()
+    # the order of the cells, by its own definition: 20 x 12 of 8 pixels, 10 x 6 of 16, 5 x 3 of 32
+    k = 0
+    for side, across, down in ((8, 20, 12), (16, 10, 6), (32, 5, 3)):
+        for row in range(down):
+            for column in range(across):
+                raw[k, :2] = rows[k, :2] / side - [column, row]
+                raw[k, 2:4] = np.log(rows[k, 2:4] / side)
+                k += 1
+    assert k == len(raw)
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": raw[None]}), "yolox"
+    )
+
+
+def test_yolov8(tmp_path: Path) -> None:
+    columns = np.zeros((84, CELLS), np.float32)
+    left = (WIDTH - COLUMNS) // 2
+    columns[:5, 12] = [*center_size(in_picture(PERSON, left)), 0.9]
+    columns[:5, 13] = [*(center_size(in_picture(PERSON, left)) + 1), 0.7]
+    columns[[0, 1, 2, 3, 7], 100] = [50, 50, 40, 40, 0.99]  # a car
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": columns[None]}), "yolov8"
+    )
+
+
+@pytest.mark.parametrize("order", [("boxes", "confs"), ("confs", "boxes")])
+def test_yolov4(tmp_path: Path, order: tuple[str, str]) -> None:
+    boxes = np.zeros((1, 40, 1, 4), np.float32)
+    scores = np.zeros((1, 40, 80), np.float32)
+    boxes[0, 5, 0] = PERSON / [333, 251, 333, 251]
+    scores[0, 5, 0] = 0.9
+    boxes[0, 6, 0] = [0.1, 0.1, 0.2, 0.2]
+    scores[0, 6, 2] = 0.99
+    outputs = {"boxes": boxes, "confs": scores}
+    path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {name: outputs[name] for name in order})
+    assert_finds_the_person(path, "yolov4")
+
+
+def test_different_numbers_of_boxes_and_scores_are_refused(tmp_path: Path) -> None:
+    outputs = {
+        "boxes": np.zeros((1, 40, 1, 4), np.float32),
+        "confs": np.zeros((1, 39, 80), np.float32),
+    }
+    path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, outputs)
+    (tmp_path / "m.json").write_text('{"type": "yolov4"}')
+    with pytest.raises(ModelFileError, match=r"do not match a yolov4 detector.*m\.json"):
+        BoxDetector(path, threads=1)
+
+
+def test_end_to_end(tmp_path: Path) -> None:
+    rows = np.zeros((1, 300, 6), np.float32)
+    rows[0, 0] = [10, 10, 50, 50, 0.99, 2]
+    rows[0, 1] = [*in_picture(PERSON, (WIDTH - COLUMNS) // 2), 0.9, 0]
+    assert_finds_the_person(
+        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output0": rows}), "end_to_end"
+    )
+
+
+def test_detections_need_their_normalization(tmp_path: Path) -> None:
+    rows = np.array([[[*in_picture(PERSON), 0.9], [1, 1, 9, 9, 0.95]]], np.float32)
+    path = fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"dets": rows, "labels": np.array([[0, 3]])})
+    with pytest.raises(ModelFileError, match=r"m\.json.*\"mean\""):
+        BoxDetector(path, threads=1)
+    description = {"type": "detections", "mean": 0, "std": 1, "channel_order": "bgr"}
+    (tmp_path / "m.json").write_text(json.dumps(description))
+    assert_finds_the_person(path, "detections")

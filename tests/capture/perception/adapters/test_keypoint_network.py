@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all keypoint networks share: channels, normalization, the set of keypoints, and the next
 region.
+
+Heatmap and SimCC networks on small graphs: coloured spots at known pixels, and maxima between
+cells.
+
+Each set's keypoints arrive at those of their names.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -18,7 +24,7 @@ from scope.scope_addon.capture.perception.region import Region
 from scope.solver.errors import ModelFileError
 
 from ...small_graphs import fixed, heatmaps, simcc
-from .spots_in_picture import REGIONS, SPOTS, spots, unit_colours
+from .spots_in_picture import REGIONS, SIZES, SPOTS, assert_finds_the_spots, spots, unit_colours
 
 
 def test_channel_order_and_square_inputs(tmp_path: Path) -> None:
@@ -122,3 +128,71 @@ def test_the_next_region_contains_the_keypoints(tmp_path: Path) -> None:
         network._next_region(low, confidence, Region((400, 400), 100.0, 0.0)).side_px
         > 1.6 * (65 + 50 + 40) - 1
     )
+
+
+@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_known_pixels_are_found_in_heatmaps(
+    tmp_path: Path, region: Region, size: tuple[int, int]
+) -> None:
+    assert_finds_the_spots(heatmaps(tmp_path / "m.onnx", 17, *size), region, atol=1.0)
+
+
+@pytest.mark.parametrize("how", ["dark", "quarter"])
+@pytest.mark.parametrize("udp", [False, True])
+def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> None:
+    """Gaussians with known sub-cell centres: DARK finds them exactly, the quarter offset
+    roughly.
+    """
+    rng = np.random.default_rng(3)
+    middle = rng.uniform([6, 6], [41, 57], (17, 2))
+    y, x = np.mgrid[:64, :48]
+    maps = [np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 2.0**2)) for u, v in middle]
+    path = fixed(
+        tmp_path / "m.onnx", 192, 256, {"heatmaps": np.stack(maps)[None].astype(np.float32)}
+    )
+    path.with_suffix(".json").write_text(json.dumps({"decode": how, "udp": udp}))
+    network = KeypointNetwork(path, threads=1)
+    points, scores = network._format.decode(
+        network._graph.trial_outputs, network._graph, network._description
+    )
+    pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
+    assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
+    assert scores.min() > 0.9
+
+
+@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_known_pixels_are_found_by_simcc(
+    tmp_path: Path, region: Region, size: tuple[int, int]
+) -> None:
+    assert_finds_the_spots(simcc(tmp_path / "m.onnx", 17, *size), region, atol=0.8)
+
+
+def numbered(count: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.stack([np.arange(count), 1000 - np.arange(count)], axis=1).astype(float), np.linspace(
+        0.5, 1, count
+    )
+
+
+@pytest.mark.parametrize("name", KEYPOINT_SETS)
+def test_keypoint_orders(name: str) -> None:
+    points, scores = numbered(KEYPOINT_SETS[name].count)
+    ours, confidence = KEYPOINT_SETS[name].to_blazepose(points, scores)
+    at = dict(zip(KEYPOINT_NAMES, ours[:, 0], strict=True))
+    known = dict(zip(KEYPOINT_NAMES, confidence, strict=True))
+    assert at["nose"] == 0
+    assert (at["left_shoulder"], at["right_shoulder"], at["right_ankle"]) == (5, 6, 16)
+    assert known["right_ankle"] == scores[16]
+    if name == "coco17":
+        assert {n for n, c in known.items() if c > 0} == set(COCO_17)
+    if name == "halpe26":
+        assert (at["left_heel"], at["right_heel"]) == (24, 25)
+        assert at["right_foot_index"] == pytest.approx(0.85 * 21 + 0.15 * 23)
+        assert known["left_thumb"] == 0
+    if name == "wholebody133":
+        assert (at["left_heel"], at["right_heel"]) == (19, 22)
+        assert at["left_foot_index"] == pytest.approx(0.85 * 17 + 0.15 * 18)
+        assert (at["right_eye_outer"], at["left_eye_outer"], at["mouth_left"]) == (59, 68, 77)
+        assert (at["left_index"], at["right_pinky"], at["right_thumb"]) == (96, 129, 115)
+        assert min(known.values()) > 0

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Expressions fitted to landmarks: of the model's own faces, and of rendered ones as the networks
 see them.
+
+Expressions and gaze of a face that is seen briefly: what the networks make of it; of others,
+the fit's.
+
+A face that was turned, scaled and moved comes back as it was.
 """
 
 from __future__ import annotations
@@ -9,14 +14,22 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.face_landmarks import (
+    EXPRESSION_POINTS,
     FACE_POINTS,
+    ExpressionNetwork,
     FaceEstimate,
     FaceNetwork,
 )
-from scope.scope_addon.capture.perception.face_record import parts, record
+from scope.scope_addon.capture.perception.face_record import RECORD, gaze, parts, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.face import expression_fit
-from scope.scope_addon.capture.tracking.face.expression_fit import fitted, load_response, view_terms
+from scope.scope_addon.capture.tracking.face.expression_fit import (
+    aligned,
+    fitted,
+    load_response,
+    view_terms,
+    with_expressions,
+)
 from scope.solver.body_file import load_body
 from scope.solver.errors import ModelFileError
 from scope.solver.names import EXPRESSIONS
@@ -27,10 +40,20 @@ from scope.tools.render_faces.shaded import ShadedStage
 from scope.tools.render_faces.truth import SIZE, camera_vertices, focal_px
 
 T = 90
+
+
 FPS = 30
+
+
 JAW = INDEX["jawOpen"]
+
+
 BLINKS = [INDEX["eyeBlinkLeft"], INDEX["eyeBlinkRight"]]
+
+
 REGION = Region((0.0, 0.0), 1.0, 0.0)
+
+
 TIMES = np.arange(T) / FPS
 
 
@@ -158,3 +181,88 @@ def test_a_rendered_face_that_the_network_sees(tmp_path):
     for blink in BLINKS:
         closed = [np.flatnonzero(w[:, blink] > 0.5)[0] for w in (truth, weights)]
         assert abs(int(closed[1] - closed[0])) <= 1
+
+
+EXPRESSIONS_FPS = 5
+
+
+BEFORE = np.zeros(RECORD)  # a frame without a face
+
+
+@pytest.fixture(scope="module")
+def clip(frames):
+    """Two and a half seconds of a real face: the network's estimates, and a track's rows of
+    them.
+    """
+    network = FaceNetwork(1)
+    region = Region((256.0, 118.0), 200.0, 0.0)
+    estimates = []
+    for image in frames("clips/squats_5fps", stop=13):
+        estimates.append(network.estimate(image, region))
+        region = estimates[-1].next_region
+    return estimates, np.array([BEFORE, *(record(estimate) for estimate in estimates)], np.float32)
+
+
+@pytest.mark.parametrize("seen", [1, 9])
+def test_a_face_that_was_seen_briefly_gets_the_networks_weights_and_the_gaze_of_its_irises(
+    clip, seen
+):
+    estimates = clip[0][:seen]
+    rows = clip[1][: seen + 1]
+    out = with_expressions(rows, np.arange(seen + 1) / EXPRESSIONS_FPS)
+    _, _, weights, directions, _ = parts(out)
+    assert not out[0].any()
+    network = ExpressionNetwork()
+    of_network = [network.estimate(e.landmarks[list(EXPRESSION_POINTS), :2]) for e in estimates]
+    np.testing.assert_allclose(weights[1:], of_network, atol=1e-5)
+    np.testing.assert_allclose(directions[1:], [gaze(e.landmarks) for e in estimates], atol=1e-5)
+    assert weights[1:].any()
+    others = np.ones(RECORD, bool)
+    others[2 : 2 + weights.shape[1] + 6] = False
+    np.testing.assert_array_equal(out[:, others], rows[:, others])
+
+
+def test_the_expression_network_is_not_opened_for_a_face_that_is_seen_for_longer_or_not_at_all(
+    clip, monkeypatch
+):
+    monkeypatch.setattr(expression_fit, "ExpressionNetwork", None)
+    rows = clip[1]
+    times = np.arange(len(rows)) / EXPRESSIONS_FPS
+    np.testing.assert_array_equal(with_expressions(rows, times), fitted(rows, times))
+    assert not with_expressions(np.zeros_like(rows), times).any()
+
+
+Y_UP = np.array([1.0, -1.0, -1.0])
+
+
+RNG = np.random.default_rng(0)
+
+
+FACE = RNG.standard_normal((40, 3))
+
+
+SHARES = RNG.dirichlet(np.ones(40))
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 0.1), (-0.2, 0.5, 1.5)])
+def test_a_transformed_face_comes_back(turn):
+    R_camera_face = exp(np.array(turn, float))
+    pixels = (80.0 * FACE @ R_camera_face.T) * Y_UP + [320, 200, 15]
+    faces = aligned(pixels[None], FACE, SHARES)
+    np.testing.assert_allclose(faces.points[0], FACE, atol=1e-9)
+    np.testing.assert_allclose(faces.turns[0], turn, atol=1e-9)
+
+
+def test_a_reflected_face_is_not_reflected_back():
+    pixels = FACE * [-1, 1, 1] * Y_UP
+    faces = aligned(pixels[None], FACE, SHARES)
+    assert np.abs(faces.points[0] - FACE).max() > 0.5
+
+
+def test_landmarks_that_coincide_give_finite_numbers():
+    faces = aligned(np.full((2, 40, 3), 7.0), FACE, SHARES)
+    assert np.isfinite(faces.points).all()
+
+
+def test_the_terms_of_steep_views_do_not_grow():
+    assert np.abs(view_terms(np.array([[0.0, 3.0, 0.0]]))).max() < 1

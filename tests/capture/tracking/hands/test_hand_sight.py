@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A hand in a part of a frame that was kept: the network's places are those of the frame."""
+"""A hand in a part of a frame that was kept: the network's places are those of the frame.
+
+The colour of a palm, and which colours can be one hand's.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,12 @@ from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.hands.hand_sight import Sight, followed_regions
+from scope.scope_addon.capture.tracking.hands.hand_sight import (
+    Sight,
+    followed_regions,
+    is_like,
+    palm_color,
+)
 
 WRIST = KEYPOINT_NAMES.index("left_wrist")
 
@@ -48,3 +56,42 @@ def test_only_a_hand_that_moves_far_is_looked_for_in_two_places():
     moved, there = followed_regions(hand, np.array([30.0, -10.0]), 40.0)
     assert near == there == hand.next_region
     np.testing.assert_allclose(np.subtract(moved.center_px, there.center_px), [30.0, -10.0])
+
+
+SKIN = np.array([134.0, 104, 79])
+
+
+TROUSERS = np.array([26.0, 40, 45])
+
+
+HAND = np.array([[0.0, 0.0], *([x, y] for x in (-8, -4, 0, 4, 8) for y in (-10, -13, -16, -20))])
+
+
+def test_the_palm_gives_the_colour_and_its_surroundings_do_not():
+    image = np.full((100, 100, 3), TROUSERS, np.uint8)
+    image[38:66, 40:62] = SKIN
+    np.testing.assert_array_equal(palm_color(image, HAND + [50, 62]), SKIN)
+    np.testing.assert_array_equal(palm_color(image, HAND + [20, 90]), TROUSERS)
+
+
+def test_a_hand_outside_the_image_has_no_colour():
+    image = np.zeros((100, 100, 3), np.uint8)
+    assert palm_color(image, HAND + [300, 62]) is None
+    assert palm_color(image, HAND + [50, 8]) is not None  # cut by the border
+
+
+def test_shadow_leaves_a_hand_alike_and_cloth_does_not():
+    assert is_like(0.35 * SKIN, SKIN)
+    assert is_like(2.0 * SKIN, SKIN)
+    assert not is_like(TROUSERS, SKIN)
+    assert not is_like(SKIN, TROUSERS)
+    assert is_like(0.75 * SKIN + 0.25 * np.array([160.0, 160, 165]), SKIN)  # blurred over a wall
+
+
+def test_grey_images_never_contradict():
+    assert is_like(np.full(3, 20.0), np.full(3, 180.0))
+
+
+def test_an_unknown_colour_contradicts_nothing():
+    assert is_like(None, SKIN)
+    assert is_like(SKIN, None)

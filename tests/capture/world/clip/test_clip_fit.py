@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All frames of a track at once, on motions whose truth is known."""
+"""All frames of a track at once, on motions whose truth is known.
+
+The joints' standard deviations along the line of sight and across it.
+
+A limb that starts on the wrong side of the image plane, on motions whose truth is known.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,7 @@ from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
 from scope.scope_addon.capture.world import clip_fit
 from scope.scope_addon.capture.world.camera_path import CameraPath
+from scope.scope_addon.capture.world.clip_fit import ACROSS, ALONG, joint_sigma
 from scope.scope_addon.capture.world.placement import place_track
 from scope.scope_addon.kinematics.body_surface import BodySurface, with_arm_points
 from scope.solver.rotations import exp
@@ -278,3 +284,79 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
         assert lowest.max() < -0.03
     else:
         assert lowest.min() > -0.015
+
+
+def _covariances(sights, along_m, across_m):
+    """Covariances (T, K+1, 3, 3) with these deviations along unit vectors (T, K+1, 3) and at right
+    angles to them.
+    """
+    outer = sights[..., :, None] * sights[..., None, :]
+    return along_m**2 * outer + across_m**2 * (np.eye(3) - outer)
+
+
+def test_deviations_are_those_along_each_joints_own_line_of_sight():
+    rng = np.random.default_rng(0)
+    joints = rng.normal(0.0, 1.0, (5, 4, 3)) + [0.0, 0.0, 4.0]
+    sights = joints / np.linalg.norm(joints, axis=-1, keepdims=True)
+    pelvis = _covariances(sights, 0.03, 0.01)
+    others = _covariances(sights, 0.006, 0.002)
+    sigma = joint_sigma(pelvis[:, 0], others, joints, np.arange(5) / 60.0)
+    np.testing.assert_allclose(sigma[:, 0], np.tile([0.03 * ALONG, 0.01 * ACROSS], (5, 1)))
+    np.testing.assert_allclose(sigma[:, 1:], np.tile([0.006 * ALONG, 0.002 * ACROSS], (5, 3, 1)))
+
+
+@pytest.mark.parametrize(("first", "second", "ratio"), [(30.0, 60.0, 2**0.3), (1.0, 10.0, 1.0)])
+def test_the_same_covariance_says_less_of_more_frames(first, second, ratio):
+    joints = np.tile([0.0, 0.0, 3.0], (3, 2, 1))
+    covariance = np.tile(1e-5 * np.eye(3), (3, 2, 1, 1))
+    slow, fast = (
+        joint_sigma(covariance[:, 0], covariance, joints, np.arange(3) / rate)
+        for rate in (first, second)
+    )
+    np.testing.assert_allclose(fast, ratio * slow)
+
+
+def test_a_single_frame_is_as_one_of_few():
+    joints = np.tile([0.0, 0.0, 3.0], (2, 2, 1))
+    covariance = np.tile(1e-5 * np.eye(3), (2, 2, 1, 1))
+    one = joint_sigma(covariance[:1, 0], covariance[:1], joints[:1], np.zeros(1))
+    np.testing.assert_allclose(
+        one, joint_sigma(covariance[:, 0], covariance, joints, np.array([0.0, 0.1]))[:1]
+    )
+
+
+LIMB_SEARCH_FRAMES = 64
+
+
+SPAN = slice(12, 52)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was(moving: bool) -> None:
+    """For forty frames, the lifter cannot tell the thigh before the hip from one behind it, and the
+    start is wrong.
+    """
+    angles = np.linspace(0.0, 0.3, LIMB_SEARCH_FRAMES)
+    turns = exp(np.array([[0.0, angle, 0.0] for angle in (angles if moving else 0.0 * angles)]))
+    path = CameraPath(
+        turns, np.linspace([0.0, 0.0, 0.0], [0.4, 0.0, 0.0], LIMB_SEARCH_FRAMES) * moving
+    )
+    track, true = person(LIMB_SEARCH_FRAMES, path)
+    unsure = track.world_landmarks.copy()
+    sigma = np.full((LIMB_SEARCH_FRAMES, JOINTS), 0.1)
+    unsure[SPAN, LEG, 2] = unsure[SPAN, HIPS[1], None, 2]
+    sigma[SPAN, LEG] = 0.8
+    start = replace(true, rotations=true.rotations.copy())
+    for joint, angle in (("right_hip", -0.3), ("right_knee", -0.9)):
+        start.rotations[SPAN, BODY.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
+    ankle = BODY.joint_names.index("right_ankle")
+    truth, before, after = (
+        joints(each)[:, ankle]
+        for each in (
+            true,
+            start,
+            path.to_first(fit(prepare(track, unsure, sigma), path.to_frames(start), path)),
+        )
+    )
+    assert np.linalg.norm(before - truth, axis=1)[SPAN].min() > 0.5
+    assert np.linalg.norm(after - truth, axis=1).max() < 0.1

@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Planes of single points beside the one of the soles."""
+"""Planes of single points beside the one of the soles.
+
+Places at which points rest, on points whose rests are known.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world.clip_window import with_planes
+from scope.scope_addon.capture.world.clip_window import resting_places, with_planes
 from scope.solver import Floor
 
 UP = np.array([0.0, -1.0, 0.0])
+
+
 SOLES = np.array([90, 91])
+
+
 NORMALS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 0.6, 0.8]])
 
 
@@ -33,3 +40,37 @@ def test_without_points_the_floor_stays_and_without_a_floor_the_planes_stand_alo
     alone = with_planes(None, np.array([13]), NORMALS[:1], np.array([0.1]))
     np.testing.assert_array_equal(alone.normal, NORMALS[:1])
     np.testing.assert_array_equal(alone.contact, [0.0])
+
+
+T = 30
+
+
+# metres; the point rests in frames 0 to 11 and 18 to 29
+STEP = np.where(np.arange(T) < 15, 0.0, 0.4)
+
+
+RESTING = np.where((np.arange(T) < 12) | (np.arange(T) >= 18), 0.9, 0.1)[:, None]
+
+
+def _points(noise_m: float) -> np.ndarray:
+    points = np.zeros((T, 1, 3))
+    points[:, 0, 0] = STEP
+    points[:, 0, 2] = 4.0 + noise_m * np.linspace(-1.0, 1.0, T)
+    return points
+
+
+def test_each_rest_has_one_place_where_the_point_is_on_average():
+    places, p = resting_places(_points(0.01), RESTING)
+    np.testing.assert_allclose(p, np.where(RESTING > 0.5, RESTING, 0.0))
+    for rest in (slice(0, 12), slice(18, T)):
+        np.testing.assert_allclose(
+            places[rest, 0], np.tile(_points(0.01)[rest, 0].mean(axis=0), (12, 1))
+        )
+
+
+def test_a_point_that_strays_has_no_place():
+    assert not resting_places(_points(0.1), RESTING)[1].any()
+
+
+def test_a_point_that_never_rests_has_no_place():
+    assert not resting_places(_points(0.0), np.zeros((T, 1)))[1].any()

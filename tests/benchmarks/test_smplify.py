@@ -1,14 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""SMPLify's objective on keypoints of a known body."""
+"""SMPLify's objective on keypoints of a known body.
+
+The figures and views of the comparison.
+
+The dense optimizer on problems whose minima are known.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.benchmarks.smplify.comparison import errors
+from scope.benchmarks.smplify.dense import minimize
 from scope.benchmarks.smplify.objective import ROOT, SIGMA_PX, UPRIGHT, Frame, Objective, PosePrior
 from scope.solver.rotations import exp
 
 K = np.array([[900.0, 0, 480], [0, 900, 270], [0, 0, 1]])
+
+
 NAMES = tuple(
     f"{side}_{part}"
     for part in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "heel", "foot_index")
@@ -65,3 +74,31 @@ def test_the_robust_term_is_geman_mcclures(body, prior, truth):
     frame.pixels[0] += [300.0, 400.0]
     squared = (Objective(body, prior, frame).residuals(truth[None], 0.0, 0.0)[0, :2] ** 2).sum()
     assert squared == pytest.approx(SIGMA_PX**2 * 500.0**2 / (SIGMA_PX**2 + 500.0**2))
+
+
+COMPARED_NAMES = [
+    side + limb for limb in ("Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle") for side in "LR"
+]
+
+
+def test_errors_are_those_put_in(body):
+    joints = np.tile(body.rest_joints(np.zeros(body.P)), (3, 1, 1))
+    sides = {"L": "left", "R": "right"}
+    true = joints[
+        :,
+        [body.joint_names.index(f"{sides[name[0]]}_{name[1:].lower()}") for name in COMPARED_NAMES],
+    ].copy()
+    joints += [0.3, 0.0, 1.0]
+    joints[:, body.joint_names.index("left_wrist")] += [0.0, 0.024, 0.0]
+    found = errors(body, joints, true, COMPARED_NAMES)
+    assert found["mpjpe_root"] == pytest.approx(2.0)
+    assert found["pa_mpjpe"] < 24.0 / np.sqrt(12)
+
+
+def test_a_linear_problem_has_the_normal_equations_solution():
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(20, 6))
+    b = rng.normal(size=20)
+    found = minimize(lambda x: x @ A.T - b, np.zeros(6), np.ones(6, bool), 50, 1e-15)
+    np.testing.assert_allclose(found.x, np.linalg.lstsq(A, b, rcond=None)[0], atol=1e-6)
+    assert found.cost == pytest.approx(0.5 * np.sum((A @ found.x - b) ** 2))

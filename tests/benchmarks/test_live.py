@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The measures of live captures, on motions whose differences are known."""
+"""The measures of live captures, on motions whose differences are known.
+
+A simulated machine processes as many frames as its costs allow, and the same ones every time.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,12 @@ from scope.benchmarks.live.measures import (
     compared,
     jerk,
 )
+from scope.benchmarks.live.paced import Costs, EveryFrame, simulated
+from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion
 from scope.solver import Body, rotations
 
-from ...made_motion import made_motion
+from ..made_motion import made_motion
 
 
 def test_jerk_of_cubics_does_not_depend_on_which_frames_are_there() -> None:
@@ -52,3 +57,27 @@ def test_a_hand_that_is_elsewhere_and_twice_the_jitter(body: Body, walking: Moti
     assert compared(replace(walking, joints_cam=twice), walking, body)["jitter"] == pytest.approx(
         2.0, rel=1e-3
     )
+
+
+FRAME_S = 1 / 30  # of the sample clip
+
+
+COSTS = Costs(
+    frame_s=0.3,
+    spread=0.0,
+    largest_s=0.0,
+    reference_s=0.0,
+    estimate_s=0.0,
+    first_estimate_s=0.0,
+    shared=1.0,
+)
+
+
+def test_poses_and_latency_follow_from_the_costs(body, networks):
+    recording, told = simulated(body, SAMPLE, "fast", EveryFrame, COSTS)
+    assert told["poses_per_second"] == pytest.approx(10 / 3, abs=0.15)
+    assert 300.0 <= told["latency_ms"]["median"] <= 1000 * (0.3 + FRAME_S)
+    assert told["dropped"] == pytest.approx(8 * told["poses"], abs=9)
+    again, told_again = simulated(body, SAMPLE, "fast", EveryFrame, COSTS)
+    assert told_again == told
+    assert again.timestamps.tolist() == recording.timestamps.tolist()

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blocks of frames give what one call for all frames gives.
+
+Runs of True.
+
+The path with the least cost, against all possible paths.
+"""
+
+from __future__ import annotations
+
+import itertools
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics import frame_blocks
+from scope.scope_addon.kinematics.runs import runs
+from scope.scope_addon.kinematics.viterbi import least_cost_path
+
+
+@pytest.mark.parametrize("frames", [0, 1, 4, 5, 6, 17])
+def test_blocks_give_the_result_of_one_call(frames, monkeypatch):
+    monkeypatch.setattr(frame_blocks, "BLOCK_FRAMES", 5)
+    rng = np.random.default_rng(frames)
+    a = rng.normal(size=(frames, 3))
+    b = rng.normal(size=(frames, 2)).astype(np.float32)
+    sizes = []
+
+    def compute(x, y):
+        sizes.append(len(x))
+        return x.sum(axis=1), (2 * y).astype(np.float32)
+
+    total, double = frame_blocks.by_blocks(compute, a, b)
+    np.testing.assert_array_equal(total, a.sum(axis=1))
+    np.testing.assert_array_equal(double, 2 * b)
+    assert double.dtype == np.float32
+    assert max(sizes) <= 5
+    assert sum(sizes) == frames
+
+
+def test_one_array_is_enough(monkeypatch):
+    monkeypatch.setattr(frame_blocks, "BLOCK_FRAMES", 5)
+    (squares,) = frame_blocks.by_blocks(lambda x: (x**2,), np.arange(12))
+    np.testing.assert_array_equal(squares, np.arange(12) ** 2)
+
+
+def test_runs_of_every_short_mask_are_those_that_grouping_finds():
+    for mask in itertools.product([False, True], repeat=7):
+        expected = []
+        row = 0
+        for value, group in itertools.groupby(mask):
+            length = len(list(group))
+            expected += [(row, row + length)] if value else []
+            row += length
+        assert runs(np.array(mask)) == expected
+
+
+@pytest.mark.parametrize("value", [False, True])
+def test_an_empty_mask_has_none_and_a_full_one_is_one(value):
+    assert runs(np.zeros(0, bool)) == []
+    assert runs(np.full(3, value)) == ([(0, 3)] if value else [])
+
+
+@pytest.mark.parametrize("barred", [0.0, 0.4])
+@pytest.mark.parametrize(("count", "states"), [(1, 3), (2, 2), (5, 3), (6, 4)])
+def test_no_other_path_costs_less(count: int, states: int, barred: float) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(5):
+        costs = rng.normal(size=(count, states))
+        switching = rng.normal(size=(count - 1, states, states))
+        switching[rng.random(switching.shape) < barred] = np.inf
+        switching[:, 0, 0] = 1.0  # there is always a way
+
+        def cost(path, costs=costs, switching=switching) -> float:
+            there = sum(costs[t, x] for t, x in enumerate(path))
+            return there + sum(switching[t, a, b] for t, (a, b) in enumerate(pairwise(path)))
+
+        expected = min(product(range(states), repeat=count), key=cost)
+        assert tuple(least_cost_path(costs, switching)) == expected
+
+
+def test_ties_are_resolved_to_lower_states() -> None:
+    assert least_cost_path(np.zeros((4, 3)), np.zeros((3, 3, 3))).tolist() == [0, 0, 0, 0]
+
+
+def test_no_frames() -> None:
+    assert least_cost_path(np.zeros((0, 3)), np.zeros((0, 3, 3))).shape == (0,)

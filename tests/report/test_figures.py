@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the page says about the computer and the versions.
+
+Figures of motions whose figures are known.
+
+The pictures of the overlay: which frames, how large, and never too many bytes.
+"""
+
+from __future__ import annotations
+
+import platform
+import tomllib
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scope.scope_addon.report import machine
+from scope.scope_addon.report.footage_pictures import Picture, bounded, small_picture, spread_rows
+from scope.scope_addon.report.motion_figures import height_text, highest_speed, motion_figures
+
+from ..made_motion import made_motion
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_versions_are_those_that_run():
+    stated = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
+    said = machine.versions().split(", ")
+    assert {
+        f"Scope {stated}",
+        f"Python {platform.python_version()}",
+        f"numpy {np.__version__}",
+    } <= set(said)
+
+
+def test_the_version_of_an_unknown_installation_is_said_to_be_unknown(tmp_path, monkeypatch):
+    monkeypatch.setattr(machine, "_ROOT", tmp_path)
+    monkeypatch.setattr(
+        machine, "version", lambda name: (_ for _ in ()).throw(machine.PackageNotFoundError(name))
+    )
+    assert machine.scope_version() == "of an unknown version"
+
+
+def test_the_computer_is_described_in_one_line():
+    assert platform.system() in machine.machine()
+    assert "\n" not in machine.machine()
+
+
+def test_a_walk_of_known_length_and_speed(body):
+    T = 61
+    trans = np.zeros((T, 3))
+    # 1.5 m in a second, then a second of standing
+    trans[:, 0] = np.minimum(np.arange(T), 30) / 30 * 1.5
+    trans[:, 2] = 0.9 - body.rest_joints()[0, 2]
+    contact = np.zeros((T, 4))
+    contact[31:, 1] = 1.0
+    residual = np.r_[np.full(T - 1, 4.0), 100.0]
+    valid = np.arange(T) < T - 1
+    motion = made_motion(
+        body,
+        np.zeros((T, 3 * (body.K + 1))),
+        trans,
+        foot_contact=contact,
+        residual_px=residual,
+        valid=valid,
+    )
+    figures = motion_figures(motion, body)
+    assert figures["Frames seen"] == "60 of 61"
+    assert figures["Path over the floor"] == "1.50 m"
+    assert figures["Highest speed"] == "1.50 m/s"
+    assert figures["Pelvis height"] == "0.90 to 0.90 m"
+    # of the frames in which the person was seen
+    assert figures["Reprojection error, mean"] == "4.0 px"
+    assert figures["Left foot in contact"] == "49 % of frames"
+    assert figures["Right foot in contact"] == "0 % of frames"
+    assert figures["Frames to review"] == "1"
+    assert figures["Height"] == f"{100 * np.ptp(body.v_template[:, 1]):.0f} cm"
+
+
+def test_the_height_with_its_deviation():
+    assert height_text(1.7449, 0.0882) == "174 ± 9 cm"
+    assert height_text(1.7449, 0.005) == "174.5 ± 0.5 cm"
+    assert height_text(1.7449, np.nan) == "174 cm"
+
+
+def test_speed_of_very_short_motions():
+    assert highest_speed(np.zeros((1, 2)), np.zeros(1)) == 0.0
+    assert np.isclose(highest_speed(np.array([[0.0, 0], [0.2, 0]]), np.array([0.0, 0.1])), 2.0)
+
+
+def test_rows_are_spread_from_the_first_to_the_last():
+    assert spread_rows(101, 5).tolist() == [0, 25, 50, 75, 100]
+    assert spread_rows(3, 40).tolist() == [0, 1, 2]
+    assert spread_rows(1, 40).tolist() == [0]
+
+
+def test_a_picture_is_a_small_webp_of_the_same_content():
+    image = np.zeros((1000, 1600, 3), np.uint8)
+    image[:, 800:] = (250, 60, 20)
+    picture = small_picture(7, image)
+    assert (picture.row, picture.width, picture.height) == (7, 800, 500)
+    assert picture.url.startswith("data:image/webp;base64,")
+    back = cv2.cvtColor(
+        cv2.imdecode(np.frombuffer(picture.content, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB
+    )
+    assert back.shape == (500, 800, 3)
+    assert np.abs(back[250, 600].astype(int) - (250, 60, 20)).max() < 12
+    assert back[250, 200].max() < 12
+
+
+def test_pictures_that_are_too_large_together_become_fewer():
+    pictures = [Picture(row, b"x" * 100, 1, 1) for row in range(9)]
+    assert [p.row for p in bounded(pictures, 300)] == [0, 4, 8]
+    assert len(bounded(pictures, 900)) == 9
+    assert len(bounded(pictures, 10)) == 1
