@@ -121,17 +121,20 @@ class Cache:
         """
         import json
 
+        from ..atomic_write import atomic_path, replace_durably
+
         target = self.root / "captures" / key
         try:
             content = json.dumps({"motions": motions, "report": report})
-            (job_folder / REPORT).write_text(content, encoding="utf-8")
+            with atomic_path(job_folder / REPORT) as temporary:
+                temporary.write_text(content, encoding="utf-8")
             target.parent.mkdir(parents=True, exist_ok=True)
             # Its name begins with the job's, so that it is removed with the job.
             former = job_folder.with_name(f"{job_folder.name}.former")
             if target.exists():
                 os.replace(target, former)
             try:
-                os.replace(job_folder, target)
+                replace_durably(job_folder, target)
             except OSError:
                 if former.exists():
                     os.replace(former, target)

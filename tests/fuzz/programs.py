@@ -66,16 +66,19 @@ def panel_live(video: str, result: str) -> int:
 
 def cache(motion: str, root: str) -> int:
     """Keep two captures, find the second, and remove the first, for which there is no space."""
+    from scope.scope_addon.atomic_write import atomic_path
     from scope.scope_addon.job.cache import Cache
+    from scope.scope_addon.temporary import discard
 
     kept = Cache(Path(root))
     for key in ("old", KEY):
         folder = kept.new_job_folder()
         try:
-            shutil.copy(motion, folder / "person1.npz")
+            with atomic_path(folder / "person1.npz") as temporary:
+                shutil.copyfile(motion, temporary)
             kept.keep(folder, key, ["person1.npz"], {"people": 1})
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            discard(folder)
         kept.prune(1)
     assert kept.find(KEY) is not None
     return 0
