@@ -111,10 +111,8 @@ def usable_guess(rig: bpy.types.Object) -> BoneMap:
     :raises InputError: when the rig has no bones, or its rest pose contradicts the guess.
     """
     found = guess_bone_map(rig)
-    heads = {found.parts[bone.name]: bone for bone in rig.data.bones if bone.name in found.parts}
-    places = {part: np.array(rig.matrix_world @ bone.head_local) for part, bone in heads.items()}
-    for fault in rest_faults(places):
-        bones = ", ".join(f"'{heads[part].name}'" for part in fault.parts)
+    for fault in rest_faults(_heads_at_rest(rig, found)):
+        bones = ", ".join(f"'{found.bone(part)}'" for part in fault.parts)
         raise InputError(
             f"the bone map of '{rig.name}' could not be guessed, because {bones} "
             f"{PHRASES[fault.reason]}; choose the bones yourself, or put the armature upright"
@@ -122,7 +120,7 @@ def usable_guess(rig: bpy.types.Object) -> BoneMap:
     return found
 
 
-def map_notices(rig: bpy.types.Object, skeleton: Skeleton, bone_map: BoneMap) -> list[Notice]:
+def map_notices(rig: bpy.types.Object, bone_map: BoneMap) -> list[Notice]:
     """Return what a user should know about a bone map: guesses, parts without bones, and bones that
     do not look like their parts.
     """
@@ -135,13 +133,19 @@ def map_notices(rig: bpy.types.Object, skeleton: Skeleton, bone_map: BoneMap) ->
     still += [part for part in _EXPECTED if part not in parts]
     if still:
         notices.append(notice("still_parts", rig=rig.name, parts=still))
-    heads: dict[str, NDArray[np.float64]] = {}
-    for name, head in zip(skeleton.names, skeleton.heads, strict=True):
-        heads.setdefault(bone_map.parts[name], head)
-    for fault in rest_faults(heads):
+    for fault in rest_faults(_heads_at_rest(rig, bone_map)):
         bones = [bone_map.bone(part) or part for part in fault.parts]
         notices.append(notice("odd_bones", rig=rig.name, bones=bones, reason=fault.reason))
     return notices
+
+
+def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, NDArray[np.float64]]:
+    """Return the head (3,) of the first bone of each part at rest, in the world, metres."""
+    heads: dict[str, NDArray[np.float64]] = {}
+    for bone, part in bone_map.parts.items():
+        if bone in rig.data.bones and part not in heads:
+            heads[part] = np.array(rig.matrix_world @ rig.data.bones[bone].head_local)
+    return heads
 
 
 def retarget(
@@ -197,7 +201,7 @@ def retarget(
             ).pose(clip)
             motion = _placed(source, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
-            warnings = map_notices(rig, skeleton, bone_map)
+            warnings = map_notices(rig, bone_map)
             warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)
             keys = [BoneKeys(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(

@@ -44,10 +44,14 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Fill the list."""
-        from ...scene.rigs.rig_retarget import guess_bone_map
+        from ...scene.rigs.rig_retarget import guess_bone_map, map_notices
 
-        found = guess_bone_map(context.scene.scope_retarget.rig)
-        fill_list(context.scene.scope_retarget, found)
+        settings = context.scene.scope_retarget
+        found = guess_bone_map(settings.rig)
+        fill_list(settings, found)
+        for warning in map_notices(settings.rig, found)[:1]:
+            self.report({"WARNING"}, warning_text(warning))
+            return ""
         count = len(found.parts)
         return rpt_(
             "Found {count} bone; check the list"

@@ -56,6 +56,23 @@ def test_a_rig_follows_the_motion_and_stands_on_the_floor(kind):
     np.testing.assert_allclose(seen["lowest"], expected, atol=0.02)
 
 
+@pytest.mark.parametrize("name", ["MetaHuman", "VRM, VRoid", "MMD", "Roblox R15"])
+def test_a_rig_whose_names_say_nothing_is_guessed_from_its_rest_pose(name):
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    source = captured(MOTION)
+    rig = make_rig(KIND[name])
+    names = {bone.name: f"Bone.{k:03d}" for k, bone in enumerate(rig.armature.data.bones)}
+    for bone in list(rig.armature.data.bones):
+        bone.name = names[bone.name]
+    rig = replace(rig, bone_at={place: names[bone] for place, bone in rig.bone_at.items()})
+    bone_map = usable_guess(rig.armature)
+    (warning,) = retarget(source, BODY, BETAS, rig.armature, bone_map, RATE).warnings
+    assert warning.code == "guessed_bones"
+    seen = measured(rig, JOINTS, NAMES, FRAMES)
+    assert seen["limbs"].max() < 6
+    assert seen["trunk"].max() < 6
+
+
 def lowest_of_body(source):
     """Return the height of the captured mesh's lowest vertex in each frame, metres."""
     mesh = next(child for child in source.children if child.type == "MESH")
