@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bone_map import FINGERS
+from .rest_pose import RestPose
 
 _WORDS = {
     "thumb": ("thumb",),
@@ -25,32 +26,29 @@ _NUMBERED = re.compile(r"finger[ _.-]*(\d)", re.IGNORECASE)
 _PHALANGES = 3
 
 
-def find_fingers(
-    names: list[str], parents: NDArray[np.intp], heads: NDArray[np.float64], wrists: dict[str, int]
-) -> dict[str, str]:
+def find_fingers(rest: RestPose, wrists: dict[str, int]) -> dict[str, str]:
     """Find the bones of the fingers below each wrist.
 
-    :param names: names of the B bones, parents before children.
-    :param parents: (B,) indices, -1 for none.
-    :param heads: (B, 3) at rest.
     :param wrists: index of the hand's bone, by side.
     :return: bone name -> part (``left_index1``, ...).
     """
     found: dict[str, str] = {}
     for side, wrist in wrists.items():
-        below = _below(parents, wrist)
-        chains = _by_name(names, parents, below) or _by_geometry(parents, heads, wrist, below)
+        below = rest.below(wrist)
+        chains = _by_name(rest, below) or _by_geometry(rest, wrist, below)
         for finger, chain in chains.items():
-            found |= {names[i]: f"{side}_{finger}{k}" for k, i in enumerate(chain[:_PHALANGES], 1)}
+            found |= {
+                rest.names[i]: f"{side}_{finger}{k}" for k, i in enumerate(chain[:_PHALANGES], 1)
+            }
     return found
 
 
-def _by_name(names: list[str], parents: NDArray[np.intp], below: list[int]) -> dict[str, list[int]]:
+def _by_name(rest: RestPose, below: list[int]) -> dict[str, list[int]]:
     """Return the bones of each finger from the knuckle on; empty if no name is that of a finger."""
     own: dict[str, set[int]] = {}
     numbered: dict[int, set[int]] = {}
     for i in below:
-        name = names[i].rsplit(":", 1)[-1]
+        name = rest.names[i].rsplit(":", 1)[-1]
         words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)
         if any(_NO_PHALANX.fullmatch(word) for word in words):
             continue
@@ -65,22 +63,16 @@ def _by_name(names: list[str], parents: NDArray[np.intp], below: list[int]) -> d
             numbered.setdefault(int(number.group(1)), set()).add(i)
     unnamed = [finger for finger in FINGERS if finger not in own]
     own |= {finger: numbered[n] for finger, n in zip(unnamed, sorted(numbered), strict=False)}
-    return {finger: _longest(parents, bones) for finger, bones in own.items()}
+    return {finger: _longest(rest.parents, bones) for finger, bones in own.items()}
 
 
-def _by_geometry(
-    parents: NDArray[np.intp], heads: NDArray[np.float64], wrist: int, below: list[int]
-) -> dict[str, list[int]]:
+def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list[int]]:
     """Identify five chains: the thumb is the one that diverges most, the others are ordered by
     distance from it.
     """
-    leaves = [i for i in below if i not in set(parents[below].tolist())]
-    chains = []
-    for leaf in leaves:
-        chain = [leaf]
-        while parents[chain[0]] != wrist:
-            chain.insert(0, int(parents[chain[0]]))
-        chains.append(chain)
+    heads = rest.heads
+    leaves = [i for i in below if not rest.children[i]]
+    chains = [rest.chains[leaf][rest.chains[leaf].index(wrist) + 1 :] for leaf in leaves]
     if len(chains) != len(FINGERS) or any(
         not _PHALANGES <= len(chain) <= _PHALANGES + 2 for chain in chains
     ):
@@ -97,15 +89,6 @@ def _by_geometry(
         palm = finger != "thumb" and len(chain) > _PHALANGES and from_wrist[0] < 0.5 * from_wrist[1]
         out[finger] = chain[palm:]
     return out
-
-
-def _below(parents: NDArray[np.intp], wrist: int) -> list[int]:
-    """Return the indices of all descendants of the wrist."""
-    found = {wrist}
-    for i in range(len(parents)):  # Parents come before children.
-        if int(parents[i]) in found:
-            found.add(i)
-    return sorted(found - {wrist})
 
 
 def _longest(parents: NDArray[np.intp], bones: set[int]) -> list[int]:

@@ -179,7 +179,7 @@ def _fingers(rest: RestPose, parts: dict[str, str]) -> dict[str, str]:
         for bone, part in parts.items()
         if part.endswith("_wrist")
     }
-    found = find_fingers(rest.names, rest.parents, rest.heads, wrists)
+    found = find_fingers(rest, wrists)
     return {bone: part for bone, part in found.items() if bone not in parts}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from scope.scope_addon.retarget.fingers import find_fingers
+from scope.scope_addon.retarget.rest_pose import RestPose
 
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 # Names of the left hand's bones as their makers give them, of each finger and its three phalanges
@@ -77,14 +78,14 @@ def expected(names: list[str]) -> dict[str, str]:
 def test_fingers_are_found_by_their_names(tool):
     names, parents, heads = hand(*NAMES[tool])
     heads[:] = 0.0  # so that nothing but the names can tell
-    assert find_fingers(names, parents, heads, {"left": 0}) == expected(names)
+    assert find_fingers(RestPose(names, parents, heads), {"left": 0}) == expected(names)
 
 
 def test_numbered_fingers_are_counted_from_the_thumb():
     """Biped's fingers: Finger0, Finger01, Finger02 are the thumb's."""
     names, parents, heads = hand("x{finger}{k}", FINGERS)
     names[1:] = [f"Bip01 L Finger{f}{k or ''}" for f in range(5) for k in range(3)]
-    assert find_fingers(names, parents, heads, {"left": 0}) == expected(names)
+    assert find_fingers(RestPose(names, parents, heads), {"left": 0}) == expected(names)
 
 
 def test_bones_of_the_palm_and_controls_are_left_out():
@@ -92,7 +93,7 @@ def test_bones_of_the_palm_and_controls_are_left_out():
     with_others = [*names, *OTHERS]
     parents = np.concatenate([parents, np.zeros(len(OTHERS), int)])
     heads = np.concatenate([heads, np.zeros((len(OTHERS), 3))])
-    assert find_fingers(with_others, parents, heads, {"left": 0}) == expected(names)
+    assert find_fingers(RestPose(with_others, parents, heads), {"left": 0}) == expected(names)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7, 3.0])
@@ -101,16 +102,15 @@ def test_fingers_without_names_are_found_by_their_shape_in_any_order(turn):
     c = np.cos(turn)
     s = np.sin(turn)
     heads = heads @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    assert find_fingers(names, parents, heads, {"left": 0}) == expected(names)
+    assert find_fingers(RestPose(names, parents, heads), {"left": 0}) == expected(names)
     order = [0, *(1 + 3 * f + k for f in (3, 0, 4, 2, 1) for k in range(3))]
     place = {old: new for new, old in enumerate(order)}
     shuffled = np.array([place.get(int(parents[old]), -1) for old in order])
-    assert find_fingers(
-        [names[old] for old in order], shuffled, heads[order], {"left": 0}
-    ) == expected(names)
+    rest = RestPose([names[old] for old in order], shuffled, heads[order])
+    assert find_fingers(rest, {"left": 0}) == expected(names)
 
 
 def test_a_hand_without_fingers_or_with_four_has_none():
     names, parents, heads = hand("b{finger}{k}", tuple("qwerz"))
-    assert find_fingers(names[:1], parents[:1], heads[:1], {"left": 0}) == {}
-    assert find_fingers(names[:-3], parents[:-3], heads[:-3], {"left": 0}) == {}
+    assert find_fingers(RestPose(names[:1], parents[:1], heads[:1]), {"left": 0}) == {}
+    assert find_fingers(RestPose(names[:-3], parents[:-3], heads[:-3]), {"left": 0}) == {}

@@ -114,7 +114,7 @@ def _ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> NDArray[np
     wrists = {
         part.partition("_")[0]: row[name] for name, part in parts.items() if part.endswith("_wrist")
     }
-    phalanges = find_fingers(rest.names, rest.parents, rest.heads, wrists)
+    phalanges = find_fingers(rest, wrists)
     bone_of = {part: row[name] for name, part in parts.items()}
     forward = np.zeros(3)
     if {"left_hip", "right_hip"} <= bone_of.keys():
