@@ -232,7 +232,7 @@ COMMANDS = (
         "cache",
         PROGRAM,
         ("cache", "in/walk.npz", CACHE),
-        (f"{CACHE}/captures/new/*",),
+        (f"{CACHE}/captures/11111111111111111111111111111111/*",),
         ("walk",),
         _is_same,
         replaces=False,

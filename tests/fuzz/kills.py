@@ -33,7 +33,7 @@ UNFINISHED = "home/scope-mocap/unfinished/"
 SEEN = ("out", "tmp", "home")  # folders in which nothing may be left
 # may be empty
 KEPT_FOLDERS = (
-    *("scope-mocap", "cache", "captures", "jobs", "kernels", "new", "unfinished", "recordings"),
+    *("scope-mocap", "cache", "captures", "jobs", "kernels", "1" * 32, "unfinished", "recordings"),
 )
 # What a live capture that was killed leaves on purpose, until the user finishes it.
 RECORDED = re.compile(r".*\.recording(\.lock)?|.*\.unfinished( \d+)?\.mp4")

@@ -18,7 +18,7 @@ from typing import Any
 
 from scope.solver.errors import ScopeError
 
-KEY = "new"
+KEY = "1" * 32
 
 
 def continued(*arguments: str) -> int:
@@ -71,7 +71,7 @@ def cache(motion: str, root: str) -> int:
     from scope.scope_addon.temporary import discard
 
     kept = Cache(Path(root))
-    for key in ("old", KEY):
+    for key in ("0" * 32, KEY):
         folder = kept.new_job_folder()
         try:
             with atomic_path(folder / "person1.npz") as temporary:

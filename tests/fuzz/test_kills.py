@@ -26,7 +26,7 @@ BY_NAME = {command.name: command for command in COMMANDS}
         ("npz", NO_MEMORY, (-1,)),
         ("blend", FULL, (7,)),  # Blender does not say so
         ("usdc", FULL, (10,)),  # nor does it here
-        ("cache", KILL, (23,)),  # before a capture is moved into it
+        ("cache", KILL, (31,)),  # before a capture is moved into it
         ("cache", FULL, (5,)),
         ("compile", KILL, (8,)),  # before it renames
     ],
