@@ -23,7 +23,7 @@ def first_place(
     The rotation is the one that turns all lifted bodies of the first camera into those of the
     second one, and the translation joins their hips, both by weights that fall with the distance.
 
-    :param times: of the first camera's clock, seconds.
+    :param times: (N,) of the first camera's clock, seconds.
     """
     a = first.at(times)
     b = second.at(times + offset_s)
