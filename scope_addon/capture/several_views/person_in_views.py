@@ -123,7 +123,10 @@ class PersonInViews(Person):
         self.fit = to_single_precision(with_build(self.prepared, fit_views(self.prepared)))
 
     def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: Float64Array) -> None:
-        """Add when feet rest, and the floor. Distance, lean and shape stay as cameras saw them."""
+        """Add when feet rest, and the floor. Distance, lean and shape stay as cameras saw them.
+
+        :param T_floor_camera: (4, 4), see `Person.ground`.
+        """
         if not self.prepared.others:
             super().ground(shot, placed, T_floor_camera)
             return
