@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.errors import ScopeError
-from ..capture.media.image_sequence import find_sequence
 from ..content import add_content, state_of
 from ..errors import ChangedFootageError
 
@@ -80,6 +79,9 @@ class WatchedFootage:
         return report
 
     def _files(self) -> list[Path]:
+        # Imported here, so that a missing package is reported in the panel.
+        from ..capture.media.image_sequence import find_sequence
+
         try:
             sequence = find_sequence(self._path, self._rate_given)
         except (ScopeError, OSError):
