@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,19 @@ def add_footage_strips(
         strip[_OURS] = True
     scene.render.use_sequencer = render_strips
     return added
+
+
+def turn_strip(strip: bpy.types.Strip, background: bpy.types.CameraBackgroundImage) -> None:
+    """Turn and mirror the picture as the camera's background shows it: where the footage was turned
+    for the capture.
+
+    A strip turns counterclockwise, and exchanges its sides after it has turned, unlike the
+    background.
+    """
+    strip.transform.rotation = -background.rotation
+    flips = background.use_flip_x, background.use_flip_y
+    is_quarter_turn = abs(math.sin(background.rotation)) > 0.5
+    strip.use_flip_x, strip.use_flip_y = reversed(flips) if is_quarter_turn else flips
 
 
 def strips_of(editor: bpy.types.SequenceEditor) -> Any:

@@ -12,10 +12,11 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.footage_view import FootageView
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.footage_strip import add_footage_strips
+from scope.scope_addon.scene.footage_strip import add_footage_strips, turn_strip
 
-from ..capture.media.corner_picture import corner_image, corners
+from ..capture.media.corner_picture import corner_image, corners, encode
 from ..capture.media.made_video import patch_track_header, write_video
 
 END = (0, 0, 0, 1 << 30)
@@ -145,3 +146,23 @@ def test_rotated_footage_is_shown_as_captured_and_brings_no_warning(tmp_path, ma
         captured = next(iter(video)).image_rgb
     assert not video.warnings
     assert corners(shown_by_blender(path)) == corners(captured)
+
+
+@pytest.mark.parametrize("turn", [0, 90, 180, 270])
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_a_strip_is_turned_as_the_footage_was_for_the_capture(
+    tmp_path, body, make_motion, turn, is_mirrored
+):
+    path = tmp_path / "still.png"
+    path.write_bytes(encode(".png", corner_image()))
+    view = FootageView(turn, is_mirrored)
+    captured = view.show(corner_image())
+    size = captured.shape[1::-1]
+    motion = make_motion(body, 1, image_size=size)
+    motion.footage_rotation, motion.footage_mirrored = turn, is_mirrored
+    camera = build_scene([motion], body, path, BuildOptions()).people[0].camera
+    scene = bpy.context.scene
+    (strip,) = add_footage_strips(scene, path, 1.0)
+    turn_strip(strip, camera.data.background_images[0])
+    scene.render.use_sequencer = True
+    assert corners(rendered(scene, tmp_path, size)) == corners(captured)

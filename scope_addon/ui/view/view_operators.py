@@ -189,7 +189,7 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         """Add the strips."""
         from ...scene.animation_data.stored_values import start_frame
         from ...scene.animation_data.timing import scene_rate
-        from ...scene.footage_strip import add_footage_strips, strips_of
+        from ...scene.footage_strip import add_footage_strips, strips_of, turn_strip
 
         scene = context.scene
         result = context.scene.scope.result
@@ -197,6 +197,9 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
+        camera = camera_of(scene)
+        if camera is not None and camera.data.background_images:
+            turn_strip(strips[-1], camera.data.background_images[0])
         rate = getattr(strips[-1], "fps", 0.0)
         if rate and abs(rate - scene_rate(scene)) > 0.01:
             self.report(
