@@ -24,6 +24,7 @@ _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 
 # Of compressed meshes; Blender reads Draco's.
 _UNREADABLE_EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _LARGEST_JSON = 200_000_000
+_MOST_BONES = 4096  # Blender takes a minute for 10,000 to import them; avatars have some hundred
 _LARGEST_FILE = 2 << 30
 _MAX_ELEMENTS = 50_000_000  # Of an accessor without data: its elements are all zero.
 _DAMAGED = (
@@ -57,6 +58,12 @@ def check_gltf(path: Path) -> None:
         for image in gltf.get("images", ()):
             if "uri" in image:
                 _uri_bytes(path, image["uri"])
+        joints = {node for skin in gltf.get("skins", ()) for node in skin["joints"]}
+        if len(joints) > _MOST_BONES:
+            raise InputError(
+                f"{path} has {len(joints)} bones, with which Blender would take minutes; a rig may "
+                f"have {_MOST_BONES}: choose another, or export it with fewer bones"
+            )
         views = gltf.get("bufferViews", [])
         for view in views:
             _require(

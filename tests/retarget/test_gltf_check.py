@@ -151,3 +151,17 @@ def test_a_compression_that_blender_does_not_read_is_named(tmp_path, extension):
     with pytest.raises(InputError, match=f"is compressed with {extension}") as caught:
         check_gltf(path)
     assert "damaged" not in str(caught.value)
+
+
+@pytest.mark.parametrize("bones", [4096, 4097])
+def test_bones_are_counted_before_blender_imports_them(tmp_path, bones):
+    """Once each, however many skins they move."""
+    content = copy.deepcopy(GLTF)
+    content["skins"] = [{"joints": list(range(bones))}, {"joints": list(range(bones))}]
+    path = tmp_path / "rig.glb"
+    glb(path, content)
+    if bones <= 4096:
+        check_gltf(path)
+        return
+    with pytest.raises(InputError, match="has 4097 bones, with which Blender would take minutes"):
+        check_gltf(path)
