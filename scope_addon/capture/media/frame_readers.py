@@ -384,7 +384,10 @@ class PyavReader:
 
 
 def count_frames(path: Path) -> int:
-    """Return how many frames a video file has, without decoding them; 0 if it cannot be read."""
+    """Return how many frames a video file has, without decoding them; 0 if it cannot be read.
+
+    :raises VideoError: PyAV is not installed.
+    """
     failure, container = _open_with_pyav(path)
     if container is None:
         return 0
