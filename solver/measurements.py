@@ -23,14 +23,20 @@ from .validation import (
     as_number,
     check_intrinsics,
     check_not_negative,
+    check_robust,
     check_rotations,
     check_type,
-    warn_of_units,
+    warn_of_pixels,
+    warn_of_points,
 )
 
 # No length, coordinate or confidence is as large. What the solver multiplies of smaller ones stays
 # finite; one pixel whose square does not would else make the cost of a whole clip infinite.
 LARGEST = 1e30
+# Standard deviations that the default weights stand for: of 2D keypoints in normalized image
+# coordinates, a pixel at a focal length of 1000, and of 3D keypoints in metres.
+SIGMA_2D = 1e-3
+SIGMA_3D = 1e-2
 
 
 @kernel
@@ -63,27 +69,36 @@ def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> None:
 
 @dataclass
 class Keypoints2D:
-    """Points in the image: indices (n,), pixels (n, 2) without lens distortion, confidence (n,).
+    """Points in the image: indices (n,), pixels (n, 2) without lens distortion, confidence (n,) or
+    one for all.
 
-    A row with NaN, or without a positive confidence, is left out, as of 3D keypoints and
-    directions. Cameras have no distortion coefficients: undistort pixels first, for instance with
-    OpenCV's undistortPoints(pixels, K, dist, P=K).
+    sigma_px: standard deviation of a point of confidence 1 in pixels, one for all or (n,). Its
+    weight is then 1/sigma^2, times `Weights.keypoints2d` over its default. A row with NaN, or
+    without a positive confidence, is left out, as of 3D keypoints and directions.
+
+    Cameras have no distortion coefficients: undistort pixels first, for instance with OpenCV's
+    undistortPoints(pixels, K, dist, P=K).
     """
 
     indices: ArrayLike
     pixels: ArrayLike
-    confidence: ArrayLike
+    confidence: ArrayLike = 1.0
+    sigma_px: ArrayLike | None = None
 
 
 @dataclass
 class Keypoints3D:
-    """Points in space: indices (n,), points (n, 3) in metres in the camera frame, confidence
-    (n,).
+    """Points in space: indices (n,), points (n, 3) in metres in the camera frame, confidence (n,)
+    or one for all.
+
+    sigma_m: standard deviation of each coordinate of a point of confidence 1 in metres, one for all
+    or (n,). Its weight is then 1/sigma^2, times `Weights.keypoints3d` over its default.
     """
 
     indices: ArrayLike
     points: ArrayLike
-    confidence: ArrayLike
+    confidence: ArrayLike = 1.0
+    sigma_m: ArrayLike | None = None
 
 
 @dataclass
@@ -92,13 +107,13 @@ class OrientationField:
     (n,).
 
     A bone is the direction from a joint M + par(i) to its child M + i. Directions are in the camera
-    frame and need not be normalized.
+    frame and need not be normalized. The confidence is (n,) or one for all.
     """
 
     starts: ArrayLike
     ends: ArrayLike
     directions: ArrayLike
-    confidence: ArrayLike
+    confidence: ArrayLike = 1.0
 
 
 @dataclass
@@ -201,8 +216,13 @@ class Measurements:
             )
         K = as_array(self.intrinsics, (3, 3), "Intrinsics")
         check_intrinsics(K)
+        confidence = _confidence(m.confidence, n, "2D keypoints")
         out = np.empty((n, 3))
-        _normalize(K, pixels, as_array(m.confidence, (n,), "Confidence of 2D keypoints"), out)
+        _normalize(K, pixels, confidence, out)
+        warn_of_pixels(K, pixels, out)
+        if m.sigma_px is not None:
+            sigma_px = _sigmas(m.sigma_px, n, "sigma_px of 2D keypoints")
+            out[:, 2] *= SIGMA_2D**2 * K[0, 0] * K[1, 1] / sigma_px**2
         return indices, out
 
     def packed3d(self, points: int) -> tuple[Array, Array]:
@@ -216,10 +236,14 @@ class Measurements:
             return np.zeros(0, np.int64), np.zeros((0, 4))
         indices = as_indices(m.indices, points, "Indices of 3D keypoints")
         points_3d = as_array(m.points, (len(indices), 3), "Points of 3D keypoints")
-        warn_of_units(points_3d, "Points of 3D keypoints")
         out = np.empty((len(indices), 4))
         out[:, :3] = points_3d
-        out[:, 3] = as_array(m.confidence, (len(indices),), "Confidence of 3D keypoints")
+        out[:, 3] = _confidence(m.confidence, len(indices), "3D keypoints")
+        warn_of_points(out)
+        if m.sigma_m is not None:
+            out[:, 3] *= (
+                SIGMA_3D / _sigmas(m.sigma_m, len(indices), "sigma_m of 3D keypoints")
+            ) ** 2
         return indices, out
 
     def packed_directions(self, points: int) -> tuple[Array, Array, Array]:
@@ -240,7 +264,7 @@ class Measurements:
             )
         out = np.empty((n, 4))
         out[:, :3] = as_array(m.directions, (n, 3), "Directions of the orientation field")
-        out[:, 3] = as_array(m.confidence, (n,), "Confidence of the orientation field")
+        out[:, 3] = _confidence(m.confidence, n, "the orientation field")
         return starts, ends, out
 
     def packed_tables(self, K: int, points: int) -> dict[str, tuple[Array, Array]]:
@@ -272,6 +296,27 @@ _KINDS = {
     "floor": Floor,
     "tables": Mapping,
 }
+
+
+def _confidence(value: ArrayLike, n: int, of: str) -> Array:
+    if isinstance(value, (int, float)):
+        return np.full(n, float(value))
+    return as_array(value, (n,), f"Confidence of {of}")
+
+
+def _sigmas(value: ArrayLike, n: int, name: str) -> Array:
+    """Return standard deviations (n,).
+
+    :raises ShapeError: they are neither one number nor (n,).
+    :raises InvalidValueError: one is not positive.
+    """
+    if not _has_axis(value):
+        check_robust(value, name)
+        return np.full(n, float(np.asarray(value)))
+    sigmas = as_array(value, (n,), name)
+    if not (sigmas > 0.0).all():
+        raise InvalidValueError(f"{name} must be positive, but hold {sigmas.min():g}.")
+    return sigmas
 
 
 # Residuals that have a field of their own.
@@ -317,19 +362,19 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     return _usable_rows(foot_contact.pack(indices, stand, weight))
 
 
-def _has_rows(value: ArrayLike) -> bool:
-    """Whether a value is a list of lists; a ragged one is, too, and is refused where it is
+def _has_axis(value: ArrayLike, more_than: int = 0) -> bool:
+    """Whether a value has more axes than that; a ragged list has, and is refused where it is
     converted.
     """
     try:
-        return np.ndim(value) > 1
+        return np.ndim(value) > more_than
     except ValueError:
         return True
 
 
 def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     indices = as_indices(m.indices, points, "Indices of the floor's points")
-    planes = (len(indices),) if _has_rows(m.normal) else ()
+    planes = (len(indices),) if _has_axis(m.normal, 1) else ()
     normal = as_array(m.normal, (*planes, 3), "Normal of the floor")
     contact = as_array(m.contact, (len(indices),), "Contact with the floor")
     below = np.ones(len(indices)) if m.below is None else m.below

@@ -4,6 +4,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from .arrays import as_array
 from .errors import InvalidValueError
 from .learned_prior import load_joint_prior
+from .measurements import SIGMA_2D, SIGMA_3D
 from .part import Array
 from .residuals import joint_limits, joint_prior
 from .residuals.registry import COLUMNS, FIRST_EXTERNAL, RESIDUALS, column_of, registered
@@ -31,24 +33,27 @@ from .validation import (
 
 @dataclass(frozen=True)
 class Weights:
-    """Weight of each kind of residual, on 1/2 |r|^2.
+    """Weight 1/sigma^2 of each kind of residual, on 1/2 |r|^2: sigma is the standard deviation of
+    what was measured with confidence 1, or of what is expected.
 
-    Units: per squared normalized image coordinate (pixels over focal length), per metre^2, per
-    squared difference of unit vectors, per radian^2; joint_flow multiplies a density's exponent, so
-    that 1 is what was learned; the pose prior's and the tables' weigh what their rows say.
-    `tables`: of further registered residuals by name, 1 if left out.
+    keypoints2d: per squared normalized image coordinate, pixels over focal length; 1e6 is a pixel
+    at a focal length of 1000. keypoints3d, foot_contact, floor: per metre^2; 1e4 is a centimetre.
+    orientation_field: per squared difference of unit vectors, joint_prior and joint_limits: per
+    radian^2. joint_flow multiplies a density's exponent, and shape the population's, so that 1 is
+    what was learned: larger weights of these two are regularization. pose_prior and the tables
+    weigh what their rows say. `tables`: of further registered residuals by name, 1 if left out.
     """
 
-    keypoints2d: float = 1e6
-    keypoints3d: float = 24000.0
+    keypoints2d: float = SIGMA_2D**-2
+    keypoints3d: float = SIGMA_3D**-2
     orientation_field: float = 2500.0
     pose_prior: float = 1.0
-    joint_prior: float = 50.0
+    joint_prior: float = 4.0
     joint_limits: float = 2000.0
     joint_flow: float = 1.0
     foot_contact: float = 4e4
     floor: float = 4e4
-    shape: float = 100.0
+    shape: float = 1.0
     tables: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -85,17 +90,22 @@ class Weights:
 
 @dataclass(frozen=True)
 class Stage:
-    """Weights until the cost's relative decrease in an accepted step falls below `tolerance`."""
+    """Weights until the cost's relative decrease in an accepted step falls below `tolerance`.
+
+    widening: factor of the sigmas of the robust kernels, larger than 1 in early stages, from where
+    the measurements are still far away.
+    """
 
     weights: Weights = Weights()
     tolerance: float = 1e-6
     max_iterations: int = 50
+    widening: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises InvalidValueError: the tolerance is negative or NaN, or the limit is negative or not
-            a whole number.
+        :raises InvalidValueError: the tolerance is negative or NaN, the limit is negative or not a
+            whole number, or the widening is not positive.
         """
         check_type(self.weights, Weights, "Stage.weights")
         if not as_number(self.tolerance, "Stage.tolerance") >= 0.0:
@@ -103,66 +113,68 @@ class Stage:
                 f"Stage.tolerance must be a number of at least 0, but is {self.tolerance}."
             )
         check_count(self.max_iterations, "Stage.max_iterations", 0)
+        check_robust(self.widening, "Stage.widening")
 
 
-# From far away: directions first, which have no bad minimum nearby, positions in the image and in
-# space joining in.
-_LAST = Weights()
-COLD_STAGES = (
-    Stage(
-        replace(
-            _LAST,
-            orientation_field=1e4,
-            keypoints3d=2400.0,
-            keypoints2d=1e4,
-            joint_prior=1000.0,
-            joint_flow=10.0,
-            shape=1000.0,
-        ),  # fmt: skip
-        5e-2,
-        10,
-    ),
-    Stage(
-        replace(
-            _LAST,
-            orientation_field=4000.0,
-            keypoints2d=2e5,
-            joint_prior=300.0,
-            joint_flow=3.0,
-            shape=400.0,
-        ),
-        1e-2,
-        15,
-    ),
-    Stage(_LAST, 1e-6, 50),
-)
-WARM_STAGES = (Stage(_LAST, 1e-6, 50),)
+def cold_stages(weights: Weights) -> tuple[Stage, ...]:
+    """Return the stages of a fit from far away: directions, which have no bad minimum nearby, and
+    priors first; positions join in, and the robust kernels become narrow.
+    """
+    far = replace(
+        weights,
+        orientation_field=4.0 * weights.orientation_field,
+        keypoints3d=0.1 * weights.keypoints3d,
+        keypoints2d=0.01 * weights.keypoints2d,
+        joint_prior=20.0 * weights.joint_prior,
+        joint_flow=10.0 * weights.joint_flow,
+        shape=100.0 * weights.shape,
+    )
+    near = replace(
+        weights,
+        orientation_field=1.6 * weights.orientation_field,
+        keypoints2d=0.2 * weights.keypoints2d,
+        joint_prior=6.0 * weights.joint_prior,
+        joint_flow=3.0 * weights.joint_flow,
+        shape=10.0 * weights.shape,
+    )
+    return Stage(far, 5e-2, 10, 1000.0), Stage(near, 1e-2, 15, 30.0), *warm_stages(weights)
+
+
+def warm_stages(weights: Weights) -> tuple[Stage, ...]:
+    """Return the stages of a fit from a state that is known."""
+    return (Stage(weights, 1e-6, 50),)
+
+
+COLD_STAGES = cold_stages(Weights())
+WARM_STAGES = warm_stages(Weights())
 
 
 @dataclass(frozen=True)
 class Options:
     """How the optimizer works.
 
+    weights: of the default schedule, whose earlier stages scale them; `Weights()` if None.
     robust_*: Geman-McClure sigma in the square of each residual's unit; infinity turns the kernel
     off. triggs: 0 is first-order reweighting; up to 1, the second-order correction clamped at that
     share. damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians;
     root_length: metres of pelvis motion that are damped like one radian. stages: replaces the
-    default schedule, which depends on whether an initial state is given. curvature: estimate from
-    the steps taken what Gauss-Newton leaves out of the joints' Hessians (curvature.py), in every
-    fit of one frame; without, each step is plain Levenberg-Marquardt's. It changes the steps, not
-    the minimum. report: also tell what the cost is made of (`Fit.cost_by_term`), which takes
-    another evaluation for each kind of residual.
+    default schedule, COLD_STAGES or, where an initial state is given, WARM_STAGES. curvature:
+    estimate from the steps taken what Gauss-Newton leaves out of the joints' Hessians
+    (curvature.py), in every fit of one frame; without, each step is plain Levenberg-Marquardt's. It
+    changes the steps, not the minimum. report: also tell what the cost is made of
+    (`Fit.cost_by_term`), which takes another evaluation for each kind of residual.
     """
 
     stages: Sequence[Stage] | None = None
     robust_keypoints2d: float = 0.01
-    robust_keypoints3d: float = 0.01
-    robust_orientation_field: float = 0.1
+    robust_keypoints3d: float = 0.1
+    robust_orientation_field: float = 1.0
     triggs: float = 0.0
     damping: float = 1.0
     root_length: float = 0.3
     curvature: bool = True
     report: bool = False
+    weights: Weights | None = None
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -184,6 +196,19 @@ class Options:
         check_type(self.stages, (Sequence, type(None)), "Options.stages")
         for k, stage in enumerate(self.stages or ()):
             check_type(stage, Stage, f"Options.stages[{k}]")
+        check_type(self.weights, (Weights, type(None)), "Options.weights")
+        if self.stages is not None and self.weights is not None:
+            raise InvalidValueError(
+                "Options.weights are those of the default stages; with Options.stages, give each "
+                "Stage its weights."
+            )
+
+    @cached_property
+    def _default_stages(self) -> tuple[tuple[Stage, ...], tuple[Stage, ...]]:
+        """The schedules of a cold and of a warm start."""
+        if self.weights is None:
+            return COLD_STAGES, WARM_STAGES
+        return cold_stages(self.weights), warm_stages(self.weights)
 
     def schedule(self, cold: bool) -> Sequence[Stage]:
         """Return the stages of a fit, `cold` without an initial state.
@@ -191,7 +216,7 @@ class Options:
         :raises InvalidValueError: there are none.
         """
         if self.stages is None:
-            return COLD_STAGES if cold else WARM_STAGES
+            return self._default_stages[0 if cold else 1]
         if not self.stages:
             raise InvalidValueError(
                 "A fit needs at least one stage, but Options.stages is empty; None is the default."
@@ -210,7 +235,7 @@ class Options:
         for k, stage in enumerate(stages):
             check_type(stage, Stage, f"Options.stages[{k}]")
             table[k, 0] = stage.weights.row()
-        table[:, 1, :3] = 1.0 / sigmas
+            table[k, 1, :3] = 1.0 / (stage.widening * sigmas)
         tolerances = np.array([float(stage.tolerance) for stage in stages])
         return (
             table,

@@ -11,18 +11,21 @@ that nothing is allocated. The lower half does the same on numpy arrays with any
 """
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import as_arrays
+from .errors import UnitsWarning
 from .kernel import kernel
 
 Array = NDArray[Any]
 
 # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
 _PI_MARGIN = 1e-4
+_SEVERAL_TURNS = 6.0 * math.pi  # radians, of a rotation vector
 
 
 @kernel
@@ -165,11 +168,20 @@ def _lag(s: Array, small: Array, th: Array) -> Array:
 
 
 def exp(phi: ArrayLike) -> Array:
-    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3).
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3), radians.
+
+    Vectors of several turns are probably in degrees, and give a `UnitsWarning`.
 
     :raises ShapeError: the vectors have another shape.
     """
     phi = as_arrays(phi, (3,), "A rotation vector")
+    if (np.abs(phi) > _SEVERAL_TURNS).any():
+        warnings.warn(
+            f"A rotation vector turns by {np.abs(phi).max():.6g} radians, several turns; convert "
+            "degrees by numpy.radians.",
+            UnitsWarning,
+            stacklevel=2,
+        )
     angles = _squares_and_angles(phi)
     cross = hat(phi)
     return np.eye(3) + _sine(*angles) * cross + _versine(*angles) * (cross @ cross)

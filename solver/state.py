@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Literal
 
 import numpy as np
 
@@ -90,6 +91,10 @@ class State:
         )
 
 
+# In place of an initial state: begin with several headings, and keep the fit of the lowest cost.
+MULTI: Literal["multi"] = "multi"
+
+
 def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
     """Check the rotations of an initial state, (3, 3) and (K, 3, 3).
 
@@ -97,6 +102,20 @@ def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
     """
     check_rotations(R_camera_root[None], "R_camera_root of the initial state")
     check_rotations(Omega, "Omega of the initial state")
+
+
+def given_states(
+    init: "Sequence[State] | Literal['multi'] | None", frames: int
+) -> "Sequence[State] | None":
+    """Return the initial states of a clip, checked; None if there are none, or for "multi".
+
+    :raises InvalidValueError: they are not a list, or an entry is of another type.
+    :raises ShapeError: there are more or fewer than `frames`.
+    """
+    if init is None or (isinstance(init, str) and init == MULTI):
+        return None
+    check_states(init, frames)
+    return init
 
 
 def check_states(
@@ -129,9 +148,10 @@ class Fit:
     t_camera_part: Array  # (K+1, 3), the joints
     # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
     beta_information: Array
-    # usable points, directions and rows of pose priors, such as the pull of `Temporal`; contacts,
-    # the floor and further tables add to a fit, but alone they are no measurements
+    # usable points, directions, rows of pose priors, such as the pull of `Temporal`, contacts,
+    # points above a floor, and rows of further tables
     measurements: int
+    seen: int = 0  # of them, the points, directions and rows of pose priors
     rejected: int = 0  # of the iterations, those whose step did not lower the cost
     # adds up to `cost`; with Options.report only
     cost_by_term: dict[str, float] = field(default_factory=dict)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import as_integers, described
-from .errors import InvalidValueError, ShapeError, UnitsWarning
+from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning
 from .kernel import allocating_kernel, kernel
 from .part import Array
 
@@ -30,6 +30,9 @@ LARGEST_STEP = 10.0
 _FEWEST_TIMES = 5  # whole numbers that are no coincidence
 _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
+_FEWEST_POINTS = 4  # that are no coincidence
+_WIDEST = 4.0  # tangent of half a pinhole camera's field of view, 76 degrees
+_MOST_CONFIDENT = 10.0  # on average: confidences are shares of one, or a few times that
 
 
 def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
@@ -218,6 +221,61 @@ def warn_of_units(points: Array, name: str) -> None:
         )
 
 
+def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
+    """Warn of 2D keypoints that are probably not what they were meant to be.
+
+    :param K: (3, 3) intrinsics. :param pixels: (n, 2).
+    :param normalized: (n, 3) of normalized image coordinates and confidence.
+    """
+    fault = _fault_of_pixels(K, pixels, normalized)
+    if fault == 1:
+        _warn(
+            UnitsWarning,
+            "Pixels of 2D keypoints all lie in 0..1; multiply them by the image's size in pixels.",
+        )
+    elif fault == 2:
+        _warn(
+            ScopeWarning,
+            "Pixels of 2D keypoints are (0, 0), as of keypoints that are missing; give these a "
+            "confidence of 0.",
+        )
+    elif fault == 3:
+        _warn(
+            UnitsWarning,
+            f"Focal lengths of {K[0, 0]:.6g} and {K[1, 1]:.6g} pixels are too short for these "
+            "pixels; multiply millimetres by the image's width in pixels over the sensor's in "
+            "millimetres.",
+        )
+    elif fault == 4:
+        _warn(ScopeWarning, f"Confidence of 2D keypoints {_TOO_CONFIDENT}")
+
+
+def warn_of_points(points: Array) -> None:
+    """Warn of 3D keypoints (n, 4), positions and confidence, that are probably not in metres in
+    camera axes.
+    """
+    warn_of_units(points, "Points of 3D keypoints")
+    fault = _fault_of_points(points)
+    if fault == 1:
+        _warn(
+            ScopeWarning,
+            "Points of 3D keypoints all lie behind the camera, z < 0; camera axes are x right, y "
+            "down, z forward: negate y and z of points whose y is up.",
+        )
+    elif fault == 2:
+        _warn(ScopeWarning, f"Confidence of 3D keypoints {_TOO_CONFIDENT}")
+
+
+_TOO_CONFIDENT = (
+    "is far above 1 on average; divide percentages by 100, or give standard deviations as sigma_px "
+    "or sigma_m."
+)
+
+
+def _warn(kind: type[ScopeWarning], message: str) -> None:
+    warnings.warn(message, kind, stacklevel=4)
+
+
 def warn_of_frame_numbers(times: Array) -> None:
     """Warn of times (T,) of a motion's frames that are probably no seconds, with `UnitsWarning`.
 
@@ -346,6 +404,61 @@ def _fault_of_intrinsics(K: Array) -> int:
     ):
         return 2
     return 0 if K[0, 0] > 0.0 and K[1, 1] > 0.0 else 1
+
+
+@kernel
+def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
+    """Return 0, or what is wrong: 1 pixels in 0..1, 2 missing at (0, 0), 3 focal length, 4
+    confidence.
+    """
+    count = 0
+    small = 0
+    zero = 0
+    wide = 0
+    confidence = 0.0
+    for k in range(pixels.shape[0]):
+        x = pixels[k, 0]
+        y = pixels[k, 1]
+        if not normalized[k, 2] > 0.0 or 0.0 * (x + y) != 0.0:
+            continue
+        count += 1
+        confidence += normalized[k, 2]
+        if 0.0 <= x <= 1.0 and 0.0 <= y <= 1.0:
+            small += 1
+        if x == 0.0 and y == 0.0:
+            zero += 1
+        if abs(normalized[k, 0]) > _WIDEST or abs(normalized[k, 1]) > _WIDEST:
+            wide += 1
+    if count < _FEWEST_POINTS:
+        return 0
+    if small == count and K[0, 2] > 2.0:
+        return 1
+    if 0 < zero < count:
+        return 2
+    if 2 * wide > count or K[0, 2] > _WIDEST * K[0, 0] or K[1, 2] > _WIDEST * K[1, 1]:
+        return 3
+    return 4 if confidence > _MOST_CONFIDENT * count else 0
+
+
+@kernel
+def _fault_of_points(points: Array) -> int:
+    """Return 0, or what is wrong with (n, 4): 1 all behind the camera, 2 confidence."""
+    count = 0
+    behind = 0
+    confidence = 0.0
+    for k in range(points.shape[0]):
+        total = 0.0 * points[k, 0] + 0.0 * points[k, 1] + 0.0 * points[k, 2]
+        if total != 0.0 or not points[k, 3] > 0.0:
+            continue
+        count += 1
+        confidence += points[k, 3]
+        if points[k, 2] < 0.0:
+            behind += 1
+    if count < _FEWEST_POINTS:
+        return 0
+    if behind == count:
+        return 1
+    return 2 if confidence > _MOST_CONFIDENT * count else 0
 
 
 @kernel

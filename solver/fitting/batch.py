@@ -5,11 +5,11 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
-from ..state import ClipFit, Fit, State, check_states
+from ..state import MULTI, ClipFit, Fit, State, check_states
 from ..temporal import Temporal
 from ..tree import BodyArrays, make_tree
 from ..validation import check_count, check_list, check_type
@@ -26,7 +26,7 @@ def fit_batch(
     body: BodyArrays,
     measurements: Sequence[Measurements],
     *,
-    init: Sequence[State | None] | None = None,
+    init: Sequence[State | None] | Literal["multi"] | None = None,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
     threads: int = 0,
@@ -35,7 +35,7 @@ def fit_batch(
 
     Every frame comes out as `fit` gives it, bit by bit, whatever the number of threads.
 
-    :param init: a state for each frame, None where there is none.
+    :param init: a state for each frame, None where there is none; or "multi" for all, as of `fit`.
     :param threads: how many; 0 is one for each core.
     :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has
         another length.
@@ -44,9 +44,12 @@ def fit_batch(
     check_list(measurements, "measurements", "frame")
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
-    if init is not None:
+    starts: list[State | Literal["multi"] | None] = [None] * len(measurements)
+    if init == MULTI:
+        starts = [MULTI] * len(measurements)
+    elif init is not None:
         check_states(init, len(measurements), (State, type(None)))
-    starts = [None] * len(measurements) if init is None else list(init)
+        starts = list(init)
     tree = make_tree(body)
     priors = default_priors(body) if priors is None else priors
     own = threading.local()

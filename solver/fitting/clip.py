@@ -12,6 +12,7 @@ matrix summed so far is the prior of the next frame (`carry`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ from ..options import Options, Priors, default_priors
 from ..part import Blocks, Pose
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
-from ..state import ClipFit, Fit, State, Status, check_states
+from ..state import MULTI, ClipFit, Fit, State, Status, given_states
 from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_list, check_switch, check_type, check_weight
@@ -69,7 +70,7 @@ def fit_clip(
     body: BodyArrays,
     measurements: Sequence[Measurements],
     *,
-    init: Sequence[State] | None = None,
+    init: Sequence[State] | Literal["multi"] | None = None,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
     temporal: Temporal | None = None,
@@ -80,7 +81,8 @@ def fit_clip(
     """Fit every frame's pose and one shape, and with `focal` one focal length, to a clip.
 
     First every frame is fitted in order, from the frame before and with the shape's information
-    carried along (not if `init` is given); then all poses and the shape are optimized together.
+    carried along (not if `init` is given; with "multi", as `fit` does where the person appears);
+    then all poses and the shape are optimized together.
     `temporal` adds the pull towards the frame before, as it came out of the first pass. A frame
     without measurements gets the pose of the last frame before it that has some, or of the first
     after it; its status is `NO_MEASUREMENTS`. With `temporal` the pull is a measurement of its own:
@@ -100,27 +102,27 @@ def fit_clip(
     check_weight(focal_weight, "focal_weight")
     check_count(shape_frames, "shape_frames")
     check_switch(focal, "focal")
-    if init is not None:
-        check_states(init, len(measurements))
+    states = given_states(init, len(measurements))
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")
     check_type(temporal, (Temporal, type(None)), "temporal")
     tree = make_tree(body)
-    if init is None:
-        init = fit_in_order(tree, measurements, priors, options, temporal)
+    if states is None:
+        cold = MULTI if init is not None else None
+        states = fit_in_order(tree, measurements, priors, options, temporal, cold=cold)
     if temporal is not None:
         pulled = [
-            with_previous(m, s, temporal) for m, s in zip(measurements[1:], init, strict=False)
+            with_previous(m, s, temporal) for m, s in zip(measurements[1:], states, strict=False)
         ]
         measurements = [measurements[0], *pulled]
     clip_tree = make_tree(body, focal)
     packed = pack_priors(clip_tree, priors)
     frames = [
         _Frame(clip_tree, fill_terms(clip_tree, m, packed, None)[0], s)
-        for m, s in zip(measurements, init, strict=True)
+        for m, s in zip(measurements, states, strict=True)
     ]
-    seen = [k for k, frame in enumerate(frames) if frame.count]
+    seen = [k for k, frame in enumerate(frames) if frame.counts[1]]
     chosen = seen
     if len(seen) > shape_frames:
         chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
@@ -135,7 +137,7 @@ def fit_clip(
     fits = [
         together[k]
         if k in together
-        else _fit_with_shape(fixed, measurements[k], init[k], beta, scale, priors, options)
+        else _fit_with_shape(fixed, measurements[k], states[k], beta, scale, priors, options)
         for k in range(len(frames))
     ]
     shares = joint.cost_by_term() if options.report else {}
@@ -164,6 +166,7 @@ def fit_in_order(
     options: Options,
     temporal: Temporal | None,
     cameras: Sequence[Camera] | None = None,
+    cold: Literal["multi"] | None = None,
 ) -> list[State]:
     """Fit each frame from the one before, carrying the shape's information; a lost person starts
     afresh.
@@ -172,6 +175,7 @@ def fit_in_order(
 
     :param cameras: the camera in whose axes each frame's measurements are; without it, all are in
         the states' axes.
+    :param cold: `init` of `fit` where no frame before has a state.
     :return: states in the axes of the world.
     :raises InvalidValueError: the weight of the shape in ``options`` is negative, infinite or not a
         number.
@@ -183,7 +187,7 @@ def fit_in_order(
     for m, (R, t) in zip(measurements, cameras or [_AT_ORIGIN] * len(measurements), strict=True):
         start = None if last is None else _moved(last, R, t)
         pulled = m if temporal is None or start is None else with_previous(m, start, temporal)
-        fitted = fit_tree(tree, pulled, start, priors, options)
+        fitted = fit_tree(tree, pulled, cold if start is None else start, priors, options)
         state = _moved(fitted.state, R.T, -R.T @ t)
         if fitted.status is Status.NO_MEASUREMENTS:
             states.append(states[-1] if seen else state)
@@ -239,8 +243,8 @@ class _Frame:
     init: State
 
     @property
-    def count(self) -> int:
-        """Usable measurements."""
+    def counts(self) -> tuple[int, int]:
+        """Usable measurements, as of `usable`."""
         return usable(self.terms)
 
 
@@ -249,7 +253,7 @@ class _Active:
     """A frame that takes part in the joint optimization, with its buffers."""
 
     terms: Terms
-    count: int
+    counts: tuple[int, int]
     pose: Pose
     trial: Pose
     blocks: Blocks
@@ -291,7 +295,7 @@ class _Joint(SeveralFrames):
             work = make_workspace(tree)._replace(A=shared.A, scratch=shared.scratch)
             pose = replace(f.init, beta=self.beta[: self.P]).pose(tree)
             self.frames.append(
-                _Active(f.terms, f.count, pose, make_pose(tree), make_blocks(tree), work)
+                _Active(f.terms, f.counts, pose, make_pose(tree), make_blocks(tree), work)
             )
 
     def optimize(self) -> None:
@@ -386,7 +390,7 @@ class _Joint(SeveralFrames):
             shares = self._shares(f) if self.report else {}
             outcome = Outcome(self.status, float(f.cost), self.iterations, self.rejected, shares)
             information = f.work.C[: self.P, : self.P].copy()
-            out.append(make_fit(self.tree, f.pose, outcome, information, f.count))
+            out.append(make_fit(self.tree, f.pose, outcome, information, f.counts))
         return out
 
     def _shares(self, f: _Active) -> dict[str, float]:

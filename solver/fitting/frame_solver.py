@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fitting one frame, and frame after frame in the same memory."""
 
+import math
 import threading
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,25 +14,27 @@ from ..gauss_newton.curvature import make_curvature
 from ..gauss_newton.linearize import make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
 from ..gauss_newton.recursion import make_workspace
-from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors
+from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors, usable
 from ..kernel import announce_compilation, kernel
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
-from ..state import Fit, State, Status, check_state_rotations
+from ..state import MULTI, Fit, State, Status, check_state_rotations
 from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type
 from .initialize import initial_state
 from .report import Outcome, cost_by_term, make_fit
+
+_HEADINGS = tuple(k * math.pi / 6.0 for k in range(12))  # radians from facing the camera
 
 
 def fit(
     body: BodyArrays,
     measurements: Measurements,
     *,
-    init: State | None = None,
+    init: State | Literal["multi"] | None = None,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
 ) -> Fit:
@@ -40,7 +44,8 @@ def fit(
     paper).
 
     :param init: where to start, camera frame, metres, in one stage; without it, from
-        `initial_state`, in several.
+        `initial_state`, in several. Without 3D keypoints and directions, that is facing the camera;
+        "multi" starts from twelve headings and keeps the fit of the lowest cost.
     :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the
         population's shape.
     :return: the state and how it was reached; whatever values were measured, see `Status`.
@@ -51,7 +56,11 @@ def fit(
 
 
 def fit_tree(
-    tree: Tree, measurements: Measurements, init: State | None, priors: Priors, options: Options
+    tree: Tree,
+    measurements: Measurements,
+    init: State | Literal["multi"] | None,
+    priors: Priors,
+    options: Options,
 ) -> Fit:
     """`fit` on a tree that has been made already. Calls in a row with the same tree work in the
     same memory.
@@ -98,7 +107,7 @@ class FrameSolver:
     def fit(
         self,
         measurements: Measurements,
-        init: State | None = None,
+        init: State | Literal["multi"] | None = None,
         priors: Priors | None = None,
         options: Options | None = None,
     ) -> Fit:
@@ -111,32 +120,44 @@ class FrameSolver:
         priors = self.priors if priors is None else priors
         options = self.options if options is None else options
         check_type(measurements, Measurements, "measurements")
-        check_type(init, (State, type(None)), "init")
+        multi = isinstance(init, str) and init == MULTI
+        if not multi:
+            check_type(init, (State, type(None)), "init")
         check_type(priors, Priors, "priors")
         check_type(options, Options, "options")
         tree = self.tree
         memory = self._memory
         work = self._memory.work
         packed = self._pack(priors)
-        terms, count, self._layout = fill_terms(tree, measurements, packed, self._layout)
-        count += len(terms.ints[0])
-        settings = self._settings_of(options, cold=init is None)
-        if init is None:
-            init = initial_state(tree, terms, self._mean(priors), packed.shape_mean[: tree.shape])
-        self._enter(init)
-        cost, code, iterations, rejected, which = optimize(tree, terms, count > 0, settings, memory)
-        raise_failure()
-        found = memory.poses[which]
+        terms, slots, self._layout = fill_terms(tree, measurements, packed, self._layout)
+        seen, count = usable(terms, slots)
+        settings = self._settings_of(options, cold=init is None or multi)
         P = tree.shape
         last = settings.stages[-1]
-        information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
-        shares = {}
-        if options.report:
-            shares = cost_by_term(
-                tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch
+        best: Fit | None = None
+        for heading in _HEADINGS if multi and count > 0 else (0.0,):
+            start = init
+            if not isinstance(start, State):
+                mean = self._mean(priors)
+                start = initial_state(tree, terms, mean, packed.shape_mean[:P], heading)
+            self._enter(start)
+            cost, code, iterations, rejected, which = optimize(
+                tree, terms, count > 0, settings, memory
             )
-        outcome = Outcome(Status(code), cost, iterations, rejected, shares)
-        return make_fit(tree, found, outcome, information, count)
+            raise_failure()
+            found = memory.poses[which]
+            information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * packed.shape_information[:P, :P]
+            shares = {}
+            if options.report:
+                shares = cost_by_term(
+                    tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch
+                )
+            outcome = Outcome(Status(code), cost, iterations, rejected, shares)
+            fitted = make_fit(tree, found, outcome, information, (seen, count))
+            if best is None or fitted.cost < best.cost or not np.isfinite(best.cost):
+                best = fitted
+        assert best is not None
+        return best
 
     def _pack(self, priors: Priors) -> PackedPriors:
         if self._packed is None or self._packed[0] is not priors:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..gauss_newton.linearize import make_pose, place_parts
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
 from ..kernel import kernel
+from ..rotations import exp
 from ..state import State
 from ..tree import Tree
 
@@ -109,12 +110,17 @@ def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
 
 
 def initial_state(
-    tree: Tree, terms: Terms, joint_mean: NDArray[np.float64], beta: NDArray[np.float64]
+    tree: Tree,
+    terms: Terms,
+    joint_mean: NDArray[np.float64],
+    beta: NDArray[np.float64],
+    heading: float = 0.0,
 ) -> State:
     """Return a first state in the camera frame, metres; finite whatever the measurements are.
 
     :param joint_mean: (K, 3, 3) states of joints 1..K.
     :param beta: (P,)
+    :param heading: by which the body is turned about its own vertical axis from there, radians.
     """
     pose = make_pose(tree)
     pose.Omega[1:] = joint_mean
@@ -132,6 +138,8 @@ def initial_state(
         R = _rotation_onto(directed[7:].reshape(3, 3))
     if R is None:
         R = FRONTAL
+    if heading != 0.0:
+        R = R @ exp([0.0, heading, 0.0])
     if space[0] > 0.0:
         t = (space[4:7] - R @ space[1:4]) / space[0]
     else:

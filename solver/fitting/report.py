@@ -50,15 +50,18 @@ def make_fit(
     pose: Pose,
     outcome: Outcome,
     beta_information: NDArray[np.float64],
-    measurements: int,
+    counts: tuple[int, int],
 ) -> Fit:
-    """Return the result of one frame at `pose`, which is copied; beta_information (P, P)."""
+    """Return the result of one frame at `pose`, which is copied; beta_information (P, P), counts of
+    `usable`.
+    """
     return Fit(
         state=State.from_pose(tree, pose),
         R_camera_part=pose.R.copy(),
         t_camera_part=pose.t.copy(),
         beta_information=beta_information,
-        measurements=measurements,
+        seen=counts[0],
+        measurements=counts[1],
         status=outcome.status,
         cost=outcome.cost,
         iterations=outcome.iterations,

@@ -33,6 +33,12 @@ _RANGES = {
     "indices": (0, None),
 }
 _UNLIMITED = np.iinfo(np.int64).max
+_POSE_PRIOR = list(RESIDUALS).index("pose_prior")
+# Of the tables that say where a body is, the first column of a row's weights.
+_WEIGHED = {
+    list(RESIDUALS).index(name): column
+    for name, column in (("foot_contact", 3), ("floor", 4), ("outline", 7))
+}
 
 
 class Terms(NamedTuple):
@@ -350,6 +356,18 @@ def fill_terms(
     return terms, count, layout
 
 
-def usable(terms: Terms) -> int:
-    """Return how many points, directions and poses were measured."""
-    return int(np.count_nonzero(terms.flags & ~HAS_SHAPE)) + len(terms.ints[0])
+def usable(terms: Terms, slots: int | None = None) -> tuple[int, int]:
+    """Return how many points, directions and poses were measured, and these with all else that
+    fixes where a body is: contacts, floor, outline and residuals from outside. Priors do not count.
+
+    :param slots: of points and directions in use, if it is known.
+    """
+    if slots is None:
+        slots = int(np.count_nonzero(terms.flags & ~HAS_SHAPE))
+    seen = slots + len(terms.ints[_POSE_PRIOR])
+    everything = seen + int(terms.external.calls[:, 1].sum())
+    for k, first_weight in _WEIGHED.items():
+        if len(terms.floats[k]):
+            weights = terms.floats[k][:, first_weight : first_weight + 2]
+            everything += int(np.count_nonzero((weights > 0.0).any(axis=1)))
+    return seen, everything

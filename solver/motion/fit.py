@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +20,7 @@ from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..part import Array, Pose
 from ..rotations import nearest_rotation
-from ..state import State, Status, check_state_rotations, check_states
+from ..state import MULTI, State, Status, check_state_rotations, given_states
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import (
     as_number,
@@ -31,7 +32,7 @@ from ..validation import (
     warn_of_frame_numbers,
 )
 from .covariance import joint_covariances
-from .initial import initial_states
+from .initial import initial_states, warn_of_transposed_cameras
 from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
 from .problem import ClipProblem, MotionTerms
@@ -73,7 +74,7 @@ def fit_motion(
     frames: Sequence[Measurements | Sequence[View]],
     times: ArrayLike,
     *,
-    init: Sequence[State] | None = None,
+    init: Sequence[State] | Literal["multi"] | None = None,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
     motion: MotionPrior = MotionPrior(),  # noqa: B008 - frozen
@@ -96,8 +97,8 @@ def fit_motion(
     :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are
         probably frame numbers, and give a `UnitsWarning`.
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in
-        order, several cameras by points triangulated from their 2D keypoints, or by one of them
-        where their rays are too parallel.
+        order, with "multi" as `fit` does where the person appears, several cameras by points
+        triangulated from their 2D keypoints, or by one of them where their rays are too parallel.
     :param priors: `default_priors(body)` unless given.
     :param options: the stages are those of a fit that starts from a state; `report` has no effect.
     :param motion: weights of acceleration and of standing points.
@@ -117,8 +118,7 @@ def fit_motion(
     """
     check_list(frames, "frames", "frame")
     clock = _checked_times(times, len(frames))
-    if init is not None:
-        check_states(init, len(frames))
+    states = given_states(init, len(frames))
     if not as_number(window, "window") > 0.0:
         raise InvalidValueError(
             f"window must be a positive number of seconds, or infinite for one, but is {window}."
@@ -129,6 +129,7 @@ def fit_motion(
         )
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
+    warn_of_transposed_cameras(frames)
     check_type(motion, MotionPrior, "motion")
     # weights of their own are given by those who know how far apart their frames are
     if _weighs_by_default(motion):
@@ -142,8 +143,9 @@ def fit_motion(
     check_type(options, Options, "options")
     tree = make_tree(body)
     shape = _checked_shape(shape, tree, focal)
-    if init is None:
-        init = _first_states(tree, frames, shape, priors, options)
+    if states is None:
+        cold = MULTI if init is not None else None
+        states = _first_states(tree, frames, shape, priors, options, cold)
     many = len(frames) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
     with ThreadPoolExecutor(2) if many else nullcontext() as pool:
         terms = MotionTerms.make(
@@ -153,7 +155,7 @@ def fit_motion(
             tree,
             frames,
             terms,
-            init,
+            states,
             _Settings(priors, options, focal, focal_weight, covariance),
             pool,
         )
@@ -197,11 +199,14 @@ def _first_states(
     shape: Array | None,
     priors: Priors,
     options: Options,
+    cold: Literal["multi"] | None,
 ) -> Sequence[State]:
     """Return where a clip starts that was given no states."""
     if shape is None:
-        return initial_states(tree, frames, priors, options)
-    states = initial_states(with_fixed_shape(tree, shape), frames, _without_shape(priors), options)
+        return initial_states(tree, frames, priors, options, cold)
+    states = initial_states(
+        with_fixed_shape(tree, shape), frames, _without_shape(priors), options, cold
+    )
     return [replace(state, beta=shape) for state in states]
 
 

@@ -3,11 +3,14 @@
 first.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
+from ..errors import ScopeWarning
 from ..fitting.clip import Camera, fit_in_order
 from ..measurements import Keypoints3D, Measurements
 from ..options import Options, Priors
@@ -18,18 +21,23 @@ from .views import View
 
 # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
 _MIN_CONDITION = 1e-4
+_LARGEST_ERROR = 0.02  # of cameras that agree, in normalized image coordinates
 _LEAST_SHARE = 1 / 3  # of one camera's points that must be triangulated, or that camera says more
 
 
 def initial_states(
-    tree: Tree, frames: Sequence[Measurements | Sequence[View]], priors: Priors, options: Options
+    tree: Tree,
+    frames: Sequence[Measurements | Sequence[View]],
+    priors: Priors,
+    options: Options,
+    cold: Literal["multi"] | None = None,
 ) -> list[State]:
-    """Return each frame's state in the world's axes, of one shape."""
+    """Return each frame's state in the world's axes, of one shape; `cold` as of `fit_in_order`."""
     views = [[View(frame)] if isinstance(frame, Measurements) else list(frame) for frame in frames]
     chosen = [_first_view(v, len(tree.point_part)) for v in views]
     cameras = [_camera_of(view) for view in chosen]
     states = fit_in_order(
-        tree, [view.measurements for view in chosen], priors, options, None, cameras
+        tree, [view.measurements for view in chosen], priors, options, None, cameras, cold
     )
     return [replace(state, beta=states[-1].beta) for state in states]
 
@@ -102,3 +110,58 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
     """
     np.add.at(A, indices, weight[:, None, None] * row[:, :, None] * row[:, None, :])
     np.add.at(b, indices, (weight * value)[:, None] * row)
+
+
+def warn_of_transposed_cameras(frames: Sequence[Measurements | Sequence[View]]) -> None:
+    """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
+    R_camera_world is transposed, or its whole pose inverted; with `ScopeWarning`.
+    """
+    views = next((v for v in frames if not isinstance(v, Measurements) and len(v) > 1), None)
+    if views is None or any(view.measurements.keypoints2d is None for view in views):
+        return
+    points = 1 + max(
+        int(np.max(np.asarray(view.measurements.keypoints2d.indices), initial=0))  # type: ignore[union-attr]
+        for view in views
+    )
+    given = _median_error(views, points)
+    if not given > _LARGEST_ERROR:
+        return
+    transposed = []
+    inverted = []
+    for view in views:
+        R = np.asarray(view.R_camera_world, dtype=float).T
+        t = np.asarray(view.t_camera_world, dtype=float)
+        transposed.append(replace(view, R_camera_world=R))
+        inverted.append(replace(view, R_camera_world=R, t_camera_world=-R @ t))
+    for changed, remedy in (
+        (transposed, "transpose R_camera_world"),
+        (inverted, "give R^T and -R^T t of the poses R_world_camera and t_world_camera"),
+    ):
+        if _median_error(changed, points) < 0.2 * given:
+            warnings.warn(
+                f"The cameras' rays to a point miss each other, but meet in other axes; {remedy}.",
+                ScopeWarning,
+                stacklevel=3,
+            )
+            return
+
+
+def _median_error(views: Sequence[View], points: int) -> float:
+    """Return the median distance of 2D keypoints from their triangulated points in normalized
+    image coordinates; infinite where these are behind a camera, or there are none.
+    """
+    found = triangulated(views, points).keypoints3d
+    assert found is not None
+    at = np.full((points, 3), np.nan)
+    at[np.asarray(found.indices)] = found.points
+    errors = []
+    for view in views:
+        indices, m = view.measurements.packed2d(points)
+        p = at[indices] @ np.asarray(view.R_camera_world, dtype=float).T
+        p = p + np.asarray(view.t_camera_world, dtype=float)
+        usable = np.isfinite(m).all(axis=1) & (m[:, 2] > 0.0) & np.isfinite(p).all(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.linalg.norm(p[:, :2] / p[:, 2:] - m[:, :2], axis=1)
+        errors.append(np.where(p[:, 2] > 0.0, off, np.inf)[usable])
+    together = np.concatenate(errors)
+    return float(np.median(together)) if len(together) else np.inf

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_array, described
 from ..errors import InvalidValueError
-from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms
+from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms, usable
 from ..kernel import kernel
 from ..measurements import Measurements
 from ..part import Array
@@ -186,7 +186,7 @@ class _Packer:
 
     def add(self, view: View, priors: PackedPriors) -> int:
         """Add a view, as `views_of` has checked it, and return how many measurements are usable."""
-        terms, count, layout = fill_terms(self._tree, view.measurements, priors, self._layout)
+        terms, slots, layout = fill_terms(self._tree, view.measurements, priors, self._layout)
         if layout is not self._layout:
             self._shared += len(self._layout.rest)
             self._layouts.append(layout)
@@ -202,7 +202,7 @@ class _Packer:
         self._external.append(terms.external)
         self._cameras.append(_camera_of(view))
         self._size += len(terms.flags)
-        return count + len(terms.ints[0])
+        return usable(terms, slots)[1]
 
     def packed(self, of_frame: list[int], priors: PackedPriors) -> PackedViews:
         """Return what has been added."""

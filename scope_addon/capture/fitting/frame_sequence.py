@@ -204,5 +204,5 @@ class FrameSequence:
 
 
 def is_usable(fit: Fit) -> bool:
-    """Whether a fit had measurements and gave finite values."""
-    return fit.status not in (Status.NO_MEASUREMENTS, Status.NON_FINITE)
+    """Whether a person was seen, not the floor alone, and the fit gave finite values."""
+    return fit.seen > 0 and fit.status is not Status.NON_FINITE

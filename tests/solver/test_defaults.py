@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a fit does that is given only measurements, with likely mistakes in them, and what weights
+mean: random people whose poses are drawn from the joint prior, seen by a camera.
+"""
+
+import re
+import warnings
+from dataclasses import replace
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from scope import solver
+from scope.solver import (
+    COLD_STAGES,
+    Floor,
+    FootContacts,
+    InvalidValueError,
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    Priors,
+    ScopeWarning,
+    Stage,
+    State,
+    Status,
+    UnitsWarning,
+    View,
+    Weights,
+    rotations,
+)
+from scope.solver.residuals import external
+
+from .small_problem import BODY, POINTS, SEEN, K, M, P
+from .synthetic import INTRINSICS
+
+PEOPLE = 60
+FOCAL = 1000.0
+CAMERA = np.array([[FOCAL, 0.0, 500.0], [0.0, FOCAL, 500.0], [0.0, 0.0, 1.0]])
+SIGMA_PX = 2.0
+SIGMA_M = 0.02
+
+
+class Person(NamedTuple):
+    """A random person, and what was measured."""
+
+    state: State
+    joints: np.ndarray  # (K+1, 3) camera frame, metres
+    points: np.ndarray  # (17, 3) COCO's keypoints
+    seen: Measurements
+
+
+@cache
+def people() -> tuple[Any, list[int], list[Person]]:
+    body = solver.load_body("scope")
+    prior = solver.load_joint_prior()
+    index = list(body.keypoint_set("coco").values())[:17]
+    found = []
+    for seed in range(PEOPLE):
+        rng = np.random.default_rng(seed)
+        turns = np.tile(np.eye(3), (body.K + 1, 1, 1))
+        for i, name in enumerate(body.joint_names):
+            if i > 0 and name in prior.names:
+                turns[i] = prior.sample(name, 1, rng)[0]
+        beta = rng.standard_normal(body.P)
+        heading = rotations.exp([0.0, rng.uniform(-np.pi, np.pi), 0.0])
+        lean = rotations.exp(0.2 * rng.standard_normal(3))
+        turns[0] = np.diag([1.0, -1.0, -1.0]) @ heading @ lean
+        root = np.array([rng.uniform(-0.5, 0.5), rng.uniform(-0.3, 0.3), rng.uniform(2.5, 5.0)])
+        R, t = body.forward_kinematics(turns, root - body.rest_joints(beta)[0], beta)
+        points = body.keypoints(R, t, beta, index)
+        pixels = FOCAL * points[:, :2] / points[:, 2:] + 500.0
+        pixels += SIGMA_PX * rng.standard_normal((17, 2))
+        space = points + SIGMA_M * rng.standard_normal((17, 3))
+        seen = Measurements(CAMERA, Keypoints2D(index, pixels), Keypoints3D(index, space))
+        found.append(Person(State(turns[0], t[0], turns[1:], beta), t, points, seen))
+    return body, index, found
+
+
+def test_cold_starts_find_every_limb():
+    body, index, everyone = people()
+    fits = solver.fit_batch(body, [person.seen for person in everyone])
+    for person, fit in zip(everyone, fits, strict=True):
+        found = body.keypoints(fit.R_camera_part, fit.t_camera_part, fit.state.beta, index)
+        assert np.linalg.norm(found - person.points, axis=1).max() < 0.2
+
+
+def test_from_the_image_alone_several_headings_find_the_lowest_cost():
+    body, _, everyone = people()
+    seen = [replace(person.seen, keypoints3d=None) for person in everyone]
+    from_truth = solver.fit_batch(body, seen, init=[person.state for person in everyone])
+    least = np.array([fit.cost for fit in from_truth])
+    facing = np.array([fit.cost for fit in solver.fit_batch(body, seen)])
+    several = np.array([fit.cost for fit in solver.fit_batch(body, seen, init="multi")])
+    assert (several <= facing + 1e-9).all()
+    assert (facing > 1.5 * least).sum() > PEOPLE / 10
+    assert (several > 1.5 * least).sum() <= PEOPLE / 30
+    one = solver.fit(body, seen[0], init="multi")
+    assert one.cost == several[0]
+
+
+def test_a_clip_and_a_motion_start_from_several_headings_as_well():
+    body, _, everyone = people()
+    turned = max(everyone, key=lambda person: person.state.R_camera_root[2, 2])  # seen from behind
+    frames = [replace(turned.seen, keypoints3d=None)] * 2
+    wanted = turned.state.R_camera_root
+    clip = solver.fit_clip(body, frames, init="multi")
+    motion = solver.fit_motion(body, frames, [0.0, 0.1], init="multi")
+    for state in (clip.frames[0].state, motion.states[0]):
+        turn = np.linalg.norm(rotations.log(state.R_camera_root.T @ wanted))
+        assert turn < np.pi / 2
+
+
+def test_with_standard_deviations_those_of_the_result_are_calibrated():
+    """The squares of the errors over the covariance are one on average."""
+    body, _, everyone = people()
+    squares = []
+    for person in everyone[:30]:
+        assert person.seen.keypoints2d is not None
+        assert person.seen.keypoints3d is not None
+        seen = replace(
+            person.seen,
+            keypoints2d=replace(person.seen.keypoints2d, sigma_px=SIGMA_PX),
+            keypoints3d=replace(person.seen.keypoints3d, sigma_m=SIGMA_M),
+        )
+        found = solver.fit_motion(body, [seen], [0.0], init=[person.state], covariance=True)
+        assert found.joint_covariance is not None
+        for joint in ("left_knee", "right_elbow", "left_wrist", "right_ankle", "left_shoulder"):
+            i = body.joint_names.index(joint)
+            off = found.t_world_part[0, i] - person.joints[i]
+            squares.append(off @ np.linalg.solve(found.joint_covariance[0, i], off) / 3.0)
+    assert 0.8 < np.mean(squares) < 1.2
+
+
+def test_a_standard_deviation_is_a_weight():
+    body, _, everyone = people()
+    seen = everyone[0].seen
+    assert seen.keypoints2d is not None
+    assert seen.keypoints3d is not None
+    with_sigmas = replace(
+        seen,
+        keypoints2d=replace(seen.keypoints2d, sigma_px=SIGMA_PX),
+        keypoints3d=replace(seen.keypoints3d, sigma_m=np.full(17, SIGMA_M)),
+    )
+    weights = Weights(keypoints2d=(SIGMA_PX / FOCAL) ** -2, keypoints3d=SIGMA_M**-2)
+    start = everyone[0].state
+    with_weights = solver.fit(body, seen, init=start, options=Options(weights=weights))
+    found = solver.fit(body, with_sigmas, init=start)
+    np.testing.assert_allclose(found.t_camera_part, with_weights.t_camera_part, atol=1e-6)
+    assert found.cost == pytest.approx(with_weights.cost)
+    for wrong in (0.0, -1.0, np.nan, np.zeros(17)):
+        spoiled = replace(seen, keypoints3d=replace(seen.keypoints3d, sigma_m=wrong))
+        with pytest.raises(InvalidValueError, match="sigma_m of 3D keypoints must be positive"):
+            solver.fit(body, spoiled)
+
+
+def test_one_weight_changes_all_default_stages():
+    weights = Weights(keypoints3d=3.0 * Weights().keypoints3d)
+    options = Options(weights=weights)
+    for own, default in zip(options.schedule(cold=True), COLD_STAGES, strict=True):
+        assert own.weights.keypoints3d == pytest.approx(3.0 * default.weights.keypoints3d)
+        assert replace(own.weights, keypoints3d=default.weights.keypoints3d) == default.weights
+    assert options.schedule(cold=False)[0].weights == weights
+    with pytest.raises(InvalidValueError, match=r"give each Stage its weights"):
+        Options(weights=weights, stages=[Stage()])
+
+
+def test_kernels_are_widest_first():
+    widenings = [stage.widening for stage in COLD_STAGES]
+    assert widenings == sorted(widenings, reverse=True)
+    assert widenings[-1] == 1.0
+    table = Options(robust_keypoints3d=0.5).stage_table(COLD_STAGES)[0]
+    np.testing.assert_allclose(table[:, 1, 1], 1.0 / (0.5 * np.array(widenings)))
+
+
+def height(part, ints, floats):
+    return part.t[1:2] - floats
+
+
+def test_contacts_a_floor_or_a_residual_of_ones_own_alone_are_measurements(monkeypatch):
+    monkeypatch.setattr(external, "_external", {})
+    solver.register_residual("height", function=height)
+    place = np.array([[0.3, 0.2, 3.0]])
+    up = np.array([0.0, -1.0, 0.0])
+    kinds = {
+        "contacts": Measurements(foot_contacts=FootContacts([M], place, [1.0])),
+        "floor": Measurements(floor=Floor([M], up, -0.4, [1.0])),
+        "own": Measurements(tables={"height": (np.array([[0]]), np.array([[0.4]]))}),
+    }
+    wanted = {"contacts": 0.2, "floor": 0.4, "own": 0.4}
+    for name, measured in kinds.items():
+        found = solver.fit(BODY, measured, priors=Priors())
+        assert (found.status, found.measurements, found.seen) == (Status.CONVERGED, 1, 0), name
+        assert found.t_camera_part[0, 1] == pytest.approx(wanted[name], abs=1e-3), name
+        motion = solver.fit_motion(BODY, [measured] * 2, [0.0, 0.1], priors=Priors())
+        assert motion.measurements.tolist() == [1, 1], name
+    nothing = Measurements(foot_contacts=FootContacts([M], place, [0.0]))
+    assert solver.fit(BODY, nothing, priors=Priors()).status is Status.NO_MEASUREMENTS
+
+
+def pixels(values, intrinsics=INTRINSICS, confidence=1.0):
+    index = np.arange(len(values))
+    return lambda: solver.fit(
+        BODY, Measurements(intrinsics, Keypoints2D(index, values, confidence)), priors=Priors()
+    )
+
+
+def space(values, confidence=1.0):
+    seen = Measurements(keypoints3d=Keypoints3D(np.arange(M), values, confidence))
+    return lambda: solver.fit(BODY, seen, priors=Priors())
+
+
+IMAGE = POINTS[:, :2] / POINTS[:, 2:] * INTRINSICS[0, 0] + INTRINSICS[:2, 2]
+SENSOR = np.diag([0.035, 0.035, 1.0]) @ INTRINSICS
+SENSOR[:2, 2] = INTRINSICS[:2, 2]
+MISTAKES = {
+    "pixels in 0..1": (pixels(IMAGE / 1000.0), UnitsWarning, r"lie in 0\.\.1; multiply"),
+    "missing at (0, 0)": (
+        pixels(np.where(np.arange(M)[:, None] < 2, 0.0, IMAGE)),
+        ScopeWarning,
+        r"are \(0, 0\), .* confidence of 0",
+    ),
+    "millimetres of focal length": (pixels(IMAGE, SENSOR), UnitsWarning, "multiply millimetres"),
+    "percentages": (pixels(IMAGE, confidence=np.full(M, 90.0)), ScopeWarning, "by 100"),
+    "percentages in space": (space(POINTS, np.full(M, 90.0)), ScopeWarning, "by 100"),
+    "behind the camera": (space(POINTS * [1.0, -1.0, -1.0]), ScopeWarning, "negate y and z"),
+    "degrees": (lambda: rotations.exp([0.0, 90.0, 0.0]), UnitsWarning, "numpy.radians"),
+}
+
+
+@pytest.mark.parametrize(("make", "kind", "message"), MISTAKES.values(), ids=MISTAKES)
+def test_a_likely_mistake_is_told(make, kind, message):
+    with pytest.warns(kind, match=message):
+        make()
+
+
+RIGHT = {
+    "a row that is left out at (0, 0)": pixels(
+        np.where(np.arange(M)[:, None] < 2, 0.0, IMAGE),
+        confidence=np.where(np.arange(M) < 2, 0.0, 1.0),
+    ),
+    "normalized coordinates": pixels((IMAGE - INTRINSICS[:2, 2]) / INTRINSICS[0, 0], np.eye(3)),
+    "some points behind": space(POINTS - POINTS.mean(axis=0)),
+    "weights of a few times one": space(POINTS, np.full(M, 5.0)),
+    "two turns": lambda: rotations.exp([0.0, 4.0 * np.pi, 0.0]),
+}
+
+
+@pytest.mark.parametrize("make", RIGHT.values(), ids=RIGHT)
+def test_what_is_right_brings_no_warning(make):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make()
+
+
+def views(change):
+    """Two frames of a person seen by three cameras around, whose poses are changed."""
+    found = []
+    for angle in (-0.8, 0.1, 0.9):
+        R = rotations.exp([0.1, angle, 0.05])
+        center = POINTS.mean(axis=0)
+        t = np.array([0.1, 0.0, 4.0]) - R @ center
+        p = POINTS @ R.T + t
+        image = p[:, :2] / p[:, 2:] * INTRINSICS[0, 0] + INTRINSICS[:2, 2]
+        seen = Measurements(INTRINSICS, Keypoints2D(np.arange(M), image))
+        found.append(View(seen, *change(R, t)))
+    return [found, found]
+
+
+CHANGES = {
+    "right": (lambda R, t: (R, t), None),
+    "transposed": (lambda R, t: (R.T, t), "transpose R_camera_world"),
+    "inverted": (lambda R, t: (R.T, -R.T @ t), r"R\^T and -R\^T t"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), CHANGES.values(), ids=CHANGES)
+def test_cameras_in_other_axes_are_told(change, message):
+    rest = [State.rest(K, P)] * 2
+    short = Options(stages=[Stage(max_iterations=1)])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        solver.fit_motion(BODY, views(change), [0.0, 0.1], init=rest, options=short)
+    messages = [str(each.message) for each in told]
+    if message is None:
+        assert messages == []
+    else:
+        assert len(messages) == 1
+        assert re.search(message, messages[0])
+
+
+def test_confidence_may_be_left_out_or_one_for_all():
+    index = np.arange(M)
+    with_ones = solver.fit(BODY, SEEN, priors=Priors())
+    for confidence in (1.0, np.ones(M)):
+        seen = Measurements(keypoints3d=Keypoints3D(index, POINTS, confidence))
+        assert solver.fit(BODY, seen, priors=Priors()).cost == with_ones.cost
+    left_out = Measurements(keypoints3d=Keypoints3D(index, POINTS))
+    assert solver.fit(BODY, left_out, priors=Priors()).cost == with_ones.cost
