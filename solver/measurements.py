@@ -300,7 +300,7 @@ _KINDS = {
 
 def _confidence(value: ArrayLike, n: int, of: str) -> Array:
     if isinstance(value, (int, float)):
-        return np.full(n, float(value))
+        return np.full(n, as_number(value, f"Confidence of {of}"))
     return as_array(value, (n,), f"Confidence of {of}")
 
 

@@ -45,7 +45,7 @@ def fit_batch(
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
     starts: list[State | Literal["multi"] | None] = [None] * len(measurements)
-    if init == MULTI:
+    if isinstance(init, str) and init == MULTI:
         starts = [MULTI] * len(measurements)
     elif init is not None:
         check_states(init, len(measurements), (State, type(None)))

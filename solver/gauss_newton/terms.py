@@ -33,11 +33,12 @@ _RANGES = {
     "indices": (0, None),
 }
 _UNLIMITED = np.iinfo(np.int64).max
-_POSE_PRIOR = list(RESIDUALS).index("pose_prior")
+_POSE_PRIOR = [k for k, name in enumerate(RESIDUALS) if name == "pose_prior"]
 # Of the tables that say where a body is, the first column of a row's weights.
 _WEIGHED = {
-    list(RESIDUALS).index(name): column
-    for name, column in (("foot_contact", 3), ("floor", 4), ("outline", 7))
+    k: {"foot_contact": 3, "floor": 4, "outline": 7}[name]
+    for k, name in enumerate(RESIDUALS)
+    if name in ("foot_contact", "floor", "outline")
 }
 
 
@@ -364,7 +365,7 @@ def usable(terms: Terms, slots: int | None = None) -> tuple[int, int]:
     """
     if slots is None:
         slots = int(np.count_nonzero(terms.flags & ~HAS_SHAPE))
-    seen = slots + len(terms.ints[_POSE_PRIOR])
+    seen = slots + sum(len(terms.ints[k]) for k in _POSE_PRIOR)
     everything = seen + int(terms.external.calls[:, 1].sum())
     for k, first_weight in _WEIGHED.items():
         if len(terms.floats[k]):

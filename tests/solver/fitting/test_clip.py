@@ -154,7 +154,7 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
     G = P + 1
     H = np.zeros((frames * n + G,) * 2)
     g = np.zeros(frames * n + G)
-    cost = 0.5 * 100.0 * beta @ beta
+    cost = 0.5 * Weights().shape * beta @ beta
     for k, (m, s) in enumerate(zip(measurements, starts, strict=True)):
         data = {
             "pixels": m.keypoints2d.pixels,
@@ -164,7 +164,7 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
         state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
         raw = residuals(body, data, focal=True)
         sigmas = [options.robust_keypoints2d, options.robust_keypoints3d]
-        weights = [1e6 * np.ones(M), 24000.0 * np.ones(M)]
+        weights = [1e6 * np.ones(M), Weights().keypoints3d * np.ones(M)]
         factors, part_cost = robust_factors(raw(state, np.zeros(n + G))[:2], sigmas, weights)
         cost += part_cost
 
@@ -182,8 +182,8 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
             20.0 * np.r_[np.ones(3), np.full(3, 1 / 0.09), np.ones(3 * K)]
         )
     shape = slice(frames * n, frames * n + P)
-    H[shape, shape] += 100.0 * np.eye(P)
-    g[shape] += 100.0 * beta
+    H[shape, shape] += Weights().shape * np.eye(P)
+    g[shape] += Weights().shape * beta
     H[-1, -1] += 7.0
     expected = -np.linalg.solve(H, g)
     found = [np.r_[f.work.x[0], f.work.u[1:].ravel()] for f in joint.frames]

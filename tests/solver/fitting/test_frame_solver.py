@@ -363,7 +363,7 @@ BAD = {
 }
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::scope.solver.errors.ScopeWarning")
 @pytest.mark.parametrize("robust", [True, False])
 @pytest.mark.parametrize("priors", [True, False])
 @pytest.mark.parametrize("warm", [True, False])

@@ -101,7 +101,7 @@ def scene(request):
     return body, measured(body, random_state(rng, K, P, 0.4)), State.rest(K, P)
 
 
-@pytest.mark.filterwarnings("error")
+@pytest.mark.filterwarnings("error", "ignore::scope.solver.errors.ScopeWarning")
 @pytest.mark.parametrize("warm", [True, False], ids=["warm", "cold"])
 @pytest.mark.parametrize("spoiled", SPOILED.values(), ids=SPOILED)
 def test_any_body_ends_in_a_finite_pose(scene, spoiled, warm):

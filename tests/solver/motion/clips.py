@@ -159,7 +159,9 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
                         np.full(M, 0.01),
                     )
                 )
-            out.append((points - clip.points[f], np.full(M, 24000.0), np.full(M, 0.01)))
+            out.append(
+                (points - clip.points[f], np.full(M, Weights().keypoints3d), np.full(M, 0.1))
+            )
         for f in range(2, T):
             mean = 0.5 * (h[f - 1] + h[f - 2])
             a = poses[f - 2]

@@ -77,7 +77,7 @@ def test_covariance_and_estimate_of_linear_motion_in_closed_form():
     """
     T = 24
     h = 1 / 30
-    weight = 24000.0
+    weight = Weights().keypoints3d
     w_a = 40.0
     rng = np.random.default_rng(0)
     empty = np.zeros((1, 3, 1))
