@@ -230,6 +230,7 @@ class Measurements:
 
         :param points: how many points the body has, joints included.
         :raises ShapeError: an array has another shape, or an index lies outside.
+        :raises InvalidValueError: a confidence or standard deviation cannot be used.
         """
         m = self.keypoints3d
         if m is None:
@@ -251,6 +252,7 @@ class Measurements:
 
         :param points: how many points the body has, joints included.
         :raises ShapeError: an array has another shape, or an index lies outside.
+        :raises InvalidValueError: a confidence or standard deviation cannot be used.
         """
         m = self.orientation_field
         if m is None:

@@ -117,7 +117,7 @@ SAME = {
 )
 def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver(own, built_in):
     """One that numba has compiled already, and one as plain Python."""
-    b = solved(SAME[built_in], Weights(**{built_in: 4e4}))
+    b = solved(SAME[built_in], replace(STIFF, **{built_in: 4e4}))
     a = fitted(own, POINT_ROWS[own], 4e4)
     none = solved(SEEN)
     assert_same(a, b, 1e-9)
