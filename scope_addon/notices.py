@@ -102,6 +102,15 @@ SENTENCES = {
     "ground",
     "under_floor": "{footage}: a foot of {person:who} is up to {depth_cm:.0f} cm under the floor "
     "in {under} of {total:frames}",
+    # the camera
+    "strides": "{footage}: the legs of {person:who} walk, but neither the body nor the background "
+    "moves accordingly {times:times}: either on a treadmill, or the camera moves before a "
+    "background that does not show it. No foot was held in place there; check how far the person "
+    "travels",
+    "unknown_travel": "{footage}: the camera travels, but how far is unknown, because neither a "
+    "floor nor feet at rest are seen; it was left in place, so the people's paths are wrong",
+    "zoom": "{footage}: the lens zooms {times:times}, which was mistaken for people who come "
+    "nearer or go away; capture the parts without zoom separately, with a start and end time",
     "review": "{person:whose}{reason:phrase}",
     "implausible": "{footage}, {times:times}: {person:whose}{reason:phrase}",
     "bent_knees": "{footage}: no knee of {person:who} is ever straight while standing or walking; "

@@ -88,4 +88,5 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         uneven_ground=options.uneven_ground,
         view=video.wanted.view,
         speed=speed,
+        travel=footage.camera_motion.travel,
     )

@@ -23,9 +23,11 @@ import numpy as np
 from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.smoothing import fill_rotation_gaps
+from .corner_tracks import CornerTracks, joined_corners
 from .heading_drift import FrameEdges, remove_heading_drift
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
+from .odometry import Odometry, travel_of
 
 SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
 TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
@@ -35,14 +37,18 @@ REVEALING_S = 30.0  # from the first frame with edges on, edges that people hid 
 
 @dataclass(frozen=True)
 class CameraMotion:
-    """The camera's rotation during T frames."""
+    """The camera's rotation during T frames, and its travel up to scale where it is seen."""
 
     R_first_camera: Float64Array  # (T, 3, 3) the camera's axes in those of the first frame
     known: BoolArray  # (T,) frames in which it was estimated; elsewhere it is interpolated
+    travel: Odometry | None = None
+    zooms: BoolArray | None = None  # (T,) frames in which the lens zooms; None: unknown
 
     @property
     def is_static(self) -> bool:
         """Whether the camera is static, as far as can be determined."""
+        if self.travel is not None:
+            return False
         return not self.known.any() or self.largest_turn_deg < STATIC_DEG
 
     @property
@@ -66,6 +72,7 @@ class BackgroundRecord:
     inlier_shares: list[float]  # of the corners, in the frames that were followed
     edge_frames: list[FrameEdges] = field(default_factory=list)
     bars: list[Float64Array] = field(default_factory=list)  # in the first of the edge frames
+    corners: CornerTracks = field(default_factory=CornerTracks.none)
 
     def motion(
         self, followed_with: Camera, camera: Camera, image_size: tuple[int, int]
@@ -98,7 +105,10 @@ class BackgroundRecord:
         R = filled[0].T @ filled
         if self.inlier_shares and np.mean(self.inlier_shares) < TRAVELLING_SHARE:
             R = remove_heading_drift(R, times, self.edge_frames, camera, image_size)
-        return CameraMotion(R, known)
+        odometry = travel_of(self.corners, R, times, camera, max(image_size))
+        if odometry.travels:
+            return CameraMotion(odometry.R_first_camera, known, odometry, odometry.zooms)
+        return CameraMotion(R, known, zooms=odometry.zooms)
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
         """Return the lines of the background in the first frame's axes.
@@ -148,6 +158,8 @@ def joined_backgrounds(
     shares = list(whole.inlier_shares)
     edges = list(whole.edge_frames)
     bars = whole.bars
+    corners = [whole.corners]
+    numbers = whole.corners.count
     rows = len(whole.times)
     for before, part, first in zip(parts, parts[1:], firsts[1:], strict=False):
         G = G @ _link(before, part, first)
@@ -164,9 +176,17 @@ def joined_backgrounds(
             bars = part.bars
         counted = [edge for edge in part.edge_frames if edge.row >= first or not edges]
         edges += [replace(edge, row=edge.row + rows - first) for edge in counted]
+        corners.append(part.corners.shifted(rows - first, numbers))
+        numbers += part.corners.count
         rows += len(part.times) - first
     return BackgroundRecord(
-        np.concatenate(times), np.concatenate(rotations), np.concatenate(known), shares, edges, bars
+        np.concatenate(times),
+        np.concatenate(rotations),
+        np.concatenate(known),
+        shares,
+        edges,
+        bars,
+        joined_corners(corners),
     )
 
 

@@ -31,6 +31,7 @@ from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Ar
 from ..perception.region import inside, surroundings
 from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, is_rotated
 from .bars import find_bars
+from .corner_tracks import CornerFollower, follow_corners
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
 from .intrinsics import Camera
 from .line_segments import find_segments
@@ -74,6 +75,7 @@ class BackgroundTracker:
         # The first one is the first frame in which somebody is seen.
         self.edge_frames: list[FrameEdges] = []
         self._hidden = HiddenBackground((width, height))
+        self._corners = CornerFollower()
         self.bars: list[Float64Array] = []  # in that frame
 
     def add(
@@ -110,6 +112,7 @@ class BackgroundTracker:
         boxes = [self._box(surroundings(points)) for points in people] + [
             self._box(bar) for bar in self.bars
         ]
+        self._corners.add(row, time_s, image, boxes, is_cut)
         if self._image is None:
             self._begin_key(image, boxes)
             self._rotations.append(np.eye(3))
@@ -146,8 +149,9 @@ class BackgroundTracker:
         known = np.array([R is not None for R in self._rotations], bool)
         R = np.array([np.eye(3) if R is None else R for R in self._rotations]).reshape(-1, 3, 3)
         times = np.array(self._times)
+        corners = self._corners.tracks(self._to_full)
         return BackgroundRecord(
-            times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars
+            times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars, corners
         )
 
     def _is_edge_frame(self, R_first_camera: Float64Array) -> bool:
@@ -182,8 +186,8 @@ class BackgroundTracker:
         if len(self._points) < MIN_CORNERS:
             return None
         assert self._image is not None
-        moved, found = _flow(self._image, image, self._points)
-        back, again = _flow(image, self._image, moved, near=self._points)
+        moved, found = follow_corners(self._image, image, self._points)
+        back, again = follow_corners(image, self._image, moved, near=self._points)
         good = found & again & (np.abs(back - self._points).max(1) < 0.7)
         good &= ((moved >= 0) & (moved < self._size)).all(1) & ~inside(moved, boxes)
         self._points = moved[good]
@@ -225,11 +229,15 @@ class BackgroundTracker:
         """Return the (n, 3) unit directions, in camera axes, of points (n, 2) in the working
         image.
         """
-        # A working pixel's centre in the full image: OpenCV scales areas, not their centres.
-        full = ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
-        rays = self._camera.rays(full)
+        rays = self._camera.rays(self._to_full(points))
         unit: Float64Array = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         return unit
+
+    def _to_full(self, points: Float32Array) -> Float32Array:
+        """Return points (n, 2) of the working image in the full one; OpenCV scales areas, not
+        pixels' centres.
+        """
+        return ((points + 0.5) / (self._scale * self._step) - 0.5) * self._step
 
     def _box(self, box_px: NDArray[Any]) -> Float64Array:
         """Return a box x0, y0, x1, y1 in the working image, with a margin."""
@@ -270,26 +278,6 @@ def _kabsch(a: Float64Array, b: Float64Array) -> Float64Array:
     U[..., :, 2] *= sign[..., None]
     R: Float64Array = U @ Vt
     return R
-
-
-def _flow(
-    before: Uint8Array, after: Uint8Array, points: Float32Array, near: Float32Array | None = None
-) -> tuple[Float32Array, BoolArray]:
-    """Follow corners (n, 2) from one working image to another.
-
-    :param near: (n, 2) where to look for them, without an image pyramid.
-    :return: positions (n, 2), and (n,) whether each was found.
-    """
-    start = points.astype(np.float32)
-    guess, levels, flags = (
-        (start, 3, 0)
-        if near is None
-        else (near.astype(np.float32), 0, cv2.OPTFLOW_USE_INITIAL_FLOW)
-    )
-    moved, found, _ = cv2.calcOpticalFlowPyrLK(
-        before, after, start, guess.copy(), winSize=(15, 15), maxLevel=levels, flags=flags
-    )
-    return np.array(moved, np.float32), np.array(found).ravel() == 1
 
 
 class HiddenBackground:

@@ -26,6 +26,7 @@ from ...content import add_content
 from ...notices import Notice, notices_of
 from ...untrusted.files import read_members
 from ..camera.background_record import BackgroundRecord
+from ..camera.corner_tracks import CornerTracks
 from ..camera.heading_drift import FrameEdges
 from ..camera.line_segments import Segments
 from ..options import CaptureOptions
@@ -42,7 +43,7 @@ MASK_SIDE = 256
 MAX_TEXT = 100_000
 # Name: type and shape. The first length of several arrays is the same where the letter is: frames
 # (N), tracklets (M), their rows (R), references (Q), masks (K), regions (S), edge frames (E), edges
-# (L).
+# (L), corners (D).
 _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
     # Number, anchor, begin and end of the window, width and height of the image.
     "geometry": (np.float64, "6", ()),
@@ -55,6 +56,9 @@ _ARRAYS: dict[str, tuple[type[Any], str, tuple[int, ...]]] = {
     "known": (np.bool_, "N", ()),
     "inlier_shares": (np.float64, "I", ()),
     "bars": (np.float64, "B", (4,)),
+    "corner_rows": (np.int64, "D", ()),  # one row for each time that a corner was seen
+    "corner_numbers": (np.int64, "D", ()),
+    "corner_points": (np.float32, "D", (2,)),
     "edge_rows": (np.int64, "E", (2,)),  # row and number of the edges
     "edge_ends": (np.float64, "L", (2, 2)),
     "edge_lengths": (np.float64, "L", ()),
@@ -107,6 +111,9 @@ def save_window(folder: Path, record: WindowRecord, size: tuple[int, int]) -> Pa
         "known": background.known,
         "inlier_shares": background.inlier_shares,
         "bars": background.bars,
+        "corner_rows": background.corners.rows,
+        "corner_numbers": background.corners.numbers,
+        "corner_points": background.corners.points_px,
         "edge_rows": [(edge.row, len(edge.segments.lengths)) for edge in background.edge_frames],
         "edge_ends": _joined([each.ends_px for each in segments]),
         "edge_lengths": _joined([each.lengths for each in segments]),
@@ -207,6 +214,7 @@ def _check(arrays: Arrays) -> None:
     for name, column in (
         ("cut_rows", ...),
         ("edge_rows", 0),
+        ("corner_rows", ...),
         ("tracklet_rows", ...),
         ("references", 1),
         ("masks", 1),
@@ -228,6 +236,10 @@ def _check(arrays: Arrays) -> None:
     sides = (arrays["sides"], arrays["mask_regions"][:, 2], arrays["anchor_regions"][:, 3])
     _require(all(bool((side > 0).all()) for side in sides), "sides")
     _require(lengths["T"] <= MAX_TEXT, "text")
+    corners = arrays["corner_numbers"]
+    # Each is at least once in the file, so that its number says nothing about memory.
+    _require(bool(((corners >= 0) & (corners < len(corners))).all()), "corner_numbers")
+    _require(bool((np.diff(arrays["corner_rows"]) >= 0).all()), "corner_rows")
 
 
 def _sums_to(counts: NDArray[np.int64], total: int) -> bool:
@@ -256,6 +268,7 @@ def _record(arrays: Arrays, window: Window, size: tuple[int, int]) -> WindowReco
             for (row, _), each in zip(arrays["edge_rows"], edges, strict=False)
         ],
         list(arrays["bars"]),
+        CornerTracks(arrays["corner_rows"], arrays["corner_numbers"], arrays["corner_points"]),
     )
     return WindowRecord(
         window,

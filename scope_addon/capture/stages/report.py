@@ -15,6 +15,7 @@ from ....solver.names import BODY_JOINTS
 from ...arrays import Float64Array
 from ...capture_report import Report
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
+from ...kinematics.runs import runs
 from ...motion import Motion
 from ...notices import Notice, Value, notice
 from ...options.capture import ON
@@ -74,6 +75,7 @@ def make_report(
         + speed_warnings(video, options)
         + up_warnings(Path(video.path).name, solved.up_source, is_still)
         + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
+        + camera_warnings(Path(video.path).name, footage, solved)
         + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
     )
 
@@ -121,6 +123,24 @@ def _plausibility_warnings(name: str, person: int, motion: Motion) -> list[Notic
             )
     if has_bent_knees(motion):
         warnings.append(notice("bent_knees", footage=name, person=person))
+    return warnings
+
+
+def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]:
+    """Say where the camera's zoom or travel is not known, and where strides contradict it."""
+    times = footage.timestamps
+    warnings = []
+    zooms = footage.camera_motion.zooms
+    if zooms is not None and zooms.any():
+        starts = [float(times[first]) for first, _ in runs(zooms)]
+        warnings.append(notice("zoom", footage=name, times=starts))
+    if not solved.has_scale:
+        warnings.append(notice("unknown_travel", footage=name))
+    people = numbered(solved.motions)
+    for (person, _), contradicts in zip(people, solved.contradictions, strict=True):
+        if contradicts is not None:
+            starts = [float(times[first]) for first, _ in runs(contradicts)]
+            warnings.append(notice("strides", footage=name, person=person, times=starts))
     return warnings
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....solver.body_file import CHILD_BELOW_M
-from ...arrays import Float64Array
+from ...arrays import BoolArray, Float64Array
 from ...kinematics.single_precision import to_single_precision
 from ...motion import Motion
 from ..fitting.frame_sequence import FittedTrack
@@ -26,6 +26,8 @@ from ..world.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
 from ..world.stance import stance_on_ground
+from ..world.strides import contradicting_strides
+from ..world.travel_scale import scaled_travel
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 
@@ -47,6 +49,8 @@ class Solved:
     path: CameraPath
     iterations: float
     up_source: str
+    contradictions: list[BoolArray | None]  # of each person, frames (T,); see `strides`
+    has_scale: bool  # whether it is known how far the camera travels, where it does
 
 
 class Person:
@@ -63,6 +67,8 @@ class Person:
     fit: FittedTrack  # in each frame's camera
     raw: RawMotion
     placed: PlacedTrack
+    # (T,) frames whose strides contradict the camera's path; None: none
+    contradicts: BoolArray | None = None
 
     def __init__(
         self, shot: Shot, track: Track, height_m: float | None, progress: Progress
@@ -93,7 +99,24 @@ class Person:
     def fitted_places(self, shot: Shot) -> PlacedTrack:
         """Return the smoothed fit without gaps, in the first frame's camera axes."""
         whole = self.fit.with_fingers_at_rest(self.prepared)
-        return place_track(shot.body, self.track, whole, True, shot.path, shot.uneven_ground)
+        return self._place(shot, whole, smoothing=True)
+
+    def _place(self, shot: Shot, whole: FittedTrack, smoothing: bool) -> PlacedTrack:
+        return place_track(
+            shot.body,
+            self.track,
+            whole,
+            smoothing,
+            shot.path,
+            shot.uneven_ground,
+            self.contradicts,
+        )
+
+    def check_strides(self, shot: Shot) -> None:
+        """Let no foot rest where strides contradict the camera's path."""
+        placed = self.fitted_places(shot)
+        contradicts = contradicting_strides(placed, find_world([placed], shot.lines).up)
+        self.contradicts = contradicts if contradicts.any() else None
 
     def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: Float64Array) -> None:
         """Add to the measurements the distance and lean that follow from floor, feet and balance.
@@ -126,9 +149,7 @@ class Person:
         """Place the finished motion, and let go of the measurements."""
         whole = to_single_precision(self.fit).with_fingers_at_rest(self.prepared)
         del self.prepared, self.fit
-        self.placed = place_track(
-            shot.body, self.track, whole, False, shot.path, shot.uneven_ground
-        )
+        self.placed = self._place(shot, whole, smoothing=False)
         return_freed_memory()
 
     def finish(self, shot: Shot, world: SharedWorld, number: int) -> Motion:
@@ -164,16 +185,19 @@ def solve_people(shot: Shot, people: Sequence[Person], known: int) -> Solved:
     for person in people:
         person.fit_alone()
     resize_people(shot, people, known)
-    shot = replace(shot, path=find_camera_path(shot, people[0]))
+    shot = with_camera_path(shot, people[0])
     iterations = people[0].fit.iterations
     if not shot.is_still:
+        for person in people:
+            person.check_strides(shot)
         ground_all(shot, people)
     for person in people:
         person.refine(shot)
         person.settle(shot)
-    world = find_world([person.placed for person in people], shot.lines)
+    world = find_world([person.placed for person in people], shot.lines, shot.floor_up)
     motions = [person.finish(shot, world, number) for number, person in enumerate(people)]
-    return Solved(motions, shot.path, iterations, world.up_source)
+    contradictions = [person.contradicts for person in people]
+    return Solved(motions, shot.path, iterations, world.up_source, contradictions, shot.has_scale)
 
 
 def prepare(
@@ -227,22 +251,26 @@ def resize_people(shot: Shot, people: Sequence[Person], known: int) -> None:
             person.fit_with_height(factor * alone.stature_m)
 
 
-def find_camera_path(shot: Shot, first: Person) -> CameraPath:
-    """Return the camera's path; the travel of a rotating camera is estimated from one person's
-    feet.
+def with_camera_path(shot: Shot, first: Person) -> Shot:
+    """Return the shot with the camera's path; one person tells the scale of a travel that the
+    background shows, and otherwise the travel of a rotating camera.
     """
     if shot.path.is_static or shot.is_still:
-        return shot.path
+        return shot
     placed = first.fitted_places(shot)
     up = find_world([placed], shot.lines).up
-    center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
-    return replace(shot.path, center=center)
+    if shot.travel is None:
+        center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
+        return replace(shot, path=replace(shot.path, center=center))
+    scaled = scaled_travel(placed.soles, placed.valid, up, placed.times, shot.travel)
+    path = replace(shot.path, center=scaled.center)
+    return replace(shot, path=path, floor_up=scaled.floor_up, has_scale=scaled.is_known)
 
 
 def ground_all(shot: Shot, people: Sequence[Person]) -> None:
     """Put the people on the floor that they share; see `Person.ground`."""
     placed = [person.fitted_places(shot) for person in people]
-    world = find_world(placed, shot.lines)
+    world = find_world(placed, shot.lines, shot.floor_up)
     return_freed_memory()
     for number, person in enumerate(people):
         person.ground(shot, placed[number], world.floor_from_camera(number))

@@ -19,6 +19,7 @@ from ...kinematics.frame_blocks import by_blocks
 from ...motion import Motion
 from ..camera.intrinsics import Camera
 from ..camera.line_segments import Lines
+from ..camera.odometry import Odometry
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..tracking.face.expression_fit import with_expressions
@@ -191,6 +192,10 @@ class Shot:
     uneven_ground: bool = False  # True: feet rest at any height
     view: FootageView = AS_IN_FILE  # how the footage was turned
     speed: float = 1.0  # how many times as fast as the footage plays everything happened
+    travel: Odometry | None = None  # of the camera, up to scale, if the background shows it
+    # (3,) of the floor that a travelling camera passes, in the first frame's axes
+    floor_up: Float64Array | None = None
+    has_scale: bool = True  # False: how far the camera travels is unknown
 
     @property
     def is_still(self) -> bool:

@@ -52,6 +52,8 @@ class PlacedTrack:
     contact_points_visible: FloatArray  # (T, 6) 0..1
     center: FloatArray  # (T, 3) of the camera
     uneven_ground: bool = False  # both feet may rest at any height
+    # (T,) frames in which nothing rests, because strides contradict the path; None: none
+    contradicts: BoolArray | None = None
 
     @property
     def soles(self) -> FloatArray:
@@ -89,6 +91,8 @@ class PlacedTrack:
             self.contact_points, up, self.times, self.center, self.uneven_ground
         )
         contact *= self.contact_points_visible * self.valid[:, None]
+        if self.contradicts is not None:
+            contact[self.contradicts] = 0.0
         steps = np.diff(self.times)
         if len(steps):
             longest = max(MAX_STEP_S, MAX_STEP * float(np.median(steps)))
@@ -103,11 +107,13 @@ def place_track(
     smoothing: bool,
     path: CameraPath | None = None,
     uneven_ground: bool = False,
+    contradicts: BoolArray | None = None,
 ) -> PlacedTrack:
     """Compute once what the world is estimated from and the motion is assembled from.
 
     :param fitted: in each frame's camera.
     :param path: of the camera; None: it is static.
+    :param contradicts: (T,) frames in which nothing rests, see `contradicting_strides`.
     """
     path = path or CameraPath.static(len(track))
     times = track.times
@@ -134,6 +140,7 @@ def place_track(
             visible,
             path.center,
             uneven_ground,
+            contradicts,
         )
     )
 

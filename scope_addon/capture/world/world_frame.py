@@ -30,13 +30,15 @@ SAME_FLOOR_M = 0.4
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
 FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
 LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
-# What the up direction follows from: edges of the background, or how people stand and move.
+# What the up direction follows from: edges of the background, how people stand and move, or the
+# floor past which a camera travels.
 LINES = "lines"
 BODIES = "bodies"
+FLOOR = "floor"
 # Standard deviations of the up direction, degrees, in (clips, still images): the root mean square
 # of its errors in five clips and five pictures of people whose true up direction is known, most of
-# them with lines.
-UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0)}
+# them with lines; that of the floor in seven rendered clips with a travelling camera.
+UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0), FLOOR: (0.9, 0.9)}
 
 
 def up_from_standing(people: Sequence[PlacedTrack]) -> Float64Array:
@@ -187,7 +189,7 @@ class SharedWorld:
     """``T_world_camera`` (4, 4) for all people, and the height of each person's own floor in that
     world, metres.
 
-    ``up_source``: what the up direction follows from, `LINES` or `BODIES`.
+    ``up_source``: what the up direction follows from, `LINES`, `BODIES` or `FLOOR`.
     """
 
     T_world_camera: Float64Array
@@ -206,7 +208,9 @@ class SharedWorld:
         return T
 
 
-def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedWorld:
+def find_world(
+    placed: list[PlacedTrack], lines: Lines | None = None, floor_up: FloatArray | None = None
+) -> SharedWorld:
     """Estimate the world: z up, the floor at z = 0, the origin below the first position of the most
     prominent person.
 
@@ -217,11 +221,16 @@ def find_world(placed: list[PlacedTrack], lines: Lines | None = None) -> SharedW
 
     :param placed: the most prominent person first.
     :param lines: of the background, in the first frame's camera axes.
+    :param floor_up: (3,) of the floor that a travelling camera passes, in the same axes. It is
+        used instead, except on uneven ground.
     """
     all_soles = [person.soles[person.valid] for person in placed]
     up = up_from_bodies(placed)
     centered = np.concatenate([soles - _lowest(soles, up).mean(axis=0) for soles in all_soles])
-    up, up_source = up_from_scene(up, None if placed[0].uneven_ground else centered, lines)
+    if floor_up is not None and not placed[0].uneven_ground:
+        up, up_source = floor_up, FLOOR
+    else:
+        up, up_source = up_from_scene(up, None if placed[0].uneven_ground else centered, lines)
     contacts = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
     heights = []
     for person, soles, contact in zip(placed, all_soles, contacts, strict=True):

@@ -1,0 +1,488 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Visual odometry: how a camera travels and rotates, up to scale, from corners of the background.
+
+Two frames tell a camera that travels from one that only rotates or zooms: rotation and zoom move
+the picture alike at any depth (`Turn`); travel moves near corners more than far ones, which only an
+essential matrix explains. Where one explains clearly more corners than any turn does, the two
+frames give a map: places of corners, from two lines of sight each. From there on, every frame
+is placed by the corners whose places are known (`_place`), new corners are placed by frames that
+see them from far enough apart, and the last frames are adjusted with all their corners
+(`bundle_adjustment`). Where too few corners of the map are left, another map begins, at another
+scale: a part of the path.
+
+Sources: Nistér 2004 (essential matrix from five points), Triggs et al. 2000 (bundle adjustment).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from ....solver.rotations import exp, log
+from ...arrays import BoolArray, Float64Array, IndexArray
+from .bundle_adjustment import Bundle, adjust, projected, refine_pose
+from .corner_tracks import CornerTracks
+from .intrinsics import Camera
+
+WORKING_SIDE_PX = (
+    480.0  # of the images in which the corners were followed: errors are in its pixels
+)
+INLIER_PX = 1.5
+MIN_COMMON = 30  # corners that two frames must share
+MIN_COMMON_SHARE = 0.45  # of those of the first one: a small part of a picture tells little
+MIN_ESSENTIAL_SHARE = 0.55  # of them that an essential matrix explains
+# Of the corners that an essential matrix explains, the share that a camera may explain which only
+# rotates and zooms.
+MAX_TURN_SHARE = 0.65
+MIN_ZOOM_SHARE = 0.8  # of all corners that a zoom must explain
+MIN_ZOOM = 0.05  # logarithm of the focal length's change
+LONGEST_ZOOM = 11  # frames in which it changes as much
+TURN_STEPS = 10
+TURN_PRIOR = (1e-9, 1e-9, 1e-9, 1e-3, 1e-6)  # small rotations do not tell the focal length
+_DIFFERENCE = 1e-6
+MIN_PARALLAX = 0.012  # radians that corners move by more than in a rotation, in the median
+MIN_TRIANGULATION = 0.012  # radians between two lines of sight of a corner
+FARTHEST = 200.0  # of a corner, in units of the first baseline
+MIN_MAP = 14  # corners with known places that a frame must see
+MIN_MAP_SHARE = 0.5  # of them that must agree
+ADJUSTED = 30  # frames that are adjusted together, with the first of them fixed
+FIXED = 8
+ADJUSTED_EVERY = 6
+# Frames between the two that begin a map.
+PAIRS = np.array([2, 4, 7, 10, 13, 16, 20, 25, 31, 40, 50])
+NEXT_START = 4  # frames from one that begins no map to the next one that is tried
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """The camera in T frames.
+
+    p_first = R_first_camera p_camera + s_k center, with the scale s_k of the part k of the path.
+    """
+
+    R_first_camera: Float64Array  # (T, 3, 3)
+    center: Float64Array  # (T, 3) in units of its part, 0 where no travel is seen
+    part: IndexArray  # (T,) from 0; −1 where the camera does not travel, as far as is seen
+    # Of each part, places (C, 3) of corners in the first frame's axes, in units of the part.
+    maps: list[Float64Array]
+    zooms: BoolArray  # (T,) frames in which the lens zooms
+
+    @property
+    def travels(self) -> bool:
+        """Whether the camera travels in any frame."""
+        return bool((self.part >= 0).any())
+
+
+@dataclass
+class _Sightings:
+    """The corners that each of S frames sees, as lines of sight."""
+
+    rows: IndexArray  # (S,) numbers of the frames
+    numbers: list[IndexArray]  # of the corners, ascending
+    rays: list[Float64Array]  # (n, 2) x / z and y / z
+    tolerance: float  # radians
+
+    @classmethod
+    def of(cls, corners: CornerTracks, camera: Camera, longer_side_px: float) -> _Sightings:
+        rows, first = np.unique(corners.rows, return_index=True)
+        rays = camera.rays(corners.points_px.astype(float))[:, :2]
+        tolerance = INLIER_PX * longer_side_px / WORKING_SIDE_PX / camera.intrinsics[0, 0]
+        return cls(
+            rows,
+            np.split(corners.numbers, first[1:]),
+            np.split(rays, first[1:]),
+            float(tolerance),
+        )
+
+    def common(self, a: int, b: int) -> tuple[IndexArray, IndexArray, IndexArray]:
+        """Return the numbers of the corners that two frames share, and where each has them."""
+        numbers, in_a, in_b = np.intersect1d(
+            self.numbers[a], self.numbers[b], assume_unique=True, return_indices=True
+        )
+        return numbers, in_a, in_b
+
+
+def travel_of(
+    corners: CornerTracks,
+    R_first_camera: Float64Array,
+    times: Float64Array,
+    camera: Camera,
+    longer_side_px: float,
+) -> Odometry:
+    """Return how the camera travels.
+
+    :param R_first_camera: (T, 3, 3) as estimated for a camera that only rotates; it is kept where
+        no travel is seen.
+    :param times: (T,) seconds.
+    :param longer_side_px: of the image.
+    """
+    frames = len(times)
+    still = Odometry(
+        R_first_camera, np.zeros((frames, 3)), np.full(frames, -1), [], np.zeros(frames, bool)
+    )
+    if not len(corners.rows):
+        return still
+    sightings = _Sightings.of(corners, camera, longer_side_px)
+    tracker = _Tracker(sightings, R_first_camera[sightings.rows], corners.count)
+    parts = tracker.parts()
+    for a, b in tracker.zooms:
+        still.zooms[sightings.rows[a] : sightings.rows[b] + 1] = True
+    if not parts:
+        return still
+    return replace(_joined(parts, sightings.rows, R_first_camera, times), zooms=still.zooms)
+
+
+@dataclass
+class _Part:
+    """Consecutive frames of one map: p_camera = R p_map + t."""
+
+    first: int  # number of the sighting
+    R: Float64Array  # (n, 3, 3)
+    t: Float64Array  # (n, 3)
+    places: Float64Array  # (C, 3) of corners, in the axes of the map
+
+    @property
+    def end(self) -> int:
+        """One more than the number of the last sighting."""
+        return self.first + len(self.R)
+
+
+class _Tracker:
+    """Places the frames of a clip, one after another."""
+
+    def __init__(self, sightings: _Sightings, R_first_camera: Float64Array, corners: int) -> None:
+        self._seen = sightings
+        self._R_guess = np.swapaxes(R_first_camera, 1, 2)  # world to camera
+        self._places = np.full((corners, 3), np.nan)
+        self._is_outlier = np.zeros(corners, bool)
+        self._first_ray = np.full((corners, 3), np.nan)  # in map axes
+        self._first_center = np.full((corners, 3), np.nan)
+        self.zooms: list[tuple[int, int]] = []  # pairs of frames between which the lens zooms
+
+    def parts(self) -> list[_Part]:
+        """Return the parts of the path, in order."""
+        parts = []
+        start = 0
+        count = len(self._seen.rows)
+        while start < count - 1:
+            pair = self._first_pair(start)
+            if pair is None:
+                start += NEXT_START
+                continue
+            part = self._part(*pair)
+            self._extend_backwards(part, parts[-1].end if parts else 0)
+            part.places = self._places[~np.isnan(self._places[:, 0])]
+            parts.append(part)
+            start = max(part.end - 1, pair[1])
+        return parts
+
+    def _first_pair(self, a: int) -> tuple[int, int, Float64Array, Float64Array] | None:
+        """Return the next two frames that see enough parallax, from frame ``a`` on, and rotation
+        and translation from the one to the other.
+        """
+        for b in (a + PAIRS).tolist():
+            if b >= len(self._seen.rows):
+                return None
+            _, in_a, in_b = self._seen.common(a, b)
+            if len(in_a) < max(MIN_COMMON, MIN_COMMON_SHARE * len(self._seen.rays[a])):
+                return None
+            found = self._essential(self._seen.rays[a][in_a], self._seen.rays[b][in_b], a, b)
+            if found is not None:
+                return a, b, *found
+        return None
+
+    def _essential(
+        self, rays_a: Float64Array, rays_b: Float64Array, a: int, b: int
+    ) -> tuple[Float64Array, Float64Array] | None:
+        """Return R (3, 3) and t (3,) of p_b = R p_a + t, |t| = 1; None where a homography explains
+        nearly as much.
+        """
+        tolerance = self._seen.tolerance
+        turned = homogeneous(rays_a) @ (self._R_guess[b] @ self._R_guess[a].T).T
+        moved = np.linalg.norm(turned[:, :2] / turned[:, 2:] - rays_b, axis=1)
+        spread = np.median(np.abs(moved - np.median(moved)))
+        if max(np.median(moved), 3.0 * spread) < MIN_PARALLAX:
+            return None
+        cv2.setRNGSeed(0)
+        E, mask = cv2.findEssentialMat(
+            rays_a, rays_b, np.eye(3), cv2.RANSAC, 0.999, 0.7 * tolerance
+        )
+        if E is None or E.shape != (3, 3):
+            return None
+        explained = mask.ravel() > 0
+        if explained.mean() < MIN_ESSENTIAL_SHARE:
+            return None
+        H, _ = cv2.findHomography(rays_a, rays_b, cv2.RANSAC, tolerance)
+        if H is None:
+            return None
+        turn = Turn.nearest(np.asarray(H, float)).refined(rays_a, rays_b, tolerance)
+        by_turn = np.linalg.norm(turn.residuals(rays_a, rays_b), axis=1) < tolerance
+        if by_turn[explained].mean() > MAX_TURN_SHARE:
+            is_zoomed = abs(np.log(turn.zoom)) > MIN_ZOOM and b - a <= LONGEST_ZOOM
+            if is_zoomed and by_turn.mean() > MIN_ZOOM_SHARE:
+                self.zooms.append((a, b))
+            return None
+        count, R, t, _ = cv2.recoverPose(E, rays_a[explained], rays_b[explained], np.eye(3))
+        if count < 0.6 * explained.sum():
+            return None
+        return np.asarray(R, float), np.asarray(t, float).ravel()
+
+    def _part(self, a: int, b: int, R: Float64Array, t: Float64Array) -> _Part:
+        """Return the part of the path that begins with two frames."""
+        self._places[:] = np.nan
+        self._is_outlier[:] = False
+        self._first_ray[:] = np.nan
+        part = _Part(a, np.eye(3)[None], np.zeros((1, 3)), self._places[:0])
+        self._see(part, a)
+        first, second = part.first, b
+        self._triangulate(R, t, second)
+        # The frames between the two lie between their poses; each is then placed by the map.
+        turn = log(R)
+        share = np.arange(1, b - a) / (b - a)
+        between_R = exp(share[:, None] * turn)
+        between_t = share[:, None] * t
+        part = _Part(
+            a,
+            np.concatenate([np.eye(3)[None], between_R, R[None]]),
+            np.concatenate([np.zeros((1, 3)), between_t, t[None]]),
+            self._places[:0],
+        )
+        for k in range(first + 1, second):
+            placed = self._place(k, part.R[k - first], part.t[k - first])
+            if placed is not None:
+                part.R[k - first], part.t[k - first] = placed
+        self._adjust(part, fixed=1)
+        for k in range(second + 1, len(self._seen.rows)):
+            turn_k = self._R_guess[k] @ self._R_guess[k - 1].T
+            guess_R = turn_k @ part.R[-1]
+            center = -part.R[-1].T @ part.t[-1]
+            if len(part.R) > 1:
+                center = center + 0.8 * (center + part.R[-2].T @ part.t[-2])
+            placed = self._place(k, guess_R, -guess_R @ center)
+            if placed is None:
+                break
+            part.R = np.concatenate([part.R, placed[0][None]])
+            part.t = np.concatenate([part.t, placed[1][None]])
+            self._triangulate(*placed, k)
+            self._see(part, k)
+            if (k - second) % ADJUSTED_EVERY == 0:
+                self._adjust(part)
+        self._adjust(part)
+        return part
+
+    def _extend_backwards(self, part: _Part, end: int) -> None:
+        """Place frames before the part, down to ``end``, by its map: the first pair with enough
+        parallax may come late.
+        """
+        while part.first > end:
+            k = part.first - 1
+            guess_R = self._R_guess[k] @ self._R_guess[k + 1].T @ part.R[0]
+            center = -part.R[0].T @ part.t[0]
+            placed = self._place(k, guess_R, -guess_R @ center)
+            if placed is None:
+                break
+            part.R = np.concatenate([placed[0][None], part.R])
+            part.t = np.concatenate([placed[1][None], part.t])
+            part.first = k
+
+    def _see(self, part: _Part, k: int) -> None:
+        """Remember the line of sight of the corners that the frame ``k`` sees first."""
+        numbers = self._seen.numbers[k]
+        new = np.isnan(self._first_ray[numbers, 0])
+        R, t = part.R[k - part.first], part.t[k - part.first]
+        rays = homogeneous(self._seen.rays[k][new]) @ R
+        self._first_ray[numbers[new]] = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+        self._first_center[numbers[new]] = -R.T @ t
+
+    def _triangulate(self, R: Float64Array, t: Float64Array, k: int) -> None:
+        """Place the corners that the frame ``k`` sees from far enough beside where they were first
+        seen from: at the point nearest to both lines of sight.
+        """
+        numbers = self._seen.numbers[k]
+        open_ = np.isnan(self._places[numbers, 0]) & ~np.isnan(self._first_ray[numbers, 0])
+        open_ &= ~self._is_outlier[numbers]
+        numbers = numbers[open_]
+        a = self._first_ray[numbers]
+        b = homogeneous(self._seen.rays[k][open_]) @ R
+        b /= np.linalg.norm(b, axis=1, keepdims=True)
+        center = -R.T @ t
+        baseline = center - self._first_center[numbers]
+        cosine = (a * b).sum(axis=1)
+        sine2 = np.maximum(1.0 - cosine**2, 1e-12)
+        along_a = ((a * baseline).sum(axis=1) - cosine * (b * baseline).sum(axis=1)) / sine2
+        along_b = (cosine * (a * baseline).sum(axis=1) - (b * baseline).sum(axis=1)) / sine2
+        from_a = self._first_center[numbers] + along_a[:, None] * a
+        from_b = center + along_b[:, None] * b
+        gap = np.linalg.norm(from_a - from_b, axis=1)
+        good = (np.sqrt(sine2) > MIN_TRIANGULATION) & (along_a > 0) & (along_b > 0)
+        good &= (along_b < FARTHEST) & (gap < 2.0 * self._seen.tolerance * along_b)
+        self._places[numbers[good]] = 0.5 * (from_a + from_b)[good]
+
+    def _place(
+        self, k: int, R: Float64Array, t: Float64Array
+    ) -> tuple[Float64Array, Float64Array] | None:
+        """Return rotation and translation of the frame ``k`` by the map, from a guess; None where
+        too few of its corners agree.
+        """
+        numbers = self._seen.numbers[k]
+        known = ~np.isnan(self._places[numbers, 0])
+        if known.sum() < MIN_MAP:
+            return None
+        places = self._places[numbers[known]]
+        rays = self._seen.rays[k][known]
+        R, t = refine_pose(places, rays, R, t, self._seen.tolerance)
+        agree = _agrees(places, rays, R, t, 2.0 * self._seen.tolerance)
+        if agree.sum() < MIN_MAP or agree.mean() < MIN_MAP_SHARE:
+            return None
+        return R, t
+
+    def _adjust(self, part: _Part, fixed: int = FIXED) -> None:
+        """Adjust the last frames and their corners together, and drop corners that do not agree."""
+        count = len(part.R)
+        begin = max(0, count - ADJUSTED)
+        frames = range(part.first + begin, part.first + count)
+        numbers = np.concatenate([self._seen.numbers[k] for k in frames])
+        rays = np.concatenate([self._seen.rays[k] for k in frames])
+        frame = np.repeat(np.arange(len(frames)), [len(self._seen.numbers[k]) for k in frames])
+        known = ~np.isnan(self._places[numbers, 0])
+        corners, corner = np.unique(numbers[known], return_inverse=True)
+        if len(corners) < MIN_MAP:
+            return
+        bundle = Bundle(
+            part.R[begin:], part.t[begin:], self._places[corners], frame[known], corner, rays[known]
+        )
+        bundle = adjust(bundle, fixed if begin or fixed == 1 else 1, self._seen.tolerance)
+        part.R[begin:] = bundle.R
+        part.t[begin:] = bundle.t
+        self._places[corners] = bundle.places
+        error = np.linalg.norm(bundle.residuals(), axis=1)
+        wrong = np.bincount(corner, error > 2.0 * self._seen.tolerance, len(corners))
+        is_wrong = wrong > 0.5 * np.bincount(corner, minlength=len(corners))
+        self._places[corners[is_wrong]] = np.nan
+        self._is_outlier[corners[is_wrong]] = True
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How lines of sight move while a camera only rotates and zooms: p_b ~ D(a g) R D(1 / a) p_a.
+
+    D(a) = diag(a, a, 1); ``focal`` a is the assumed focal length relative to the true one.
+    """
+
+    R: Float64Array  # (3, 3)
+    focal: float
+    zoom: float  # g, of the focal length from the first frame to the second
+
+    @classmethod
+    def nearest(cls, H: Float64Array) -> Turn:
+        """Return the turn nearest to a homography (3, 3) of lines of sight.
+
+        With the right a and g, D(1 / (a g)) H D(a) has equal singular values.
+        """
+        focal, zoom, R = 1.0, 1.0, np.eye(3)
+        for focal_step, zoom_step in ((1.1, 1.08), (1.03, 1.02), (1.008, 1.005)):
+            factors = np.arange(-5, 6)
+            focals, zooms = np.meshgrid(focal * focal_step**factors, zoom * zoom_step**factors)
+            a, g = focals.ravel(), zooms.ravel()
+            one = np.ones(len(a))
+            left = np.stack([1.0 / (a * g), 1.0 / (a * g), one], axis=1)
+            right = np.stack([a, a, one], axis=1)
+            U, s, Vt = np.linalg.svd(left[:, :, None] * H * right[:, None])
+            best = int(((s[:, 0] - s[:, 2]) / s[:, 1]).argmin())
+            focal, zoom, R = float(a[best]), float(g[best]), U[best] @ Vt[best]
+        return cls(R * np.sign(np.linalg.det(R)), focal, zoom)
+
+    def residuals(self, rays_a: Float64Array, rays_b: Float64Array) -> Float64Array:
+        """Return the (n, 2) differences of lines of sight (n, 2) from where the turn takes them."""
+        a = self.focal
+        turned = homogeneous(rays_a / a) @ self.R.T
+        return projected(turned) * (a * self.zoom) - rays_b
+
+    def refined(self, rays_a: Float64Array, rays_b: Float64Array, scale: float) -> Turn:
+        """Return the turn that most lines of sight (n, 2) agree with, from this one.
+
+        :param scale: of the robust kernel at the end, radians; it begins eight times as wide.
+        """
+        turn = self
+        for step in range(TURN_STEPS):
+            residuals = turn.residuals(rays_a, rays_b)
+            width = scale * max(1.0, 8.0 * 0.5**step)
+            weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
+            J = np.empty((*residuals.shape, 5))
+            for k, direction in enumerate(np.eye(5) * _DIFFERENCE):
+                J[..., k] = (turn.moved(direction).residuals(rays_a, rays_b) - residuals) / (
+                    _DIFFERENCE
+                )
+            weighted = J * weight[:, None, None]
+            normal = np.einsum("nki,nkj->ij", weighted, J) + np.diag(TURN_PRIOR)
+            change = np.linalg.solve(normal, -np.einsum("nki,nk->i", weighted, residuals))
+            turn = turn.moved(np.clip(change, -0.2, 0.2))
+        return turn
+
+    def moved(self, change: Float64Array) -> Turn:
+        """Return the turn after a change (5,): rotation, logarithms of focal length and zoom."""
+        return Turn(
+            exp(change[:3]) @ self.R,
+            float(np.clip(self.focal * np.exp(change[3]), 0.4, 2.5)),
+            float(self.zoom * np.exp(change[4])),
+        )
+
+
+def homogeneous(rays: Float64Array) -> Float64Array:
+    """Return lines of sight (n, 2) as (n, 3) with z = 1."""
+    return np.concatenate([rays, np.ones((len(rays), 1))], axis=1)
+
+
+def _agrees(
+    places: Float64Array, rays: Float64Array, R: Float64Array, t: Float64Array, tolerance: float
+) -> BoolArray:
+    points = places @ R.T + t
+    error = np.linalg.norm(projected(points) - rays, axis=1)
+    agree: BoolArray = (points[:, 2] > 0) & (error < tolerance)
+    return agree
+
+
+def _joined(
+    parts: list[_Part], rows: IndexArray, R_first_camera: Float64Array, times: Float64Array
+) -> Odometry:
+    """Return the path of all frames: parts one after another, and between them the rotation as it
+    was estimated. Frames between two that were placed are interpolated.
+    """
+    frames = len(times)
+    R = R_first_camera.copy()
+    center = np.zeros((frames, 3))
+    part_of = np.full(frames, -1)
+    maps = []
+    for number, part in enumerate(parts):
+        seen = rows[part.first : part.first + len(part.R)]
+        inside = np.arange(seen[0], seen[-1] + 1)
+        R_map_camera = np.swapaxes(part.R, 1, 2)
+        # The map's axes are those of the part's first frame.
+        R_first_map = R[seen[0]] @ R_map_camera[0].T
+        c_map = -np.einsum("nij,nj->ni", R_map_camera, part.t)
+        c_first = (c_map - c_map[0]) @ R_first_map.T
+        maps.append((part.places - c_map[0]) @ R_first_map.T)
+        R_before = R[seen[-1]].copy()
+        R[inside] = _interpolated(R_first_map @ R_map_camera, times[seen], times[inside])
+        center[inside] = _interpolated_places(c_first, times[seen], times[inside])
+        part_of[inside] = number
+        after = slice(seen[-1] + 1, frames)
+        # What follows keeps its rotation relative to this part's last frame.
+        R[after] = R[seen[-1]] @ R_before.T @ R[after]
+    return Odometry(R, center, part_of, maps, np.zeros(frames, bool))
+
+
+def _interpolated(R: Float64Array, at: Float64Array, times: Float64Array) -> Float64Array:
+    """Return rotations (n, 3, 3) at the times ``at`` on arcs between them, at other times."""
+    k = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(at) - 2)
+    share = (times - at[k]) / (at[k + 1] - at[k])
+    steps = log(np.swapaxes(R[k], 1, 2) @ R[k + 1])
+    between: Float64Array = R[k] @ exp(share[:, None] * steps)
+    return between
+
+
+def _interpolated_places(c: Float64Array, at: Float64Array, times: Float64Array) -> Float64Array:
+    """Return places (n, 3) at the times ``at`` on straight lines between them, at other times."""
+    return np.stack([np.interp(times, at, c[:, axis]) for axis in range(3)], axis=1)

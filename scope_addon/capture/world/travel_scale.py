@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scale of a camera's path, which the background shows up to scale: from people on the floor.
+
+Where the map of the background has a floor, its distance below the camera is known twice: in units
+of the path, and in metres from the feet of somebody of known size who stands on it. Their ratio
+does not depend on how long strides are, which are seen too short where people walk along the line
+of sight. Without a floor, the scale is that with which one foot is at rest most of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import BoolArray, Float64Array, FloatArray
+from ...kinematics.smoothing import gaussian_smooth
+from ..camera.odometry import Odometry
+
+MIN_FRAMES = 12  # in which the person was seen
+# The floor, see `find_floor`.
+PLANES = 600  # that are tried, of three corners each
+MAX_TILT_COS = np.cos(np.radians(15.0))  # between floor and up direction
+FLAT = 0.02  # distance of a corner from the floor, in units of the camera's height above it
+NEAR = 8.0  # of corners that tell the floor, likewise
+MIN_FLOOR = 20  # corners on it
+MAX_UNDER = 0.08  # share of the near corners that may be under it
+MAX_RATIO = 2.5  # between the scales from the floor and from the feet
+# The feet, see `scale_by_feet`.
+CARRYING_M_S = 0.35  # σ: speed below which a foot may carry
+CARRYING_HEIGHT_M = 0.1  # of such a foot above the lowest sole of its frame
+CUTOFF_HZ = 4.0
+CAMERA_SPEEDS_M_S = (0.03, 30.0)  # root mean squares of the camera's speed that are tried
+SPEEDS = 240
+LIKELY_SPEED_M_S = 1.4
+# Weight of the squared logarithm of the speed relative to that: decides where feet do not tell.
+SPEED_WEIGHT = 0.004
+MIN_CARRIED = 0.3  # share of the frames in which a foot must carry
+
+
+class Plane(NamedTuple):
+    """Points p with normal · p = offset."""
+
+    normal: Float64Array  # (3,) unit
+    offset: float
+
+
+@dataclass(frozen=True)
+class ScaledTravel:
+    """The displacement (T, 3) of the camera's centre since the first frame, metres, and the (3,) up
+    direction of the floor that it passes, None without one; both in the first frame's axes.
+    """
+
+    center: Float64Array
+    floor_up: Float64Array | None
+    is_known: bool  # False: the scale of a part of the path is unknown, and it stays in place there
+
+
+def scaled_travel(
+    soles: FloatArray, valid: BoolArray, up: FloatArray, times: Float64Array, travel: Odometry
+) -> ScaledTravel:
+    """Return the camera's travel in metres. Where ``travel`` shows none, the camera stays where it
+    is.
+
+    :param soles: (T, F, 3) metres, relative to the camera's centre, in the first frame's axes.
+    :param valid: (T,) frames in which the person was seen.
+    :param up: (3,) unit vector, as far as it is known.
+    :param times: (T,) seconds.
+    :param travel: of the camera, up to scale.
+    """
+    center = np.zeros((len(times), 3))
+    floor_up = None
+    most_frames = 0
+    is_known = True
+    for number, places in enumerate(travel.maps):
+        rows = np.flatnonzero(travel.part == number)
+        part = slice(int(rows[0]), int(rows[-1]) + 1)
+        path = travel.center[part]
+        seen = valid[part]
+        scale = scale_by_feet(soles[part], seen, up, times[part], path)
+        floor = find_floor(places, path, up)
+        if floor is not None and seen.any():
+            floor = with_feet(floor, places, soles[part][seen], path[seen])
+            by_floor = scale_by_floor(soles[part][seen], path[seen], floor)
+            if scale == 0.0 or abs(np.log(by_floor / scale)) < np.log(MAX_RATIO):
+                scale = by_floor
+                if len(rows) > most_frames:
+                    floor_up, most_frames = floor.normal, len(rows)
+        is_known &= scale > 0.0
+        center[part] = center[part.start] + scale * (path - path[0])
+        center[part.stop :] = center[part.stop - 1]
+    return ScaledTravel(center, floor_up, bool(is_known))
+
+
+def find_floor(places: Float64Array, path: Float64Array, up: FloatArray) -> Plane | None:
+    """Return the floor below a camera's path: the plane with most corners near it, and next to none
+    under it; None if there is none.
+
+    :param places: (C, 3) of corners.
+    :param path: (T, 3) of the camera, in the same axes and units.
+    :param up: (3,) unit vector, which may be off by some degrees.
+    """
+    eye = path.mean(axis=0)
+    below = places[(places - eye) @ up < 0]
+    if len(below) < MIN_FLOOR:
+        return None
+    random = np.random.default_rng(0)
+    corners = below[random.integers(0, len(below), (PLANES, 3))]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals / np.maximum(lengths, 1e-12)[:, None]
+    normals *= np.sign(normals @ up)[:, None]
+    heights = ((eye - corners[:, 0]) * normals).sum(axis=1)
+    level = (normals @ up > MAX_TILT_COS) & (heights > 0) & (lengths > 1e-9)
+    best: Plane | None = None
+    most = MIN_FLOOR - 1
+    for normal, height in zip(normals[level], heights[level], strict=True):
+        floor = Plane(normal, float(normal @ eye) - float(height))
+        on_it, under = _on_floor(places, path, floor)
+        count = int(on_it.sum())
+        if count > most and under.sum() < MAX_UNDER * (count + under.sum()):
+            best, most = floor, count
+    if best is None:
+        return None
+    for _ in range(3):
+        on_it, _ = _on_floor(places, path, best)
+        best = _fitted_plane(places[on_it], up)
+    return best
+
+
+def _on_floor(
+    places: Float64Array, path: Float64Array, floor: Plane
+) -> tuple[BoolArray, BoolArray]:
+    """Return (C,) whether each corner is on a floor, and whether it is near the camera and under
+    it.
+    """
+    eye = path.mean(axis=0)
+    height = float(floor.normal @ eye) - floor.offset
+    above = places @ floor.normal - floor.offset
+    distance = np.linalg.norm(places[:, None] - path[:: max(1, len(path) // 20)], axis=2).min(1)
+    near = distance < NEAR * height
+    return near & (np.abs(above) < FLAT * height), near & (above < -3.0 * FLAT * height)
+
+
+def _fitted_plane(places: Float64Array, up: FloatArray) -> Plane:
+    mean = places.mean(axis=0)
+    normal = np.linalg.svd(places - mean)[2][2]
+    normal = normal * np.sign(normal @ up)
+    return Plane(normal, float(normal @ mean))
+
+
+def with_feet(floor: Plane, places: Float64Array, soles: FloatArray, path: Float64Array) -> Plane:
+    """Return the floor on which the feet walk as well, which may go farther than its corners.
+
+    :param soles: (T, F, 3) metres, relative to the camera's centre.
+    :param path: (T, 3) of the camera, in units.
+    """
+    row = np.arange(len(soles))
+    for _ in range(3):
+        scale = scale_by_floor(soles, path, floor)
+        lowest = soles[row, (soles @ floor.normal).argmin(axis=1)] / scale + path
+        height = np.median(path @ floor.normal - floor.offset)
+        near = np.abs(lowest @ floor.normal - floor.offset) < 4.0 * FLAT * height
+        on_it, _ = _on_floor(places, path, floor)
+        corners = places[on_it]
+        feet = lowest[near][:: max(1, len(lowest) // max(1, len(corners)))]
+        floor = _fitted_plane(np.concatenate([corners, feet]), floor.normal)
+    return floor
+
+
+def scale_by_floor(soles: FloatArray, path: Float64Array, floor: Plane) -> float:
+    """Return the scale, metres per unit: the median of the height of the camera above the lowest
+    sole over that above the floor.
+
+    :param soles: (T, F, 3) metres, relative to the camera's centre.
+    :param path: (T, 3) of the camera, in units.
+    """
+    height_m = -(soles @ floor.normal).min(axis=1)
+    height = path @ floor.normal - floor.offset
+    return float(np.median(height_m / np.maximum(height, 1e-9)))
+
+
+def scale_by_feet(
+    soles: FloatArray, valid: BoolArray, up: FloatArray, times: Float64Array, path: Float64Array
+) -> float:
+    """Return the scale s of a camera's path, metres per unit; 0 if it is unknown.
+
+    In the world, one foot is at rest most of the time, whichever it is and however the person
+    moves. With the speed v of the slowest of a frame's low soles for a scale, s minimizes
+
+        mean_t v² / (v² + σ²) + w log²(s v_c / v_0)        v = min_f |dq_f/dt + s dc/dt|
+
+    The second term, with the camera's mean speed s v_c, only decides where feet do not tell.
+
+    :param soles: (T, F, 3) q, metres, relative to the camera's centre, in axes that do not rotate.
+    :param valid: (T,) frames in which the person was seen.
+    :param up: (3,) unit vector.
+    :param times: (T,) seconds.
+    :param path: (T, 3) c of the camera, in units.
+    """
+    if valid.sum() < MIN_FRAMES:
+        return 0.0
+    height = soles @ up
+    is_low = height < height.min(axis=1, keepdims=True) + CARRYING_HEIGHT_M
+    v_sole = np.gradient(gaussian_smooth(soles, times, CUTOFF_HZ), times, axis=0)
+    v_camera = np.gradient(gaussian_smooth(path, times, CUTOFF_HZ), times, axis=0)
+    unit_speed = float(np.sqrt((v_camera[valid] ** 2).sum(axis=1).mean()))
+    if unit_speed <= 0.0:
+        return 0.0
+
+    def slowest2(speed_m_s: float) -> Float64Array:
+        v = v_sole + (speed_m_s / unit_speed) * v_camera[:, None]
+        v2: Float64Array = np.where(is_low, (v**2).sum(axis=2), np.inf).min(axis=1)[valid]
+        return v2
+
+    def cost(speed_m_s: float) -> float:
+        v2 = slowest2(speed_m_s)
+        unlikely = SPEED_WEIGHT * np.log(speed_m_s / LIKELY_SPEED_M_S) ** 2
+        return float((v2 / (v2 + CARRYING_M_S**2)).mean() + unlikely)
+
+    speeds = np.geomspace(*CAMERA_SPEEDS_M_S, SPEEDS)
+    best = float(speeds[np.argmin([cost(speed) for speed in speeds])])
+    fine = best * np.linspace(0.97, 1.03, 31)
+    best = float(fine[np.argmin([cost(speed) for speed in fine])])
+    if (slowest2(best) < CARRYING_M_S**2).mean() < MIN_CARRIED:
+        return 0.0
+    return best / unit_speed

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A camera's travel from corners of a street, a room and a wall, at known places, as exact cameras
+see them.
+"""
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.bundle_adjustment import Bundle, adjust, refine_pose
+from scope.scope_addon.capture.camera.corner_tracks import CornerTracks, joined_corners
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.scope_addon.capture.camera.odometry import travel_of
+from scope.solver.rotations import exp, log
+
+WIDTH, HEIGHT = 1280, 720
+FOCAL_PX = 1100.0
+T = 60
+TIMES = np.arange(T) / 12.0
+NOISE_PX = 0.3
+SHAKE = 0.01 * np.stack([np.sin(7 * TIMES), np.cos(9 * TIMES), np.sin(5 * TIMES)], axis=1)
+
+
+def street(rng):
+    """Corners of a floor 1.5 m below the camera, two walls 4 m beside it, and one far ahead."""
+    n = 60
+    z = rng.uniform(2, 45, 3 * n)
+    x = np.concatenate([rng.uniform(-4, 4, n), np.full(n, -4.0), np.full(n, 4.0)])
+    y = np.concatenate([np.full(n, 1.5), rng.uniform(-5, 1.5, 2 * n)])
+    ahead = np.stack([rng.uniform(-4, 4, n), rng.uniform(-5, 1.5, n), np.full(n, 45.0)], axis=1)
+    return np.concatenate([np.stack([x, y, z], axis=1), ahead])
+
+
+def wall(rng):
+    """Corners of a wall 5 m ahead, which nearly fills the picture, and of the floor before it."""
+    n = 260
+    x = rng.uniform(-5, 15, 2 * n)
+    upright = np.stack([x[:n], rng.uniform(-3, 1.2, n), np.full(n, 5.0)], axis=1)
+    floor = np.stack([x[n:], np.full(n, 1.2), rng.uniform(2, 5, n)], axis=1)
+    return np.concatenate([upright, floor])
+
+
+def seen(places, R, center, focal_px=FOCAL_PX, outliers=0.0):
+    """Return the tracks of corners (C, 3) in T frames, some of which move on their own."""
+    rng = np.random.default_rng(1)
+    focal = np.broadcast_to(focal_px, T)
+    walks = rng.random(len(places)) < outliers
+    rows, numbers, points = [], [], []
+    for k in range(T):
+        moved = places + walks[:, None] * [1.2 * TIMES[k], 0.0, 0.0]
+        p = (moved - center[k]) @ R[k]
+        px = p[:, :2] / p[:, 2:] * focal[k] + [WIDTH / 2, HEIGHT / 2]
+        inside = (p[:, 2] > 0.5) & (px >= 0).all(axis=1) & (px < [WIDTH, HEIGHT]).all(axis=1)
+        found = np.flatnonzero(inside)
+        rows.append(np.full(len(found), k))
+        numbers.append(found)
+        points.append(px[found] + NOISE_PX * rng.standard_normal((len(found), 2)))
+    return CornerTracks(
+        np.concatenate(rows), np.concatenate(numbers), np.concatenate(points).astype(np.float32)
+    )
+
+
+def camera(focal_px=FOCAL_PX):
+    return Camera(pinhole(WIDTH, HEIGHT, focal_px), np.zeros(5), "given")
+
+
+def aligned(center, true):
+    """The path, scaled to the true one; its axes are those of the first frame already."""
+    return center * ((center * true).sum() / (center**2).sum())
+
+
+@pytest.mark.parametrize(
+    "velocity", [(0.0, 0.0, -1.3), (0.0, 0.0, 1.3), (1.2, 0.0, 0.3), (0.5, -0.25, 0.5)]
+)
+def test_a_camera_that_travels_through_a_street(velocity):
+    """Also where one corner in ten is a passer-by, and the rotation was not known before."""
+    places = street(np.random.default_rng(0))
+    R = exp(SHAKE)
+    R = R[0].T @ R
+    center = TIMES[:, None] * np.array(velocity) + 0.5 * SHAKE
+    center -= center[0]
+    corners = seen(places, R, center, outliers=0.1)
+    found = travel_of(corners, np.tile(np.eye(3), (T, 1, 1)), TIMES, camera(), WIDTH)
+    assert found.travels
+    assert (found.part == 0).all()
+    off = np.linalg.norm(aligned(found.center, center) - center, axis=1)
+    length = np.linalg.norm(np.diff(center, axis=0), axis=1).sum()
+    assert np.sqrt((off**2).mean()) < 0.02 * length
+    turned = np.linalg.norm(log(np.swapaxes(R, 1, 2) @ found.R_first_camera), axis=1)
+    assert np.degrees(turned).max() < 0.5
+
+
+def test_a_camera_that_travels_along_a_wall():
+    places = wall(np.random.default_rng(0))
+    center = TIMES[:, None] * [1.3, 0.0, 0.0]
+    R = np.tile(np.eye(3), (T, 1, 1))
+    found = travel_of(seen(places, R, center), R, TIMES, camera(), WIDTH)
+    assert found.travels
+    assert np.abs(aligned(found.center, center) - center).max() < 0.3
+
+
+@pytest.mark.parametrize("assumed", [0.8, 1.0, 1.25])
+def test_a_camera_that_pans_does_not_travel(assumed):
+    """Also where the assumed focal length is wrong."""
+    R = exp(np.stack([0 * TIMES, 0.12 * TIMES, 0 * TIMES], axis=1) + SHAKE)
+    R = R[0].T @ R
+    corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)))
+    found = travel_of(corners, R, TIMES, camera(assumed * FOCAL_PX), WIDTH)
+    assert not found.travels
+    assert not found.zooms.any()
+    np.testing.assert_array_equal(found.R_first_camera, R)
+
+
+def test_a_lens_that_zooms_does_not_travel():
+    R = np.tile(np.eye(3), (T, 1, 1))
+    focal = FOCAL_PX * (1 + np.clip(TIMES - 2, 0, 2) / 2)
+    corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)), focal)
+    found = travel_of(corners, R, TIMES, camera(), WIDTH)
+    assert not found.travels
+    assert found.zooms[28:44].any()
+    assert not found.zooms[:12].any()
+    assert not found.zooms[58:].any()
+
+
+def test_without_corners_nothing_is_known():
+    R = np.tile(np.eye(3), (T, 1, 1))
+    found = travel_of(CornerTracks.none(), R, TIMES, camera(), WIDTH)
+    assert not found.travels
+    np.testing.assert_array_equal(found.center, 0.0)
+
+
+def test_windows_that_overlap_share_the_corners_of_common_frames():
+    places = street(np.random.default_rng(0))
+    center = TIMES[:, None] * [0.0, 0.0, -1.3]
+    R = np.tile(np.eye(3), (T, 1, 1))
+    whole = seen(places, R, center)
+    early, late = whole.rows < 45, whole.rows >= 30
+    first = CornerTracks(whole.rows[early], whole.numbers[early], whole.points_px[early])
+    second = CornerTracks(whole.rows[late] - 30, whole.numbers[late], whole.points_px[late])
+    joined = joined_corners([first, second.shifted(30, first.count)])
+    assert (np.diff(joined.rows) >= 0).all()
+    assert joined.count == first.count + second.count
+    both = joined.rows == 35
+    assert both.sum() == 2 * (whole.rows == 35).sum()
+    assert (np.diff(joined.numbers[both]) > 0).all()
+
+
+def test_an_adjusted_bundle_is_the_true_one():
+    rng = np.random.default_rng(4)
+    frames, corners = 8, 60
+    R = exp(0.1 * rng.standard_normal((frames, 3)))
+    t = 0.5 * rng.standard_normal((frames, 3))
+    places = rng.uniform([-3, -2, 5], [3, 2, 12], (corners, 3))
+    frame, corner = (grid.ravel() for grid in np.mgrid[:frames, :corners])
+    exact = Bundle(R, t, places, frame, corner, np.zeros((len(frame), 2)))
+    rays = exact.residuals()
+    moved_R = R.copy()
+    moved_R[2:] = exp(0.01 * rng.standard_normal((frames - 2, 3))) @ R[2:]
+    moved_t = t.copy()
+    moved_t[2:] += 0.03 * rng.standard_normal((frames - 2, 3))
+    near = places + 0.05 * rng.standard_normal(places.shape)
+    found = adjust(Bundle(moved_R, moved_t, near, frame, corner, rays), 2, 0.01)
+    assert np.abs(found.residuals()).max() < 1e-4
+    np.testing.assert_allclose(found.t, t, atol=2e-3)
+    found_R, found_t = refine_pose(places, rays[frame == 5], moved_R[5], moved_t[5], 0.01)
+    np.testing.assert_allclose(found_R, R[5], atol=1e-6)
+    np.testing.assert_allclose(found_t, t[5], atol=1e-6)

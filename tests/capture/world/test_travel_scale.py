@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scale of a camera's path from a floor and from feet, and strides that contradict a path."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.odometry import Odometry
+from scope.scope_addon.capture.world.strides import contradicting_strides
+from scope.scope_addon.capture.world.travel_scale import find_floor, scaled_travel
+from scope.solver.rotations import exp
+
+UP = np.array([0.0, -1.0, 0.0])
+T = 120
+TIMES = np.arange(T) / 30.0
+HEIGHT_M = 1.5  # of the camera above the floor
+SCALE = 2.3  # metres per unit of the map
+SPEED_M_S = 1.3
+
+
+def walk(shortened=1.0):
+    """(T, 4, 3) soles of somebody who walks along +z, 4 m ahead of the first camera; strides along
+    the line of sight may be seen too short.
+    """
+    soles = np.zeros((T, 4, 3))
+    for point in range(4):
+        shift = 0.5 * (point // 2)
+        phase = TIMES + shift
+        share = phase % 1.0
+        swing = np.clip((share - 0.6) / 0.4, 0, 1)
+        ahead = (np.floor(phase) + swing + 0.3 - shift) * SPEED_M_S
+        body = SPEED_M_S * TIMES
+        z = 4.0 + body + shortened * (ahead - body) + 0.2 * (point % 2)
+        lift = 0.12 * np.sin(np.pi * swing)
+        side = np.full(T, 0.1 - 0.2 * (point // 2))
+        soles[:, point] = np.stack([side, HEIGHT_M - lift, z], axis=1)
+    return soles
+
+
+def room(rng, with_floor=True):
+    """Corners in units of the map: of a floor, table tops, and walls."""
+    floor = np.stack(
+        [rng.uniform(-3, 3, 80), np.full(80, HEIGHT_M), rng.uniform(1, 14, 80)], axis=1
+    )
+    table = np.stack(
+        [rng.uniform(1, 3, 30), np.full(30, HEIGHT_M - 0.75), rng.uniform(3, 6, 30)], axis=1
+    )
+    wall = np.stack(
+        [np.full(150, -3.0), rng.uniform(-1.5, HEIGHT_M, 150), rng.uniform(1, 14, 150)], axis=1
+    )
+    parts = [floor, table, wall] if with_floor else [wall]
+    places = np.concatenate(parts)
+    return (places + 0.004 * rng.standard_normal(places.shape)) / SCALE
+
+
+def travel(places):
+    """A camera that follows at the walker's speed, as the background shows it."""
+    center = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
+    still = np.tile(np.eye(3), (T, 1, 1))
+    odometry = Odometry(still, center / SCALE, np.zeros(T, int), [places], np.zeros(T, bool))
+    return odometry, center
+
+
+@pytest.mark.parametrize("shortened", [1.0, 0.65])
+def test_the_floor_tells_the_scale_however_long_strides_seem(shortened):
+    odometry, center = travel(room(np.random.default_rng(0)))
+    seen = walk(shortened) - center[:, None]
+    tilted = exp([0.1, 0.0, 0.0]) @ UP  # as the up direction of a body may be
+    found = scaled_travel(seen, np.ones(T, bool), tilted, TIMES, odometry)
+    assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+    assert np.degrees(np.arccos(found.floor_up @ UP)) < 1.0
+    assert found.is_known
+
+
+def test_without_a_floor_the_feet_tell_it():
+    odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
+    assert find_floor(odometry.maps[0], odometry.center, UP) is None
+    found = scaled_travel(walk() - center[:, None], np.ones(T, bool), UP, TIMES, odometry)
+    assert np.abs(found.center - center).max() < 0.1 * center[-1, 2]
+    assert found.floor_up is None
+
+
+def test_a_scale_that_nobody_tells_is_said_to_be_unknown():
+    odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
+    seen = walk() - center[:, None]
+    found = scaled_travel(seen, np.zeros(T, bool), UP, TIMES, odometry)
+    assert not found.is_known
+    np.testing.assert_array_equal(found.center, 0.0)
+
+
+def placed(soles, root):
+    """What `contradicting_strides` reads of a motion whose pelvis faces +z."""
+    facing = np.tile(np.eye(3), (T, 1, 1, 1))
+    return SimpleNamespace(
+        soles=soles, root=root, times=TIMES, valid=np.ones(T, bool), rotations=facing
+    )
+
+
+def test_strides_on_the_spot_contradict_a_path_that_stands_still():
+    body = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
+    walks = contradicting_strides(placed(walk(), body), UP)
+    assert not walks.any()
+    seen_short = contradicting_strides(placed(walk(0.65), body), UP)
+    assert not seen_short.any()
+    on_the_spot = contradicting_strides(placed(walk(0.65) - body[:, None], 0.0 * body), UP)
+    assert on_the_spot.mean() > 0.9
+
+
+def test_legs_that_kick_or_stand_contradict_nothing():
+    stands = np.tile(walk()[0], (T, 1, 1))
+    root = np.zeros((T, 3))
+    assert not contradicting_strides(placed(stands, root), UP).any()
+    kicks = stands.copy()
+    kicks[:, :2, 2] = stands[:, 2:, 2] + 0.4 * np.maximum(np.sin(2 * np.pi * TIMES), 0)[:, None]
+    assert not contradicting_strides(placed(kicks, root), UP).any()
