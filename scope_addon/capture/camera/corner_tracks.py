@@ -144,8 +144,8 @@ class CornerFollower:
         mask = np.full(image.shape, 255, np.uint8)
         for x0, y0, x1, y1 in boxes:
             mask[max(0, int(y0)) : max(0, int(y1) + 1), max(0, int(x0)) : max(0, int(x1) + 1)] = 0
-        for x, y in np.round(self._points).astype(int).tolist():
-            cv2.circle(mask, (x, y), SPACING_PX, 0, -1)
+        for x, y in self._points:
+            cv2.circle(mask, (round(float(x)), round(float(y))), SPACING_PX, (0,), -1)
         wanted = MAX_CORNERS - len(self._points)
         corners = cv2.goodFeaturesToTrack(image, wanted, QUALITY, SPACING_PX, mask=mask)
         if corners is None:

@@ -163,7 +163,7 @@ class _Tracker:
 
     def parts(self) -> list[_Part]:
         """Return the parts of the path, in order."""
-        parts = []
+        parts: list[_Part] = []
         start = 0
         count = len(self._seen.rows)
         while start < count - 1:
