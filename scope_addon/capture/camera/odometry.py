@@ -131,7 +131,9 @@ def travel_of(
         still.zooms[sightings.rows[a] : sightings.rows[b] + 1] = True
     if not parts:
         return still
-    return replace(_joined(parts, sightings.rows, R_first_camera, times), zooms=still.zooms)
+    found = _joined(parts, sightings.rows, R_first_camera, times)
+    # In a few frames, a camera that goes back or forth looks like one that zooms.
+    return replace(found, zooms=still.zooms & (found.part < 0))
 
 
 @dataclass

@@ -81,6 +81,7 @@ def test_a_camera_that_travels_through_a_street(velocity):
     found = travel_of(corners, np.tile(np.eye(3), (T, 1, 1)), TIMES, camera(), WIDTH)
     assert found.travels
     assert (found.part == 0).all()
+    assert not found.zooms.any()
     off = np.linalg.norm(aligned(found.center, center) - center, axis=1)
     length = np.linalg.norm(np.diff(center, axis=0), axis=1).sum()
     assert np.sqrt((off**2).mean()) < 0.02 * length
