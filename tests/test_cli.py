@@ -113,7 +113,7 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
             2,
             "00:00:00:99 does not exist",
         ),
-        (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 1, "download"),
+        (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 2, "download"),
         (["frobnicate"], 2, "frobnicate"),
         (["capture", "a.mp4", "--unknown=" + 300 * "x"], 2, "unknown arguments: --unknown=xxx"),
         ([], 2, "COMMAND"),

@@ -198,7 +198,7 @@ def _most_keys(rigs: Sequence[bpy.types.Object], scene: bpy.types.Scene) -> int:
     """
     if any(actions.nla_strips(rig) for rig in rigs):
         return int(scene.frame_end - scene.frame_start + 1)
-    keys = [len(curve.keyframe_points) for rig in rigs for curve in actions.fcurves(rig)]
+    keys: list[int] = [len(curve.keyframe_points) for rig in rigs for curve in actions.fcurves(rig)]
     return max(keys, default=0)
 
 
