@@ -240,7 +240,9 @@ class Measurements:
         out = np.empty((len(indices), 4))
         out[:, :3] = points_3d
         out[:, 3] = _confidence(m.confidence, len(indices), "3D keypoints")
-        warn_of_points(out)
+        warn_of_points(
+            out, has_camera=self.intrinsics is not None, are_weights=m.sigma_m is not None
+        )
         if m.sigma_m is not None:
             out[:, 3] *= (
                 SIGMA_3D / _sigmas(m.sigma_m, len(indices), "sigma_m of 3D keypoints")

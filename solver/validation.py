@@ -250,19 +250,23 @@ def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
         _warn(ScopeWarning, f"Confidence of 2D keypoints {_TOO_CONFIDENT}")
 
 
-def warn_of_points(points: Array) -> None:
+def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
     """Warn of 3D keypoints (n, 4), positions and confidence, that are probably not in metres in
     camera axes.
+
+    :param has_camera: without one, points may lie anywhere.
+    :param are_weights: whether the confidences are relative to given deviations, and so may be
+        large.
     """
     warn_of_units(points, "Points of 3D keypoints")
     fault = _fault_of_points(points)
-    if fault == 1:
+    if fault == 1 and has_camera:
         _warn(
             ScopeWarning,
             "Points of 3D keypoints all lie behind the camera, z < 0; camera axes are x right, y "
             "down, z forward: negate y and z of points whose y is up.",
         )
-    elif fault == 2:
+    elif fault == 2 and not are_weights:
         _warn(ScopeWarning, f"Confidence of 3D keypoints {_TOO_CONFIDENT}")
 
 

@@ -42,6 +42,8 @@ MAX_OPCODES = 5_000_000  # of a file with a table for each frame
 _LARGEST_PICKLE = 1 << 30  # bytes, unpacked
 _ZLIB = b"\x78"  # the first byte of what joblib has compressed
 _ZIP = b"PK"
+# How pickles begin: from protocol 2 on, and the tables, lists, tuples and objects of older ones.
+_PICKLES = (b"\x80", b"}", b"]", b"(", b"c")
 _PYTORCH = "data.pkl"
 _STORAGES = {
     "DoubleStorage": "<f8",
@@ -150,6 +152,8 @@ def _of_stream(path: Path) -> Any:
         data = unpacker.decompress(data, _LARGEST_PICKLE)
         if unpacker.unconsumed_tail:
             raise ModelFileError(f"it unpacks to more than {_LARGEST_PICKLE >> 20} MiB")
+    if not data.startswith(_PICKLES):
+        raise pickle.UnpicklingError("it is no archive, array or pickle")
     return _Plain().convert(_unpickled(data))
 
 

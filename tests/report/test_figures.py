@@ -63,6 +63,7 @@ def test_a_walk_of_known_length_and_speed(body):
         foot_contact=contact,
         residual_px=residual,
         valid=valid,
+        uneven_ground=True,  # so that joints that no camera has seen do not float above the floor
     )
     figures = motion_figures(motion, body)
     assert figures["Frames seen"] == "60 of 61"

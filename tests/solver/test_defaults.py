@@ -207,8 +207,9 @@ def pixels(values, intrinsics=INTRINSICS, confidence=1.0):
     )
 
 
-def space(values, confidence=1.0):
-    seen = Measurements(keypoints3d=Keypoints3D(np.arange(M), values, confidence))
+def space(values, confidence=1.0, intrinsics=None, sigma_m=None):
+    points = Keypoints3D(np.arange(M), values, confidence, sigma_m)
+    seen = Measurements(intrinsics, keypoints3d=points)
     return lambda: solver.fit(BODY, seen, priors=Priors())
 
 
@@ -225,7 +226,11 @@ MISTAKES = {
     "millimetres of focal length": (pixels(IMAGE, SENSOR), UnitsWarning, "multiply millimetres"),
     "percentages": (pixels(IMAGE, confidence=np.full(M, 90.0)), ScopeWarning, "by 100"),
     "percentages in space": (space(POINTS, np.full(M, 90.0)), ScopeWarning, "by 100"),
-    "behind the camera": (space(POINTS * [1.0, -1.0, -1.0]), ScopeWarning, "negate y and z"),
+    "behind the camera": (
+        space(POINTS * [1.0, -1.0, -1.0], intrinsics=INTRINSICS),
+        ScopeWarning,
+        "negate y and z",
+    ),
     "degrees": (lambda: rotations.exp([0.0, 90.0, 0.0]), UnitsWarning, "numpy.radians"),
 }
 
@@ -242,6 +247,8 @@ RIGHT = {
         confidence=np.where(np.arange(M) < 2, 0.0, 1.0),
     ),
     "normalized coordinates": pixels((IMAGE - INTRINSICS[:2, 2]) / INTRINSICS[0, 0], np.eye(3)),
+    "without a camera": space(POINTS * [1.0, -1.0, -1.0]),
+    "weights": space(POINTS, np.full(M, 90.0), sigma_m=0.01),
     "some points behind": space(POINTS - POINTS.mean(axis=0)),
     "weights of a few times one": space(POINTS, np.full(M, 5.0)),
     "two turns": lambda: rotations.exp([0.0, 4.0 * np.pi, 0.0]),

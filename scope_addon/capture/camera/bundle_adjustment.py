@@ -126,6 +126,7 @@ def refine_pose(
 ) -> tuple[Float64Array, Float64Array]:
     """Return the pose of one frame by known places (n, 3) and their rays (n, 2), from a guess.
 
+    :param R, t: (3, 3), (3,) the guess.
     :param scale: of the robust kernel at the end, radians; it begins eight times as wide.
     """
     for step in range(POSE_STEPS):

@@ -88,8 +88,8 @@ class CornerFollower:
         """Follow the corners to the next image.
 
         :param row: the number of the frame.
-        :param image: (h, w) grey.
-        :param boxes: what is not background: x0, y0, x1, y1 each, in pixels of the image.
+        :param image: (H, W) grey.
+        :param boxes: (n, 4) what is not background: x0, y0, x1, y1 each, in pixels of the image.
         """
         if is_cut:
             self._points = self._points[:0]
@@ -109,7 +109,7 @@ class CornerFollower:
     def tracks(self, to_full: Callable[[Float32Array], Float32Array]) -> CornerTracks:
         """Return the corners so far.
 
-        :param to_full: takes points of the working image to the full one.
+        :param to_full: takes points (n, 2) of the working image to the full one.
         """
         if len(self._kept) < 2:
             return CornerTracks.none()

@@ -403,7 +403,7 @@ class Turn:
         return projected(turned) * (a * self.zoom) - rays_b
 
     def refined(self, rays_a: Float64Array, rays_b: Float64Array, scale: float) -> Turn:
-        """Return the turn that most lines of sight (n, 2) agree with, from this one.
+        """Return the turn that most lines of sight, (n, 2) and (n, 2), agree with, from this one.
 
         :param scale: of the robust kernel at the end, radians; it begins eight times as wide.
         """

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
+from ....solver.measurements import SIGMA_3D
 from ...arrays import Float64Array, FloatArray
 from ..perception.landmark_network import KEYPOINT_NAMES
 from .weights import WEIGHTS
@@ -117,7 +118,10 @@ class Measurer:
             intrinsics=self.intrinsics,
             keypoints2d=Keypoints2D(self.indices, pixels, confidence * self.weight),
             keypoints3d=Keypoints3D(
-                self.lifted_indices, placed, self.lifted_weight * (DEPTH_SIGMA_M / sigma) ** 2
+                self.lifted_indices,
+                placed,
+                self.lifted_weight * (DEPTH_SIGMA_M / sigma) ** 2,
+                SIGMA_3D,
             ),
             orientation_field=OrientationField(
                 self.bone_starts,

@@ -143,6 +143,8 @@ def _film(path: Path, container: InputContainer) -> av.VideoStream:
 
     def rank(stream: av.VideoStream) -> tuple[bool, int, bool]:
         is_default = bool(stream.disposition & Disposition.default)
+        if not stream.codec_context:  # FFmpeg knows no decoder for it
+            return False, 0, is_default
         return stream.frames != 1, (stream.width or 0) * (stream.height or 0), is_default
 
     films = [s for s in container.streams.video if not s.disposition & Disposition.attached_pic]

@@ -153,6 +153,7 @@ def _fitted_plane(places: Float64Array, up: FloatArray) -> Plane:
 def with_feet(floor: Plane, places: Float64Array, soles: FloatArray, path: Float64Array) -> Plane:
     """Return the floor on which the feet walk as well, which may go farther than its corners.
 
+    :param places: (n, 3) of its corners.
     :param soles: (T, F, 3) metres, relative to the camera's centre.
     :param path: (T, 3) of the camera, in units.
     """

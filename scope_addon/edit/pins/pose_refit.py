@@ -133,6 +133,7 @@ class PoseRefit:
         tree = import_module(".tree", self._solver.__name__)
         self._tree = tree.with_fixed_shape(self._solver.make_tree(self.body), self.betas)
         self._options = _options(self._solver)
+        self._sigma_m = import_module(".measurements", self._solver.__name__).SIGMA_3D
         self._points = len(self.body.keypoint_names)
         self._priors: dict[tuple[str, ...], Priors] = {}
         self._limits = joint_limits.hinges_of(self.names)
@@ -206,7 +207,7 @@ class PoseRefit:
         if in_space:
             xyz = (np.array([points.values[k] for k in in_space]) - center) @ R_camera_world.T
             measured.keypoints3d = self._solver.Keypoints3D(
-                numbers[in_space], xyz, weights[in_space]
+                numbers[in_space], xyz, weights[in_space], self._sigma_m
             )
         if in_image and camera is not None:
             uv = np.array([points.values[k] for k in in_image])
