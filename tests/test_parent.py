@@ -117,7 +117,8 @@ import subprocess, sys, threading
 child = "from scope.scope_addon import parent\\nimport signal, sys\\n" \
     "parent.end_with_parent()\\nprint(1, flush=True)\\n" \
     "while not signal.getitimer(signal.ITIMER_REAL)[0]: pass\\n" \
-    "while signal.getitimer(signal.ITIMER_REAL)[0]: pass\\nprint(2, flush=True)"
+    "while signal.getitimer(signal.ITIMER_REAL)[0]: pass\\nprint(2, flush=True)\\n" \
+    "import time; time.sleep(600)"
 found = []
 def start():
     pipe = subprocess.PIPE

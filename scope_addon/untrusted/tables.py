@@ -72,8 +72,13 @@ def read_tables(path: Path, error: type[InputError], what: str, wanted: Collecti
         if zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as archive:
                 tables = _of_archive(archive, path, error, what, wanted)
-        else:
+        elif _begins_like_tables(path):
             tables = _of_stream(path)
+        else:
+            raise error(
+                f"{path} is not a readable {what} (it is no archive, array or pickle); choose "
+                "another file"
+            )
     except ModelFileError as cause:
         raise error(f"{path} cannot be used as a {what}: {cause}") from None
     except FileNotFoundError as cause:
@@ -132,6 +137,11 @@ def _put(tables: Table, key: str, value: Any) -> None:
     tables[last] = value
 
 
+def _begins_like_tables(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(8).startswith((np.lib.format.MAGIC_PREFIX, _ZIP, _ZLIB, *_PICKLES))
+
+
 def _of_stream(path: Path) -> Any:
     """Read a file that is no archive: an array of Python objects, or a pickle."""
     with path.open("rb") as file:
@@ -152,8 +162,6 @@ def _of_stream(path: Path) -> Any:
         data = unpacker.decompress(data, _LARGEST_PICKLE)
         if unpacker.unconsumed_tail:
             raise ModelFileError(f"it unpacks to more than {_LARGEST_PICKLE >> 20} MiB")
-    if not data.startswith(_PICKLES):
-        raise pickle.UnpicklingError("it is no archive, array or pickle")
     return _Plain().convert(_unpickled(data))
 
 

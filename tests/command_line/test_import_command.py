@@ -54,7 +54,7 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
     ("arguments", "status", "says"),
     [
         (["missing.npz"], 1, "does not exist"),
-        (["text.npz"], 1, "not a readable motion file"),
+        (["text.npz"], 1, "not a readable motion file (it is no archive, array or pickle)"),
         (["other.npz"], 1, "no SMPL-style motion"),
         (["walk.npz", "-o", "out.xyz"], 2, ".xyz"),
         (["walk.npz", "-o", "walk.npz"], 2, "is the input itself"),
