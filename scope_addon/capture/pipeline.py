@@ -20,6 +20,7 @@ from .stages.observe import Footage, Listeners, ObserveFrames, Watch, observe
 from .stages.repair import repair
 from .stages.report import make_report
 from .stages.solve import solve
+from .tracking.track import Track
 from .world.assemble import Shot
 from .world.camera_path import CameraPath
 
@@ -58,13 +59,17 @@ def capture(
         )
     with clock.stage("solver"):
         shot = shot_of(video, body, options, footage)
-        tracks = [replace(track, times=track.times / shot.speed) for track in tracks]
-        tracks = [repair(track, footage.camera) for track in tracks]
-        solved = solve(shot, tracks, progress, options.heights_m)
+        solved = solve(shot, repaired(shot, tracks), progress, options.heights_m)
         times_s = footage.timestamps / shot.speed
         motions = [replace(motion, timestamps=times_s) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))
+
+
+def repaired(shot: Shot, tracks: list[Track]) -> list[Track]:
+    """Return tracks by the clock of what was filmed, without what networks confuse."""
+    filmed = [replace(track, times=track.times / shot.speed) for track in tracks]
+    return [repair(track, shot.camera) for track in filmed]
 
 
 def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:

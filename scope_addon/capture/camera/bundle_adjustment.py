@@ -75,8 +75,8 @@ def _step(bundle: Bundle, fixed: int, scale: float, damping: float) -> Bundle | 
     points = bundle.points()
     residuals = projected(points) - bundle.rays
     weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / scale**2)
-    by_point = _projection_jacobian(points)  # (n, 2, 3)
-    by_pose = np.concatenate([-by_point @ _cross(points), by_point], axis=2)  # (n, 2, 6)
+    by_point = projection_jacobian(points)  # (n, 2, 3)
+    by_pose = np.concatenate([-by_point @ cross_matrices(points), by_point], axis=2)  # (n, 2, 6)
     by_place = by_point @ bundle.R[bundle.frame]  # (n, 2, 3)
     weighted_pose = by_pose * weight[:, None, None]
     weighted_place = by_place * weight[:, None, None]
@@ -135,8 +135,8 @@ def refine_pose(
         width = scale * max(1.0, 8.0 * 0.5**step)
         weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
         weight *= points[:, 2] > _NEAREST
-        by_point = _projection_jacobian(points)
-        by_pose = np.concatenate([-by_point @ _cross(points), by_point], axis=2)
+        by_point = projection_jacobian(points)
+        by_pose = np.concatenate([-by_point @ cross_matrices(points), by_point], axis=2)
         weighted = by_pose * weight[:, None, None]
         H = np.einsum("nki,nkj->ij", weighted, by_pose)
         g = np.einsum("nki,nk->i", weighted, residuals)
@@ -155,7 +155,7 @@ def projected(points: Float64Array) -> Float64Array:
     return flat
 
 
-def _projection_jacobian(points: Float64Array) -> Float64Array:
+def projection_jacobian(points: Float64Array) -> Float64Array:
     """Return the (n, 2, 3) derivatives of `projected` with respect to points (n, 3)."""
     x, y, z = points.T
     z = np.maximum(z, _NEAREST)
@@ -164,7 +164,7 @@ def _projection_jacobian(points: Float64Array) -> Float64Array:
     return np.stack(rows, axis=1)
 
 
-def _cross(points: Float64Array) -> Float64Array:
+def cross_matrices(points: Float64Array) -> Float64Array:
     """Return the (n, 3, 3) matrices [p]× of points (n, 3)."""
     x, y, z = points.T
     zero = np.zeros(len(points))

@@ -119,7 +119,7 @@ def _fit_shape(prepared: PreparedTrack, root_cam: FloatArray | None = None) -> C
     at = (lambda k: None) if root_cam is None else root_cam.__getitem__
     measurements = [
         prepared.measure(k, at(k))
-        for k in _spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)
+        for k in spread(np.flatnonzero(prepared.track.seen), SHAPE_FRAMES)
     ]
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(measurements))
     options = replace(ROBUST, stages=cold_stages(weights))
@@ -137,8 +137,8 @@ def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
     return stature_sigma(prepared.body, shape.beta, information, prepared.is_stature_given)
 
 
-def _spread(indices: IndexArray, count: int) -> IndexArray:
-    """Return at most ``count`` of the indices, evenly spread."""
+def spread(indices: IndexArray, count: int) -> IndexArray:
+    """Return at most ``count`` of indices (n,), evenly spread."""
     rows = np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
     chosen: IndexArray = indices[rows]
     return chosen

@@ -31,6 +31,7 @@ import numpy as np
 
 from ....solver.rotations import exp
 from ...arrays import BoolArray, Float64Array
+from ..camera.bundle_adjustment import cross_matrices, projected, projection_jacobian
 from .seen_person import BONE_ENDS, BONE_OF_ROW, BONE_STARTS, MIN_CONFIDENCE, SeenPerson
 
 KEYPOINT_SIGMA = 0.004  # of a keypoint, normalized image coordinates
@@ -84,16 +85,11 @@ class CameraPlace:
 
 @dataclass(frozen=True)
 class Bundle:
-    """Adjusted cameras, and the keypoints (N, n, 3) at times (N,) of the first camera's clock."""
+    """Adjusted cameras, the cost, and how many keypoints at least two cameras see."""
 
     cameras: list[CameraPlace]
-    lengths: Float64Array  # (B,) of the bones, metres
-    times: Float64Array
-    points: Float64Array
-    known: BoolArray  # (N, n) whether at least two cameras see the keypoint
-    # (V, N, n) distances from the rays, in standard deviations of a keypoint; NaN: not seen
-    residuals: Float64Array
     cost: float
+    known: int
 
 
 @dataclass(frozen=True)
@@ -121,7 +117,6 @@ def adjust(
     times: Float64Array,
     focal_sigma: Sequence[float],
     mean_lengths: Float64Array,
-    size_sigma: float = BONE_PRIOR,
 ) -> Bundle:
     """Adjust cameras to what they see of one person.
 
@@ -131,7 +126,7 @@ def adjust(
     :param focal_sigma: (V,) relative errors of the focal lengths; 0: they are known.
     :param mean_lengths: (B,) the bones of the mean body, or of one of the person's stature, metres.
     """
-    problem = _Problem(people, times, list(cameras), focal_sigma, mean_lengths, size_sigma)
+    problem = _Problem(people, times, list(cameras), focal_sigma, mean_lengths)
     start = triangulate(*problem.observed(cameras), cameras)
     now = _Unknowns(list(cameras), mean_lengths.copy(), start)
     damping = 1e-3
@@ -250,14 +245,12 @@ class _Problem:
         start: list[CameraPlace],
         focal_sigma: Sequence[float],
         mean_lengths: Float64Array,
-        size_sigma: float,
     ) -> None:
         self.people = people
         self.times = times
         self.start = start
         self.focal_sigma = focal_sigma
         self.mean_lengths = mean_lengths
-        self.size_sigma = size_sigma
         of_cameras = np.ones((len(people), _UNKNOWNS), bool)
         of_cameras[0, :_FOCAL] = False
         of_cameras[0, _CLOCK] = False
@@ -283,7 +276,7 @@ class _Problem:
         rays, confidence = self.observed(now.cameras)
         total = self._prior_cost(now)
         for ray, weight, place in zip(rays, confidence, now.cameras, strict=True):
-            residual, depth = _residual(ray, place, now.points)
+            residual, depth = image_residual(ray, place, now.points)
             square = np.square(residual).sum(axis=-1) / KEYPOINT_SIGMA**2
             square = np.where(depth > NEAREST_M, square, 1e4)
             total += float((weight * np.log1p(square)).sum())
@@ -293,7 +286,7 @@ class _Problem:
         return total + float((weight * np.log1p(np.square(stretch / BONE_SIGMA_M))).sum())
 
     def _prior_cost(self, now: _Unknowns) -> float:
-        lengths = np.log(now.lengths / self.mean_lengths) / self.size_sigma
+        lengths = np.log(now.lengths / self.mean_lengths) / BONE_PRIOR
         total = float(np.square(lengths).sum())
         for place, start, sigma in zip(now.cameras, self.start, self.focal_sigma, strict=True):
             total += ((place.offset_s - start.offset_s) / _CLOCK_SIGMA_S) ** 2
@@ -316,7 +309,7 @@ class _Problem:
         for v, place in enumerate(now.cameras):
             own = slice(v * _UNKNOWNS, (v + 1) * _UNKNOWNS)
             speed = self._speed(v, place).reshape(-1, 2)
-            residual, depth = _residual(rays[v].reshape(-1, 2), place, flat)
+            residual, depth = image_residual(rays[v].reshape(-1, 2), place, flat)
             square = np.square(residual).sum(axis=-1) / KEYPOINT_SIGMA**2
             weight = (
                 confidence[v].ravel() * (depth > NEAREST_M) / (1.0 + square) / KEYPOINT_SIGMA**2
@@ -409,7 +402,7 @@ class _Problem:
                 diagonal[focal] = 1.0 / self.focal_sigma[v] ** 2
                 pull[focal] = place.log_focal
         lengths = slice(len(now.cameras) * _UNKNOWNS, None)
-        diagonal[lengths] = 1.0 / self.size_sigma**2
+        diagonal[lengths] = 1.0 / BONE_PRIOR**2
         pull[lengths] = np.log(now.lengths / self.mean_lengths)
         H_global += np.diag(diagonal) / _INDEPENDENT
         g_global += diagonal * pull / _INDEPENDENT
@@ -425,20 +418,10 @@ class _Problem:
         return speed
 
     def result(self, now: _Unknowns, cost: float) -> Bundle:
-        """Return cameras with their deviations, and points with their residuals."""
+        """Return cameras with their deviations."""
         count = len(now.cameras)
         sigmas = self.linearize(now).sigmas()[: count * _UNKNOWNS].reshape(count, _UNKNOWNS)
-        rays, confidence = self.observed(now.cameras)
-        residuals = np.array(
-            [
-                np.where(
-                    weight > 0,
-                    np.linalg.norm(_residual(ray, place, now.points)[0], axis=-1),
-                    np.nan,
-                )
-                for ray, weight, place in zip(rays, confidence, now.cameras, strict=True)
-            ]
-        )
+        _, confidence = self.observed(now.cameras)
         cameras = [
             replace(
                 place,
@@ -449,20 +432,18 @@ class _Problem:
             )
             for place, sigma in zip(now.cameras, sigmas, strict=True)
         ]
-        known = (confidence > 0).sum(axis=0) >= 2
-        return Bundle(
-            cameras, now.lengths, self.times, now.points, known, residuals / KEYPOINT_SIGMA, cost
-        )
+        return Bundle(cameras, cost, int((confidence > 0).any(axis=0).sum()))
 
 
-def _residual(
+def image_residual(
     rays: Float64Array, place: CameraPlace, points: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Return the residuals (..., 2) of points, and their depths (...,)."""
+    """Return the residuals (..., 2) of points, and their depths (...).
+
+    :param rays: (..., 2) normalized image coordinates. :param points: (..., 3) first camera's axes.
+    """
     seen = place.of(points)
-    depth = np.maximum(seen[..., 2], 1e-3)
-    image = np.exp(place.log_focal) * seen[..., :2] / depth[..., None]
-    return image - rays, seen[..., 2]
+    return np.exp(place.log_focal) * projected(seen) - rays, seen[..., 2]
 
 
 def _derivatives(
@@ -473,22 +454,11 @@ def _derivatives(
     A step w of the rotation moves a point y in the camera's axes to exp(w) y, so it adds w x y.
     """
     seen = place.of(points)
-    depth = np.maximum(seen[:, 2], 1e-3)
     scale = np.exp(place.log_focal)
-    J_seen = np.zeros((len(points), 2, 3))
-    J_seen[:, 0, 0] = scale / depth
-    J_seen[:, 1, 1] = scale / depth
-    J_seen[:, :, 2] = -scale * seen[:, :2] / np.square(depth)[:, None]
-    x, y, z = seen.T
-    zero = np.zeros_like(x)
-    # The matrix of w -> w x y.
-    turned = np.empty((len(points), 3, 3))
-    turned[:, 0] = np.stack([zero, z, -y], axis=1)
-    turned[:, 1] = np.stack([-z, zero, x], axis=1)
-    turned[:, 2] = np.stack([y, -x, zero], axis=1)
+    J_seen = scale * projection_jacobian(seen)
     J_camera = np.zeros((len(points), 2, _UNKNOWNS))
-    J_camera[:, :, :3] = J_seen @ turned
+    J_camera[:, :, :3] = -J_seen @ cross_matrices(seen)
     J_camera[:, :, 3:6] = J_seen
-    J_camera[:, :, _FOCAL] = scale * seen[:, :2] / depth[:, None]
+    J_camera[:, :, _FOCAL] = scale * projected(seen)
     J_camera[:, :, _CLOCK] = -speed
     return J_seen @ place.R_camera_first, J_camera

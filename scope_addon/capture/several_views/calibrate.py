@@ -16,10 +16,11 @@ import numpy as np
 from ....solver.rotations import exp
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.runs import runs
-from .bundle import KEYPOINT_SIGMA, Bundle, CameraPlace, adjust, triangulate
+from ..fitting.track_fit import spread
+from .bundle import KEYPOINT_SIGMA, CameraPlace, adjust, image_residual, triangulate
 from .first_places import first_place
 from .seen_person import SeenPerson
-from .synchronize import Offset, offset_between
+from .synchronize import offset_between
 
 LONGEST_OFFSET_S = 60.0
 _PAIR_FRAMES = 80  # of a clip that two cameras are adjusted to
@@ -42,21 +43,18 @@ class Calibration:
     # (V,) the number of the first camera's most prominent person in each camera
     main: list[int | None]
     is_offset_certain: list[bool]  # (V,)
-    bundle: Bundle | None  # of the cameras with a place; None if no other has one
 
 
 def calibrate(
     people: Sequence[Sequence[SeenPerson]],
     focal_sigma: Sequence[float],
     mean_lengths: Float64Array,
-    offsets_s: Sequence[float | None],
 ) -> Calibration:
     """Find clocks and places of all cameras.
 
     :param people: (V,) of each camera, the people that it shows, the most prominent one first.
     :param focal_sigma: (V,) relative errors of focal lengths; 0: they are given.
     :param mean_lengths: (B,) bones of the mean body, metres.
-    :param offsets_s: (V,) offsets of clocks that are known; None: they are looked for.
     """
     first = people[0][0]
     places: list[CameraPlace | None] = [CameraPlace.first()]
@@ -67,7 +65,7 @@ def calibrate(
         found = [
             (pair, number)
             for number, person in enumerate(people[v])
-            if (pair := _pair(first, person, sigma, mean_lengths, offsets_s[v])) is not None
+            if (pair := _pair(first, person, sigma, mean_lengths)) is not None
         ]
         best, number = min(found, key=lambda each: each[0].cost, default=(None, None))
         places.append(best.place if best is not None else None)
@@ -75,7 +73,7 @@ def calibrate(
         certain.append(best.is_offset_certain if best is not None else False)
     used = [v for v, place in enumerate(places) if place is not None]
     if len(used) < 2:
-        return Calibration(places, main, certain, None)
+        return Calibration(places, main, certain)
     bundle = adjust(
         [people[v][main[v] or 0] for v in used],
         [place for place in places if place is not None],
@@ -85,7 +83,7 @@ def calibrate(
     )
     for v, place in zip(used, bundle.cameras, strict=True):
         places[v] = place
-    return Calibration(places, main, certain, bundle)
+    return Calibration(places, main, certain)
 
 
 @dataclass(frozen=True)
@@ -102,10 +100,8 @@ def _pair(
     second: SeenPerson,
     focal_sigma: tuple[float, float],
     mean_lengths: Float64Array,
-    offset_s: float | None,
 ) -> _Pair | None:
-    offset = Offset(offset_s, True) if offset_s is not None else None
-    offset = offset or offset_between(first, second, LONGEST_OFFSET_S)
+    offset = offset_between(first, second, LONGEST_OFFSET_S)
     if offset is None:
         return None
     shared = _shared_times(first, second, offset.seconds)
@@ -124,7 +120,7 @@ def _pair(
         for turn in _TURNS
     ]
     best = min(adjusted, key=lambda bundle: bundle.cost)
-    return _Pair(best.cameras[1], offset.is_certain, best.cost / max(int(best.known.sum()), 1))
+    return _Pair(best.cameras[1], offset.is_certain, best.cost / max(best.known, 1))
 
 
 def _turned(place: CameraPlace, point: Float64Array, angle: float) -> CameraPlace:
@@ -135,9 +131,7 @@ def _turned(place: CameraPlace, point: Float64Array, angle: float) -> CameraPlac
 
 def _times(person: SeenPerson, most: int) -> Float64Array:
     """Return at most so many times at which the person is seen, evenly spread."""
-    seen = np.flatnonzero(person.seen)
-    rows = np.unique(np.linspace(0, len(seen) - 1, min(most, len(seen))).round().astype(int))
-    times: Float64Array = person.times[seen[rows]]
+    times: Float64Array = person.times[spread(np.flatnonzero(person.seen), most)]
     return times
 
 
@@ -194,11 +188,8 @@ def _apart(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
 
 def _distance(person: SeenPerson, camera: CameraPlace, points: Float64Array) -> Float64Array:
     """Return the distances (N, n) of points from a person's rays, in standard deviations."""
-    seen = camera.of(points)
-    depth = np.maximum(seen[..., 2:], 1e-3)
-    image = np.exp(camera.log_focal) * seen[..., :2] / depth
-    distance: Float64Array = np.linalg.norm(image - person.rays, axis=-1) / KEYPOINT_SIGMA
-    return np.where(seen[..., 2] > 0, distance, np.inf)
+    residual, depth = image_residual(person.rays, camera, points)
+    return np.where(depth > 0, np.linalg.norm(residual, axis=-1) / KEYPOINT_SIGMA, np.inf)
 
 
 def contradicting_spans(

@@ -23,10 +23,9 @@ from ..fitting.prepared_track import prepare_track
 from ..media.video import Video, open_video
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..pipeline import Capture, shot_of
+from ..pipeline import Capture, repaired, shot_of
 from ..stages.clock import Progress, StageClock
 from ..stages.observe import Footage, Listeners, Watch, observe
-from ..stages.repair import repair
 from ..stages.report import make_report
 from ..stages.solve import progress_of_person, solve_people
 from ..tracking.track import Track
@@ -86,7 +85,6 @@ def capture_views(
             [view.people for view in views],
             [view.camera.focal_deviation for view in views],
             bone_lengths(_rest_keypoints(body, options)),
-            [None] * len(views),
         )
         first = views[0]
         camera = with_focal_scale(first.camera, calibration.places[0] or CameraPlace.first())
@@ -147,9 +145,7 @@ def _observe_view(
             "or capture this video alone"
         )
     with clock.stage("solver"):
-        speed = shot_of(video, body, options, footage).speed
-        tracks = [replace(track, times=track.times / speed) for track in tracks]
-        tracks = [repair(track, footage.camera) for track in tracks]
+        tracks = repaired(shot_of(video, body, options, footage), tracks)
         people = [
             seen_person(prepare_track(body, track, footage.camera, None, False), footage.camera)
             for track in tracks

@@ -30,7 +30,7 @@ from ..world.assemble import Shot
 from ..world.placement import PlacedTrack
 from ..world.stance import stance_on_ground
 from .bundle import CameraPlace
-from .seen_person import LONGEST_GAP_S
+from .seen_person import Between
 
 # Of a bone's length as cameras together tell it: with 1 cm, outlines of clothes move the errors of
 # two phones by 2 mm, with 3 mm by 0.4.
@@ -51,27 +51,16 @@ def track_at(track: Track, times: Float64Array) -> Track:
     """Return a track at other times (n,) of its own clock: keypoints by linear interpolation, the
     rest of the nearest frame, and nothing of hands, face and masks.
     """
-    own = np.asarray(track.times, float)
-    after = np.clip(np.searchsorted(own, times), 1, max(len(own) - 1, 1))
-    before = after - 1
-    after = np.minimum(after, len(own) - 1)
-    gap = own[after] - own[before]
-    share = (times - own[before]) / np.maximum(gap, 1e-9)
-    seen = track.seen[before] & track.seen[after] & (gap <= LONGEST_GAP_S)
-    seen &= (share >= -1e-9) & (share <= 1.0 + 1e-9)
-    share = np.clip(share, 0.0, 1.0)
-    pixels = (1.0 - share[:, None, None]) * track.keypoints_px[before]
-    pixels = pixels + share[:, None, None] * track.keypoints_px[after]
-    nearest = np.where(share < 0.5, before, after)
-    confidence = np.minimum(track.confidence[before], track.confidence[after]) * seen[:, None]
+    between = Between.of(np.asarray(track.times, float), track.seen, times)
+    nearest = np.where(between.share < 0.5, between.before, between.after)
     return Track(
         frames=np.arange(len(times)),
         times=times,
-        seen=seen,
-        keypoints_px=pixels,
-        confidence=confidence,
-        world_landmarks=track.world_landmarks[nearest] * seen[:, None, None],
-        acquired=track.acquired[nearest] & seen,
+        seen=between.seen,
+        keypoints_px=between.mixed(track.keypoints_px),
+        confidence=between.least(track.confidence),
+        world_landmarks=track.world_landmarks[nearest] * between.seen[:, None, None],
+        acquired=track.acquired[nearest] & between.seen,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import BoolArray, Float64Array
+from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..camera.intrinsics import Camera
 from ..fitting.frame_measurements import place
 from ..fitting.prepared_track import PreparedTrack
@@ -48,6 +48,48 @@ LONGEST_GAP_S = 0.12  # between two frames between which keypoints are interpola
 
 
 @dataclass(frozen=True)
+class Between:
+    """Where times (n,) lie between the frames of a camera that sees a person."""
+
+    before: IndexArray  # (n,) the frame before
+    after: IndexArray  # (n,) the frame after
+    share: Float64Array  # (n,) 0..1 from the one to the other
+    # (n,) whether the person is seen in both, and they are at most `LONGEST_GAP_S` apart; False
+    # before the first frame and after the last one
+    seen: BoolArray
+
+    @classmethod
+    def of(cls, own: Float64Array, seen: BoolArray, times: Float64Array) -> Between:
+        """Look up times among those of the frames.
+
+        :param own: (T,) times of the frames. :param seen: (T,) whether the person is seen.
+        :param times: (n,).
+        """
+        after = np.clip(np.searchsorted(own, times), 1, max(len(own) - 1, 1))
+        before = after - 1
+        after = np.minimum(after, len(own) - 1)
+        gap = own[after] - own[before]
+        share = (times - own[before]) / np.maximum(gap, 1e-9)
+        both: BoolArray = seen[before] & seen[after] & (gap <= LONGEST_GAP_S)
+        both &= (share >= -1e-9) & (share <= 1 + 1e-9)
+        return cls(before, after, np.clip(share, 0.0, 1.0), both)
+
+    def mixed(self, values: FloatArray) -> Float64Array:
+        """Return values (T, ...) at the times (n, ...), by linear interpolation."""
+        share: Float64Array = self.share.reshape(-1, *[1] * (values.ndim - 1))
+        of_frames = np.asarray(values, np.float64)
+        mixed: Float64Array = (1.0 - share) * of_frames[self.before]
+        mixed += share * of_frames[self.after]
+        return mixed
+
+    def least(self, confidence: FloatArray) -> Float64Array:
+        """Return the lower confidence (n, ...) of both frames, of (T, ...); 0 where not seen."""
+        least = np.minimum(confidence[self.before], confidence[self.after])
+        of_seen: Float64Array = least * self.seen[:, None]
+        return of_seen
+
+
+@dataclass(frozen=True)
 class SeenPerson:
     """A person in T frames of a camera, by the clock of its file. n keypoints, see `KEYPOINTS`."""
 
@@ -64,24 +106,10 @@ class SeenPerson:
         Times before the first frame, after the last one, in gaps of more than `LONGEST_GAP_S`, or
         beside a frame in which the person is not seen are those of an unseen person.
         """
-        after = np.clip(np.searchsorted(self.times, times), 1, max(len(self.times) - 1, 1))
-        before = after - 1
-        after = np.minimum(after, len(self.times) - 1)
-        gap = self.times[after] - self.times[before]
-        share = (times - self.times[before]) / np.maximum(gap, 1e-9)
-        seen = self.seen[before] & self.seen[after] & (gap <= LONGEST_GAP_S)
-        seen &= (share >= -1e-9) & (share <= 1 + 1e-9)
-        share = np.clip(share, 0.0, 1.0)
-
-        def mixed(values: Float64Array) -> Float64Array:
-            weight = share.reshape(-1, *[1] * (values.ndim - 1))
-            both: Float64Array = (1.0 - weight) * values[before] + weight * values[after]
-            return both
-
-        confidence = np.minimum(self.confidence[before], self.confidence[after]) * seen[:, None]
-        return SeenPerson(
-            times, seen, mixed(self.rays), confidence, mixed(self.points), mixed(self.root)
-        )
+        between = Between.of(self.times, self.seen, times)
+        confidence = between.least(self.confidence)
+        rays, points, root = map(between.mixed, (self.rays, self.points, self.root))
+        return SeenPerson(times, between.seen, rays, confidence, points, root)
 
 
 def bone_lengths(keypoints: Float64Array) -> Float64Array:

@@ -115,7 +115,7 @@ def test_gradient_is_that_of_the_cost():
     people = [seen(CameraPlace.first(), points, 30.0), seen(beside(70.0), points, 30.0)]
     places = [CameraPlace.first(), replace(beside(65.0), log_focal=0.05, offset_s=0.01)]
     times = people[0].times[10:40:10]
-    problem = bundle._Problem(people, times, places, [0.1, 0.1], 1.1 * mean_lengths(), 0.07)
+    problem = bundle._Problem(people, times, places, [0.1, 0.1], 1.1 * mean_lengths())
     rng = np.random.default_rng(0)
     start = np.array([points(time_s) for time_s in times]) + rng.normal(0, 0.03, (3, 16, 3))
     now = bundle._Unknowns(places, mean_lengths(), start)
@@ -141,7 +141,7 @@ def test_cameras_are_found_from_the_people(degrees):
     points = moving_points()
     truth = replace(beside(degrees, 5.0), offset_s=0.42, log_focal=0.08)
     people = [[seen(CameraPlace.first(), points, 30.0)], [seen(truth, points, 59.94, seed=2)]]
-    found = calibrate(people, [0.0, 0.2], mean_lengths(), [None, None])
+    found = calibrate(people, [0.0, 0.2], mean_lengths())
     place = found.places[1]
     assert angle_deg(place.R_camera_first, truth.R_camera_first) < 1.0
     assert place.offset_s == pytest.approx(0.42, abs=0.008)
@@ -175,7 +175,7 @@ def test_people_are_recognized_by_where_they_are():
     first = [seen(CameraPlace.first(), each, 30.0) for each in (left, right)]
     second = [seen(truth, each, 30.0, seed=5) for each in (right, left)]
     people = [first, second]
-    found = calibrate(people, [0.0, 0.0], mean_lengths(), [None, None])
+    found = calibrate(people, [0.0, 0.0], mean_lengths())
     assert found.main == [0, 1]
     assert same_people(people, found) == [[0, 1], [1, 0]]
 
@@ -187,7 +187,7 @@ def test_somebody_else_is_nobody_in_the_other_camera():
         [seen(CameraPlace.first(), each, 30.0) for each in (left, right)],
         [seen(truth, left, 30.0, seed=5)],
     ]
-    found = calibrate(people, [0.0, 0.0], mean_lengths(), [None, 0.0])
+    found = calibrate(people, [0.0, 0.0], mean_lengths())
     assert same_people(people, found) == [[0, 0], [1, None]]
 
 
