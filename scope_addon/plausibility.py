@@ -6,7 +6,7 @@ footage itself says nothing. Numpy only.
   image, as if it had been solved in front of the body and then behind it;
 - lean: the weight is held beside the feet for seconds, where anybody would fall;
 - floating: both feet are above the floor for longer than a jump takes;
-- bent knees: somebody who stands or walks never straightens a knee. This is of the whole clip.
+- bent knees: somebody who stands or walks does not straighten a knee once in the whole clip.
 
 They may be true: of a punch, of somebody who is held or hangs, of a crouch.
 """

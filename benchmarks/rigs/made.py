@@ -183,7 +183,8 @@ def _part(rig: bpy.types.Object, row: _Row, vertices: list[Vector]) -> bpy.types
 
 def _box(kind: RigKind, row: _Row) -> list[Vector]:
     """Return the eight corners of a bone's box; those of feet stand on the floor."""
-    head, end = row.head, row.end
+    head = row.head
+    end = row.end
     if row.place in ("ankle", "ball"):
         floor = kind.lift
         back = _place(kind, "heel", row.side) if row.place == "ankle" else head

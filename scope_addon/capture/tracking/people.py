@@ -196,7 +196,7 @@ MIN_SHARE = 0.02  # of the frames; a person who was seen in fewer is a mistake o
 MIN_INTERVAL_S = 0.3  # the same for the longest time without interruption
 MIN_PROMINENCE = 0.05  # of the most prominent person's
 # Speed of hands and feet, in sides of the region per second, from which somebody counts as moving
-# throughout: half that of walking. Who sits or stands and watches has less than 0.05.
+# throughout: half that of walking. People who sit or stand and watch have less than 0.05.
 ACTIVE = 0.2
 _ACTIVITY_STEP_S = 0.3
 _LIMB_ENDS = [15, 16, 27, 28]  # wrists and ankles

@@ -2,7 +2,7 @@
 """The scale of a camera's path, which the background shows up to scale: from people on the floor.
 
 Where the map of the background has a floor, its distance below the camera is known twice: in units
-of the path, and in metres from the feet of somebody of known size who stands on it. Their ratio
+of the path, and in metres from the feet of a person of known size on it. The ratio of the two
 does not depend on how long strides are, which are seen too short where people walk along the line
 of sight. Without a floor, the scale is that with which one foot is at rest most of the time.
 """
