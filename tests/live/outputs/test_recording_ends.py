@@ -25,6 +25,7 @@ from scope.scope_addon.live.outputs.people_recording import (
     unfinished_recording,
 )
 from scope.scope_addon.motion import Motion
+from scope.solver.body_file import load_body
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp
 
@@ -312,19 +313,23 @@ def test_the_command_finishes_the_recording_however_its_capture_ends(
     assert [file.name for file in path.parent.iterdir()] == ["take.npz"]
 
 
+def is_whole(path):
+    """Whether all poses are in a recording on the disk."""
+    about = read_about(path)
+    return len(read_records(path, about, load_body(about.body))) == POSES
+
+
 KILLED = """
-import os, signal, sys, threading
+import os, signal, sys, time
 import pytest
 from scope.scope_addon.cli import SAMPLE, main
 from scope.tests.live.outputs import test_recording_ends as tests
 def end():
-    while not list(tests.Path(sys.argv[2]).parent.glob("*.recording")):
-        pass
-    for thread in threading.enumerate():
-        if thread.name == "scope-recording":
-            journal = thread._target.__self__
-            while journal._waiting.qsize() or len(journal._records) < tests.POSES:
-                pass
+    left = tests.Path(sys.argv[2]).with_suffix(".recording")
+    for _ in range(6000):
+        if tests.is_whole(left):
+            break
+        time.sleep(0.01)
     os.kill(os.getpid(), signal.SIGKILL)
 with pytest.MonkeyPatch.context() as patch:
     tests.fake_run(patch, end)
