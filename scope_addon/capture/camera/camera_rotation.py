@@ -85,6 +85,7 @@ class BackgroundTracker:
         people: Sequence[NDArray[Any]],
         is_cut: bool = False,
         is_sampled: bool = False,
+        is_shared: bool = False,
     ) -> None:
         """Process the next frame.
 
@@ -95,6 +96,7 @@ class BackgroundTracker:
             unchanged.
         :param is_sampled: whether the rotation is to be estimated in this frame even if the last
             estimate is recent.
+        :param is_shared: whether another window has the frame as well.
         """
         self._times.append(time_s)
         row = len(self._times) - 1
@@ -112,7 +114,7 @@ class BackgroundTracker:
         boxes = [self._box(surroundings(points)) for points in people] + [
             self._box(bar) for bar in self.bars
         ]
-        self._corners.add(row, time_s, image, boxes, is_cut)
+        self._corners.add(row, time_s, image, boxes, is_cut, is_shared)
         if self._image is None:
             self._begin_key(image, boxes)
             self._rotations.append(np.eye(3))

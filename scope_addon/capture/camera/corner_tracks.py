@@ -84,12 +84,15 @@ class CornerFollower:
         image: Uint8Array,
         boxes: Sequence[Float64Array],
         is_cut: bool,
+        is_shared: bool = False,
     ) -> None:
         """Follow the corners to the next image.
 
         :param row: the number of the frame.
         :param image: (H, W) grey.
         :param boxes: (n, 4) what is not background: x0, y0, x1, y1 each, in pixels of the image.
+        :param is_shared: whether the frame is kept in any case, because the corners of another
+            window are kept in it: frames with corners of both windows link these.
         """
         if is_cut:
             self._points = self._points[:0]
@@ -98,7 +101,7 @@ class CornerFollower:
             self._follow(image, boxes)
         self._image = image
         is_short = len(self._points) < REPLENISHED_SHARE * MAX_CORNERS
-        if self._has_moved(time_s) or is_cut or not self._kept:
+        if is_shared or self._has_moved(time_s) or is_cut or not self._kept:
             if is_short:
                 self._replenish(image, boxes)
             self._kept.append((row, self._numbers, self._points))

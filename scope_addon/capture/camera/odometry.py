@@ -8,7 +8,8 @@ frames give a map: places of corners, from two lines of sight each. From there o
 is placed by the corners whose places are known (`_place`), new corners are placed by frames that
 see them from far enough apart, and the last frames are adjusted with all their corners
 (`bundle_adjustment`). Where too few corners of the map are left, another map begins, at another
-scale: a part of the path.
+scale. Frames that both maps place tell how the second one lies in the first; without them, the path
+has another part.
 
 Sources: Nistér 2004 (essential matrix from five points), Triggs et al. 2000 (bundle adjustment).
 """
@@ -53,6 +54,8 @@ ADJUSTED_EVERY = 6
 # Frames between the two that begin a map.
 PAIRS = np.array([2, 4, 7, 10, 13, 16, 20, 25, 31, 40, 50])
 NEXT_START = 4  # frames from one that begins no map to the next one that is tried
+COMMON = (4, 30)  # least and most frames that both of two maps place
+MAX_COMMON_OFF = 0.15  # between their paths there, relative to the first one's
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,17 @@ class _Part:
         """One more than the number of the last sighting."""
         return self.first + len(self.R)
 
+    @property
+    def centers(self) -> Float64Array:
+        """The camera's places (n, 3)."""
+        centers: Float64Array = -np.einsum("nji,nj->ni", self.R, self.t)
+        return centers
+
+    def since(self, first: int) -> _Part:
+        """Return the part without the sightings before a number."""
+        left_out = max(0, first - self.first)
+        return _Part(self.first + left_out, self.R[left_out:], self.t[left_out:], self.places)
+
 
 class _Tracker:
     """Places the frames of a clip, one after another."""
@@ -174,10 +188,18 @@ class _Tracker:
                 start += NEXT_START
                 continue
             part = self._part(*pair)
-            self._extend_backwards(part, parts[-1].end if parts else 0)
+            before = parts[-1] if parts else None
+            earliest = 0 if before is None else max(before.first, before.end - COMMON[1])
+            self._extend_backwards(part, earliest)
             part.places = self._places[~np.isnan(self._places[:, 0])]
-            parts.append(part)
             start = max(part.end - 1, pair[1])
+            continued = None if before is None else _continued(before, part)
+            if before is None:
+                parts.append(part)
+            elif continued is None:
+                parts.append(part.since(before.end - 1))
+            else:
+                parts[-1] = continued
         return parts
 
     def _first_pair(self, a: int) -> tuple[int, int, Float64Array, Float64Array] | None:
@@ -444,6 +466,43 @@ def _agrees(
     error = np.linalg.norm(projected(points) - rays, axis=1)
     agree: BoolArray = (points[:, 2] > 0) & (error < tolerance)
     return agree
+
+
+def _continued(before: _Part, after: _Part) -> _Part | None:
+    """Return two successive parts as one in the axes and units of the first; None where they do not
+    place the same frames, or place them differently.
+
+    The second map lies in the first by p = s G p' + b. In the frames that both have placed, G is
+    the mean of R^T R', and s the ratio of the paths' extents there. In these frames, the path goes
+    over evenly from one to the other.
+    """
+    common = before.end - after.first
+    if common < COMMON[0]:
+        return None
+    kept = before.R[-common:]
+    U, _, Vt = np.linalg.svd(np.einsum("nji,njk->ik", kept, after.R[:common]))
+    U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
+    G = U @ Vt
+    center = before.centers[-common:]
+    center_after = after.centers @ G.T
+    way = center - center.mean(axis=0)
+    way_after = center_after[:common] - center_after[:common].mean(axis=0)
+    length = np.linalg.norm(way)
+    scale = length / max(float(np.linalg.norm(way_after)), 1e-12)
+    if np.linalg.norm(way - scale * way_after) > MAX_COMMON_OFF * length:
+        return None
+    moved = center.mean(axis=0) - scale * center_after[:common].mean(axis=0)
+    R = after.R @ G.T
+    centers = scale * center_after + moved
+    share = np.arange(1, common + 1)[:, None] / (common + 1)
+    R[:common] = kept @ exp(share * log(np.swapaxes(kept, 1, 2) @ R[:common]))
+    centers[:common] = center + share * (centers[:common] - center)
+    return _Part(
+        before.first,
+        np.concatenate([before.R[:-common], R]),
+        np.concatenate([before.t[:-common], -np.einsum("nij,nj->ni", R, centers)]),
+        np.concatenate([before.places, scale * after.places @ G.T + moved]),
+    )
 
 
 def _joined(

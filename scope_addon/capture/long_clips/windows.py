@@ -152,7 +152,9 @@ class WindowRun:
         image = np.ascontiguousarray(frame.image_rgb)
         self._checksums.append(zlib.crc32(image.data) if is_shared else 0)
         self._first += not is_own
-        observations = self._observer.add(frame, upcoming, counts=is_own, is_sampled=is_anchor)
+        observations = self._observer.add(
+            frame, upcoming, counts=is_own, is_sampled=is_anchor, is_shared=is_shared
+        )
         if is_anchor:
             self._anchor_regions = {number: each.region for number, each in observations}
         return largest_person(observations)

@@ -221,13 +221,19 @@ class FrameObserver:
         self._following: Future[None] | None = None
 
     def add(
-        self, frame: Frame, upcoming: Frame | None, counts: bool = True, is_sampled: bool = False
+        self,
+        frame: Frame,
+        upcoming: Frame | None,
+        counts: bool = True,
+        is_sampled: bool = False,
+        is_shared: bool = False,
     ) -> list[tuple[int, Observation]]:
         """Observe the next frame, and return tracklet number and observation of each person.
 
         :param upcoming: the frame after it; None at the end of the clip.
         :param counts: whether the frame counts in the schedule of the masks and among the cuts.
         :param is_sampled: whether the camera's rotation has to be estimated in this frame.
+        :param is_shared: whether another window has the frame as well.
         """
         time_s = frame.timestamp_s
         row = len(self.timestamps)
@@ -254,7 +260,13 @@ class FrameObserver:
         with self._clock.stage("background"):
             self._wait_for_background()
             self._following = self._pool.submit(
-                self.background.add, frame.image_rgb, time_s, people_px, is_cut, is_sampled
+                self.background.add,
+                frame.image_rgb,
+                time_s,
+                people_px,
+                is_cut,
+                is_sampled,
+                is_shared,
             )
         return observations
 

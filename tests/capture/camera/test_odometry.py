@@ -144,6 +144,25 @@ def test_windows_that_overlap_share_the_corners_of_common_frames():
     assert (np.diff(joined.numbers[both]) > 0).all()
 
 
+def test_maps_without_common_corners_are_one_by_the_frames_that_both_place():
+    """All corners are lost, and others are followed, which are farther away: the few frames that
+    have both do not tell where these are.
+    """
+    places = street(np.random.default_rng(0))
+    center = TIMES[:, None] * [0.5, 0.0, -0.5]
+    R = np.tile(np.eye(3), (T, 1, 1))
+    whole = seen(places, R, center)
+    early = whole.rows < 34
+    late = (whole.rows >= 30) & (places[whole.numbers, 2] > 12.0)
+    first = CornerTracks(whole.rows[early], whole.numbers[early], whole.points_px[early])
+    second = CornerTracks(whole.rows[late], whole.numbers[late], whole.points_px[late])
+    corners = joined_corners([first, second.shifted(0, first.count)])
+    found = travel_of(corners, R, TIMES, camera(), WIDTH)
+    assert (found.part == 0).all()
+    off = np.linalg.norm(aligned(found.center, center) - center, axis=1)
+    assert off.max() < 0.04 * np.linalg.norm(center[-1])
+
+
 def test_an_adjusted_bundle_is_the_true_one():
     rng = np.random.default_rng(4)
     frames, corners = 8, 60
