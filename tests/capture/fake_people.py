@@ -118,6 +118,9 @@ class FakeDetector:
     def detect_in_parts(self, image: np.ndarray) -> list[Detection]:
         return []
 
+    def detect_turned(self, image: np.ndarray) -> list[Detection]:
+        return []
+
 
 class FakeLandmarks:
     def __init__(self, people: list[Person], is_reliable: bool = False) -> None:

@@ -97,6 +97,24 @@ def test_a_lost_person_is_found_again(own_networks: tuple[Path, Path]) -> None:
     assert after[0][0][1].region.resembles(before[-1][0][1].region, 0.15)
 
 
+@pytest.mark.parametrize("quarter_turns", [1, 2, 3])
+def test_a_detector_of_upright_boxes_finds_people_who_are_not_upright(
+    own_networks: tuple[Path, Path], frames: Frames, quarter_turns: int
+) -> None:
+    """Boxes do not say which way up a person is; the built-in detector does, and is the truth."""
+    theirs = PeopleTracker("fast", 1, detector=own_networks[0])
+    ours = PeopleTracker("fast", 1)
+    for clip in ("clips/squats_5fps", "clips/gesture_square", "people/inputs/labval_squat"):
+        theirs.reset()
+        ours.reset()
+        for image in frames(clip, stop=3):
+            turned = np.ascontiguousarray(np.rot90(image, quarter_turns))
+            ((_, expected),) = ours.step(turned)
+            ((_, found),) = theirs.step(turned)
+            off_px = np.linalg.norm(found.keypoints_px - expected.keypoints_px, axis=1)
+            assert off_px.mean() < 0.02 * expected.region.side_px
+
+
 def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path: Path) -> None:
     """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly
     visible.

@@ -52,6 +52,22 @@ class Detection:
         """The region for the landmark network."""
         return region_from_points(self.points_px[0], self.points_px[1])
 
+    def turned_back(self, quarter_turns: int, width: int, height: int) -> Detection:
+        """Convert a detection in a turned image to one in the image.
+
+        :param quarter_turns: counterclockwise, as ``np.rot90`` has turned the image.
+        :param width, height: of the image, pixels.
+        """
+        corners = self.box_px.reshape(2, 2)
+        points = np.concatenate([corners, self.points_px])
+        for turn in range(quarter_turns, 0, -1):
+            # The width of the image from which this quarter turn was made.
+            side = width if turn % 2 else height
+            points = np.stack([side - 1 - points[:, 1], points[:, 0]], axis=1)
+        low = points[:2].min(axis=0)
+        high = points[:2].max(axis=0)
+        return Detection(self.score, np.concatenate([low, high]), points[2:])
+
 
 class PersonDetector:
     """The detection network; stateless between calls.
@@ -99,6 +115,10 @@ class PersonDetector:
         as long as `detect` takes for the whole image.
         """
         return self._detect_in_squares(image_rgb, parts(*image_rgb.shape[:2]))
+
+    def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:
+        """Return nothing for any (H, W, 3) image: `detect` finds people at any turn."""
+        return []
 
     def _detect_in_squares(
         self, image_rgb: Uint8Array, within: list[tuple[int, int, int]]

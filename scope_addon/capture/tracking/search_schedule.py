@@ -21,8 +21,8 @@ OPENING_S = 2.0
 SMALL_SHARE = 0.39  # of the picture's longer side
 # The time between two searches for small people, each as long as some twenty plain ones.
 SMALL_SEARCH_S = 1.0
-# The longest time between two searches beside people, each as long as six or more plain ones.
-PARTS_SEARCH_S = 64 * FRAME_S
+# The longest time between two searches that take several times as long as a plain one.
+RAREST_SEARCH_S = 64 * FRAME_S
 # A plain detection may miss a person in a smaller region, in shorter sides of the picture.
 SMALL_SIDE = 0.4
 EAGER_S = 15 * FRAME_S  # for which a lost person is looked for in every frame
@@ -44,12 +44,9 @@ class SearchSchedule:
 
     def forget(self) -> None:
         """Forget when the last searches were."""
-        self._search_s = self._close_search_s = self._small_search_s = (
-            self._parts_search_s
-        ) = -math.inf
-        # See `begin_parts`.
-        self._parts_beside = 0
-        self._parts_interval_s = SEARCH_LOST_S
+        self._search_s = self._close_search_s = self._small_search_s = -math.inf
+        self._parts = _RarerSearch(self._clock)
+        self._turned = _RarerSearch(self._clock)
 
     def is_due(
         self, image_rgb: Uint8Array, live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
@@ -99,18 +96,16 @@ class SearchSchedule:
         Only where fewer people are tracked than are wanted, and more and more rarely until their
         number changes: somebody whom a close search missed is mostly there from the start.
         """
-        if len(live) != self._parts_beside:
-            self._parts_beside = len(live)
-            self._parts_interval_s = SEARCH_LOST_S
-        if self._largest_only or not 0 < len(live) < self._wanted:
-            return False
-        if not self._clock.has_passed(
-            self._parts_interval_s, self._clock.time_s - self._parts_search_s
-        ):
-            return False
-        self._parts_search_s = self._clock.time_s
-        self._parts_interval_s = min(2 * self._parts_interval_s, PARTS_SEARCH_S)
-        return True
+        is_wanted = not self._largest_only and 0 < len(live) < self._wanted
+        return self._parts.begin(len(live), is_wanted)
+
+    def begin_turned(self, live: Sequence[TrackedTarget]) -> bool:
+        """Return whether to look for people who are not upright in this frame, and if so, note it.
+
+        Only where fewer people are tracked than are wanted, and more and more rarely until their
+        number changes: it takes as long as three plain searches.
+        """
+        return self._turned.begin(len(live), len(live) < self._wanted)
 
     def _interval_s(
         self, image_rgb: Uint8Array, live: Sequence[TrackedTarget], lost: Sequence[TrackedTarget]
@@ -137,6 +132,32 @@ class SearchSchedule:
             return False
         sides = [f.estimate.next_region.side_px for f in live]
         return bool(sides) and max(sides) < SMALL_SHARE * max(image_rgb.shape[:2])
+
+
+class _RarerSearch:
+    """A search that is repeated more and more rarely while as many people are tracked."""
+
+    def __init__(self, clock: FrameClock) -> None:
+        self._clock = clock
+        self._search_s = -math.inf
+        self._interval_s = SEARCH_LOST_S
+        self._tracked = 0
+
+    def begin(self, tracked: int, is_wanted: bool) -> bool:
+        """Return whether the search is due in this frame, and if so, note it.
+
+        :param tracked: how many people are tracked.
+        :param is_wanted: whether it is of use in this frame.
+        """
+        if tracked != self._tracked:
+            self._tracked = tracked
+            self._interval_s = SEARCH_LOST_S
+        elapsed_s = self._clock.time_s - self._search_s
+        if not is_wanted or not self._clock.has_passed(self._interval_s, elapsed_s):
+            return False
+        self._search_s = self._clock.time_s
+        self._interval_s = min(2 * self._interval_s, RAREST_SEARCH_S)
+        return True
 
 
 def _are_small(image_rgb: Uint8Array, people: Sequence[TrackedTarget]) -> bool:

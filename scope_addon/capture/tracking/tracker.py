@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +78,19 @@ _MIN_REDETECTION_PRESENCE = 0.9
 _MAX_REDETECTION_INNOVATION = 0.35
 CURLED_SPREAD = 0.25
 LEAVING_SHARE = 0.8  # a lost person with fewer of the keypoints in the image has left it
+
+
+@dataclass(frozen=True)
+class _DetectedBody:
+    """A plausible body, and whether its detection is independent evidence of it."""
+
+    estimate: PoseEstimate
+    is_sure: bool
+
+    def is_less_spread_than(self, other: _DetectedBody) -> bool:
+        """Return whether the other one covers this one, and its keypoints are more spread out."""
+        share = share_within(self.estimate, other.estimate)
+        return share > MAX_SHARE_WITHIN and self.estimate.spread < other.estimate.spread
 
 
 class PeopleTracker:
@@ -317,8 +330,14 @@ class PeopleTracker:
         nobody else is.
         """
         closely = self._schedule.begin(image_rgb, self._live, self._lost)
+        turned = []
+        if self._schedule.begin_turned(self._live):
+            turned = self._networks.detector.detect_turned(image_rgb)
         self._start_detected(
-            image_rgb, self._networks.detector.detect(image_rgb, closely=closely), SURE_SCORE
+            image_rgb,
+            self._networks.detector.detect(image_rgb, closely=closely),
+            SURE_SCORE,
+            self._estimate_detected(image_rgb, turned, math.inf),
         )
         if self._schedule.begin_parts(self._live):
             self._start_detected(
@@ -330,18 +349,39 @@ class PeopleTracker:
             )
 
     def _start_detected(
-        self, image_rgb: Uint8Array, found: list[Detection], sure_score: float
+        self,
+        image_rgb: Uint8Array,
+        found: list[Detection],
+        sure_score: float,
+        turned: Sequence[_DetectedBody] = (),
     ) -> None:
         """Start a tracklet for every plausible body that is not tracked yet.
 
+        :param sure_score: the score from which a detection is independent evidence of a body.
+        :param turned: what was detected in turned pictures. The same body at the wrong turn can be
+            plausible, but its keypoints are less spread out.
+        """
+        upright = self._estimate_detected(image_rgb, found, sure_score)
+        for body in upright:
+            if not any(body.is_less_spread_than(other) for other in turned):
+                self._add(body.estimate, body.is_sure)
+        for body in sorted(turned, key=lambda body: -body.estimate.spread):
+            self._add(body.estimate, body.is_sure)
+
+    def _estimate_detected(
+        self, image_rgb: Uint8Array, found: list[Detection], sure_score: float
+    ) -> list[_DetectedBody]:
+        """Return every plausible body that is not tracked yet, those that are sure first.
+
         Each is estimated twice: the landmarks give a better region than the detector.
 
-        :param sure_score: the score from which a detection is independent evidence of a body.
+        :param sure_score: see `_start_detected`.
         """
         detections = [d for d in self._ranked(found) if self._may_be_new(d.region)]
         detections = detections[: 3 if self._largest_only else 2 * self._max_live]
         if not detections:
-            return
+            return []
+        bodies = []
         first = self._networks.landmarks.estimate(image_rgb, [d.region for d in detections])
         likely = [k for k, e in enumerate(first) if e.presence >= PRESENCE_THRESHOLD]
         for sure in (True, False):
@@ -350,7 +390,8 @@ class PeopleTracker:
                 image_rgb, [first[k].next_region for k in chosen], sure
             ):
                 if estimate is not None:
-                    self._add(estimate, sure)
+                    bodies.append(_DetectedBody(estimate, sure))
+        return bodies
 
     def _ranked(self, detections: list[Detection]) -> list[Detection]:
         """Sort detections: those that may be a lost person first, then by score times size."""

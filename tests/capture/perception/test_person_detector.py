@@ -14,6 +14,7 @@ import pytest
 from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.letterbox import fit_in
 from scope.scope_addon.capture.perception.person_detector import (
+    Detection,
     PersonDetector,
     decode,
     make_anchors,
@@ -177,6 +178,22 @@ def test_finds_both_people(
 
 def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
     assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
+
+
+@pytest.mark.parametrize("quarter_turns", [0, 1, 2, 3])
+def test_a_detection_in_a_turned_picture_is_turned_back(quarter_turns: int) -> None:
+    """Marked pixels tell where the corners of the box, the hips and the head are."""
+    places = np.array([[3, 5], [14, 9], [7, 2], [11, 6]])  # x, y
+    image = np.zeros((20, 31), int)
+    image[places[:, 1], places[:, 0]] = [1, 2, 3, 4]
+    turned = np.rot90(image, quarter_turns)
+    row, column = zip(*(np.argwhere(turned == k)[0] for k in (1, 2, 3, 4)), strict=True)
+    points = np.stack([column, row], axis=1).astype(float)
+    corners = [points[:2].min(axis=0), points[:2].max(axis=0)]
+    found = Detection(0.9, np.concatenate(corners), points[2:]).turned_back(quarter_turns, 31, 20)
+    np.testing.assert_array_equal(found.points_px, places[2:])
+    np.testing.assert_array_equal(found.box_px, [3, 5, 14, 9])
+    assert found.score == 0.9
 
 
 def test_missing_and_damaged_networks_are_named(

@@ -102,6 +102,25 @@ def test_the_search_beside_people_becomes_rare_until_their_number_changes() -> N
     assert not SearchSchedule(clock, None).begin_parts([person(300.0)])
 
 
+@pytest.mark.parametrize("people", [None, 2])
+def test_the_search_in_turned_pictures_becomes_rare_while_it_finds_nobody(
+    people: int | None,
+) -> None:
+    clock = FrameClock()
+    schedule = SearchSchedule(clock, people)
+    times = []
+    for t in range(700):
+        clock.advance(t / 30)
+        live = [person(300.0)] * (people or 1) if 450 <= t < 500 else []
+        if schedule.begin_turned(live):
+            times.append(t)
+    assert list(np.diff(times)[:5]) == [8, 16, 32, 64, 64]  # frames
+    assert not [t for t in times if 450 <= t < 500]
+    lost = [t for t in times if t >= 500]
+    assert lost[0] == 500
+    assert lost[1] == 508
+
+
 def test_after_forgetting_the_next_frame_is_searched() -> None:
     clock = FrameClock()
     clock.advance(0.0)

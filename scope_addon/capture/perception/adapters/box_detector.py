@@ -257,6 +257,20 @@ class BoxDetector:
         """Return nothing for any (H, W, 3) image, as `detect_small`."""
         return []
 
+    def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:
+        """Detect people who are not upright in an (H, W, 3) uint8 RGB image.
+
+        A box does not say which way up a person is, and many networks miss people who are upside
+        down. Searches the image in the three other quarter turns.
+        """
+        height, width = image_rgb.shape[:2]
+        found = []
+        for quarter_turns in (1, 2, 3):
+            turned_rgb = np.ascontiguousarray(np.rot90(image_rgb, quarter_turns))
+            for detection in self.detect(turned_rgb):
+                found.append(detection.turned_back(quarter_turns, width, height))
+        return found
+
     def _boxes(self, outputs: Outputs) -> Boxes:
         try:
             boxes = self._format.decode(outputs, self._graph, self._description)
