@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Folders of captures in progress: what has been observed, with which the same capture continues
 after a kill.
+
+A capture that runs holds a lock beside its folder. So a second one of the same footage keeps
+nothing, and neither of them removes what the other one needs.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from typing import NamedTuple
 
 from ..errors import ChangedFootageError, NoPersonError
 from ..notices import Notice, notice
-from ..temporary import own_entries, remove, remove_if_empty
+from ..temporary import hold, is_abandoned, own_entries, release, remove, remove_if_empty
 from .request import code_version
 from .watched_footage import WatchedFootage
 
@@ -27,7 +30,6 @@ _FOLDER_NAME = re.compile("[0-9a-f]{32}-[0-9a-f]{32}")
 ROOT = Path(__file__).resolve().parents[2]
 _ABANDONED_S = 7 * 24 * 3600.0
 _LARGEST = 2 << 30  # bytes of all captures
-_RUNNING_S = 600.0  # within which a running capture has written
 
 
 class UnfinishedCapture(NamedTuple):
@@ -52,7 +54,8 @@ def unfinished_capture(
 
     It is that of this program and of the footage's content, so that nothing is continued with other
     images than those with which it began; what is left of others is removed. The folder is made by
-    whoever first writes to it. It stays if the block is left by another exception.
+    whoever first writes to it. It stays if the block is left by another exception. There is none
+    where the same capture runs already.
 
     :param root: folder of caches; None: nothing is to be kept.
     :param path: of the footage.
@@ -60,20 +63,44 @@ def unfinished_capture(
     """
     footage = WatchedFootage(path, rate_given)
     folder = None if root is None else _folder(root, path, footage)
-    if root is None or folder is None:
+    if root is None or folder is None or not _lock(folder):
         yield UnfinishedCapture(None, footage, [])
         return
-    _remove_old(root)
-    former = _folders_of_other_content(folder)
-    for each in former:
-        remove(each)
-    warnings = [notice("changed_footage", footage=path.name)] if former else []
     try:
-        yield UnfinishedCapture(folder, footage, warnings)
-    except (NoPersonError, ChangedFootageError):
-        _remove(folder)
-        raise
-    _remove(folder)
+        _remove_old(folder)
+        former = _folders_of_other_content(folder)
+        for each in former:
+            remove(each)
+        warnings = [notice("changed_footage", footage=path.name)] if former else []
+        try:
+            yield UnfinishedCapture(folder, footage, warnings)
+        except (NoPersonError, ChangedFootageError):
+            remove(folder)
+            raise
+        remove(folder)
+    finally:
+        release(_lock_of(folder))
+        remove_if_empty(folder.parent)
+
+
+def _lock_of(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}.lock")
+
+
+def _lock(folder: Path) -> bool:
+    """Lock the folder of a capture; return False if the same capture runs already, or if nothing
+    can be written there.
+    """
+    try:
+        folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return hold(_lock_of(folder))
+    except OSError:
+        return False
+
+
+def _is_running(folder: Path) -> bool:
+    lock = _lock_of(folder)
+    return lock.exists() and not is_abandoned(lock)
 
 
 def _folder(root: Path, path: Path, footage: WatchedFootage) -> Path | None:
@@ -95,32 +122,30 @@ def _folders_of_other_content(folder: Path) -> list[Path]:
     return [
         each
         for each in own_entries(folder.parent, _FOLDER_NAME)
-        if each.name.startswith(begin) and each.name != folder.name
+        if each.name.startswith(begin) and each.name != folder.name and not _is_running(each)
     ]
 
 
 def unfinished_captures(root: Path) -> list[Path]:
-    """Return the folders of captures in a folder of caches."""
-    return own_entries(root / FOLDER, _FOLDER_NAME)
+    """Return the folders in a folder of caches of captures that do not run."""
+    return [
+        folder for folder in own_entries(root / FOLDER, _FOLDER_NAME) if not _is_running(folder)
+    ]
 
 
-def _remove(folder: Path) -> None:
-    remove(folder)
-    remove_if_empty(folder.parent)
-
-
-def _remove_old(root: Path) -> None:
-    """Remove what is old, and if all is too much, the oldest."""
+def _remove_old(own: Path) -> None:
+    """Remove what is old beside the folder of a capture, and if all is too much, the oldest."""
     found = []
-    for folder in unfinished_captures(root):
+    for folder in own_entries(own.parent, _FOLDER_NAME):
         with suppress(OSError):
             size, changed_s = _size_and_time(folder)
             found.append((time.time() - changed_s, size, folder))
     total = 0
     for age_s, size, folder in sorted(found):
         total += size
-        if age_s > _ABANDONED_S or (total > _LARGEST and age_s > _RUNNING_S):
+        if (age_s > _ABANDONED_S or total > _LARGEST) and not _is_running(folder):
             remove(folder)
+            release(_lock_of(folder))
 
 
 def _size_and_time(folder: Path) -> tuple[int, float]:

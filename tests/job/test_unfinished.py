@@ -212,6 +212,38 @@ def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypat
     assert [folder.exists() for folder in folders] == [False, True, False]
 
 
+def test_the_same_capture_twice_at_once_is_kept_by_the_first_alone(tmp_path, footage):
+    with unfinished_capture(tmp_path, footage) as first:
+        first.folder.mkdir(parents=True)
+        with unfinished_capture(tmp_path, footage) as second:
+            assert second.folder is None
+        assert Cache(tmp_path).clear() == 0
+        assert first.folder.is_dir()
+    assert list(tmp_path.iterdir()) == [footage]
+
+
+def test_a_running_capture_is_neither_too_much_nor_too_old_nor_one_of_other_content(
+    tmp_path, footage, monkeypatch
+):
+    monkeypatch.setattr(unfinished, "_LARGEST", 10)
+    other = tmp_path / "run.mp4"
+    other.write_text("other footage")
+    with unfinished_capture(tmp_path, footage) as first:
+        first.folder.mkdir(parents=True)
+        (first.folder / "0.npz").write_bytes(bytes(1000))
+        os.utime(first.folder, (time.time() - 30 * 86400,) * 2)
+        end(tmp_path, other)
+        footage.write_text("changed")
+        with unfinished_capture(tmp_path, footage) as second:
+            assert second.folder not in (None, first.folder)
+            assert second.warnings == []
+        assert (first.folder / "0.npz").is_file()
+    end(tmp_path, other, KeyboardInterrupt())
+    monkeypatch.setattr(unfinished, "_ABANDONED_S", -1.0)
+    end(tmp_path, footage)
+    assert not (tmp_path / FOLDER).exists()
+
+
 def test_clearing_the_cache_removes_it(tmp_path, footage):
     folder = end(tmp_path, footage, KeyboardInterrupt())
     cache = Cache(tmp_path)
