@@ -22,6 +22,8 @@ from .subjects import PosedBody, Subject
 _SHARES = {
     "pck": metrics.pck,
     "auc": metrics.auc,
+    "pa_pck": metrics.pck,
+    "pa_auc": metrics.auc,
     "pck_50": metrics.challenge_pck,
     "auc_200": metrics.challenge_auc,
 }
@@ -171,10 +173,13 @@ def _in_camera(
     if "acceleration" in protocol.measures:
         found["acceleration"] = metrics.acceleration_error(x, y, rate)
     if protocol.pck_joints:
-        errors = metrics.joint_errors(x, y)[
-            :, [protocol.joints.index(name) for name in protocol.pck_joints]
-        ]
-        found |= {key: share(errors) for key, share in _SHARES.items() if key in protocol.measures}
+        counted = [protocol.joints.index(name) for name in protocol.pck_joints]
+        errors = metrics.joint_errors(x, y)[:, counted]
+        aligned = metrics.aligned(x, metrics.similarity(x, y))
+        errors_aligned = metrics.joint_errors(aligned, y)[:, counted]
+        for key, share in _SHARES.items():
+            if key in protocol.measures:
+                found[key] = share(errors_aligned if key.startswith("pa_") else errors)
     if "mpvpe" in protocol.measures and isinstance(true, PosedBody) and _same_mesh(captured, true):
         found["mpvpe"] = _vertex_errors(captured, true, roots)
     return found

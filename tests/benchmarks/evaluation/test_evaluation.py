@@ -185,6 +185,9 @@ def test_mpi_inf_3dhp(walker, tmp_path, monkeypatch):
     assert means["auc"] == pytest.approx(
         100 * ((12 * 30 + 1 + 0) / (14 * 31) + 18 / 31 + 30 / 31) / 3
     )
+    # Aligned, the pelvis alone is off in the second frame, and no joint of any by 150 mm.
+    assert means["pa_pck"] == pytest.approx(100)
+    assert means["auc"] < means["pa_auc"] < 100
 
 
 def test_3dpw_by_the_rules_of_its_challenge(walker, tmp_path, monkeypatch):

@@ -333,3 +333,5 @@ def test_every_row_has_a_source_and_figures_of_its_protocol():
             assert row.figures, row
             assert set(row.figures) <= set(PROTOCOLS[name].measures), row
             assert row.figures.get("pa_mpjpe", 0) < row.figures.get("mpjpe", 1e9), row
+            assert row.figures.get("pck", 0) < row.figures.get("pa_pck", 1e9), row
+            assert row.figures.get("auc", 0) < row.figures.get("pa_auc", 1e9), row
