@@ -183,8 +183,7 @@ def _add_priors(tree, terms, stage, pose, blocks, H, g) -> None:  # type: ignore
     ints = terms.ints[FLOW]
     floats = terms.floats[FLOW]
     weight = stage[0, FLOW_COLUMN]
-    inv_sigma = stage[1, FLOW_COLUMN]
-    joint_flow.accumulate(tree, ints, floats, weight, inv_sigma, 0.0, pose, blocks)
+    joint_flow.accumulate(tree, ints, floats, weight, pose, blocks)
     for i in range(1, tree.parents.shape[0]):
         at = 3 + 3 * i
         for r in range(3):

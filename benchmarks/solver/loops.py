@@ -75,7 +75,5 @@ def priors(count, tree, terms, stage, bank, pose, blocks):  # type: ignore[no-un
     total = 0.0
     for k in range(count):
         put(bank, k, pose)
-        total += accumulate_tables(
-            tree, terms.ints, terms.floats, stage[0], stage[1], 0.0, pose, blocks
-        )
+        total += accumulate_tables(tree, terms.ints, terms.floats, stage[0], pose, blocks)
     return total

@@ -51,8 +51,6 @@ LEVELS = {
     ),
     "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
 }
-# folders whose sources do not count; an installation may lack the first
-WITHOUT_KERNELS = {"examples"}
 _chosen: list[Path] = []  # at most one
 _STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
 
@@ -66,9 +64,7 @@ def sources_digest(folder: Path) -> str:
     """Return a digest of the names and contents of all sources below a folder, whatever their line
     ends.
     """
-    files = sorted(
-        f for f in folder.rglob("*.py") if not WITHOUT_KERNELS & set(f.relative_to(folder).parts)
-    )
+    files = sorted(folder.rglob("*.py"))
     texts = [
         (f.relative_to(folder).as_posix(), f.read_bytes().replace(b"\r\n", b"\n")) for f in files
     ]

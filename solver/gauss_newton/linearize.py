@@ -477,10 +477,8 @@ def linearize(
             tree, terms, i, (tx, ty, tz), settings, pose, blocks, scratch, cost
         )
         _add_part(tree, i, (tx - ox, ty - oy, tz - oz), sums, pose, blocks, scratch)
-    cost += accumulate_tables(
-        tree, terms.ints, terms.floats, weights, inv_sigma, triggs, pose, blocks
-    )
-    cost += accumulate_external(tree, terms.external, weights, inv_sigma, triggs, pose, blocks)
+    cost += accumulate_tables(tree, terms.ints, terms.floats, weights, pose, blocks)
+    cost += accumulate_external(tree, terms.external, weights, pose, blocks)
     cost += shape_prior.accumulate(
         terms.shape_mean, terms.shape_information, weights[SHAPE_PRIOR], pose, blocks
     )

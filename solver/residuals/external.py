@@ -33,7 +33,7 @@ _I = types.int64
 _F = types.float64
 _PI, _PF = types.CPointer(_I), types.CPointer(_F)  # type: ignore[no-untyped-call]
 _PROTOTYPE = _F(
-    _PI, _I, _PF, _F, _F, _F,  # ints, how many rows, floats, weight, inv_sigma, triggs
+    _PI, _I, _PF, _F,  # ints, how many rows, floats, weight
     _I, _I, _I, _I, _I, _I,  # parts, points, W, and keypoints, shape and globals of `Tree`
     _PI, _PF, _PF, _PI, _PF, _PF,  # the arrays of `Tree`
     _PF, _PF, _PF, _PF, _PF, _PF,  # of `Pose`
@@ -96,8 +96,6 @@ class Registered:
             rows,
             f,
             weight,
-            inv_sigma,
-            triggs,
             n,
             points,
             W,
@@ -152,7 +150,7 @@ class Registered:
             )
             table = carray(i, (rows, ints))
             numbers = carray(f, (rows, floats))
-            return accumulate(tree, table, numbers, weight, inv_sigma, triggs, pose, blocks)
+            return accumulate(tree, table, numbers, weight, pose, blocks)
 
         try:
             return cfunc(_PROTOTYPE)(entry)
@@ -173,9 +171,7 @@ class Registered:
         ints = self.INTS
         floats = self.FLOATS
 
-        def call(
-            i: int, rows: int, f: int, weight: float, _s: float, _t: float, *sizes_and_arrays: int
-        ) -> float:
+        def call(i: int, rows: int, f: int, weight: float, *sizes_and_arrays: int) -> float:
             try:
                 assert function is not None
                 return numeric.accumulate(
@@ -246,9 +242,7 @@ def _call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def accumulate_external(  # type: ignore[no-untyped-def]
-    tree, external, weights, inv_sigma, triggs, pose, blocks
-):
+def accumulate_external(tree, external, weights, pose, blocks):  # type: ignore[no-untyped-def]
     """Add all rows to the blocks and return their cost."""
     cost = 0.0
     n = tree.parents.shape[0]
@@ -261,8 +255,6 @@ def accumulate_external(  # type: ignore[no-untyped-def]
             rows,
             external.floats[f:],
             weights[column],
-            inv_sigma[column],
-            triggs,
             n,
             points,
             W,

@@ -22,9 +22,7 @@ INDEXES = "points"
 
 
 @kernel
-def accumulate(  # type: ignore[no-untyped-def]
-    tree, ints, floats, weight, inv_sigma, triggs, pose, blocks
-):
+def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-untyped-def]
     """Add every row's M, N, m, C, c to the blocks and return the cost. ints (n, 1), floats (n,
     6).
     """

@@ -339,9 +339,7 @@ def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
 
 
 @allocating_kernel
-def accumulate(  # type: ignore[no-untyped-def]
-    tree, ints, floats, weight, inv_sigma, triggs, pose, blocks
-):
+def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-untyped-def]
     """Add every joint's H_uu and g_u to the blocks and return the cost. ints (n, LANES), floats (n,
     FLOATS).
     """

@@ -9,7 +9,7 @@ A residual r_i(T_i, Omega_i, beta) in addition to the measurements is a module w
     INDEXES
         what all its whole numbers count: "points" as in the measurements, "parts" 0..K or "joints"
         1..K. Rows outside are refused; without it, negative ones
-    accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) -> cost
+    accumulate(tree, ints, floats, weight, pose, blocks) -> cost
         compiled with @kernel; adds JᵀJ and Jᵀr to `Blocks` (see part.py)
 
 To add it here: its import, and one line, its module in RESIDUALS. Its tables come in through
@@ -51,9 +51,7 @@ COLUMNS = FIRST_EXTERNAL + MAX_EXTERNAL
 
 
 @inlined_kernel
-def _nothing(  # type: ignore[no-untyped-def]
-    tree, ints, floats, weights, inv_sigma, triggs, pose, blocks
-):
+def _nothing(tree, ints, floats, weights, pose, blocks):  # type: ignore[no-untyped-def]
     """Cost of no residual."""
     return 0.0
 
@@ -62,13 +60,9 @@ def _followed_by(before: Any, index: int, name: str, accumulate: Any) -> Any:
     """Return the kernel that runs `before`, then the residual with that index and name."""
     column = FIRST_TABLE + index
 
-    def run(  # type: ignore[no-untyped-def]
-        tree, ints, floats, weights, inv_sigma, triggs, pose, blocks
-    ):
-        cost = before(tree, ints, floats, weights, inv_sigma, triggs, pose, blocks)
-        w = weights[column]
-        s = inv_sigma[column]
-        return cost + accumulate(tree, ints[index], floats[index], w, s, triggs, pose, blocks)
+    def run(tree, ints, floats, weights, pose, blocks):  # type: ignore[no-untyped-def]
+        cost = before(tree, ints, floats, weights, pose, blocks)
+        return cost + accumulate(tree, ints[index], floats[index], weights[column], pose, blocks)
 
     # Numba names machine code by this and a number that counts up within a process. Code that
     # several processes have put on disk is linked by name: under one name for all, a kernel of one
@@ -127,9 +121,9 @@ def register_residual(
     :param floats: columns of other numbers.
     :param indexes: what all whole numbers count: "points" as in the measurements, "parts" 0..K or
         "joints" 1..K.
-    :param kernel: ``accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks) ->
-        cost``, as this module describes it: a plain function, which is compiled here, or one that
-        `numba.njit` has compiled. Its speed is that of Scope's own.
+    :param kernel: ``accumulate(tree, ints, floats, weight, pose, blocks) -> cost``, as this module
+        describes it: a plain function, which is compiled here, or one that `numba.njit` has
+        compiled. Its speed is that of Scope's own.
     :param function: ``function(part, ints, floats) -> r (n,)`` of one row (ints,), (floats,) in
         plain Python, with R (3, 3), t (3,) of `part.Part` the pose of part i in the camera
         frame, metres, Omega (3, 3) the state of its joint and beta (P,). Derivatives are central

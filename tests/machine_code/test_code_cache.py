@@ -10,8 +10,6 @@ import shutil
 import pytest
 from scope.scope_addon.machine_code.code_files import SUFFIX, read_code, write_code
 from scope.scope_addon.machine_code.code_folders import (
-    SOLVER,
-    WITHOUT_KERNELS,
     can_run_shipped,
     shipped_processor,
 )
@@ -211,10 +209,3 @@ def test_a_changed_source_makes_code_stale(run, folder):
         os.utime(version, (1, 1))
     assert run(folder, folder / "cache")[0] == [1] * COUNT
     assert len(list((folder / "cache").iterdir())) == 1
-
-
-def test_folders_whose_sources_do_not_count_have_no_kernels():
-    for name in WITHOUT_KERNELS:
-        sources = [path.read_text("utf-8") for path in (SOLVER / name).rglob("*.py")]
-        assert sources
-        assert not any("import kernel" in text or "njit" in text for text in sources)

@@ -25,10 +25,10 @@ from scope.solver import (
     rotations,
     with_previous,
 )
-from scope.solver.examples import person
 from scope.solver.fitting.clip import _Frame, _Joint
 from scope.solver.gauss_newton.terms import make_terms
 
+from .. import person
 from ..dense import jacobian, residuals, robust_factors
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
 

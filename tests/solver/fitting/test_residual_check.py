@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 from scope.solver import InvalidValueError, check_residual, load_joint_prior, register_residual
-from scope.solver.examples import own_residual
 from scope.solver.residuals import floor, pose_prior
 from scope.solver.residuals.accumulation import add_to_point
 
+from .. import own_residual
 from ..synthetic import random_body
 
 K = 5
@@ -20,7 +20,7 @@ ROWS = [[2], [4]], [[0.3, 1.0], [-0.2, 2.0]]
 def kernel(gradient, curvature):
     """The example's kernel, with its Jᵀr and JᵀJ times a factor each."""
 
-    def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
+    def accumulate(tree, ints, floats, weight, pose, blocks):
         cost = 0.0
         for k in range(ints.shape[0]):
             i = ints[k, 0]

@@ -15,7 +15,8 @@ from scope.solver import (
     load_body,
     rotations,
 )
-from scope.solver.examples import person
+
+from .. import person
 
 
 def both_fits(seed):

@@ -15,9 +15,10 @@ from scope.solver import (
     make_tree,
     rotations,
 )
-from scope.solver.examples import person
 from scope.solver.motion.initial import initial_states, triangulated
 from scope.solver.motion.views import View
+
+from .. import person
 
 K = np.array([[800.0, 0, 320], [0, 800, 240], [0, 0, 1]])
 POINTS = 12

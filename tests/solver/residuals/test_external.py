@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +30,6 @@ from scope.solver import (
     register_residual,
     rotations,
 )
-from scope.solver.examples import own_residual
 from scope.solver.part import Part
 from scope.solver.residuals import (
     external,
@@ -40,6 +40,7 @@ from scope.solver.residuals import (
     pose_prior,
 )
 
+from .. import own_residual
 from ..synthetic import forward, random_body, random_state
 
 K = 6
@@ -262,7 +263,7 @@ def test_what_a_python_residual_must_return_is_said(returned, message):
 
 
 def test_a_kernel_that_does_not_compile_is_refused():
-    def wrong(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
+    def wrong(tree, ints, floats, weight, pose, blocks):
         return tree.nothing_of_the_sort
 
     register_residual("broken", kernel=wrong)
@@ -361,14 +362,16 @@ def test_the_solvers_machine_code_on_disk_stays_good():
     """
     code = """
 import scope.scope_addon
-from scope.solver.examples import own_residual
+from tests.solver import own_residual
 from scope.solver.gauss_newton.optimizer import optimize
 own_residual.main()
 stats = optimize.stats
 assert sum(stats.cache_hits.values()) == 1 and not stats.cache_misses, stats
 """
     own_residual.main()
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    root = Path(__file__).resolve().parents[3]
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=root)
     assert done.returncode == 0, done.stderr
 
 

@@ -94,7 +94,7 @@ def test_vector_kernel_agrees_with_numpy_joint_by_joint_also_at_half_turns():
     for h in (0.0, 0.8):
         blocks = make_blocks(tree)
         cost = jf.accumulate(
-            tree, *jf.pack(np.arange(1, K + 1), flows, weights, h), 1.3, 0.0, 0.0, pose, blocks
+            tree, *jf.pack(np.arange(1, K + 1), flows, weights, h), 1.3, pose, blocks
         )
         expected = 0.0
         for i in range(1, K + 1):

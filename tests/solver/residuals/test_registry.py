@@ -22,7 +22,7 @@ INTS, FLOATS = 1, 2  # part;  height, w
 INDEXES = "parts"
 
 @kernel
-def accumulate(tree, ints, floats, weight, inv_sigma, triggs, pose, blocks):
+def accumulate(tree, ints, floats, weight, pose, blocks):
     cost = 0.0
     for k in range(ints.shape[0]):
         r, w = pose.t[ints[k, 0], 1] - floats[k, 0], weight * floats[k, 1]
@@ -58,9 +58,9 @@ def terms_of(part):
     return make_terms(tree, solver.Measurements(tables={"toy": rows}), priors)
 
 @kernel
-def add_tables(tree, terms, stage, triggs, pose, blocks):
+def add_tables(tree, terms, stage, pose, blocks):
     return registry.accumulate_tables(
-        tree, terms.ints, terms.floats, stage[0], stage[1], triggs, pose, blocks
+        tree, terms.ints, terms.floats, stage[0], pose, blocks
     )
 
 pose, blocks = make_pose(tree), make_blocks(tree)
@@ -68,7 +68,7 @@ pose.t[0] = 0.1, 0.2, 3.0
 stage = np.zeros((2, registry.COLUMNS))
 stage[0, registry.column_of("toy")] = 8.0
 place_parts(tree, pose)
-cost = add_tables(tree, terms_of(2), stage, 1.0, pose, blocks)
+cost = add_tables(tree, terms_of(2), stage, pose, blocks)
 print(cost, *blocks.A[2, :, GRADIENT])
 for part, declared in ((3, True), (-1, True), (-1, False)):
     if not declared and hasattr(toy, "INDEXES"):

@@ -169,7 +169,7 @@ def test_every_registered_residual_is_in_these_tests():
     for module in registry.RESIDUALS.values():
         assert module.INDEXES in ("points", "parts", "joints")
         assert list(inspect.signature(module.accumulate.py_func).parameters) == [
-            "tree", "ints", "floats", "weight", "inv_sigma", "triggs", "pose", "blocks",
+            "tree", "ints", "floats", "weight", "pose", "blocks",
         ]  # fmt: skip
 
 
@@ -266,7 +266,7 @@ def test_table_kernels_accumulate_their_residual(name, seed):
         tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
         found = ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)
     blocks = make_blocks(tree)
-    cost = registry.RESIDUALS[name].accumulate(tree, *tables, w, 0.0, 0.0, pose, blocks)
+    cost = registry.RESIDUALS[name].accumulate(tree, *tables, w, pose, blocks)
     check_blocks(tree, blocks, cost, i, found)
 
 

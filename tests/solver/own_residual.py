@@ -11,15 +11,24 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scope.solver import (
+    Keypoints3D,
+    Measurements,
+    Options,
+    Stage,
+    Weights,
+    fit,
+    load_body,
+    register_residual,
+)
+from scope.solver.part import Part
+from scope.solver.residuals.accumulation import add_to_point
 
-from .. import Keypoints3D, Measurements, Options, Stage, Weights, fit, load_body, register_residual
-from ..part import Part
-from ..residuals.accumulation import add_to_point
 from . import person
 
 
 def accumulate(  # type: ignore[no-untyped-def]
-    tree, ints, floats, weight, inv_sigma, triggs, pose, blocks
+    tree, ints, floats, weight, pose, blocks
 ):
     """Add every row's JᵀJ and Jᵀr to the blocks and return the cost. ints (n, 1): part; floats (n,
     2): height, w.

@@ -5,8 +5,7 @@ them.
 
 import numpy as np
 from numpy.typing import NDArray
-
-from .. import Body, State, rotations
+from scope.solver import Body, State, rotations
 
 INTRINSICS = np.array([[1400.0, 0.0, 960.0], [0.0, 1400.0, 540.0], [0.0, 0.0, 1.0]])
 
