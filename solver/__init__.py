@@ -9,7 +9,8 @@ and the errors, the body files and the command line do without it.
 """
 
 import ast
-from importlib import import_module
+import tomllib
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,10 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .fitting.frame_solver import FrameSolver as FrameSolver
     from .fitting.frame_solver import fit as fit
     from .fitting.frame_solver import fit_tree as fit_tree
+    from .fitting.normal_equations import GaussNewtonStep as GaussNewtonStep
+    from .fitting.normal_equations import NormalEquations as NormalEquations
+    from .fitting.normal_equations import gauss_newton_step as gauss_newton_step
+    from .fitting.normal_equations import linearize as linearize
     from .fitting.residual_check import check_residual as check_residual
     from .learned_prior import JointPrior as JointPrior
     from .learned_prior import load_joint_prior as load_joint_prior
@@ -53,6 +58,7 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .options import Stage as Stage
     from .options import Weights as Weights
     from .options import default_priors as default_priors
+    from .points import frames_of as frames_of
     from .residuals.registry import register_residual as register_residual
     from .state import ClipFit as ClipFit
     from .state import Fit as Fit
@@ -65,6 +71,7 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .tree import make_tree as make_tree
 
     __all__: list[str]
+    __version__: str
 
 if not TYPE_CHECKING:
 
@@ -84,6 +91,8 @@ if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
         """Import a public name, or the module `rotations`, when it is first used (PEP 562)."""
+        if name == "__version__":
+            return _version()
         if name not in _MODULE_OF:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         module = import_module(f".{_MODULE_OF[name]}", __name__)
@@ -91,5 +100,12 @@ if not TYPE_CHECKING:
         globals()[name] = value
         return value
 
+    def _version() -> str:
+        """Return the version of Scope: the extension's manifest states it, the wheel's metadata."""
+        manifest = Path(__file__).parents[1] / "blender_manifest.toml"
+        if manifest.is_file():
+            return str(tomllib.loads(manifest.read_text("utf-8"))["version"])
+        return metadata.version("scope-mocap")
+
     def __dir__() -> list[str]:
-        return sorted({*globals(), *_MODULE_OF})
+        return sorted({*globals(), *_MODULE_OF, "__version__"})

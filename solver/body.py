@@ -15,8 +15,9 @@ Files are read by ``body_file.load_body``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from typing import Any
 
@@ -114,6 +115,14 @@ class Body:
         out = rest.copy()
         out[1:] -= rest[self.parents[1:]]
         return out
+
+    def point(self, name: str) -> int:
+        """Return the number of a point in measurements: of a keypoint, such as ``coco/nose``, or of
+        a joint, such as ``left_wrist``, which is M + its number.
+
+        :raises InvalidValueError: the body has no point of that name.
+        """
+        return number_of(numbers_of(self), name)
 
     def keypoint_set(self, prefix: str) -> dict[str, int]:
         """Return the keypoints of one set, e.g. ``blazepose``: name without the prefix -> index, in
@@ -276,3 +285,35 @@ class Body:
             np.int32, order="C"
         )
         return halves
+
+
+def numbers_of(body: object) -> Mapping[str, int]:
+    """Return the number of each point that a body names: its keypoints, and joint i as M + i.
+
+    :param body: `keypoint_names` (M,) and `joint_names` (K+1,) are read, if it has them.
+    """
+    keypoints = list(getattr(body, "keypoint_names", ()))
+    joints = list(getattr(body, "joint_names", ()))
+    first = len(getattr(body, "keypoint_part", keypoints))
+    numbers = {name: first + i for i, name in enumerate(joints)}
+    return numbers | {name: j for j, name in enumerate(keypoints)}
+
+
+def number_of(numbers: Mapping[str, int], name: Any) -> int:
+    """Return the number of a point.
+
+    :param numbers: of `numbers_of`.
+    :raises InvalidValueError: the body has no point of that name.
+    """
+    if not isinstance(name, str):
+        raise InvalidValueError(f"The name of a point must be a text, but is {described(name)}.")
+    if name not in numbers:
+        near = get_close_matches(name, numbers, 3, 0.5)
+        near = near or [known for known in numbers if known.endswith(f"/{name}")]
+        hint = f"did you mean {' or '.join(map(repr, near))}?" if near else _known(numbers)
+        raise InvalidValueError(f"the body has no point named {name!r}; {hint}")
+    return numbers[name]
+
+
+def _known(numbers: Mapping[str, int]) -> str:
+    return f"it has {', '.join(numbers)}." if numbers else "its points have no names."

@@ -74,13 +74,15 @@ def is_compiled(compiled: Any) -> bool:
     return bool(compiled.signatures) or _keeper.has_code(compiled)
 
 
-def announce_compilation(compiled: Any) -> None:
-    """Log why the coming call takes long; warnings go to stderr unless logging is configured.
+def announce_compilation(*kernels: Any) -> None:
+    """Log why the coming calls of kernels take long; warnings go to stderr unless logging is
+    configured.
 
     Once in a process: further threads that come meanwhile wait for the same machine code.
     """
-    if not is_compiled(compiled) and compiled not in _announced:
-        _announced.add(compiled)
+    missing = {compiled for compiled in kernels if not is_compiled(compiled)} - _announced
+    if missing:
+        _announced.update(missing)
         _LOG.warning("Compiling the solver for this machine, once: a minute or two.")
 
 

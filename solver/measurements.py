@@ -3,8 +3,10 @@
 image in pixels.
 
 Points are numbered as in the body's keypoints, 0..M-1, followed by the joints: M + i is the origin
-of part i. A confidence multiplies the squared residual; zero, or a value that is not finite or
-beyond `LARGEST`, leaves the measurement out.
+of part i. Instead of its number, a point may have its name on the body: "coco/nose" or
+"left_wrist". Parts of pose priors may have the names of their joints. A confidence multiplies the
+squared residual; zero, or a value that is not finite or beyond `LARGEST`, leaves the measurement
+out.
 """
 
 from collections.abc import Mapping

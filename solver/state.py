@@ -66,19 +66,27 @@ class State:
         :raises InvalidValueError: R_camera_root, or a matrix of Omega, is not a rotation.
         """
         check_type(tree, Tree, "tree")
-        K = len(tree.parents) - 1
-        P = tree.shape
-        R = as_array(self.R_camera_root, (3, 3), "R_camera_root")
-        t = as_array(self.t_camera_root, (3,), "t_camera_root")
-        Omega = as_array(self.Omega, (K, 3, 3), "Omega")
-        check_state_rotations(R, Omega)
+        R, t, Omega, beta = self.arrays(tree)
         pose = make_pose(tree)
         pose.R[0] = nearest_rotation(R)
         pose.t[0] = t
         pose.Omega[1:] = nearest_rotation(Omega)
-        pose.beta[:P] = as_array(self.beta, (P,), "beta")
+        pose.beta[: tree.shape] = beta
         place_parts(tree, pose)
         return pose
+
+    def arrays(self, tree: Tree) -> tuple[Array, Array, Array, Array]:
+        """Return R_camera_root (3, 3), t_camera_root (3,), Omega (K, 3, 3) and beta (P,), checked.
+
+        :raises ShapeError: an array does not fit the tree.
+        :raises InvalidValueError: R_camera_root, or a matrix of Omega, is not a rotation.
+        """
+        R = as_array(self.R_camera_root, (3, 3), "R_camera_root")
+        t = as_array(self.t_camera_root, (3,), "t_camera_root")
+        Omega = as_array(self.Omega, (len(tree.parents) - 1, 3, 3), "Omega")
+        check_rotations(R[None], "R_camera_root of the initial state")
+        check_rotations(Omega, "Omega of the initial state")
+        return R, t, Omega, as_array(self.beta, (tree.shape,), "beta")
 
     @classmethod
     def from_pose(cls, tree: Tree, pose: Pose) -> "State":
@@ -93,15 +101,6 @@ class State:
 
 # In place of an initial state: begin with several headings, and keep the fit of the lowest cost.
 MULTI: Literal["multi"] = "multi"
-
-
-def check_state_rotations(R_camera_root: Array, Omega: Array) -> None:
-    """Check the rotations of an initial state, (3, 3) and (K, 3, 3).
-
-    :raises InvalidValueError: a matrix is not a rotation.
-    """
-    check_rotations(R_camera_root[None], "R_camera_root of the initial state")
-    check_rotations(Omega, "Omega of the initial state")
 
 
 def given_states(

@@ -9,6 +9,7 @@ from typing import Literal, TypeVar
 
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
+from ..points import frames_of
 from ..state import MULTI, ClipFit, Fit, State, check_states
 from ..temporal import Temporal
 from ..tree import BodyArrays, make_tree
@@ -24,7 +25,7 @@ _R = TypeVar("_R")
 
 def fit_batch(
     body: BodyArrays,
-    measurements: Sequence[Measurements],
+    measurements: Sequence[Measurements] | Measurements,
     *,
     init: Sequence[State | None] | Literal["multi"] | None = None,
     priors: Priors | None = None,
@@ -35,13 +36,15 @@ def fit_batch(
 
     Every frame comes out as `fit` gives it, bit by bit, whatever the number of threads.
 
+    :param measurements: of each frame; or of all, as arrays with an axis for the frames:
+        `frames_of`.
     :param init: a state for each frame, None where there is none; or "multi" for all, as of `fit`.
     :param threads: how many; 0 is one for each core.
     :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has
         another length.
     :raises InvalidValueError: a value that no fit can use, in whichever frame.
     """
-    check_list(measurements, "measurements", "frame")
+    measurements = frames_of(body, measurements)
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
     starts: list[State | Literal["multi"] | None] = [None] * len(measurements)
@@ -67,7 +70,7 @@ def fit_batch(
 
 def fit_clips(
     body: BodyArrays,
-    clips: Sequence[Sequence[Measurements]],
+    clips: Sequence[Sequence[Measurements] | Measurements],
     *,
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
@@ -87,7 +90,7 @@ def fit_clips(
     check_list(clips, "clips", "clip")
     priors = default_priors(body) if priors is None else priors
 
-    def one(clip: Sequence[Measurements]) -> ClipFit:
+    def one(clip: Sequence[Measurements] | Measurements) -> ClipFit:
         return fit_clip(
             body,
             clip,

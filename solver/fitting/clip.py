@@ -33,12 +33,13 @@ from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..part import Blocks, Pose
+from ..points import frames_of
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
 from ..state import MULTI, ClipFit, Fit, State, Status, given_states
 from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
-from ..validation import check_count, check_list, check_switch, check_type, check_weight
+from ..validation import check_count, check_switch, check_type, check_weight
 from .frame_solver import fit_tree
 from .report import Outcome, cost_by_term, make_fit
 
@@ -68,7 +69,7 @@ def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
 
 def fit_clip(
     body: BodyArrays,
-    measurements: Sequence[Measurements],
+    measurements: Sequence[Measurements] | Measurements,
     *,
     init: Sequence[State] | Literal["multi"] | None = None,
     priors: Priors | None = None,
@@ -90,11 +91,13 @@ def fit_clip(
     At most `shape_frames` frames, evenly spaced, decide the shape; the others are then fitted with
     it fixed.
 
+    :param measurements: of each frame; or of the clip, as arrays with an axis for the frames:
+        `frames_of`.
     :return: the frames' fits and the shape they share.
     :raises ShapeError: when there is no frame, or when an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use.
     """
-    check_list(measurements, "measurements", "frame")
+    measurements = frames_of(body, measurements)
     for k, m in enumerate(measurements):
         check_type(m, Measurements, f"measurements[{k}]")
     if len(measurements) == 0:

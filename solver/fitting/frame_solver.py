@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import as_array
 from ..gauss_newton.curvature import make_curvature
 from ..gauss_newton.linearize import make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
@@ -18,10 +17,11 @@ from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors, 
 from ..kernel import announce_compilation, kernel
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
+from ..points import numbered
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
 from ..rotations import nearest_rotation, orthonormalize
-from ..state import MULTI, Fit, State, Status, check_state_rotations
+from ..state import MULTI, Fit, State, Status
 from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type
 from .initialize import initial_state
@@ -90,6 +90,7 @@ class FrameSolver:
         :raises InvalidValueError: `priors` or `options` is of another type.
         """
         announce_compilation(optimize)
+        self.body = body
         self.tree = body if isinstance(body, Tree) else make_tree(body)
         self.priors = default_priors(body) if priors is None else priors
         self.options = options
@@ -129,6 +130,7 @@ class FrameSolver:
         memory = self._memory
         work = self._memory.work
         packed = self._pack(priors)
+        measurements = numbered(self.body, measurements)
         terms, slots, self._layout = fill_terms(tree, measurements, packed, self._layout)
         seen, count = usable(terms, slots)
         settings = self._settings_of(options, cold=init is None or multi)
@@ -181,15 +183,9 @@ class FrameSolver:
 
     def _enter(self, state: State) -> None:
         """Put `state` into the first pose, with rotations made orthonormal."""
-        tree = self.tree
         pose = self._memory.poses[0]
-        K = len(tree.parents) - 1
-        P = tree.shape
-        R = as_array(state.R_camera_root, (3, 3), "R_camera_root")
-        t = as_array(state.t_camera_root, (3,), "t_camera_root")
-        Omega = as_array(state.Omega, (K, 3, 3), "Omega")
-        check_state_rotations(R, Omega)
-        if not _enter(R, t, Omega, as_array(state.beta, (P,), "beta"), pose):
+        R, t, Omega, beta = state.arrays(self.tree)
+        if not _enter(R, t, Omega, beta, pose):
             pose.R[0] = nearest_rotation(R)
             pose.Omega[1:] = nearest_rotation(Omega)
 

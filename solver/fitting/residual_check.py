@@ -6,17 +6,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..gauss_newton.linearize import linearize, make_blocks
-from ..gauss_newton.recursion import make_workspace
 from ..gauss_newton.terms import make_terms
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, Weights
-from ..part import GRADIENT, SHAPE, Array
-from ..residuals.external import raise_failure
-from ..rotations import exp, hat
+from ..rotations import exp
 from ..state import State
 from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_count, check_type
+from .normal_equations import equations, moved
 
 _STEP = 1e-5  # of the differences, radians and metres
 _UNEXPLAINED = 1e-6  # of the gradient, outside the range of JᵀJ: more is no rounding
@@ -47,10 +44,15 @@ def check_residual(
     check_type(name, str, "name")
     check_count(seed, "seed", 0)
     tree = make_tree(body)
-    problem = _Problem(tree, name, ints, floats)
+    terms = make_terms(tree, Measurements(tables={name: (ints, floats)}), Priors())
+    alone = Weights(tables={name: 1.0}, **_OTHERS_OFF)
+    stage = Options().stage_table([Stage(alone)])[0][0]
     state = _random_state(tree, seed)
-    found = np.zeros(problem.size)
-    cost, g, H = problem.linearized(state)
+    at_state = equations(tree, terms, stage, state)
+    cost = at_state.cost
+    g = at_state.g
+    H = at_state.H
+    found = np.zeros(len(g))
     if not 0.0 < cost < np.inf:
         raise InvalidValueError(
             f"The cost of {name!r} must be positive and finite to be differentiated, but is "
@@ -63,9 +65,9 @@ def check_residual(
             "the random state of "
             f"seed {seed}."
         )
-    for k in range(problem.size):
-        step = _STEP * np.eye(problem.size)[k]
-        ahead, behind = (problem.linearized(problem.moved(state, d))[0] for d in (step, -step))
+    for k, step in enumerate(_STEP * np.eye(len(g))):
+        ahead = equations(tree, terms, stage, moved(tree, state, step)).cost
+        behind = equations(tree, terms, stage, moved(tree, state, -step)).cost
         found[k] = (ahead - behind) / (2.0 * _STEP)
     off = np.abs(g - found) / max(np.abs(found).max(), np.abs(g).max(), 1e-300)
     joints = 6 + 3 * (len(tree.parents) - 1)
@@ -79,63 +81,6 @@ def check_residual(
         "shape": float(off[joints:].max(initial=0.0)),
         "curvature": max(0.0, explained - 1.0),
     }
-
-
-class _Problem:
-    """The cost of some rows as a function of all unknowns: x_0 (6), u_1..u_K (3 each), beta (P)."""
-
-    def __init__(self, tree: Tree, name: str, ints: Any, floats: Any) -> None:
-        self._tree = tree
-        self._terms = make_terms(tree, Measurements(tables={name: (ints, floats)}), Priors())
-        weights = Weights(tables={name: 1.0}, **_OTHERS_OFF)
-        self._weights = Options().stage_table([Stage(weights)])[0][0]
-        self.size = 3 + 3 * len(tree.parents) + tree.shape
-
-    def linearized(self, state: State) -> tuple[float, Array, Array]:
-        """Return the cost, its gradient (n,) and JᵀJ (n, n), of the blocks of all parts."""
-        tree = self._tree
-        blocks = make_blocks(self._tree)
-        pose = state.pose(self._tree)
-        cost = linearize(
-            tree, self._terms, self._weights, 0.0, pose, blocks, make_workspace(tree).scratch
-        )
-        raise_failure()
-        n = self.size
-        P = tree.shape
-        end = SHAPE + tree.shape
-        # x_i = x[i] @ unknowns
-        g = np.zeros(n)
-        H = np.zeros((n, n))
-        x = np.zeros((len(tree.parents), 6, n))
-        beta = np.eye(n)[n - P :]
-        for i, parent in enumerate(tree.parents):
-            if i == 0:
-                x[0] = np.eye(6, n)
-            else:
-                u = np.eye(n)[3 + 3 * i : 6 + 3 * i]
-                x[i] = x[parent] + np.vstack([np.eye(3), hat(pose.t[i] - pose.t[0])]) @ u
-                H_u = blocks.H_u[i]
-                g += u.T @ H_u[:, GRADIENT]
-                mixed = u.T @ (H_u[:, :6] @ x[i] + H_u[:, SHAPE:end] @ beta)
-                H += mixed + mixed.T + u.T @ blocks.H_uu[i] @ u
-            A = blocks.A[i]
-            g += x[i].T @ A[:, GRADIENT]
-            mixed = x[i].T @ A[:, SHAPE:end] @ beta
-            H += mixed + mixed.T + x[i].T @ A[:, :6] @ x[i]
-        C = np.triu(blocks.C[:P, :P])
-        g += beta.T @ blocks.c[:P]
-        H += beta.T @ (C + np.triu(C, 1).T) @ beta
-        return float(cost), g, H
-
-    def moved(self, state: State, d: Array) -> State:
-        """Return the state after a step d (n,) of the unknowns."""
-        pose = state.pose(self._tree)
-        P = self._tree.shape
-        R_parent = pose.R[self._tree.parents[1:]]
-        turns = exp(d[6 : len(d) - P].reshape(-1, 3))
-        Omega = np.swapaxes(R_parent, 1, 2) @ turns @ R_parent @ state.Omega
-        R = exp(d[:3]) @ state.R_camera_root
-        return State(R, state.t_camera_root + d[3:6], Omega, state.beta + d[len(d) - P :])
 
 
 def _random_state(tree: Tree, seed: int) -> State:

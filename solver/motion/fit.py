@@ -12,20 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array
+from ..body import numbers_of
 from ..errors import InvalidValueError, ShapeError
 from ..fitting.clip import shape_information
-from ..gauss_newton.optimizer import SharedPriors, make_settings
+from ..gauss_newton.optimizer import SharedPriors, make_settings, optimize
 from ..gauss_newton.terms import pack_priors
+from ..kernel import announce_compilation
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..part import Array, Pose
+from ..points import has_names, with_numbers
 from ..rotations import nearest_rotation
-from ..state import MULTI, State, Status, check_state_rotations, given_states
+from ..state import MULTI, State, Status, given_states
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import (
     as_number,
     check_finite,
-    check_list,
     check_switch,
     check_type,
     check_weight,
@@ -35,9 +37,9 @@ from .covariance import joint_covariances
 from .initial import initial_states, warn_of_transposed_cameras
 from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
-from .problem import ClipProblem, MotionTerms
+from .problem import ClipProblem, MotionTerms, linearize_half
 from .system import make_poses
-from .views import View, pack_frames, views_of
+from .views import View, pack_frames, view_frames_of, views_of
 from .windows import Window, combined, overlapping, tiles
 
 _FRAMES_FOR_TWO_THREADS = 16
@@ -71,7 +73,7 @@ class MotionFit:
 
 def fit_motion(
     body: BodyArrays,
-    frames: Sequence[Measurements | Sequence[View]],
+    frames: Sequence[Measurements | Sequence[View]] | Measurements | Sequence[View],
     times: ArrayLike,
     *,
     init: Sequence[State] | Literal["multi"] | None = None,
@@ -94,6 +96,8 @@ def fit_motion(
     has little to say, and a frame without measurements is filled in.
 
     :param frames: of each frame its measurements, or one `View` for each camera that saw something.
+        Or arrays with an axis for the frames, as of `frames_of`: the measurements of the clip, or a
+        list of one `View` for each camera, which stands still.
     :param times: (T,) seconds, increasing; they need not be evenly spaced. Whole numbers are
         probably frame numbers, and give a `UnitsWarning`.
     :param init: each frame's state in the world's axes; without it, the frames are first fitted in
@@ -116,7 +120,7 @@ def fit_motion(
     :raises ShapeError: there is no frame, or an array does not fit the body or the clip.
     :raises InvalidValueError: a value that no fit can use.
     """
-    check_list(frames, "frames", "frame")
+    frames = view_frames_of(body, frames)
     clock = _checked_times(times, len(frames))
     states = given_states(init, len(frames))
     if not as_number(window, "window") > 0.0:
@@ -141,7 +145,13 @@ def fit_motion(
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")
+    announce_compilation(linearize_half, optimize)
     tree = make_tree(body)
+    if stands is not None and has_names(stands.indices):
+        stands = replace(
+            stands,
+            indices=with_numbers(numbers_of(body), stands.indices, "Indices of standing points"),
+        )
     shape = _checked_shape(shape, tree, focal)
     if states is None:
         cold = MULTI if init is not None else None
@@ -249,12 +259,10 @@ class _Clip:
         self.t = np.empty((T, K + 1, 3))
         self.Omega = np.empty((T, K, 3, 3))
         for f, state in enumerate(init):
-            self.R[f, 0] = as_array(state.R_camera_root, (3, 3), "R_camera_root")
-            self.t[f, 0] = as_array(state.t_camera_root, (3,), "t_camera_root")
-            self.Omega[f] = as_array(state.Omega, (K, 3, 3), "Omega")
-            check_state_rotations(self.R[f, 0], self.Omega[f])
-        self.R[:, 0], self.Omega = nearest_rotation(self.R[:, 0]), nearest_rotation(self.Omega)
-        self.beta = as_array(init[-1].beta, (P,), "beta").copy()
+            self.R[f, 0], self.t[f, 0], self.Omega[f], beta = state.arrays(tree)
+        self.R[:, 0] = nearest_rotation(self.R[:, 0])
+        self.Omega = nearest_rotation(self.Omega)
+        self.beta = beta.copy()
         self.log_focal = 0.0
         self.information = np.zeros((P, P))
         self.covariances = np.empty((2, T, K + 1, 3, 3)) if settings.covariance else None

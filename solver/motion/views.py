@@ -8,7 +8,7 @@ blocks and likewise the rest. Nothing else in the solver knows of several camera
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,16 +16,17 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from ..arrays import as_array, described
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, ShapeError
 from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms, usable
 from ..kernel import kernel
 from ..measurements import Measurements
 from ..part import Array
+from ..points import frames_of, numbered
 from ..residuals.external import External
 from ..residuals.registry import RESIDUALS, empty_tables
 from ..rotations import nearest_rotation
 from ..tree import Tree
-from ..validation import check_finite, check_rotations, check_type
+from ..validation import check_finite, check_list, check_rotations, check_type
 
 
 @dataclass
@@ -167,6 +168,45 @@ def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
             as_array(t, (3,), f"t_camera_world of {name}[{k}]"), f"t_camera_world of {name}[{k}]"
         )
     return frame
+
+
+def view_frames_of(
+    body: object, frames: Sequence[Measurements | Sequence[View]] | Measurements | Sequence[View]
+) -> Sequence[Measurements | Sequence[View]]:
+    """Return what was measured of each frame, with points as numbers, however it was given: see
+    `fit_motion`.
+
+    :raises ShapeError: the arrays of a clip, or of its cameras, have different numbers of frames.
+    :raises InvalidValueError: the body has no point of a name, or `frames` is no list.
+    """
+    if isinstance(frames, Measurements):
+        return frames_of(body, frames, "frames")
+    check_list(frames, "frames", "frame")
+    if len(frames) and all(isinstance(view, View) for view in frames):
+        cameras = [
+            [replace(view, measurements=m) for m in frames_of(body, view.measurements, "frames")]
+            for view in frames
+            if isinstance(view, View)
+        ]
+        lengths = [len(camera) for camera in cameras]
+        if len(set(lengths)) > 1:
+            raise ShapeError(f"Cameras must have the same number of frames, but have {lengths}.")
+        return [list(views) for views in zip(*cameras, strict=True)]
+    return [_numbered_frame(body, frame) for frame in frames]
+
+
+def _numbered_frame(body: object, frame: Any) -> Any:
+    """Return what was measured of one frame with points as numbers; anything else as it is."""
+    if isinstance(frame, Measurements):
+        return numbered(body, frame)
+    if not isinstance(frame, (list, tuple)):
+        return frame
+    return [
+        replace(view, measurements=numbered(body, view.measurements))
+        if isinstance(view, View) and isinstance(view.measurements, Measurements)
+        else view
+        for view in frame
+    ]
 
 
 class _Packer:

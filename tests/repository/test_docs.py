@@ -393,7 +393,10 @@ def test_the_captures_of_the_readme_are_run(words, folder):
         assert (folder / name).stat().st_size > 1000
 
 
-@pytest.mark.parametrize("code", blocks("python"))
+# Those of the solver's page are run by tests/solver/test_api_page.py.
+@pytest.mark.parametrize(
+    "code", [each for each in blocks("python") if not str(each.id).startswith("solver_api")]
+)
 def test_every_python_block_runs(code, body, folder):
     seen = {"joints_cam": np.ones((3, body.K + 1, 3))}
     made_motion(body, np.zeros((3, 3 * (body.K + 1))), np.zeros((3, 3)), **seen).save(

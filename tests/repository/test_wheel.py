@@ -38,6 +38,7 @@ DATA = {
     "scope/scope_addon/report/static/viewer.js",
     "scope/scope_addon/report/static/webgl.js",
     "scope/scope_addon/ui/translations.txt",
+    "scope/solver/py.typed",
 }
 CAPTURE_MODULES = ("cv2", "onnxruntime", "av", "bpy")
 
@@ -53,6 +54,7 @@ from scope import solver
 assert scope.__file__.startswith(sys.prefix), scope.__file__
 assert solver.load_body("scope").K == 23 and solver.load_body("scope_h").K == 51
 assert "left_knee" in solver.load_joint_prior().names
+assert solver.__version__[0].isdigit()
 body = solver.load_body("scope")
 joints = body.rest_joints() * [1.0, -1.0, -1.0] + [0.0, 0.0, 3.0]
 seen = solver.Keypoints3D(len(body.keypoint_names) + np.arange(24), joints, np.ones(24))

@@ -3,6 +3,8 @@
 
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 from scope import solver
@@ -30,6 +32,11 @@ def test_every_name_is_there_when_it_is_first_used():
         [sys.executable, "-c", FIRST_USES], capture_output=True, text=True, check=False, cwd="/"
     )
     assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_the_version_is_the_manifests():
+    manifest = Path(solver.__file__).parents[1] / "blender_manifest.toml"
+    assert solver.__version__ == tomllib.loads(manifest.read_text("utf-8"))["version"]
 
 
 def test_a_name_that_does_not_exist_is_an_error():
