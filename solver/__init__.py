@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The body model and the sparse constrained solver. numpy and numba only.
 
 body = load_body("scope")

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Conversion of what comes in from outside to arrays of the expected shape; every message names the
 field.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The body model: a kinematic tree with shape, a skinned mesh, and keypoints rigidly attached to
 body parts.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Bodies by name or file: the built-in ones, files in the same format, and users' SMPL models.
 
 The arrays of a file are taken as they are. Files of unknown origin go through

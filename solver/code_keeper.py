@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Who keeps the machine code of the kernels: numba's own cache, unless a program brings another.
 
 This file needs no numba, so that a program can choose before numba is loaded.

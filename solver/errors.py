@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Every error and warning the solver raises on purpose. One tree, so that one ``except ScopeError``
 is enough.
 

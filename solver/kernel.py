@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """How every kernel of the solver is compiled, and how its machine code is kept."""
 
 import hashlib

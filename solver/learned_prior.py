@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The joint-state prior learned from motion capture: one flow for each joint, by name, read from
 assets/prior.
 """

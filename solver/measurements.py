@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """What was measured in one frame. Camera frame: OpenCV's (x right, y down, z forward), metres;
 image in pixels.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Names and orders that are agreed on: SMPL's body joints, BlazePose's and COCO's keypoints."""
 
 # The joints that SMPL, SMPL+H and SMPL-X share, and each one's parent (-1: the root).

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """How to fit: weights, stages, robust kernels, damping, and the priors on joints and shape."""
 
 import math

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """What every residual r(T_i, Omega_i, beta) is a function of, its derivatives, and the sums they go
 into.
 

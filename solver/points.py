@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Points of a body by name, and clips as arrays: both become what fits take, numbers and one
 `Measurements` for each frame.
 """

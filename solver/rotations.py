@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Rotations: so(3) and SO(3) exponential, logarithm, left Jacobian; unit quaternions.
 
 Conventions: a rotation vector phi (3,) in radians is angle times unit axis; exp(phi) turns

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A user's SMPL, SMPL+H, SMPL-X or STAR model as a ``Body``: tree, shape, skin and keypoints.
 
     J̄ = J_regressor v_template,   J_s = J_regressor shapedirs

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Causal temporal terms: the last frame's estimate is a constant, so it enters as priors of this
 frame's pose.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The kinematic tree as flat arrays for the kernels. Any number of joints, any shape basis, any
 tree par(i) < i.
 """

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Checks of what comes in from outside, one for each kind of value; every message names the field.
 
 Two errors: ShapeError for what is no array of numbers of the expected shape, InvalidValueError for

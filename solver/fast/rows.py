@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The functions of gauss_newton/plain_rows.py, four columns at a time; see there what they compute.
 
 Each formula below is run once for every four columns, with all of their rows in registers. Products

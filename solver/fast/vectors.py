@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Doubles in vector registers: LLVM code for a pass over rows, for products, and for formulas.
 
 LLVM lowers a vector of four doubles to whatever the processor has (AVX, two NEON registers, ...).

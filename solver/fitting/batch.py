@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Many frames, or many clips, on all cores. The kernels release the GIL, so plain threads do."""
 
 import os

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """One shape, and if asked one focal length, over a clip: O(T (K + N)) for a step of all poses and
 the shape.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A first pose of the root from the measurements alone, every joint at the prior's mean.
 
 Rotation: the one that best turns the rest pose's points (3D keypoints) or bones (orientation field)

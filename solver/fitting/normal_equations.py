@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The normal equations of a frame and their solution, for those who study the step itself.
 
 The unknowns of a step are d = (w, nu, u_1..u_K, dbeta), n = 6 + 3K + P of them: the root's twist in

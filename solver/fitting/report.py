@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The results of a fit: its state, how it ended, and what its cost is made of.
 
 Every residual's cost is linear in its weight, so the share of one kind is the cost with all other

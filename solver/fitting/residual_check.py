@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """`check_residual`: whether the blocks of a registered residual are those of its cost."""
 
 from typing import Any

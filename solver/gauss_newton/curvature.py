@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """What Gauss-Newton leaves out of a joint's Hessian, estimated from the steps that are taken.
 
 The joint priors and limits together are functions f_i(Omega_i) of three numbers each. Gauss-Newton

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """One pass over the body: poses of the parts, cost, and the Gauss-Newton blocks of every term.
 
 The 2D keypoint, 3D keypoint and orientation terms of one point are merged: with e = R_i v the lever

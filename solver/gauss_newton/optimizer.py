@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Levenberg-Marquardt: the control that every fit shares, the compiled optimizer of one frame, and
 the loop over several frames.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The loops of a Gauss-Newton step over the shape's columns, and over joints with a learned prior,
 in plain numba.
 

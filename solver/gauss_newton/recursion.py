@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The Gauss-Newton step in O(K): eliminate the joints from the leaves to the root, solve 6 + P,
 substitute back.
 

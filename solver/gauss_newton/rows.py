@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The loops over columns and joints that all fits run: those of `fast`, or the same in plain numba.
 
 With ten shape coefficients, a Gauss-Newton step in plain numba takes 1.7 to 2 times as long as with

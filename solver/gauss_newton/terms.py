@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Measurements of one frame as flat arrays: one slot a point, with all that was measured of it, by
 body part.
 """

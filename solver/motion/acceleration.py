@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 r"""Acceleration over three frames, of joints relative to their parents and of the root in the
 world.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 r"""Block-banded Cholesky over time, with an arrowhead of global columns: the exact step of a clip
 in O(T).
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 r"""Marginal covariances of a clip's joints and of its global columns, by selected inversion of the
 factor.
 

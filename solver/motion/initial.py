@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Where a clip's optimization starts: frames fitted in order, what several cameras see triangulated
 first.
 """

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Levenberg-Marquardt over all poses of a clip and what they share.
 
 What Gauss-Newton leaves out of the joints' Hessians is learned over the clip, as

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A clip's objective: the terms of every frame, the acceleration between frames, and the shape's
 prior once.
 """

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 r"""The velocity of points that stand still: a sole in contact is where it was one frame before.
 
     r = sqrt(w p / h) (p_f - p_{f-1}),   p = R_i (V_j beta + v_bar_j) + t_i in the world, metres

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 r"""The normal equations of a clip: dense blocks of width 6 + 3K a frame, what couples them, and
 global columns.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """What cameras see of one frame. Each camera is linearized in its own axes, and its blocks are
 turned to the world's.
 

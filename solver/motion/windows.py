@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Cutting a clip into windows, and what they say together about the unknowns that they share."""
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """What residuals have in common: the robust kernel, and the way from a weight and gradient to the
 Gauss-Newton blocks.
 

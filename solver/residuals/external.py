@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Residuals that other programs register: compiled ones, and plain Python ones with finite
 differences (numeric.py).
 

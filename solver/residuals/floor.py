@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The floor: no point may be below it, and one in contact may not be above it either.
 
     h = n^T p - d,   p = R_i (V_j beta + v_bar_j) + t_i,

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A point that stands still: a heel or toe in contact has no velocity, so it is where it was.
 
     r = sqrt(w) (p - p_stand),   p = R_i (V_j beta + v_bar_j) + t_i,   metres

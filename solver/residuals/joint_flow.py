@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A joint's state by a normalizing flow z(Omega) on SO(3), learned from motion: the paper's joint
 state prior.
 

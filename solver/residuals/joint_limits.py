@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """One-sided limits on a joint's state: its angle about an axis, and how far it swings off that
 axis.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A joint's state pulled towards a mean: the rest pose, a learned mean, or last frame's state.
 
     r = sqrt(w_i) log(Omega_mean_iᵀ Omega_i),   radians

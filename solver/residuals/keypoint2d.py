@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 r"""A keypoint seen in the image.
 
     r = (f x/z - u, f y/z - v),   p = (x, y, z) = R_i (V_j beta + v_bar_j) + t_i

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A keypoint measured in space, in the camera frame.
 
     r = p - p_measured,   p = R_i (V_j beta + v_bar_j) + t_i,   metres

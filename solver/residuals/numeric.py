@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A residual that is a plain Python function: its derivatives by central differences, added to the
 same blocks.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The part orientation field: the unit direction between two points of one part against a measured
 unit vector.
 

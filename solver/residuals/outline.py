@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The outline of the body against the contour of a person mask: one signed distance for each point
 of the rim.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """A known estimate (R^, t^) of a part's pose in the camera frame, such as last frame's.
 
     r = (sqrt(w_R) log(R^ᵀ R), sqrt(w_t) (t - t^)),   radians and metres

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """Every residual the optimizer knows. This is the one place to add another; `register_residual`
 adds one from outside.
 

@@ -1,4 +1,4 @@
-# SPDX-License-Identifier: GPL-3.0-or-later
+# SPDX-License-Identifier: Apache-2.0
 """The shape pulled towards a mean: 1/2 w (beta - mean)ᵀ Lambda (beta - mean).
 
 Lambda (P, P) is the identity for the population prior, or an information matrix carried from

@@ -46,7 +46,26 @@ def test_the_citation_names_the_paper_and_states_no_version_of_its_own():
     for author in paper["authors"]:
         assert f"{author['family-names']}, {author['given-names']}" in bibtex
     manifest = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-    assert citation["license"] == manifest["project"]["license"]
+    assert manifest["project"]["license"] == f"{citation['license']} AND Apache-2.0"
+
+
+def test_every_source_states_its_licence():
+    """The solver's is Apache-2.0, so that others can use it, and all else the program's."""
+    wrong = []
+    for top in ("solver", "scope_addon", "tests", "benchmarks", "tools", "scripts"):
+        licence = "Apache-2.0" if top == "solver" else "GPL-3.0-or-later"
+        for path in sorted((ROOT / top).rglob("*.py")):
+            first = path.read_text("utf-8").partition("\n")[0]
+            if path.stat().st_size and first != f"# SPDX-License-Identifier: {licence}":
+                wrong.append(path.relative_to(ROOT).as_posix())
+    assert wrong == []
+
+
+def test_the_licences_texts_are_complete():
+    apache = (ROOT / "solver" / "LICENSE").read_text("utf-8")
+    assert apache.split()[:4] == ["Apache", "License", "Version", "2.0,"]
+    assert "END OF TERMS AND CONDITIONS" in apache
+    assert "GNU GENERAL PUBLIC LICENSE" in (ROOT / "LICENSE").read_text("utf-8")
 
 
 def test_the_hooks_run_what_the_check_runs():
