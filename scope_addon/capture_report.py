@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 from .notices import Notice, notices_of
@@ -46,6 +47,17 @@ class Report:
         """Return the report as JSON has it: warnings as sentences, and as records beside."""
         figures = {each.name: getattr(self, each.name) for each in fields(self)}
         return figures | warnings_as_json(self.warnings)
+
+    def placed_videos(self, videos: Sequence[str | Path]) -> list[Path]:
+        """Return those of the further videos whose cameras could be placed, which are the further
+        cameras of the motions.
+
+        :param videos: all of the capture but the first.
+        """
+        if not videos:
+            return []
+        further = zip(self.views[1:], videos, strict=True)
+        return [Path(video) for about, video in further if about["is_used"]]
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Report:

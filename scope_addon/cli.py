@@ -41,6 +41,7 @@ from .command_line.outputs import (
     files_to_read,
     refuse_inputs,
     summary,
+    write_calibration,
     write_outputs,
 )
 from .command_line.problem_command import add_problem_report
@@ -169,6 +170,12 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="one page about the capture to open in a browser: overlay, 3D view, plots, warnings: "
         ".html",
+    )
+    capture.add_argument(
+        "--save-calibration",
+        type=path_argument,
+        metavar="FILE",
+        help="of several cameras, write what was found of them as a calibration: .toml",
     )
     # Passed by a batch to its processes.
     capture.add_argument(STOP_WITH_STDIN, action="store_true", help=argparse.SUPPRESS)
@@ -301,7 +308,17 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
             "give a VIDEO to capture"
         )
     outputs = distinct_paths(args.output) or default_outputs(video)
-    check_outputs(outputs, vars(args) | {"video": video}, args.overlay, args.report)
+    if args.save_calibration and (not args.views or args.mirror):
+        raise UsageError(
+            "--save-calibration is for several videos, given one after the other, without --mirror"
+        )
+    check_outputs(
+        outputs,
+        vars(args) | {"video": video},
+        args.overlay,
+        args.report,
+        args.save_calibration,
+    )
     check_blender(outputs)
     check_memory_limit(
         with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs)
@@ -341,9 +358,15 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
             each.check()
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
-            written, warnings = write_outputs(outputs, result.motions, body, video, args, rig)
+            placed = result.report.placed_videos(args.views)
+            written, warnings = write_outputs(
+                outputs, result.motions, body, video, args, rig, placed
+            )
             warnings = [*result.report.warnings, *unfinished.warnings, *warnings]
             captured = replace(result.report, warnings=warnings)
+            if args.save_calibration:
+                write_calibration(args.save_calibration, result.motions[0])
+                written.append(args.save_calibration)
             if args.overlay:
                 write_overlay(
                     args.overlay,

@@ -72,6 +72,14 @@ class FootageView:
         return np.array([k1, k2, p1, p2, k3])
 
     @property
+    def axes(self) -> Float64Array:
+        """(3, 3) rotation from the axes of the camera to those of one that was turned as the
+        picture is; without mirroring.
+        """
+        quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        return np.linalg.matrix_power(quarter, self.clockwise_deg // 90)
+
+    @property
     def inverse(self) -> FootageView:
         """The view that takes the shown picture to the file's; mirroring is its own inverse, and
         reverses a turn.

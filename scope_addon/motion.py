@@ -11,7 +11,7 @@ trans.
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,6 +75,8 @@ class Motion:
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
     # The face, if it was looked for: the arrays named FACE_KEYS, or none.
     face: dict[str, NDArray[Any]] = field(default_factory=dict)
+    # The further cameras, if there were several: the arrays named VIEW_KEYS, or none.
+    views: dict[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in SIGMA_KEYS:
@@ -85,6 +87,9 @@ class Motion:
             setattr(self, name, np.asarray(value, dtype) if dtype is not str else str(value))
         self.face = {
             name: np.asarray(value, _FACE_SCHEMA[name][1]) for name, value in self.face.items()
+        }
+        self.views = {
+            name: np.asarray(value, _VIEW_SCHEMA[name][1]) for name, value in self.views.items()
         }
         self.mocap_framerate, self.height_sigma_m = (
             float(self.mocap_framerate),
@@ -112,6 +117,39 @@ class Motion:
     def joint_count(self) -> int:
         """K + 1."""
         return self.joints_cam.shape[1]
+
+    @property
+    def view_count(self) -> int:
+        """How many further cameras there were."""
+        return len(self.views["view_sources"]) if self.views else 0
+
+    def from_view(self, number: int) -> Motion:
+        """Return the motion as a further camera has seen it, by the clock of its footage.
+
+        It has no keypoints, which are those of the first camera.
+
+        :param number: from 0 to `view_count` - 1.
+        """
+        of_view = {name: values[number] for name, values in self.views.items()}
+        T_view_camera = of_view["view_from_camera"]
+        joints: NDArray[np.float64] = self.joints_cam @ T_view_camera[:3, :3].T
+        times_s = self.timestamps + of_view["view_offsets_s"]
+        rate = float(of_view["view_frame_rates"])
+        return replace(
+            self,
+            frames=np.round(times_s * self.footage_speed * rate).astype(np.int64),
+            timestamps=times_s,
+            joints_cam=joints + T_view_camera[:3, 3],
+            keypoints2d=np.zeros((len(self), 0, 3)),
+            keypoints2d_names=np.zeros(0, str),
+            intrinsics=of_view["view_intrinsics"],
+            dist=of_view["view_dist"],
+            world_from_camera=self.world_from_camera @ np.linalg.inv(T_view_camera),
+            image_size=of_view["view_image_sizes"],
+            source=str(of_view["view_sources"]),
+            face={},
+            views={},
+        )
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -144,26 +182,56 @@ class Motion:
             if got != expected:
                 raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
         self._validate_face(where)
+        self._validate_views(where)
+
+    def _validate_views(self, where: str) -> None:
+        if not self.views:
+            return
+        sizes = {"V": len(np.atleast_1d(self.views.get("view_sources", ())))}
+        self._validate_group(where, self.views, _VIEW_SCHEMA, sizes, "further cameras")
+        T_view_camera = self.views["view_from_camera"]
+        R = T_view_camera[:, :3, :3]
+        turned_back = R @ np.swapaxes(R, 1, 2)
+        is_rigid = (
+            np.allclose(turned_back, np.eye(3), atol=1e-3)
+            and (T_view_camera[:, 3] == [0.0, 0.0, 0.0, 1.0]).all()
+        )
+        if not is_rigid or not (self.views["view_frame_rates"] > 0).all():
+            raise MotionFileError(
+                f"{where}: view_from_camera must be rotations and translations, and "
+                "view_frame_rates above 0; capture again"
+            )
 
     def _validate_face(self, where: str) -> None:
         if not self.face:
             return
-        if missing := sorted(set(FACE_KEYS) - set(self.face)):
-            raise MotionFileError(
-                f"{where} has a face, but lacks {', '.join(missing)}; capture again"
-            )
         sizes = {
             "T": len(self.frames),
-            "E": self.face["expression_names"].size,
-            "F": self.face["face_landmarks"].size,
+            "E": np.size(self.face.get("expression_names", ())),
+            "F": np.size(self.face.get("face_landmarks", ())),
         }
-        for name, (shape, dtype) in _FACE_SCHEMA.items():
+        self._validate_group(where, self.face, _FACE_SCHEMA, sizes, "a face")
+
+    def _validate_group(
+        self,
+        where: str,
+        group: dict[str, NDArray[Any]],
+        schema: dict[str, tuple[tuple[str | int, ...], type]],
+        sizes: dict[str, int],
+        what: str,
+    ) -> None:
+        """Check arrays that a file has together or not at all."""
+        if missing := sorted(set(schema) - set(group)):
+            raise MotionFileError(
+                f"{where} has {what}, but lacks {', '.join(missing)}; capture again"
+            )
+        for name, (shape, dtype) in schema.items():
             expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
-            if self.face[name].shape != expected:
+            if group[name].shape != expected:
                 raise MotionFileError(
-                    f"{where}: {name} must have shape {expected}, but has {self.face[name].shape}"
+                    f"{where}: {name} must have shape {expected}, but has {group[name].shape}"
                 )
-            if dtype is np.float32 and not np.isfinite(self.face[name]).all():
+            if issubclass(dtype, np.floating) and not np.isfinite(group[name]).all():
                 raise MotionFileError(
                     f"{where}: {name} has values that are not finite; capture again"
                 )
@@ -209,7 +277,7 @@ class Motion:
         arrays = {
             f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS
         }
-        return arrays | self.corrections | self.face
+        return arrays | self.corrections | self.face | self.views
 
     @classmethod
     def load(cls, path: str | Path, content: bytes | None = None) -> Motion:
@@ -233,8 +301,9 @@ class Motion:
         }
         corrections = {key: data[key] for key in CORRECTION_KEYS if key in data}
         face = {key: data[key] for key in FACE_KEYS if key in data}
+        views = {key: data[key] for key in VIEW_KEYS if key in data}
         try:
-            return cls(**values, corrections=corrections, face=face)
+            return cls(**values, corrections=corrections, face=face, views=views)
         except MotionFileError:
             raise
         except (TypeError, ValueError, OverflowError) as error:  # of numpy's conversions
@@ -277,7 +346,18 @@ FACE_KEYS = (
     "face_points",
     "face_landmarks",
 )
-_GROUPS = ("corrections", "face")  # fields that are not keys themselves
+# Only in files of captures with several cameras, one row for each but the first, which the other
+# keys describe.
+VIEW_KEYS = (
+    "view_sources",
+    "view_intrinsics",
+    "view_dist",
+    "view_image_sizes",
+    "view_frame_rates",
+    "view_from_camera",
+    "view_offsets_s",
+)
+_GROUPS = ("corrections", "face", "views")  # fields that are not keys themselves
 OPTIONAL_KEYS = {
     "source",
     *SIGMA_KEYS,
@@ -288,6 +368,7 @@ OPTIONAL_KEYS = {
     "footage_speed",
     *CORRECTION_KEYS,
     *FACE_KEYS,
+    *VIEW_KEYS,
 }
 _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "expressions": (("T", "E"), np.float32),
@@ -296,6 +377,15 @@ _FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "gaze": (("T", 2, 3), np.float32),
     "face_points": (("T", "F", 2), np.float32),
     "face_landmarks": (("F",), np.int64),
+}
+_VIEW_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
+    "view_sources": (("V",), np.str_),
+    "view_intrinsics": (("V", 3, 3), np.float64),
+    "view_dist": (("V", 5), np.float64),
+    "view_image_sizes": (("V", 2), np.int64),
+    "view_frame_rates": (("V",), np.float64),
+    "view_from_camera": (("V", 4, 4), np.float64),
+    "view_offsets_s": (("V",), np.float64),
 }
 _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "poses": (("T", "3K1"), np.float32),

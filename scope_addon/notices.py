@@ -73,6 +73,8 @@ SENTENCES = {
     "not_in_view": "{footage} does not show {person:who}, or was not recognized",
     "view_contradicts": "{footage} contradicts the other cameras about {person:who} {times:times}, "
     "and was left out there",
+    "calibration_contradicts": "{calibration} does not fit {footage}: {person:who} is not where "
+    "the other cameras see them; a camera was moved or zoomed since, or they are in another order",
     # the captured people
     "cuts": "{footage} cuts to another scene {times:times}: capture each scene separately, with a "
     "start and end time",

@@ -66,6 +66,28 @@ def made_face(T: int, **weights: np.ndarray | float) -> dict[str, np.ndarray]:
     }
 
 
+def made_views(*offsets_s: float, turn: float = 1.0) -> dict[str, np.ndarray]:
+    """The arrays of further cameras, each turned by an angle more about the vertical through a
+    point 4 m before the first one.
+    """
+    T_view_camera = np.tile(np.eye(4), (len(offsets_s), 1, 1))
+    for k, T in enumerate(T_view_camera, 1):
+        c = np.cos(k * turn)
+        s = np.sin(k * turn)
+        T[:3, :3] = [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+        T[:3, 3] = [-4.0 * s, 0.0, 4.0 - 4.0 * c]
+    V = len(offsets_s)
+    return {
+        "view_sources": np.array([f"walk{k + 2}.mp4" for k in range(V)]),
+        "view_intrinsics": np.tile([[500.0, 0, 300], [0, 510.0, 210], [0, 0, 1]], (V, 1, 1)),
+        "view_dist": np.zeros((V, 5)),
+        "view_image_sizes": np.tile([600, 400], (V, 1)),
+        "view_frame_rates": np.full(V, 60.0),
+        "view_from_camera": T_view_camera,
+        "view_offsets_s": np.array(offsets_s),
+    }
+
+
 def level_camera(T: int) -> np.ndarray:
     """(T, 4, 4) world_from_camera of a camera at (0, -4, 1) that looks along y."""
     out = np.tile(np.eye(4), (T, 1, 1))

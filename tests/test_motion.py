@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, Motion
+from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, VIEW_KEYS, Motion
 
-from .made_motion import made_face
+from .made_motion import made_face, made_views
 
 
 def make_motion(T=4, K1=24, J=33, P=10):
@@ -148,6 +148,59 @@ def test_a_face_is_saved_and_loaded_and_absent_where_it_was_not_looked_for(tmp_p
 )
 def test_a_damaged_face_is_an_error_that_names_it(tmp_path, key, value, message):
     replace(make_motion(), face=made_face(4)).save(tmp_path / "a.npz")
+    arrays = dict(np.load(tmp_path / "a.npz"))
+    del arrays[key]
+    np.savez(tmp_path / "a.npz", **arrays, **({} if value is None else {key: value}))
+    with pytest.raises(MotionFileError, match=message):
+        Motion.load(tmp_path / "a.npz")
+
+
+def test_further_cameras_are_saved_and_loaded_and_absent_where_there_was_one(tmp_path):
+    make_motion().save(tmp_path / "one.npz")
+    assert not set(np.load(tmp_path / "one.npz")) & set(VIEW_KEYS)
+    views = made_views(0.5, -0.25)
+    replace(make_motion(), views=views).save(tmp_path / "three.npz")
+    loaded = Motion.load(tmp_path / "three.npz")
+    assert loaded.view_count == 2
+    for key, value in views.items():
+        np.testing.assert_array_equal(loaded.views[key], value)
+
+
+def test_a_further_camera_sees_the_same_people_at_its_own_time():
+    motion = replace(
+        make_motion(), joints_cam=np.full((4, 24, 3), [0.1, 0.2, 4.5]), views=made_views(0.5)
+    )
+    seen = motion.from_view(0)
+    # The camera is on a circle about the point 4 m before the first one, and looks at it.
+    c, s = np.cos(1.0), np.sin(1.0)
+    np.testing.assert_allclose(
+        seen.joints_cam[0, 0], [0.1 * c + 0.5 * s, 0.2, 4.0 - 0.1 * s + 0.5 * c], atol=1e-6
+    )
+    first = np.einsum("tij,tkj->tki", motion.world_from_camera[:, :3, :3], motion.joints_cam)
+    other = np.einsum("tij,tkj->tki", seen.world_from_camera[:, :3, :3], seen.joints_cam)
+    np.testing.assert_allclose(
+        other + seen.world_from_camera[:, None, :3, 3],
+        first + motion.world_from_camera[:, None, :3, 3],
+        atol=1e-5,
+    )
+    np.testing.assert_allclose(seen.timestamps, motion.timestamps + 0.5)
+    np.testing.assert_array_equal(seen.frames, np.round((motion.timestamps + 0.5) * 60))
+    assert seen.source == "walk2.mp4"
+    assert seen.view_count == 0
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("view_dist", None, "lacks view_dist"),
+        ("view_offsets_s", np.zeros(3), "view_offsets_s must have shape \\(1,\\)"),
+        ("view_offsets_s", np.array([np.nan]), "not finite"),
+        ("view_from_camera", np.ones((1, 4, 4)), "rotations and translations"),
+        ("view_frame_rates", np.zeros(1), "above 0"),
+    ],
+)
+def test_a_damaged_further_camera_is_an_error_that_names_it(tmp_path, key, value, message):
+    replace(make_motion(), views=made_views(0.5)).save(tmp_path / "a.npz")
     arrays = dict(np.load(tmp_path / "a.npz"))
     del arrays[key]
     np.savez(tmp_path / "a.npz", **arrays, **({} if value is None else {key: value}))

@@ -6,7 +6,7 @@ opened.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from ...solver.body import Body
 from ..errors import UsageError
 from ..footage_view import FootageView
 from ..options import Place, option, options_at
-from ..options.capture import ALL, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
+from ..options.capture import ALL, AUTO, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
 from .camera.calibration import read_calibration
 from .camera.intrinsics import choose_camera
 from .fitting.hand_measurements import require_fingers
@@ -42,6 +42,8 @@ class CaptureOptions(NetworkDeclaration, CaptureDeclaration):
     wanted: FootageRange = VideoRange()  # range of frames
     part: Crop | None = None  # of the picture in which people are looked for
     chosen: ChosenPerson | None = None  # who is captured first; None: the most prominent one
+    # Of the clocks of further cameras, seconds; None: unknown. Empty: all are unknown.
+    offsets_s: Sequence[float | None] = ()
     # The length of the windows in which clips at least twice as long are observed.
     window_s: float = WINDOW_S
 
@@ -62,8 +64,28 @@ def capture_options(values: Mapping[str, Any]) -> CaptureOptions:
         wanted=parse_range(values["start"], values["end"], values["fps"], view=view),
         part=parse_crop(values["crop"]) if values["crop"] else None,
         chosen=parse_person(values["person"]) if values["person"] else None,
+        offsets_s=parse_offsets(values["offset"]) if values["offset"] else (),
         **fields,
     )
+
+
+def parse_offsets(text: str) -> tuple[float | None, ...]:
+    """Parse the offsets of further cameras' clocks, seconds, such as "1.25,auto".
+
+    :raises UsageError: one is neither a number nor auto.
+    """
+    offsets: list[float | None] = []
+    for each in text.split(","):
+        if each.strip() == AUTO:
+            offsets.append(None)
+            continue
+        if not re.fullmatch(r"\s*[+-]?\d{1,5}(\.\d{1,9})?\s*", each, re.A):
+            raise UsageError(
+                f"--offset {text[:60]!r} is not a list of offsets: give seconds, or {AUTO}, for "
+                "each further video, such as 1.25,auto"
+            )
+        offsets.append(float(each))
+    return tuple(offsets)
 
 
 def parse_person(text: str) -> ChosenPerson:
@@ -82,11 +104,12 @@ def parse_person(text: str) -> ChosenPerson:
     return ChosenPerson(float(numbers[1]), float(numbers[2]), time_s if time else None)
 
 
-def check_options(body: Body, options: CaptureOptions) -> None:
+def check_options(body: Body, options: CaptureOptions, has_views: bool = False) -> None:
     """Check the options as far as possible without opening footage or networks.
 
+    :param has_views: whether several cameras are captured.
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit
-        the body.
+        the body, or is for several cameras.
     :raises InputError: the calibration cannot be used.
     """
     most_people(options.people)
@@ -106,8 +129,10 @@ def check_options(body: Body, options: CaptureOptions) -> None:
             fov_deg=options.fov_deg,
             calibration=options.calibration,
         )
-    elif options.calibration:
+    elif options.calibration and not has_views:
         read_calibration(options.calibration)
+    if options.offsets_s and not has_views:
+        raise UsageError("--offset is for several cameras, but one video was given")
     for each in options_at(Place.CAPTURE):  # ranges not checked above
         if problem := each.range_error(getattr(options, each.name)):
             raise UsageError(f"{each.flag} {problem}")

@@ -94,7 +94,7 @@ def body_and_options(args: argparse.Namespace) -> tuple[Body, CaptureOptions]:
     values = option_values(args)
     options = capture_options(values)
     body = load_body(chosen_body(values))
-    check_options(body, options)
+    check_options(body, options, has_views=bool(getattr(args, "views", ())))
     return body, options
 
 

@@ -6,15 +6,16 @@ from __future__ import annotations
 import argparse
 import glob
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ...solver.body_file import ASSETS
+from ..atomic_write import atomic_path, reason
 from ..counts import counted
-from ..errors import UsageError
+from ..errors import OutputError, UsageError
 from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 MOTION_SUFFIXES = (".npz",)
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 REPORT_SUFFIXES = (".html",)
+CALIBRATION_SUFFIXES = (".toml",)
 
 
 def default_outputs(video: Path) -> list[Path]:
@@ -86,6 +88,8 @@ def files_to_read(values: Mapping[str, Any]) -> list[Path]:
     for name in OTHER_INPUTS:
         if values.get(name) is not None:
             path = Path(values[name])
+            if name == "calibration" and ".toml#" in path.name:
+                path = path.with_name(path.name.partition("#")[0])
             # A network's description lies beside it.
             files += [path, path.with_suffix(".json")] if path.suffix == ".onnx" else [path]
     return [path for path in files if os.path.isfile(path)]
@@ -116,8 +120,10 @@ def check_outputs(
     inputs: Mapping[str, Any],
     overlay: Path | None = None,
     report: Path | None = None,
+    calibration: Path | None = None,
 ) -> None:
-    """Check, before the capture starts, that the outputs, overlay and page can be written after it.
+    """Check, before the capture starts, that the outputs, overlay, page and calibration can be
+    written after it.
 
     :param inputs: values of the command's arguments and options; see `files_to_read`.
     :raises UsageError: an output has an unknown suffix, is a folder, or is what is read.
@@ -129,7 +135,9 @@ def check_outputs(
         check_output(overlay, OVERLAY_SUFFIXES)
     if report:
         check_output(report, REPORT_SUFFIXES)
-    written = [*outputs, *filter(None, (overlay, report))]
+    if calibration:
+        check_output(calibration, CALIBRATION_SUFFIXES)
+    written = [*outputs, *filter(None, (overlay, report, calibration))]
     for path in outputs:
         # Several people have a file each in formats that have room for one.
         written += path.parent.glob(f"{glob.escape(path.stem)}.person*{path.suffix}")
@@ -209,9 +217,11 @@ def write_outputs(
     video: Path,
     args: argparse.Namespace,
     rig: RigSource | None = None,
+    views: Sequence[Path] = (),
 ) -> tuple[list[Path], list[Notice]]:
     """Write every output; bpy is loaded only if an output needs a scene.
 
+    :param views: videos of the motions' further cameras.
     :return: the paths of the files, and warnings.
     :raises OutputError: a file cannot be written.
     """
@@ -230,7 +240,12 @@ def write_outputs(
         from ..scene.export.export import ExportOptions, export_motions
 
         footage = _footage(video, args)
-        options = replace(NEW_SCENE, name=display_text(stem_of(video)), shape=args.shape_keys)
+        options = replace(
+            NEW_SCENE,
+            name=display_text(stem_of(video)),
+            shape=args.shape_keys,
+            view_footage=views,
+        )
         if not motions[0].image_size.any():  # imported, and never seen by a camera
             options = replace(options, resolution="keep", active_camera=False, with_camera=False)
         separate = ExportOptions(
@@ -245,6 +260,20 @@ def write_outputs(
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
         written += files
     return written, warnings
+
+
+def write_calibration(path: Path, motion: Motion) -> None:
+    """Write the cameras of a motion as a TOML file.
+
+    :raises OutputError: the file cannot be written.
+    """
+    from ..capture.camera.calibration import calibration_text
+
+    try:
+        with atomic_path(path) as temporary:
+            temporary.write_text(calibration_text(motion), encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
 def _footage(video: Path, args: argparse.Namespace) -> Path | None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -51,32 +51,32 @@ class LineRequest:
 
 
 class JobRequest(LineRequest):
-    """One capture: the footage, and a value for each option of `Place.WORKER`."""
+    """One capture: the footage, further videos of the same moment, and a value for each option of
+    `Place.WORKER`.
+    """
 
     called = "a capture request"
     first_key = "footage"
 
-    def __init__(self, footage: str, **values: Any) -> None:
+    def __init__(self, footage: str, views: Sequence[str] = (), **values: Any) -> None:
         """Check the values, and fill in the defaults of the others.
 
         :raises UsageError: an option does not exist, or its value has the wrong type or is none of
             the choices.
         """
         self.footage = footage
+        self.views = tuple(views)
         self.values: dict[str, Any] = checked_values(values, Place.WORKER)
 
     def __eq__(self, other: object) -> bool:
         """Compare footage and values."""
-        return isinstance(other, JobRequest) and (self.footage, self.values) == (
-            other.footage,
-            other.values,
-        )
+        return isinstance(other, JobRequest) and self.to_json() == other.to_json()
 
     __hash__ = None  # type: ignore[assignment]
 
     def to_json(self) -> str:
         """Return the request as one line of JSON."""
-        return json.dumps({"footage": self.footage, **self.values})
+        return json.dumps({"footage": self.footage, "views": self.views, **self.values})
 
     def key(self, code_version: str) -> str:
         """Return the hexadecimal key of the result: equal only for the same footage, options and
@@ -88,7 +88,8 @@ class JobRequest(LineRequest):
         options = [option for option in options_at(Place.WORKER) if option.decides_result]
         values = {option.name: self.values[option.name] for option in options}
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
-        _add_file(digest, Path(self.footage))
+        for footage in (self.footage, *self.views):
+            _add_file(digest, Path(footage))
         named = [
             values[option.name]
             for option in options

@@ -25,6 +25,7 @@ from .live.formats_request import FormatsRequest
 from .live.request import LiveRequest
 from .request import WARM_UP, JobRequest
 from .unfinished import unfinished_capture
+from .watched_footage import WatchedFootage
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
 # of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
@@ -119,22 +120,28 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     from ..capture.long_clips.windowed_clip import lasting
     from ..capture.options import capture_options
     from ..capture.pipeline import capture
+    from ..capture.several_views.capture_views import capture_views
     from ..untrusted.body_file import load_body
     from .preview import PreviewWriter
 
-    with unfinished_capture(cache_of(job_folder), Path(request.footage)) as unfinished:
+    # What several cameras show is not continued after a kill.
+    folder = None if request.views else cache_of(job_folder)
+    with unfinished_capture(folder, Path(request.footage)) as unfinished:
+        footage = [unfinished.footage, *(WatchedFootage(Path(view)) for view in request.views)]
+        progress = reporter.progress
+        for each in footage:
+            progress = each.watched(progress)
         with PreviewWriter(job_folder, reporter.send) as watch:
             body = load_body(request.values["body"])
             options = capture_options(request.values)
-            result = capture(
-                request.footage,
-                body,
-                options,
-                unfinished.footage.watched(reporter.progress),
-                watch,
-                lasting(unfinished.folder),
-            )
-        unfinished.footage.check()
+            if request.views:
+                videos = [request.footage, *request.views]
+                result = capture_views(videos, body, options, progress, watch)
+            else:
+                observe_frames = lasting(unfinished.folder)
+                result = capture(request.footage, body, options, progress, watch, observe_frames)
+        for each in footage:
+            each.check()
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):

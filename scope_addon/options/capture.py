@@ -375,6 +375,15 @@ class CaptureDeclaration:
             value=lambda settings: settings.calibration_file if settings.lens == "FILE" else None,
         ),
     )
+    offset: ClassVar[Option] = Option(
+        "offset",
+        str,
+        "",
+        Place.COMMAND_LINE | Place.WORKER,
+        "of several cameras, the time in each further video less that in the first one, of the "
+        "same moment, in seconds, or auto",
+        argument=Argument(metavar="S[,S...]", default_text="found from the people"),
+    )
     smoothing: bool = declared(
         True,
         _EVERYWHERE,

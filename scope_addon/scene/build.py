@@ -6,7 +6,7 @@ each person.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -59,6 +59,8 @@ class BuildOptions:
     shape: str = "keyed"  # "keyed": one key. "per_frame": a key per pose. "baked": into the mesh
     with_camera: bool = True
     with_markers: bool = True  # at the review spans, on the timeline
+    # Of the motion's further cameras, in their order; None, or fewer: not shown.
+    view_footage: Sequence[str | Path | None] = ()
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -276,6 +278,24 @@ def _build_cameras(
             warnings.append(notice("pixel_aspect"))
         if footage is not None:
             warnings += camera.show_footage(person.camera, footage, person.motion, person.frames)
+        warnings += _build_views(name, person, collection, options.view_footage)
+    return warnings
+
+
+def _build_views(
+    name: str,
+    person: Person,
+    collection: bpy.types.Collection,
+    footage: Sequence[str | Path | None],
+) -> list[Notice]:
+    """Create the further cameras of a person's motion; return warnings."""
+    warnings: list[Notice] = []
+    for number in range(person.motion.view_count):
+        label = f"{name}_camera{number + 2}"
+        obj = camera.build_view(label, person.motion, number, collection, person.frames)
+        if number < len(footage) and (path := footage[number]) is not None:
+            seen = person.motion.from_view(number)
+            warnings += camera.show_footage(obj, path, seen, person.frames)
     return warnings
 
 

@@ -38,8 +38,10 @@ from .character.animation import on_one_hemisphere, quaternion_from_matrix
 # frames; footage that deviates less counts as synchronized, because 0.5 is rounding
 _MAX_OFFSET = 0.6
 _MAX_DURATION = 1_000_000  # frames; after this duration Blender would show the last frame
-# Custom property of a capture's collection: width, height and pixel aspect of the footage.
+# Custom property of a capture's collection and its further cameras: width, height and pixel aspect
+# of the footage.
 _PICTURE = "scope_picture"
+_VIEW = "scope_view"  # custom property of a capture's further cameras: their number, from 0
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
 
 
@@ -61,16 +63,18 @@ def _footage_aspect(motion: Motion) -> tuple[float, float]:
     return (x, y) if motion.view.is_upright else (y, x)
 
 
-def store_resolution(collection: bpy.types.Collection, motion: Motion) -> None:
-    """Store the size and pixel aspect of the footage in a capture's collection."""
-    collection[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
-
-
-def set_resolution(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Set the scene's resolution and pixel aspect to those of the footage, if the collection stores
-    them.
+def store_resolution(owner: bpy.types.ID, motion: Motion) -> None:
+    """Store the size and pixel aspect of the footage in a capture's collection, or in one of its
+    further cameras.
     """
-    picture = stored_numbers(collection, _PICTURE)
+    owner[_PICTURE] = [*(float(n) for n in motion.image_size), *pixel_aspect(motion)]
+
+
+def set_resolution(scene: bpy.types.Scene, owner: bpy.types.ID) -> None:
+    """Set the scene's resolution and pixel aspect to those of the footage, if a capture's
+    collection, or one of its further cameras, stores them.
+    """
+    picture = stored_numbers(owner, _PICTURE)
     if len(picture) != 4 or min(picture) <= 0:
         return
     width, height, aspect_x, aspect_y = picture
@@ -105,6 +109,30 @@ def build_camera(
         channels.write("location", frames, locations, group="Object Transforms")
         channels.write("rotation_quaternion", frames, rotations, group="Object Transforms")
     return obj
+
+
+def build_view(
+    name: str,
+    motion: Motion,
+    number: int,
+    collection: bpy.types.Collection,
+    frames: NDArray[np.float64],
+) -> bpy.types.Object:
+    """Create the camera object of a further camera of a motion.
+
+    :param number: of the camera, see `Motion.from_view`. :param frames: (T,) as of `build_camera`.
+    """
+    seen = motion.from_view(number)
+    obj = build_camera(name, seen, collection, frames)
+    obj[_VIEW] = number
+    store_resolution(obj, seen)
+    return obj
+
+
+def view_number(camera: bpy.types.Object) -> int | None:
+    """Return the number of a capture's further camera; None of its first one."""
+    number = camera.get(_VIEW)
+    return number if isinstance(number, int) else None
 
 
 def set_lens(data: bpy.types.Camera, motion: Motion) -> None:

@@ -23,7 +23,7 @@ from .animation_data.actions import fcurves, frame_range
 from .animation_data.frame_spans import FrameSpan, parse_spans
 from .animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
 from .animation_data.stored_values import start_frame
-from .camera import same_camera, show_footage_again
+from .camera import same_camera, show_footage_again, view_number
 from .character.confidence_curves import MARKER_NAMES
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
@@ -227,13 +227,18 @@ def _show_footage(
     for collection in scene.collection.children_recursive:
         seen: list[Motion] = []
         own = list(collection.objects)
-        cameras = [obj for obj in own if obj.type == "CAMERA"]
+        every_camera = [obj for obj in own if obj.type == "CAMERA"]
+        cameras = [obj for obj in every_camera if view_number(obj) is None]
         for person, motion in people.items():
             if motion is None or person not in own or any(same_camera(motion, m) for m in seen):
                 continue
             if len(seen) < len(cameras):
                 frames = timing.key_frames(motion.timestamps, rate, start_frame(person))
                 warnings += show_footage_again(cameras[len(seen)], motion, frames)
+                for view in every_camera:
+                    number = view_number(view)
+                    if number is not None and number < motion.view_count:
+                        warnings += show_footage_again(view, motion.from_view(number), frames)
             seen.append(motion)
     return warnings
 

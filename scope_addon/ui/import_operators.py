@@ -133,11 +133,20 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
 
     motion = imported.motion
     footage = None
+    view_footage: list[Path | None] = []
     seen = bool(motion.image_size.all())  # by a camera, as motions of other tools are not
-    beside = path.parent / Path(motion.source).name
-    if seen and beside.suffix.lower() in FOOTAGE_SUFFIXES and beside.is_file():
-        footage = beside
-    options = replace(options, name=path.stem, with_camera=options.with_camera and seen)
+    if seen:
+        footage = _footage_beside(path, motion.source)
+        sources = motion.views["view_sources"].tolist() if motion.views else []
+        # Videos of the same name, from several folders, cannot lie beside the file together.
+        is_unique = len({motion.source, *sources}) == 1 + len(sources)
+        view_footage = [_footage_beside(path, source) if is_unique else None for source in sources]
+    options = replace(
+        options,
+        name=path.stem,
+        with_camera=options.with_camera and seen,
+        view_footage=view_footage,
+    )
     result = build_scene([motion], imported.body, footage, options)
     pack_motion(result.people[0].armature, motion.to_bytes())
     rate = (
@@ -151,6 +160,13 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     report = Report(warnings=warnings)
     show_result(result.collection.scope_result, str(footage or ""), report, result)
     scene.scope.capture = result.collection
+
+
+def _footage_beside(path: Path, source: str) -> Path | None:
+    """Return the footage that lies beside a motion file; None if it does not."""
+    beside = path.parent / Path(source).name
+    is_footage = beside.suffix.lower() in FOOTAGE_SUFFIXES and beside.is_file()
+    return beside if is_footage else None
 
 
 def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

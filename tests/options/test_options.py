@@ -34,7 +34,7 @@ from scope.solver.body_file import load_body
 # Listed again on purpose, because users' scripts rely on the flags.
 FLAGS = """
 --quality --people --person --start --end --rotate --mirror --crop --fps --speed --body --hands
---face --height --focal-mm --fov --calibration
+--face --height --focal-mm --fov --calibration --offset
 --no-smoothing
 --uneven-ground --shape-keys --bvh-unit --skeleton --file-per-person --retarget --rig-object
 --bone-map --expression-map
@@ -92,9 +92,9 @@ def test_command_line_and_worker_have_the_same_defaults():
 
 def test_the_typed_fields_of_the_pipeline_are_the_declared_options():
     fields = {field.name for field in dataclasses.fields(CaptureOptions)}
-    # wanted: start, end, fps, rotate and mirror; part: crop; chosen: person; window_s: of long
-    # clips, which the parts of one on several machines have in common
-    others = {"wanted", "part", "chosen", "window_s"}
+    # wanted: start, end, fps, rotate and mirror; part: crop; chosen: person; offsets_s: offset;
+    # window_s: of long clips, which the parts of one on several machines have in common
+    others = {"wanted", "part", "chosen", "offsets_s", "window_s"}
     assert fields == {each.name for each in options_at(Place.CAPTURE)} | others
     for each in options_at(Place.CAPTURE | Place.WORKER):
         assert getattr(CaptureOptions(), each.name) == each.default

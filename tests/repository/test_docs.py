@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope import solver
-from scope.scope_addon.capture.camera.calibration import read_calibration
+from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
 from scope.scope_addon.capture.perception.adapters.box_detector import DETECTOR_TYPES
 from scope.scope_addon.capture.perception.adapters.description import read_description
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KEYPOINT_TYPES
@@ -35,13 +35,13 @@ from scope.scope_addon.edit.pins.corrections import (
     Pin,
     Upright,
 )
-from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, Motion
+from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, VIEW_KEYS, Motion
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.body_file import BUILT_IN
 from scope.solver.names import EXPRESSIONS
 
-from ..made_motion import made_face, made_motion
+from ..made_motion import made_face, made_motion, made_views
 
 CHOSEN = [each for each in options_at(Place.COMMAND_LINE) if each.choices]
 ROOT = Path(__file__).resolve().parents[2]
@@ -185,15 +185,17 @@ def test_the_command_line_page_states_the_choices_of_an_option_and_its_default(d
 
 
 def test_every_key_of_the_motion_file_is_defined_once():
-    keys = {field.name for field in fields(Motion)} - {"corrections", "face"} | {
+    keys = {field.name for field in fields(Motion)} - {"corrections", "face", "views"} | {
         *CORRECTION_KEYS,
         *FACE_KEYS,
+        *VIEW_KEYS,
     }
     assert defined({"key"}) == Counter({("motion_file.md", key): 1 for key in keys})
 
 
 def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
-    motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)), face=made_face(7))
+    given = {"face": made_face(7), "views": made_views(0.5)}
+    motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)), **given)
     changes = (
         Pin(2, "head", (320.0, 200.0)),
         Contact(1, 3, "left"),
@@ -304,7 +306,8 @@ def test_every_page_can_be_reached_from_the_readme(page):
 
 def test_every_block_is_of_a_language_that_is_tried():
     found = {(p.name, m[1]) for p in PAGES for m in _BLOCK.finditer(p.read_text("utf-8"))}
-    assert {language for _, language in found} <= {"sh", "python", "json", "text", "mermaid"}
+    tried = {"sh", "python", "json", "toml", "text", "mermaid"}
+    assert {language for _, language in found} <= tried
 
 
 @pytest.fixture
@@ -424,6 +427,14 @@ def test_every_python_block_runs(code, body, folder):
         assert error.mean() < 0.2  # one view does not fix the depth
     joints = names.get("joints")
     assert joints is None or np.isfinite(joints).all()
+
+
+@pytest.mark.parametrize("code", blocks("toml"))
+def test_every_toml_block_is_a_calibration_with_places(code, folder):
+    (folder / "calib.toml").write_text(code + "\n" + code.replace("cam_1", "cam_2"))
+    found = placed_cameras(folder / "calib.toml", ["Cam1", "Cam2"])
+    assert all(place is not None for _, place in found)
+    assert all(read_calibration(file).intrinsics.any() for file, _ in found)
 
 
 @pytest.mark.parametrize("code", blocks("json"))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -9,9 +10,11 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.footage_view import FootageView
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+from scope.scope_addon.scene.camera import set_resolution, view_number
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.scene.match_rate import change_rate
 
+from ..made_motion import made_views
 from ..required import package
 
 
@@ -436,3 +439,35 @@ def test_footage_whose_name_has_a_backslash_is_not_shown_and_said(body, make_mot
     motion = make_motion(body, 5, image_size=(64, 48))
     result = build_scene([motion], body, footage=path, options=NEW_SCENE)
     assert [warning.code for warning in result.warnings] == ["undecodable_footage"]
+
+
+def test_every_camera_of_a_capture_sees_joints_at_their_pixels(body, make_motion, joints_world):
+    motion = replace(make_motion(body, 8), views=made_views(0.5, -0.2))
+    built = build_scene([motion], body, options=NEW_SCENE)
+    cameras = [obj for obj in built.collection.objects if obj.type == "CAMERA"]
+    assert [view_number(camera) for camera in cameras] == [None, 0, 1]
+    assert cameras[0] == built.people[0].camera
+    for number, camera in enumerate(cameras[1:]):
+        seen = motion.from_view(number)
+        set_resolution(bpy.context.scene, camera)
+        pixels = projected_by_blender(camera, joints_world(motion)[5])
+        np.testing.assert_allclose(pixels, projected_by_intrinsics(seen, 5), atol=0.05)
+
+
+@pytest.mark.parametrize("rate", [30.0, 15.0])  # of the first camera; the film has 30
+def test_every_footage_is_shown_by_its_own_clock(body, make_motion, clip, rate):
+    views = made_views(2 / 30) | {
+        "view_image_sizes": np.array([[64, 48]]),
+        "view_frame_rates": np.array([30.0]),
+    }
+    motion = make_motion(body, 2, rate=rate, image_size=(64, 48))
+    motion = replace(motion, views=views)
+    options = replace(NEW_SCENE, view_footage=[clip])
+    built = build_scene([motion], body, clip, options)
+    _, second = (obj for obj in built.collection.objects if obj.type == "CAMERA")
+    step = round(30 / rate)
+    assert [frame_shown(second, f) for f in (0, 1)] == [2, 2 + step]
+    assert built.warnings == []
+    armature = built.people[0].armature
+    change_rate(bpy.context.scene, 60.0, {armature: motion}, [])
+    assert [frame_shown(second, f) for f in (0, 2 * step)] == [2, 2 + step]

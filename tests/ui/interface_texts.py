@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 import scope
 from scope.scope_addon import ui
-from scope.scope_addon.job.progress.job_progress import BUILDING, FIRST_ONLY, STAGES
+from scope.scope_addon.job.progress.job_progress import BUILDING, FIRST_ONLY, PLACING, STAGES
 from scope.scope_addon.notices import PARTS, PHRASES, SENTENCES
 from scope.scope_addon.ui.pins.pin_tool import HANDLES
 from scope.scope_addon.ui.translations import CONTEXT
@@ -53,7 +53,7 @@ CORRECTIONS = {
     ),
     *(f"{what} Exchanged" for what in ("Sides", "Arms", "Legs")),
 }
-_STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, BUILDING)}
+_STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, PLACING, BUILDING)}
 # Texts of warnings; of some, a sentence consists of values alone.
 _NOTICES = {
     text

@@ -10,7 +10,9 @@ eliminated first (Schur complement), so a step costs what the poses do: some ten
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +22,10 @@ from ...arrays import Float64Array, IndexArray
 STEPS = 8
 POSE_STEPS = 8
 _NEAREST = 1e-3  # depth of a corner, in units of the path
+_TOLERANCE = 1e-4  # relative decrease of the cost by the last step
+_LEAST_DAMPING = 1e-8
+_LARGEST_DAMPING = 1e3
+_State = TypeVar("_State")
 
 
 @dataclass(frozen=True)
@@ -50,22 +56,49 @@ def adjust(bundle: Bundle, fixed: int, scale: float) -> Bundle:
         size of the whole is free as well, so that damping decides on it.
     :param scale: of the robust kernel, radians.
     """
-    damping = 1e-4
-    cost = _cost(bundle.residuals(), scale)
-    for _ in range(STEPS):
-        moved = _step(bundle, fixed, scale, damping)
-        new_cost = np.inf if moved is None else _cost(moved.residuals(), scale)
-        if moved is not None and new_cost < cost:
-            is_done = new_cost > (1.0 - 1e-4) * cost
-            bundle, cost = moved, new_cost
-            damping = max(damping * 0.2, 1e-8)
+    adjusted, _ = damped_steps(
+        bundle,
+        lambda now: _cost(now.residuals(), scale),
+        lambda now: lambda damping: _step(now, fixed, scale, damping),
+        1e-4,
+        STEPS,
+    )
+    return adjusted
+
+
+def damped_steps(
+    start: _State,
+    cost_of: Callable[[_State], float],
+    linearize: Callable[[_State], Callable[[float], _State | None]],
+    damping: float,
+    most_trials: int,
+) -> tuple[_State, float]:
+    """Return the best state that Gauss-Newton steps find, and its cost. A step that raises the cost
+    is tried again with more damping (Levenberg-Marquardt).
+
+    :param linearize: returns, for a state, a function that gives the state after a step with some
+        damping; None where its equations cannot be solved.
+    :param damping: of the first step. :param most_trials: steps, also those that are not kept.
+    """
+    now = start
+    cost = cost_of(now)
+    step = linearize(now)
+    for _ in range(most_trials):
+        after = step(damping)
+        cost_after = np.inf if after is None else cost_of(after)
+        if after is not None and cost_after < cost:
+            is_done = cost_after > (1.0 - _TOLERANCE) * cost
+            now = after
+            cost = cost_after
+            damping = max(damping * 0.2, _LEAST_DAMPING)
             if is_done:
                 break
+            step = linearize(now)
         else:
             damping *= 20.0
-            if damping > 1e3:
+            if damping > _LARGEST_DAMPING:
                 break
-    return bundle
+    return now, cost
 
 
 def _step(bundle: Bundle, fixed: int, scale: float, damping: float) -> Bundle | None:

@@ -5,7 +5,16 @@ of any size; or a TOML file with a table for each camera, as Pose2Sim and Calisc
     {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3],
      "size": [width, height]}
 
-In TOML, ``calibration.toml#cam_1`` names the camera, which is only needed if there are several.
+In TOML, ``calibration.toml#cam_1`` names the camera, which is only needed if there are several. A
+capture of several cameras uses all of them, with their places in a common world:
+
+    [cam_1]
+    name = "cam_1"
+    size = [width, height]
+    matrix = [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
+    distortions = [k1, k2, p1, p2]
+    rotation = [rx, ry, rz]       # rotation vector, world to camera
+    translation = [tx, ty, tz]    # metres, of x_camera = R x_world + t
 
 Keys that describe the lens are never ignored, and impossible values are refused, because a wrong
 lens gives a wrong person. Other keys, such as a name or a date, are allowed.
@@ -17,6 +26,7 @@ import json
 import math
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,8 +34,10 @@ from typing import Any
 import numpy as np
 
 from ....solver.errors import InputError
+from ....solver.rotations import exp, log
 from ...arrays import Float64Array
 from ...json_file import read_json_object
+from ...motion import Motion
 from ...untrusted.files import check_regular, in_one_line
 
 _FORMAT = (
@@ -152,10 +164,100 @@ def calibration_file(path: Path) -> tuple[Path, str]:
     return (Path(f"{file}.toml"), camera) if camera else (path, "")
 
 
-def _toml_camera(path: Path, camera: str) -> dict[str, Any]:
-    """Return the lens of a camera of a TOML file; what concerns its place is left out.
+def placed_cameras(path: Path, stems: Sequence[str]) -> list[tuple[Path, Float64Array | None]]:
+    """Return, for each video of a take, its calibration and its camera's (4, 4) world to camera,
+    metres; None where the file does not say it.
 
-    :raises InputError: the file cannot be read, or does not say which camera it is.
+    A TOML file's cameras belong to the videos of the same names, whatever their case and signs
+    between words are, and otherwise to the videos in their order. Any other calibration is that of
+    all cameras, whose places are unknown.
+
+    :param stems: names of the videos without suffix.
+    :raises InputError: the file cannot be read, or its cameras are not those of the videos.
+    """
+    file, camera = calibration_file(path)
+    if file.suffix.lower() != ".toml" or camera:
+        return [(path, None)] * len(stems)
+    cameras = _toml_cameras(file)
+    if len(cameras) == 1:
+        return [(path, None)] * len(stems)
+    by_name: dict[str, str] = {}
+    for key, table in cameras.items():
+        for name in (str(table.get("name", key)), key):
+            by_name.setdefault(_letters(name), key)
+    keys = [by_name.get(_letters(stem), "") for stem in stems]
+    if "" in keys or len(set(keys)) < len(keys):
+        if len(cameras) != len(stems):
+            raise InputError(
+                f"{file} has the cameras {', '.join(cameras)}, which are not the names of the "
+                f"{len(stems)} videos: name them in the file after the videos, such as {stems[0]}"
+            )
+        keys = list(cameras)
+    return [(Path(f"{file}#{key}"), _world_to_camera(file, key, cameras[key])) for key in keys]
+
+
+def _letters(name: str) -> str:
+    """Return the letters and digits of a name, in lower case."""
+    return re.sub(r"[\W_]", "", name).lower()
+
+
+def _world_to_camera(path: Path, name: str, table: dict[str, Any]) -> Float64Array | None:
+    """Return the place (4, 4) of a camera of a TOML file; None where it does not say it."""
+    if table.get("rotation") is None or table.get("translation") is None:
+        return None
+    rotation = _numbers(table["rotation"])
+    translation = _numbers(table["translation"])
+    if rotation is None or translation is None or rotation.size != 3 or translation.size != 3:
+        raise InputError(
+            f"{path}: rotation and translation of {name} must be three numbers each: a rotation "
+            "vector, world to camera, and metres"
+        )
+    T = np.eye(4)
+    T[:3, :3] = exp(rotation.ravel())
+    T[:3, 3] = translation.ravel()
+    return T
+
+
+def calibration_text(motion: Motion) -> str:
+    """Return the cameras of a motion as a TOML file of Pose2Sim, with the motion's world, whose z
+    points up.
+
+    :param motion: of a camera that stands still, and of footage that is not mirrored.
+    """
+    seen = [motion, *(motion.from_view(number) for number in range(motion.view_count))]
+    view = motion.view
+    lines: list[str] = []
+    names: list[str] = []
+    for number, each in enumerate(seen, 1):
+        size = each.image_size.tolist()
+        turned = np.linalg.inv(each.world_from_camera[0])
+        turned[:3] = view.axes.T @ turned[:3]
+        name = Path(each.source).stem
+        if name in names:
+            name = f"{name}_{number}"
+        names.append(name)
+        dist = view.inverse.distortion(each.dist)
+        values = {
+            "name": name,
+            "size": [float(side) for side in view.size(*size)],
+            "matrix": view.inverse.intrinsics(each.intrinsics, *size).tolist(),
+            "distortions": dist.tolist(),
+            "rotation": log(turned[:3, :3]).tolist(),
+            "translation": turned[:3, 3].tolist(),
+            "fisheye": False,
+        }
+        lines.append(f"[{json.dumps(name)}]")
+        # Lists of numbers, strings and booleans are the same in JSON and TOML.
+        lines += [f"{key} = {json.dumps(value)}" for key, value in values.items()]
+        lines.append("")
+    lines += ["[metadata]", "adjusted = false", f"error = {float(np.mean(motion.residual_px))}", ""]
+    return "\n".join(lines)
+
+
+def _toml_cameras(path: Path) -> dict[str, dict[str, Any]]:
+    """Return the tables of cameras of a TOML file, by name.
+
+    :raises InputError: the file cannot be read.
     """
     check_regular(path, InputError, "calibration", _LARGEST_TOML)
     try:
@@ -164,11 +266,19 @@ def _toml_camera(path: Path, camera: str) -> dict[str, Any]:
         raise InputError(f"{path} does not exist; check the path") from error
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} is not a TOML file ({in_one_line(error)})") from error
-    cameras = {
+    return {
         name: table
         for name, table in tables.items()
         if isinstance(table, dict) and any(key in table for key in _NAMES["intrinsics"])
     }
+
+
+def _toml_camera(path: Path, camera: str) -> dict[str, Any]:
+    """Return the lens of a camera of a TOML file; what concerns its place is left out.
+
+    :raises InputError: the file cannot be read, or does not say which camera it is.
+    """
+    cameras = _toml_cameras(path)
     names = ", ".join(cameras) or "none"
     if camera and camera not in cameras:
         raise InputError(f"{path} has no camera {camera!r}; its cameras are {names}")

@@ -24,14 +24,19 @@ offsets of unsynchronized cameras, whose points move linearly between frames.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ....solver.rotations import exp
 from ...arrays import BoolArray, Float64Array
-from ..camera.bundle_adjustment import cross_matrices, projected, projection_jacobian
+from ..camera.bundle_adjustment import (
+    cross_matrices,
+    damped_steps,
+    projected,
+    projection_jacobian,
+)
 from .seen_person import BONE_ENDS, BONE_OF_ROW, BONE_STARTS, MIN_CONFIDENCE, SeenPerson
 
 KEYPOINT_SIGMA = 0.004  # of a keypoint, normalized image coordinates
@@ -47,8 +52,7 @@ _UNKNOWNS = 8  # of a camera: rotation 3, position 3, logarithm of the focal sca
 _FOCAL = 6
 _CLOCK = 7
 _CLOCK_SIGMA_S = 0.1  # of the offset that the bundle starts from
-_STEPS = 60
-_TOLERANCE = 1e-4  # relative decrease of the cost
+_MOST_TRIALS = 100
 NEAREST_M = 0.2  # the least distance of a keypoint from a camera
 
 
@@ -84,6 +88,16 @@ class CameraPlace:
 
 
 @dataclass(frozen=True)
+class Given:
+    """What is known of a camera before its pictures are compared with others'."""
+
+    focal_sigma: float = 0.0  # relative error of its focal length; 0: it is known
+    offset_s: float | None = None  # of its clock; None: unknown
+    # (4, 4) from the first camera's axes to its own, metres; None: unknown
+    T_camera_first: Float64Array | None = None
+
+
+@dataclass(frozen=True)
 class Bundle:
     """Adjusted cameras, the cost, and how many keypoints at least two cameras see."""
 
@@ -115,7 +129,7 @@ def adjust(
     people: Sequence[SeenPerson],
     cameras: Sequence[CameraPlace],
     times: Float64Array,
-    focal_sigma: Sequence[float],
+    given: Sequence[Given],
     mean_lengths: Float64Array,
 ) -> Bundle:
     """Adjust cameras to what they see of one person.
@@ -123,31 +137,14 @@ def adjust(
     :param people: the person as each of the V cameras sees them.
     :param cameras: where to start; the first one is at the origin.
     :param times: (N,) of the first camera's clock, seconds.
-    :param focal_sigma: (V,) relative errors of the focal lengths; 0: they are known.
+    :param given: (V,) what is known of the cameras, which stays as `cameras` has it.
     :param mean_lengths: (B,) the bones of the mean body, or of one of the person's stature, metres.
     """
-    problem = _Problem(people, times, list(cameras), focal_sigma, mean_lengths)
+    problem = _Problem(people, times, list(cameras), given, mean_lengths)
     start = triangulate(*problem.observed(cameras), cameras)
     now = _Unknowns(list(cameras), mean_lengths.copy(), start)
-    damping = 1e-3
-    cost = problem.cost(now)
-    for _ in range(_STEPS):
-        system = problem.linearize(now)
-        for _ in range(8):
-            after = now.moved(*system.solve(damping))
-            cost_after = problem.cost(after)
-            if cost_after < cost:
-                break
-            damping *= 10.0
-        else:
-            break
-        gain = (cost - cost_after) / max(cost, 1e-12)
-        now = after
-        cost = cost_after
-        damping = max(damping * 0.2, 1e-9)
-        if gain < _TOLERANCE:
-            break
-    return problem.result(now, cost)
+    best, cost = damped_steps(now, problem.cost, problem.step_from, 1e-3, _MOST_TRIALS)
+    return problem.result(best, cost)
 
 
 def triangulate(
@@ -243,18 +240,21 @@ class _Problem:
         people: Sequence[SeenPerson],
         times: Float64Array,
         start: list[CameraPlace],
-        focal_sigma: Sequence[float],
+        given: Sequence[Given],
         mean_lengths: Float64Array,
     ) -> None:
         self.people = people
         self.times = times
         self.start = start
-        self.focal_sigma = focal_sigma
+        self.focal_sigma = [each.focal_sigma for each in given]
         self.mean_lengths = mean_lengths
         of_cameras = np.ones((len(people), _UNKNOWNS), bool)
+        for free, each in zip(of_cameras, given, strict=True):
+            free[:_FOCAL] = each.T_camera_first is None
+            free[_FOCAL] = each.focal_sigma > 0
+            free[_CLOCK] = each.offset_s is None
         of_cameras[0, :_FOCAL] = False
         of_cameras[0, _CLOCK] = False
-        of_cameras[:, _FOCAL] = np.asarray(focal_sigma) > 0
         self.is_free = np.append(of_cameras.ravel(), np.ones(len(mean_lengths), bool))
 
     def observed(self, places: Sequence[CameraPlace]) -> tuple[Float64Array, Float64Array]:
@@ -293,6 +293,11 @@ class _Problem:
             if sigma > 0:
                 total += (place.log_focal / sigma) ** 2
         return total / _INDEPENDENT
+
+    def step_from(self, now: _Unknowns) -> Callable[[float], _Unknowns]:
+        """Return a function that gives the unknowns after a step with some damping."""
+        system = self.linearize(now)
+        return lambda damping: now.moved(*system.solve(damping))
 
     def linearize(self, now: _Unknowns) -> _System:
         """Return the normal equations, by iterated weights."""

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....solver.rotations import exp
+from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.runs import runs
 from ..fitting.track_fit import spread
-from .bundle import KEYPOINT_SIGMA, CameraPlace, adjust, image_residual, triangulate
+from .bundle import KEYPOINT_SIGMA, CameraPlace, Given, adjust, image_residual, triangulate
 from .first_places import first_place
 from .seen_person import SeenPerson
-from .synchronize import offset_between
+from .synchronize import Offset, offset_between
 
 LONGEST_OFFSET_S = 60.0
 _PAIR_FRAMES = 80  # of a clip that two cameras are adjusted to
@@ -28,6 +28,8 @@ _ALL_FRAMES = 150
 # Lifted bodies lean and turn by up to 15 degrees too far, and two cameras that start from such a
 # rotation can end in another minimum. So they start from several ones, turned about the person.
 _TURNS = np.radians([0.0, -20.0, 20.0])
+# Between a given rotation of a camera and that by lifted bodies.
+MOST_TURNED = np.radians(60.0)
 # Distances from rays, in standard deviations of a keypoint: of people who are the same, and of a
 # camera that contradicts the others, for at least so long.
 MOST_APART = 3.0
@@ -47,13 +49,13 @@ class Calibration:
 
 def calibrate(
     people: Sequence[Sequence[SeenPerson]],
-    focal_sigma: Sequence[float],
+    given: Sequence[Given],
     mean_lengths: Float64Array,
 ) -> Calibration:
-    """Find clocks and places of all cameras.
+    """Find clocks and places of all cameras, as far as they are not given.
 
     :param people: (V,) of each camera, the people that it shows, the most prominent one first.
-    :param focal_sigma: (V,) relative errors of focal lengths; 0: they are given.
+    :param given: (V,) what is known of each camera.
     :param mean_lengths: (B,) bones of the mean body, metres.
     """
     first = people[0][0]
@@ -61,11 +63,11 @@ def calibrate(
     main: list[int | None] = [0]
     certain = [True]
     for v in range(1, len(people)):
-        sigma = (focal_sigma[0], focal_sigma[v])
+        known = (given[0], given[v])
         found = [
             (pair, number)
             for number, person in enumerate(people[v])
-            if (pair := _pair(first, person, sigma, mean_lengths)) is not None
+            if (pair := _pair(first, person, known, mean_lengths)) is not None
         ]
         best, number = min(found, key=lambda each: each[0].cost, default=(None, None))
         places.append(best.place if best is not None else None)
@@ -78,7 +80,7 @@ def calibrate(
         [people[v][main[v] or 0] for v in used],
         [place for place in places if place is not None],
         _times(first, _ALL_FRAMES),
-        [focal_sigma[v] for v in used],
+        [given[v] for v in used],
         mean_lengths,
     )
     for v, place in zip(used, bundle.cameras, strict=True):
@@ -98,29 +100,46 @@ class _Pair:
 def _pair(
     first: SeenPerson,
     second: SeenPerson,
-    focal_sigma: tuple[float, float],
+    given: tuple[Given, Given],
     mean_lengths: Float64Array,
 ) -> _Pair | None:
-    offset = offset_between(first, second, LONGEST_OFFSET_S)
-    if offset is None:
+    """Return the second camera's place, if both may have seen the same person."""
+    offset_s = given[1].offset_s
+    if offset_s is not None:
+        offset = Offset(offset_s, is_certain=True)
+    elif (found := offset_between(first, second, LONGEST_OFFSET_S)) is not None:
+        offset = found
+    else:
         return None
     shared = _shared_times(first, second, offset.seconds)
-    start = first_place(first, second, shared, offset.seconds)
-    if start is None:
+    starts = _starts(first, second, shared, offset.seconds, given[1].T_camera_first)
+    if not len(shared) or not starts:
         return None
-    middle = np.median(first.root[first.seen], axis=0)
     adjusted = [
-        adjust(
-            [first, second],
-            [CameraPlace.first(), _turned(start, middle, turn)],
-            shared,
-            focal_sigma,
-            mean_lengths,
-        )
-        for turn in _TURNS
+        adjust([first, second], [CameraPlace.first(), start], shared, given, mean_lengths)
+        for start in starts
     ]
     best = min(adjusted, key=lambda bundle: bundle.cost)
     return _Pair(best.cameras[1], offset.is_certain, best.cost / max(best.known, 1))
+
+
+def _starts(
+    first: SeenPerson,
+    second: SeenPerson,
+    times: Float64Array,
+    offset_s: float,
+    T_camera_first: Float64Array | None,
+) -> list[CameraPlace]:
+    """Return places from which to adjust the second camera; none if both hardly see the person at
+    once.
+    """
+    if T_camera_first is not None:
+        return [CameraPlace(T_camera_first[:3, :3], T_camera_first[:3, 3], offset_s=offset_s)]
+    start = first_place(first, second, times, offset_s)
+    if start is None:
+        return []
+    middle = np.median(first.root[first.seen], axis=0)
+    return [_turned(start, middle, turn) for turn in _TURNS]
 
 
 def _turned(place: CameraPlace, point: Float64Array, angle: float) -> CameraPlace:
@@ -154,36 +173,68 @@ def same_people(
         place = calibration.places[v]
         if place is None:
             continue
-        apart = np.array(
-            [[_apart(one, other, place) for other in people[v]] for one in people[0]]
+        distances = np.array(
+            [[apart(one, other, place) for other in people[v]] for one in people[0]]
         ).reshape(len(people[0]), len(people[v]))
         main = calibration.main[v]
         if main is not None:
-            apart[0, :] = np.inf
-            apart[:, main] = np.inf
-            apart[0, main] = 0.0
-        while apart.size and np.isfinite(apart.min()) and apart.min() < MOST_APART:
-            k, number = np.unravel_index(int(apart.argmin()), apart.shape)
+            distances[0, :] = np.inf
+            distances[:, main] = np.inf
+            distances[0, main] = 0.0
+        while distances.size and distances.min() < MOST_APART:
+            k, number = np.unravel_index(int(distances.argmin()), distances.shape)
             found[int(k)][v] = int(number)
-            apart[k, :] = np.inf
-            apart[:, number] = np.inf
+            distances[k, :] = np.inf
+            distances[:, number] = np.inf
     return found
 
 
-def _apart(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
+def apart(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
     """Return the median distance from the rays of two people's keypoints, taken for one person, in
     standard deviations; infinity where both are never seen together.
     """
-    times = _shared_times(one, other, place.offset_s)
-    if not len(times):
-        return np.inf
-    at = one.at(times), other.at(times + place.offset_s)
-    first = CameraPlace.first()
-    confidence = np.array([each.confidence for each in at])
-    points = triangulate(np.array([each.rays for each in at]), confidence, [first, place])
-    off = [_distance(each, camera, points) for each, camera in zip(at, (first, place), strict=True)]
-    both = (confidence > 0).all(axis=0)
+    at, points = _common_points(one, other, place)
+    cameras = CameraPlace.first(), place
+    off = [_distance(each, camera, points) for each, camera in zip(at, cameras, strict=True)]
+    both = (at[0].confidence > 0) & (at[1].confidence > 0)
     return float(np.median(np.maximum(*off)[both])) if both.any() else np.inf
+
+
+def contradicts(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> bool:
+    """Return whether one person, as the first and another camera see them, speaks against that
+    camera's place: rays pass each other, or the body is turned otherwise.
+
+    Cameras of equal height that were exchanged have rays that meet, in a wrong place.
+    """
+    turned = first_place(one, other, _shared_times(one, other, place.offset_s), place.offset_s)
+    if turned is None:
+        return False
+    angle = float(np.linalg.norm(log(turned.R_camera_first @ place.R_camera_first.T)))
+    return angle > MOST_TURNED or apart(one, other, place) > MOST_APART
+
+
+def relative_distance(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
+    """Return how far a person is from the first camera by both cameras' rays, divided by how far
+    by the usual size of people.
+    """
+    at, points = _common_points(one, other, place)
+    both = (at[0].confidence > 0) & (at[1].confidence > 0)
+    if not both.any():
+        return 1.0
+    return float(np.median(points[both][:, 2]) / np.median(at[0].root[:, 2]))
+
+
+def _common_points(
+    one: SeenPerson, other: SeenPerson, place: CameraPlace
+) -> tuple[tuple[SeenPerson, SeenPerson], Float64Array]:
+    """Return a person at times at which the first and another camera see them, as both do, and the
+    keypoints (N, n, 3) by the rays of both, first camera's axes.
+    """
+    times = _shared_times(one, other, place.offset_s)
+    at = one.at(times), other.at(times + place.offset_s)
+    confidence = np.array([each.confidence for each in at])
+    rays = np.array([each.rays for each in at])
+    return at, triangulate(rays, confidence, [CameraPlace.first(), place])
 
 
 def _distance(person: SeenPerson, camera: CameraPlace, points: Float64Array) -> Float64Array:

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...arrays import Float64Array
 from ...errors import UsageError
 from ...footage import display_text
 from ...notices import Notice, notice
+from ..camera.calibration import placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
 from ..fitting.keypoint_offsets import with_keypoint_offsets
 from ..fitting.prepared_track import prepare_track
@@ -24,20 +26,30 @@ from ..media.video import Video, open_video
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..stages.clock import Progress, StageClock
+from ..stages.clock import FINDING, Progress, StageClock
 from ..stages.observe import Footage, Listeners, Watch, observe
 from ..stages.report import make_report
 from ..stages.solve import progress_of_person, solve_people
 from ..tracking.track import Track
 from ..world.assemble import Shot
-from .bundle import CameraPlace
-from .calibrate import Calibration, calibrate, contradicting_spans, same_people
+from .bundle import CameraPlace, Given
+from .calibrate import (
+    Calibration,
+    calibrate,
+    contradicting_spans,
+    contradicts,
+    relative_distance,
+    same_people,
+)
 from .person_in_views import PersonInViews, with_focal_scale
 from .seen_person import KEYPOINTS, SeenPerson, bone_lengths, seen_person
 
 MOST_VIEWS = 8
 # Of the standard deviation of a camera's rotation, from which on the report warns.
 WEAK_ROTATION = np.radians(5.0)
+# By given places, of a person's distance to that by the usual size of people: other units than
+# metres give 10 or more.
+MOST_RELATIVE_DISTANCE = 3.0
 
 
 @dataclass
@@ -75,17 +87,28 @@ def capture_views(
     :raises NoPersonError: a video shows nobody.
     :raises CancelledError: raised by ``progress`` itself, passed on.
     """
-    check_options(body, options)
+    check_options(body, options, has_views=True)
     _check_paths(paths, options)
+    files = _calibration_files(paths, options)
     clock = StageClock()
-    views = [_observe_view(Path(path), body, options, clock, progress, watch) for path in paths]
+    views = [
+        _observe_view(
+            Path(path),
+            body,
+            replace(options, calibration=file),
+            clock,
+            _progress_of_view(progress, number, len(paths)),
+            watch,
+        )
+        for number, (path, (file, _)) in enumerate(zip(paths, files, strict=True))
+    ]
     with clock.stage("solver"):
         progress("placing the cameras", 0, 0)
+        given = _given([view.camera for view in views], options, [T for _, T in files])
         calibration = calibrate(
-            [view.people for view in views],
-            [view.camera.focal_deviation for view in views],
-            bone_lengths(_rest_keypoints(body, options)),
+            [view.people for view in views], given, bone_lengths(_rest_keypoints(body, options))
         )
+        doubts = _doubts_about_file(views, given, calibration, options)
         first = views[0]
         camera = with_focal_scale(first.camera, calibration.places[0] or CameraPlace.first())
         footage = replace(first.footage, camera=camera)
@@ -94,12 +117,13 @@ def capture_views(
         people, notices = _people_in_views(shot, views, calibration, everyone, options, progress)
         solved = solve_people(shot, people, 0)
         times_s = footage.timestamps / shot.speed
-        motions = [replace(motion, timestamps=times_s) for motion in solved.motions]
+        further = _further_cameras(views, calibration)
+        motions = [replace(motion, timestamps=times_s, views=further) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     report = make_report(
         first.video, body, options, footage, replace(solved, motions=motions), rates
     )
-    warnings = [*_about_cameras(views, calibration), *notices, *report.warnings]
+    warnings = [*_about_cameras(views, calibration), *doubts, *notices, *report.warnings]
     about = [_about_view(view, k, calibration) for k, view in enumerate(views)]
     return Capture(motions, replace(report, views=about, warnings=warnings))
 
@@ -115,6 +139,11 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
             f"several cameras are 2 to {MOST_VIEWS} videos of the same moment, but {len(paths)} "
             "were given"
         )
+    if len(options.offsets_s) not in (0, len(paths) - 1):
+        raise UsageError(
+            f"--offset gives {len(options.offsets_s)} offsets, but there are {len(paths) - 1} "
+            "further videos: give one for each, or auto"
+        )
     seen: set[Path] = set()
     for path in paths:
         real = Path(path).resolve()
@@ -123,6 +152,125 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
         seen.add(real)
         with open_video(Path(path), options.wanted):
             pass
+
+
+def _progress_of_view(progress: Progress, number: int, count: int) -> Progress:
+    """Return the progress of observing one of several videos, as part of that of all of them."""
+
+    def report(stage: str, done: int, total: int) -> None:
+        if stage == FINDING:
+            progress(stage, number * total + done, count * total)
+        else:
+            progress(stage, done, total)
+
+    return report
+
+
+def _calibration_files(
+    paths: Sequence[str | Path], options: CaptureOptions
+) -> list[tuple[Path | None, Float64Array | None]]:
+    """Return each video's calibration, and its (4, 4) world to camera, as far as they are given.
+
+    :raises UsageError: the footage is mirrored, which no place of a camera is.
+    :raises InputError: the calibration cannot be used.
+    """
+    if options.calibration is None:
+        return [(None, None)] * len(paths)
+    stems = [Path(path).stem for path in paths]
+    files: list[tuple[Path | None, Float64Array | None]] = []
+    for file, T_camera_world in placed_cameras(options.calibration, stems):
+        read_calibration(file)
+        if T_camera_world is None:
+            files.append((file, None))
+            continue
+        if options.wanted.view.is_mirrored:
+            raise UsageError(
+                "--mirror contradicts a calibration with the places of several cameras: capture "
+                "without one of them"
+            )
+        T_view_world = T_camera_world.copy()
+        T_view_world[:3] = options.wanted.view.axes @ T_camera_world[:3]
+        files.append((file, T_view_world))
+    return files
+
+
+def _given(
+    cameras: Sequence[Camera],
+    options: CaptureOptions,
+    T_camera_world: Sequence[Float64Array | None],
+) -> list[Given]:
+    """Return what options say about each camera."""
+    offsets_s = [0.0, *(options.offsets_s or [None] * (len(cameras) - 1))]
+    first = T_camera_world[0]
+    return [
+        Given(
+            camera.focal_deviation,
+            offset_s,
+            T @ np.linalg.inv(first) if T is not None and first is not None else None,
+        )
+        for camera, offset_s, T in zip(cameras, offsets_s, T_camera_world, strict=True)
+    ]
+
+
+def _doubts_about_file(
+    views: Sequence[_View],
+    given: Sequence[Given],
+    calibration: Calibration,
+    options: CaptureOptions,
+) -> list[Notice]:
+    """Compare given places of cameras with the people whom they show; return warnings.
+
+    :raises UsageError: the places have another unit than metres.
+    """
+    doubts = []
+    first = views[0].people[0]
+    for v in range(1, len(views)):
+        place = calibration.places[v]
+        number = calibration.main[v]
+        if given[v].T_camera_first is None or place is None or number is None:
+            continue
+        person = views[v].people[number]
+        size = relative_distance(first, person, place)
+        if not 1.0 / MOST_RELATIVE_DISTANCE < abs(size) < MOST_RELATIVE_DISTANCE:
+            raise UsageError(
+                f"{options.calibration} makes people {size:.3g} times as large as people are; its "
+                "translations must be in metres"
+            )
+        if contradicts(first, person, place):
+            name = display_text(Path(str(options.calibration)).name)
+            doubts.append(
+                notice(
+                    "calibration_contradicts",
+                    calibration=name,
+                    footage=views[v].name,
+                    person=0,
+                )
+            )
+    return doubts
+
+
+def _further_cameras(views: Sequence[_View], calibration: Calibration) -> dict[str, NDArray[Any]]:
+    """Return `Motion.views`: the cameras that could be placed, without the first one."""
+    placed = [
+        (view, place)
+        for view, place in zip(views[1:], calibration.places[1:], strict=True)
+        if place is not None
+    ]
+    if not placed:
+        return {}
+    T_view_camera = np.tile(np.eye(4), (len(placed), 1, 1))
+    T_view_camera[:, :3, :3] = [place.R_camera_first for _, place in placed]
+    T_view_camera[:, :3, 3] = [place.t_camera_first for _, place in placed]
+    cameras = [with_focal_scale(view.camera, place) for view, place in placed]
+    return {
+        "view_sources": np.array([view.name for view, _ in placed]),
+        "view_intrinsics": np.array([camera.intrinsics for camera in cameras]),
+        "view_dist": np.array([camera.dist for camera in cameras]),
+        "view_image_sizes": np.array([(view.video.width, view.video.height) for view, _ in placed]),
+        "view_frame_rates": np.array([float(view.video.source_fps) for view, _ in placed]),
+        "view_from_camera": T_view_camera,
+        "view_offsets_s": np.array([place.offset_s for _, place in placed]),
+    }
 
 
 def _observe_view(

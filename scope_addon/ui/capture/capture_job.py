@@ -28,6 +28,7 @@ from ...motion import Motion
 from ...notices import notice
 from ...options import Place
 from ...options.body_choice import chosen_body
+from ...options.capture import AUTO
 from ...scene.build import BuildOptions, BuildResult, build_scene
 from ...scene.local_scene import check_local
 from ...scene.packed_motion import pack_motion
@@ -142,13 +143,16 @@ class CaptureJob:
         preview_picture.show(pixels, message["width"], message["height"])
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
+        report = Report.from_json(captured.report)
+        views = report.placed_videos(self._request.views)
+        view_footage = [path if path.is_file() else None for path in views]
         build_capture(
             scene,
             [(path, path.read_bytes()) for path in captured.motions],
             self._request.values["body"],
             self._request.footage,
-            Report.from_json(captured.report),
-            self._options,
+            report,
+            replace(self._options, view_footage=view_footage),
         )
 
 
@@ -195,17 +199,22 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     check_local(scene)
     if not settings.footage:
         raise UsageError("no footage is chosen; choose a video or image first")
-    footage = Path(bpy.path.abspath(settings.footage))
-    if not footage.is_file():
-        what = "is not a file" if footage.exists() else "does not exist"
-        raise VideoError(f"{footage} {what}; choose the video or image again")
+    footage, *views = [Path(bpy.path.abspath(each.footage)) for each in (settings, *settings.views)]
+    for path in (footage, *views):
+        if not path.is_file():
+            what = "is not a file" if path.exists() else "does not exist"
+            raise VideoError(f"{path} {what}; choose the video or image again")
     if settings.use_range and settings.range_end <= settings.range_start:
         raise UsageError("the part of the video ends before it starts; change From or To")
     if settings.lens == "FILE" and not settings.calibration_file:
         raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
     values = chosen_values(scene)
     values["body"] = chosen_body(values)
-    return JobRequest(str(footage), **values)
+    if any(view.use_offset for view in settings.views):
+        values["offset"] = ",".join(
+            f"{view.offset_s:.6f}" if view.use_offset else AUTO for view in settings.views
+        )
+    return JobRequest(str(footage), [str(view) for view in views], **values)
 
 
 def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
+from bpy.props import CollectionProperty, IntProperty, StringProperty
 
 from .. import warm_up
 from ..files.file_field import FootageBrowser, stored_path
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .capture_job import CaptureJob
 
 SAMPLE = Path(__file__).resolve().parents[3] / "assets" / "sample" / "sample.mp4"
+MOST_FURTHER_VIEWS = 7
 DRAWN_EVERY_S = 0.3  # between two drawings of a stage's progress; previews come as often
 ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
 
@@ -69,6 +71,72 @@ class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
             return {"CANCELLED"}
         context.scene.scope.footage = stored_path(context, str(path))
         show_tab(context)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_add_view(FootageBrowser, bpy.types.Operator):
+    """Add a video of the same moment by another camera. All cameras must stand still"""
+
+    bl_idname = "scope.add_view"
+    bl_label = "Add View"
+    bl_options = {"UNDO"}
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require footage, and that there may be another view."""
+        settings = context.scene.scope
+        if not settings.footage:
+            cls.poll_message_set(tip_("Choose a video or image first"))
+            return False
+        if len(settings.views) >= MOST_FURTHER_VIEWS:
+            cls.poll_message_set(tip_("There are at most eight cameras"))
+            return False
+        return True
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Use a dropped file, or ask for some."""
+        return self.execute(context) if self.filepath else self.ask(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add the chosen files."""
+        settings = context.scene.scope
+        names = [each.name for each in self.files if each.name]
+        paths = [os.path.join(self.directory, name) for name in names] or [self.filepath]
+        paths = [bpy.path.abspath(path) for path in paths]
+        if missing := next((path for path in paths if not os.path.isfile(path)), ""):
+            self.report(
+                {"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=missing)
+            )
+            return {"CANCELLED"}
+        if len(settings.views) + len(paths) > MOST_FURTHER_VIEWS:
+            self.report({"ERROR"}, rpt_("There are at most eight cameras"))
+            return {"CANCELLED"}
+        for path in paths:
+            settings.views.add().footage = stored_path(context, path)
+        show_tab(context)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_remove_view(bpy.types.Operator):
+    """Remove this video from the list; the file stays"""
+
+    bl_idname = "scope.remove_view"
+    bl_label = "Remove View"
+    bl_options = {"UNDO"}
+
+    index: IntProperty(min=0, options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove the view."""
+        views = context.scene.scope.views
+        if self.index >= len(views):
+            return {"CANCELLED"}
+        views.remove(self.index)
         return {"FINISHED"}
 
 
@@ -284,6 +352,8 @@ def stop_job() -> None:
 
 CLASSES = (
     SCOPE_OT_choose_footage,
+    SCOPE_OT_add_view,
+    SCOPE_OT_remove_view,
     SCOPE_OT_use_sample,
     SCOPE_OT_capture,
     SCOPE_OT_cancel,

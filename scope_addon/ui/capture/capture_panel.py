@@ -18,7 +18,7 @@ from ..files.file_field import draw_file
 from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_, warning_text
 from ..translations import CONTEXT
-from ..view.comparison import camera_of, is_looking_through, side_area
+from ..view.comparison import camera_of, cameras_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
 from .captures import draw_captures, people_of, people_text, shown_capture
@@ -67,7 +67,10 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             column.operator("scope.import_motion", icon="IMPORT")
             return
         row = draw_file(column, settings, "footage", text="", icon="FILE_MOVIE")
+        row.operator("scope.add_view", text="", icon="ADD")
         row.operator("scope.import_motion", text="", icon="IMPORT")
+        for index, view in enumerate(settings.views):
+            _draw_view(column, view, index)
         column.row(align=True).prop(settings, "quality", expand=True)
         if state.job is not None:
             _draw_progress(context, layout, state.job.progress)
@@ -78,6 +81,16 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             warm_up.draw(layout)
         if state.message and state.scene_uid == context.scene.session_uid:
             draw_text(context, layout.box(), state.message, "ERROR")
+
+
+def _draw_view(layout: bpy.types.UILayout, view: bpy.types.PropertyGroup, index: int) -> None:
+    """Draw a further video, and its offset if it is known."""
+    row = layout.row(align=True)
+    row.prop(view, "footage_text", text="", icon="VIEW_CAMERA")
+    row.prop(view, "use_offset", text="", icon="TIME")
+    row.operator("scope.remove_view", text="", icon="X").index = index
+    if view.use_offset:
+        layout.prop(view, "offset_s")
 
 
 def _draw_progress(
@@ -173,8 +186,8 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
                 shown = side_area(context.window.screen) is not None
                 row.operator("scope.side_view", text="", icon="SPLIT_VERTICAL", depress=shown)
             row.operator("scope.footage_to_sequencer", text="", icon="SEQUENCE")
-            for background in camera.data.background_images[:1] if back else ():
-                layout.prop(background, "alpha", text="Footage Opacity", slider=True)
+            if back:
+                _draw_compared(context, layout)
         _draw_frame_rate(context, layout)
         row = layout.row(align=True)
         row.label(text="", icon="EXPORT")
@@ -183,6 +196,21 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
         layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
+
+
+def _draw_compared(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """Draw how opaque the compared footage is, and the choice among several cameras."""
+    cameras = cameras_of(context.scene)
+    compared = context.scene.camera
+    if len(cameras) > 1:
+        row = layout.row(align=True)
+        for index, camera in enumerate(cameras):
+            button = row.operator(
+                "scope.compare_view", text=str(index + 1), depress=camera == compared
+            )
+            button.index = index
+    for background in compared.data.background_images[:1]:
+        layout.prop(background, "alpha", text="Footage Opacity", slider=True)
 
 
 def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
+    BoolProperty,
     CollectionProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -22,6 +23,7 @@ from ..files.file_field import path_text
 from .capture_operators import state
 from .captures import show_index, shown_capture, shown_index
 
+_VIEW = {"name": "View", "description": "Video of the same moment, by another camera"}
 _FOOTAGE = {"name": "Footage", "description": "Video or image of a person to capture"}
 
 
@@ -63,6 +65,32 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
         return self.id_data if isinstance(self.id_data, bpy.types.Collection) else None
 
 
+class SCOPE_PG_view(bpy.types.PropertyGroup):
+    """A further video of the same moment, and the offset of its clock."""
+
+    footage: StringProperty(
+        subtype="FILE_PATH", options=PATH_OPTIONS, update=_clear_message, **_VIEW
+    )
+    footage_text: path_text("footage", **_VIEW)
+    use_offset: BoolProperty(
+        name="Known Offset",
+        description="Enter the offset between the clocks of the cameras, which is otherwise found "
+        "from the people",
+        options=set(),
+    )
+    offset_s: FloatProperty(
+        name="Offset",
+        description="Time in this video less that in the first one, of the same moment, in seconds",
+        precision=3,
+        step=1,
+        soft_min=-60.0,
+        soft_max=60.0,
+        min=-86400.0,
+        max=86400.0,
+        options=set(),
+    )
+
+
 @with_options(Place.PANEL)
 class SCOPE_PG_settings(bpy.types.PropertyGroup):
     """The settings of a capture: the footage, the declared options of the panel, and the capture
@@ -73,6 +101,9 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         subtype="FILE_PATH", options=PATH_OPTIONS, update=_clear_message, **_FOOTAGE
     )
     footage_text: path_text("footage", **_FOOTAGE)
+    views: CollectionProperty(
+        type=SCOPE_PG_view, description="Further videos of the same moment, by other cameras"
+    )
     capture: PointerProperty(
         name="Capture",
         type=bpy.types.Collection,
@@ -94,7 +125,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         return result
 
 
-CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_settings)
+CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_view, SCOPE_PG_settings)
 
 
 def attach() -> None:

@@ -86,14 +86,16 @@ def change_world(
     from ...edit.pins.corrected_motion import corrections_of
     from ...edit.pins.corrections import world_of
     from ...scene.animation_data.transaction import all_or_nothing
-    from ...scene.camera import same_camera
+    from ...scene.camera import same_camera, view_number
     from ...scene.character.upright_scene import turn_camera
 
     motion = motion_of(armature)
     near = [obj for c in armature.users_collection for obj in c.all_objects]
     people = [obj for obj in near if obj != armature and "scope_source" in obj]
     together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
-    cameras = [obj for obj in near if obj.type == "CAMERA"][:1]
+    every_camera = [obj for obj in near if obj.type == "CAMERA"]
+    further = [obj for obj in every_camera if view_number(obj) is not None]
+    cameras = [*[obj for obj in every_camera if obj not in further][:1], *further]
     was = world_of(corrections_of(motion))
     now = world_of(change(corrections_of(motion)))
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)

@@ -29,14 +29,21 @@ _SENSOR_MM = 72.0
 _had_bones: dict[int, bool] = {}  # by viewport: whether it showed bones before the comparison
 
 
-def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the camera of the scene's last capture; None if there is none."""
+def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the cameras of the scene's last capture, the one of its first video first."""
+    from ...scene.camera import view_number
+
     collection = scene.scope.result.collection
-    return (
-        next((o for o in collection.all_objects if o.type == "CAMERA"), None)
-        if collection
-        else None
-    )
+    cameras = [o for o in collection.all_objects if o.type == "CAMERA"] if collection else []
+    first = [camera for camera in cameras if view_number(camera) is None][:1]
+    further = [camera for camera in cameras if view_number(camera) is not None]
+    further.sort(key=lambda camera: view_number(camera) or 0)
+    return [*first, *further] if first else []
+
+
+def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the camera of the first video of the scene's last capture; None if there is none."""
+    return next(iter(cameras_of(scene)), None)
 
 
 def is_looking_through(context: bpy.types.Context) -> bool:
@@ -46,10 +53,10 @@ def is_looking_through(context: bpy.types.Context) -> bool:
 
 
 def looks_through(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
-    """Return whether a viewport shows only a capture, through its camera."""
+    """Return whether a viewport shows only a capture, through one of its cameras."""
     if not space.local_view or space.region_3d.view_perspective != "CAMERA":
         return False
-    return scene.camera is not None and scene.camera == camera_of(scene)
+    return scene.camera is not None and scene.camera in cameras_of(scene)
 
 
 def begin(
@@ -67,6 +74,12 @@ def begin(
         with _in(context.window, area):
             bpy.ops.view3d.view_camera()
     fit_frame(context.scene, area)
+
+
+def look_from(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+    """Let a viewport that compares look through another camera, which is the scene's."""
+    area.spaces.active.camera = scene.camera
+    fit_frame(scene, area)
 
 
 def end(window: bpy.types.Window, area: bpy.types.Area) -> None:
@@ -159,7 +172,9 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
         bpy.ops.screen.area_split(direction="VERTICAL", factor=factor)
     side = next(each for each in screen.areas if each.as_pointer() not in before)
     collection = context.scene.scope.result.collection
-    camera = camera_of(context.scene)
+    cameras = cameras_of(context.scene)
+    compared = [each for each in cameras if each == context.scene.camera]
+    camera = next(iter([*compared, *cameras]), None)
     people = [o for o in collection.all_objects if "scope_source" in o]
     active = captured_armature(context)
     if camera is None or not people:

@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ..captured_person import captured_people
 from ..reporting import ReportingOperator, rpt_, tip_
 from . import comparison
-from .comparison import camera_of, is_looking_through, is_side_view
+from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .sidebar import redraw_sidebars_twice, viewport_of
 
 
@@ -125,6 +125,41 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SCOPE_OT_compare_view(bpy.types.Operator):
+    """Show the body over the footage of this camera. Sets the scene's camera and resolution"""
+
+    bl_idname = "scope.compare_view"
+    bl_label = "Compare with This Camera"
+    bl_options = {"UNDO"}
+
+    index: IntProperty(name="Camera", min=0)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require several cameras."""
+        return len(cameras_of(context.scene)) > 1
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the scene's camera and resolution, and what the viewport shows."""
+        from ...scene.camera import set_resolution, view_number
+
+        scene = context.scene
+        cameras = cameras_of(scene)
+        if self.index >= len(cameras):
+            return {"CANCELLED"}
+        camera = cameras[self.index]
+        is_compared = is_looking_through(context)
+        scene.camera = camera
+        camera.hide_viewport = False  # a hidden camera shows no footage
+        camera.hide_set(False, view_layer=context.view_layer)
+        is_first = view_number(camera) is None
+        set_resolution(scene, scene.scope.result.collection if is_first else camera)
+        if is_compared:
+            comparison.look_from(scene, context.area)
+        redraw_sidebars_twice()
+        return {"FINISHED"}
+
+
 def _is_shown(collection: bpy.types.Collection, layer: bpy.types.LayerCollection) -> bool:
     """Return whether a collection is visible in this layer collection or in one below it."""
     here = layer.collection == collection and layer.is_visible
@@ -218,6 +253,7 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
 CLASSES = (
     SCOPE_OT_look_through,
+    SCOPE_OT_compare_view,
     SCOPE_OT_side_view,
     SCOPE_OT_go_to_frame,
     SCOPE_OT_footage_to_sequencer,

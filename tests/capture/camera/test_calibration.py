@@ -8,9 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.calibration import read_calibration
+from scope.scope_addon.capture.camera.calibration import (
+    calibration_text,
+    placed_cameras,
+    read_calibration,
+)
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.footage_view import FootageView
+from scope.solver import load_body
 from scope.solver.errors import InputError
+from scope.solver.rotations import exp
+
+from ...made_motion import made_motion, made_views
 
 K = [[1000, 0, 500], [0, 1100, 300], [0, 0, 1]]
 KNOWN = {"intrinsics": K, "dist": [0.1, 0], "size": [1000, 600]}
@@ -221,3 +230,119 @@ def test_a_large_file_is_refused_unread(tmp_path):
         file.truncate(2 << 20)
     with pytest.raises(InputError, match="too large for a calibration"):
         read_calibration(path)
+
+
+def take(tmp_path, *names):
+    """Return a TOML file of cameras that differ in their focal length and place."""
+    lines = []
+    for k, name in enumerate(names):
+        lines += [
+            f'[{name}]\nname = "{name}"\nsize = [1000.0, 600.0]\nfisheye = false',
+            f"matrix = [[{1000 + k}.0, 0.0, 500.0], [0.0, 1100.0, 300.0], [0.0, 0.0, 1.0]]",
+            f"distortions = [0.1, 0.0, 0.0, 0.0]\nrotation = [0.0, {k}.0, 0.0]",
+            f"translation = [{k}.0, 0.0, 4.0]",
+        ]
+    path = tmp_path / "calib.toml"
+    path.write_text("\n".join(lines) + "\n[metadata]\nerror = 0.0\n", "utf-8")
+    return path
+
+
+def test_cameras_belong_to_the_videos_of_the_same_names(tmp_path):
+    path = take(tmp_path, "cam_01", "cam_02", "cam_03")
+    found = placed_cameras(path, ["Cam03", "cam-01"])
+    assert [str(file).rpartition("#")[2] for file, _ in found] == ["cam_03", "cam_01"]
+    third, first = (T for _, T in found)
+    np.testing.assert_allclose(third[:3, 3], [2, 0, 4])
+    np.testing.assert_allclose(
+        third[:3, :3],
+        [[np.cos(2), 0, np.sin(2)], [0, 1, 0], [-np.sin(2), 0, np.cos(2)]],
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(first[:3, :3], np.eye(3))
+    assert read_calibration(found[0][0]).intrinsics[0, 0] == 1002
+
+
+def test_cameras_of_other_names_belong_to_the_videos_in_their_order(tmp_path):
+    path = take(tmp_path, "a", "b")
+    found = placed_cameras(path, ["left", "right"])
+    assert [str(file).rpartition("#")[2] for file, _ in found] == ["a", "b"]
+    with pytest.raises(InputError, match="cameras a, b, which are not the names of the 3 videos"):
+        placed_cameras(path, ["left", "right", "top"])
+
+
+def test_one_lens_is_that_of_all_cameras(tmp_path, path):
+    path.write_text(json.dumps(KNOWN))
+    assert placed_cameras(path, ["left", "right"]) == [(path, None)] * 2
+    several = take(tmp_path, "a", "b")
+    named = Path(f"{several}#b")
+    assert placed_cameras(named, ["left", "right"]) == [(named, None)] * 2
+
+
+def test_a_place_that_is_none_is_refused(tmp_path):
+    path = take(tmp_path, "a", "b")
+    path.write_text(path.read_text().replace("translation = [1.0, 0.0, 4.0]", "translation = [1]"))
+    with pytest.raises(InputError, match="rotation and translation of b"):
+        placed_cameras(path, ["a", "b"])
+
+
+@pytest.mark.parametrize("rotation", [0, 90, 180, 270])
+def test_saved_cameras_are_read_again_as_they_were(tmp_path, rotation):
+    body = load_body("scope")
+    T = np.eye(4)
+    T[:3, :3] = exp(np.array([0.2, 1.1, -0.3]))
+    T[:3, 3] = [-3.0, 0.4, 2.0]
+    views = made_views(0.5) | {
+        "view_from_camera": T[None],
+        "view_dist": np.array([[0.1, -0.05, 0.003, -0.002, 0.01]]),
+    }
+    poses = np.zeros((2, 3 * (body.K + 1)))
+    motion = made_motion(
+        body,
+        poses,
+        np.zeros((2, 3)),
+        views=views,
+        footage_rotation=rotation,
+        dist=[0.1, 0, 0, 0, 0],
+    )
+    path = tmp_path / "found.toml"
+    path.write_text(calibration_text(motion), "utf-8")
+    found = placed_cameras(path, ["walk", "walk2"])
+    seen = motion, motion.from_view(0)
+    view = motion.view
+    places = []
+    for (file, T_camera_world), each in zip(found, seen, strict=True):
+        size = each.image_size.tolist()
+        again = choose_camera(*size, calibration=file, view=view)
+        np.testing.assert_allclose(again.intrinsics, each.intrinsics, atol=1e-9)
+        np.testing.assert_allclose(again.dist, each.dist, atol=1e-12)
+        turned = T_camera_world.copy()
+        turned[:3] = view.axes @ turned[:3]
+        places.append(turned)
+        np.testing.assert_allclose(np.linalg.inv(turned), each.world_from_camera[0], atol=1e-9)
+    np.testing.assert_allclose(places[1] @ np.linalg.inv(places[0]), T, atol=1e-9)
+
+
+def test_axes_turn_as_the_picture_does():
+    """A point's pixel in the turned picture is its projection in the turned axes."""
+    point = np.array([0.3, -0.2, 2.0])
+    for degrees in (0, 90, 180, 270):
+        view = FootageView(degrees)
+        pixel = (np.array(K, float) @ point)[:2] / 2.0
+        width, height = 1000, 600
+        for _ in range(degrees // 90):
+            pixel = np.array([height - 1 - pixel[1], pixel[0]])
+            width, height = height, width
+        turned = view.intrinsics(np.array(K, float), 1000, 600) @ view.axes @ point
+        np.testing.assert_allclose(turned[:2] / turned[2], pixel)
+
+
+def test_cameras_whose_videos_have_the_same_name_are_saved_too(tmp_path):
+    body = load_body("scope")
+    views = made_views(0.5) | {"view_sources": np.array(["walk.mp4"])}
+    poses = np.zeros((1, 3 * (body.K + 1)))
+    motion = made_motion(body, poses, np.zeros((1, 3)), views=views)
+    path = tmp_path / "found.toml"
+    path.write_text(calibration_text(motion), "utf-8")
+    found = placed_cameras(path, ["walk", "walk"])
+    lenses = [read_calibration(file).intrinsics[0, 0] for file, _ in found]
+    assert lenses == [600.0, 500.0]

@@ -9,10 +9,12 @@ import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.several_views import bundle
-from scope.scope_addon.capture.several_views.bundle import CameraPlace, adjust
+from scope.scope_addon.capture.several_views.bundle import CameraPlace, Given, adjust
 from scope.scope_addon.capture.several_views.calibrate import (
     calibrate,
     contradicting_spans,
+    contradicts,
+    relative_distance,
     same_people,
 )
 from scope.scope_addon.capture.several_views.seen_person import (
@@ -115,7 +117,7 @@ def test_gradient_is_that_of_the_cost():
     people = [seen(CameraPlace.first(), points, 30.0), seen(beside(70.0), points, 30.0)]
     places = [CameraPlace.first(), replace(beside(65.0), log_focal=0.05, offset_s=0.01)]
     times = people[0].times[10:40:10]
-    problem = bundle._Problem(people, times, places, [0.1, 0.1], 1.1 * mean_lengths())
+    problem = bundle._Problem(people, times, places, [Given(0.1)] * 2, 1.1 * mean_lengths())
     rng = np.random.default_rng(0)
     start = np.array([points(time_s) for time_s in times]) + rng.normal(0, 0.03, (3, 16, 3))
     now = bundle._Unknowns(places, mean_lengths(), start)
@@ -141,7 +143,7 @@ def test_cameras_are_found_from_the_people(degrees):
     points = moving_points()
     truth = replace(beside(degrees, 5.0), offset_s=0.42, log_focal=0.08)
     people = [[seen(CameraPlace.first(), points, 30.0)], [seen(truth, points, 59.94, seed=2)]]
-    found = calibrate(people, [0.0, 0.2], mean_lengths())
+    found = calibrate(people, [Given(), Given(0.2)], mean_lengths())
     place = found.places[1]
     assert angle_deg(place.R_camera_first, truth.R_camera_first) < 1.0
     assert place.offset_s == pytest.approx(0.42, abs=0.008)
@@ -165,8 +167,44 @@ def test_lengths_of_bones_tell_the_angle_between_distant_cameras():
     t = R_second_first @ middle + t_second_first - R @ middle
     start = [CameraPlace.first(), CameraPlace(R, t)]
     times = people[0].times[::2]
-    found = adjust(people, start, times, [0.0, 0.0], mean_lengths()).cameras[1]
+    found = adjust(people, start, times, [Given(), Given()], mean_lengths()).cameras[1]
     assert angle_deg(found.R_camera_first, R_second_first) < 1.5
+
+
+def given_place(place):
+    T = np.eye(4)
+    T[:3, :3] = place.R_camera_first
+    T[:3, 3] = place.t_camera_first
+    return T
+
+
+def test_what_is_given_of_a_camera_stays_and_the_rest_is_found():
+    points = moving_points()
+    truth = replace(beside(80.0), offset_s=0.42)
+    people = [[seen(CameraPlace.first(), points, 30.0)], [seen(truth, points, 59.94, seed=2)]]
+    placed = Given(T_camera_first=given_place(truth))
+    place = calibrate(people, [Given(), placed], mean_lengths()).places[1]
+    np.testing.assert_allclose(place.R_camera_first, truth.R_camera_first, atol=1e-12)
+    np.testing.assert_allclose(place.t_camera_first, truth.t_camera_first, atol=1e-12)
+    assert place.offset_s == pytest.approx(0.42, abs=0.008)
+    place = calibrate(people, [Given(), Given(offset_s=0.42)], mean_lengths()).places[1]
+    assert place.offset_s == 0.42
+    assert angle_deg(place.R_camera_first, truth.R_camera_first) < 1.0
+
+
+def test_given_places_are_compared_with_the_people():
+    points = moving_points()
+    truth = beside(80.0)
+    first = seen(CameraPlace.first(), points, 30.0)
+    second = seen(truth, points, 30.0, seed=2)
+    assert not contradicts(first, second, truth)
+    assert relative_distance(first, second, truth) == pytest.approx(1.0, abs=0.1)
+    assert contradicts(first, second, beside(-80.0))
+    turn = rotations.exp(np.radians([2.0, 0.0, 0.0]))
+    moved = CameraPlace(turn @ truth.R_camera_first, turn @ truth.t_camera_first)
+    assert contradicts(first, second, moved)
+    millimetres = replace(truth, t_camera_first=1000.0 * truth.t_camera_first)
+    assert relative_distance(first, second, millimetres) == pytest.approx(1000.0, rel=0.1)
 
 
 def test_people_are_recognized_by_where_they_are():
@@ -175,7 +213,7 @@ def test_people_are_recognized_by_where_they_are():
     first = [seen(CameraPlace.first(), each, 30.0) for each in (left, right)]
     second = [seen(truth, each, 30.0, seed=5) for each in (right, left)]
     people = [first, second]
-    found = calibrate(people, [0.0, 0.0], mean_lengths())
+    found = calibrate(people, [Given(), Given()], mean_lengths())
     assert found.main == [0, 1]
     assert same_people(people, found) == [[0, 1], [1, 0]]
 
@@ -187,7 +225,7 @@ def test_somebody_else_is_nobody_in_the_other_camera():
         [seen(CameraPlace.first(), each, 30.0) for each in (left, right)],
         [seen(truth, left, 30.0, seed=5)],
     ]
-    found = calibrate(people, [0.0, 0.0], mean_lengths())
+    found = calibrate(people, [Given(), Given()], mean_lengths())
     assert same_people(people, found) == [[0, 0], [1, None]]
 
 

@@ -3,8 +3,10 @@
 
 import json
 import os
+import shutil
 import signal
 import sys
+from dataclasses import replace
 from functools import partial
 
 import bpy
@@ -16,15 +18,17 @@ from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui.capture import capture_job
-from scope.scope_addon.ui.capture.capture_job import CaptureJob
+from scope.scope_addon.ui.capture.capture_job import CaptureJob, capture_request
 from scope.scope_addon.ui.capture.capture_operators import (
     state,
 )
 from scope.scope_addon.ui.preferences import cache
+from scope.scope_addon.ui.view.comparison import cameras_of
 from scope.solver.body_file import load_body
 from scope.solver.errors import ScopeError
 
 from ...job.processes import wait_for
+from ...made_motion import made_views
 
 FINISH = "send('progress', stage='solving', done=1, total=10)\nfinish()"
 
@@ -431,3 +435,55 @@ def test_disabling_the_extension_ends_the_worker(fake_worker, footage):
         assert job_files() == []
     finally:
         scope.register()
+
+
+def test_views_are_captured_with_their_offsets_and_shown(fake_worker, footage, tmp_path, standing):
+    standing = replace(standing, views=made_views(0.5))
+    standing.save(tmp_path / "seen.npz")
+    views = [{"source": "a", "is_used": True}]
+    views += [{"source": "b", "is_used": False}, {"source": "c", "is_used": True}]
+    fake_worker(f"""
+        assert [os.path.basename(path) for path in request["views"]] == ["b.png", "c.png"]
+        assert request["offset"] == "auto,-1.500000"
+        shutil.copy({str(tmp_path / "seen.npz")!r}, os.path.join(folder, "person1.npz"))
+        report = dict(people=1, reprojection_px=2.5, fps=dict(total=5.0), warnings=[])
+        send("result", motions=["person1.npz"], report=dict(report, views={views!r}))
+    """)
+    scene = bpy.context.scene
+    settings = scene.scope
+    settings.footage = str(footage)
+    for name in ("b.png", "c.png"):
+        shutil.copy(footage, tmp_path / name)
+        assert bpy.ops.scope.add_view(filepath=str(tmp_path / name)) == {"FINISHED"}
+    settings.views[1].use_offset = True
+    settings.views[1].offset_s = -1.5
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    cameras = cameras_of(scene)
+    shown = [camera.data.background_images[0].image.filepath for camera in cameras]
+    assert [os.path.basename(path) for path in shown] == [footage.name, "c.png"]
+    first = capture_request(scene)
+    settings.views[1].offset_s = -1.0
+    other = capture_request(scene)
+    assert first.key("1") != other.key("1")
+    assert bpy.ops.scope.remove_view(index=0) == {"FINISHED"}
+    assert [view.footage for view in settings.views] == [str(tmp_path / "c.png")]
+    assert capture_request(scene).views == (str(tmp_path / "c.png"),)
+
+
+def test_at_most_seven_further_views_which_exist(footage, tmp_path):
+    settings = bpy.context.scene.scope
+    assert not bpy.ops.scope.add_view.poll()
+    settings.footage = str(footage)
+    with pytest.raises(RuntimeError, match="is not a file"):
+        bpy.ops.scope.add_view(filepath=str(tmp_path / "gone.mp4"))
+    files = [{"name": footage.name}] * 8
+    with pytest.raises(RuntimeError, match="at most eight"):
+        bpy.ops.scope.add_view(directory=str(tmp_path), files=files)
+    assert len(settings.views) == 0
+    assert bpy.ops.scope.add_view(directory=str(tmp_path), files=files[:7]) == {"FINISHED"}
+    assert len(settings.views) == 7
+    assert not bpy.ops.scope.add_view.poll()
+    footage.rename(tmp_path / "moved.png")
+    settings.footage = str(tmp_path / "moved.png")
+    with pytest.raises(ScopeError, match="does not exist; choose the video or image again"):
+        capture_request(bpy.context.scene)

@@ -3,12 +3,19 @@
 them.
 """
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix
+from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.camera import view_number
 from scope.scope_addon.ui.view import comparison
 from scope.scope_addon.ui.view.view_operators import show_new_capture
+from scope.solver import load_body
+
+from ...made_motion import made_views
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7, 3.0])
@@ -95,3 +102,38 @@ def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(m
     with bpy.context.temp_override(window=window, area=area):
         show_new_capture(bpy.context)
     assert space.region_3d.view_perspective == "CAMERA"
+
+
+def test_the_comparison_switches_between_the_cameras_of_a_capture(standing):
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    scene = bpy.context.scene
+    motion = replace(standing, views=made_views(0.5, -0.2))
+    built = build_scene([motion], load_body("scope"), options=BuildOptions())
+    scene.scope.capture = built.collection
+    window = bpy.context.window_manager.windows[0]
+    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    space = area.spaces.active
+    cameras = comparison.cameras_of(scene)
+    assert [view_number(camera) for camera in cameras] == [None, 0, 1]
+    assert comparison.camera_of(scene) == built.people[0].camera
+    scene.camera = cameras[0]
+    with bpy.context.temp_override(window=window, area=area):
+        comparison.begin(bpy.context, area, built.collection)
+        for index in (2, 0, 1):
+            assert bpy.ops.scope.compare_view(index=index) == {"FINISHED"}
+            assert scene.camera == space.camera == cameras[index]
+            assert comparison.is_looking_through(bpy.context)
+            size = scene.render.resolution_x, scene.render.resolution_y
+            assert size == ((640, 480) if index == 0 else (600, 400))
+        comparison.end_others(scene, built.collection)
+        assert space.local_view  # it is the shown capture itself
+        assert bpy.ops.scope.compare_view(index=3) == {"CANCELLED"}
+        comparison.end(window, area)
+    assert space.region_3d.view_perspective != "CAMERA"
+
+
+def test_one_camera_has_no_others_to_switch_to():
+    collection, camera = capture_with_camera("one")
+    bpy.context.scene.scope.capture = collection
+    assert comparison.cameras_of(bpy.context.scene) == [camera]
+    assert not bpy.ops.scope.compare_view.poll()
