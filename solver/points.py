@@ -51,8 +51,8 @@ def numbered(body: object, measurements: Measurements) -> Measurements:
     priors = measurements.pose_priors
     if priors is not None and has_names(priors.parts):
         parts = {name: i for i, name in enumerate(getattr(body, "joint_names", ()))}
-        found = with_numbers(parts, priors.parts, "Parts of pose priors")
-        changed["pose_priors"] = replace(priors, parts=found)
+        own = with_numbers(parts, priors.parts, "Parts of pose priors")
+        changed["pose_priors"] = replace(priors, parts=own)
     return replace(measurements, **changed) if changed else measurements
 
 
