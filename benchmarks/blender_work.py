@@ -23,6 +23,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scope_addon.expression_names import EXPRESSIONS
 from ..scope_addon.motion import Motion
 from ..scope_addon.scene.animation_data.actions import Channels
 from ..scope_addon.scene.build import BuildOptions, build_scene
@@ -31,7 +32,6 @@ from ..scope_addon.scene.character.armature import build_armature, rest_pose
 from ..scope_addon.scene.character.body_mesh import build_mesh, rest_vertices_world
 from ..scope_addon.scene.character.expression_keys import add_expression_keys, key_expressions
 from ..scope_addon.untrusted.body_file import load_body
-from ..solver.names import EXPRESSIONS
 
 WRITTEN = 10_000  # frames
 LENGTHS = {"half_a_minute": 900, "five_minutes": 9000}  # frames, at 30 per second

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
-from ...solver.names import EXPRESSIONS
+from ..expression_names import EXPRESSIONS
 from ..json_file import load_map, save_map
 from .bone_map import is_name
 

@@ -35,11 +35,11 @@ from scope.scope_addon.edit.pins.corrections import (
     Pin,
     Upright,
 )
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, VIEW_KEYS, Motion
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.body_file import BUILT_IN
-from scope.solver.names import EXPRESSIONS
 
 from ..made_motion import made_face, made_motion, made_views
 

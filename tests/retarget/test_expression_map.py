@@ -10,6 +10,7 @@ import json
 import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import (
     ExpressionMap,
     guess_expression_map,
@@ -17,7 +18,6 @@ from scope.scope_addon.retarget.expression_map import (
     save_expression_map,
 )
 from scope.solver.errors import InputError
-from scope.solver.names import EXPRESSIONS
 
 OCULUS = [
     f"viseme_{v}"

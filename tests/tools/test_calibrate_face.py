@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scope.scope_addon.capture.perception.face_landmarks import EXPRESSION_POINTS, FACE_POINTS
 from scope.scope_addon.capture.tracking.face.expression_fit import aligned, fit_units
-from scope.solver.names import EXPRESSIONS
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.tools.calibrate_face.observe import SeenFaces
 from scope.tools.calibrate_face.response import measure_response, units_of_expression
 from scope.tools.render_faces.sequences import INDEX, random_poses, talk_and_grimaces

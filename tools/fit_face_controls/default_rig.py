@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.expression_names import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, TURNED
 from ...scope_addon.retarget.face.face_frame import RestBone, measure_face
-from ...solver.names import EXPRESSIONS
 from ...solver.rotations import exp
 from .amounts import Amounts, Problem, eye_amounts, free_of, jacobian, share_shown
 from .shapes import FaceShapes

@@ -13,10 +13,10 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...scope_addon.errors import SetupError
+from ...scope_addon.expression_names import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, ExpressionMap
 from ...scope_addon.retarget.face.face_controls import control_motions
 from ...scope_addon.retarget.face.face_frame import FaceFrame, RestBone, measure_face
-from ...solver.names import EXPRESSIONS
 from .amounts import Amounts, Problem, eye_amounts, free_of, jacobian, share_shown
 from .shapes import FaceShapes
 

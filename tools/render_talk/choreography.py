@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.expression_names import EXPRESSIONS
 from ...scope_addon.kinematics.axes import R_WORLD_MODEL
 from ...solver.body import Body
-from ...solver.names import EXPRESSIONS
 from ...solver.rotations import exp
 from ..render_faces.sequences import GRIMACES, INDEX, VISEMES, add_pose, with_gaze
 from ..render_sample.choreography import Key, arm_keys, arm_pose, on_side, rotation_at, turns

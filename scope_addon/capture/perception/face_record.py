@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.names import EXPRESSIONS
 from ...arrays import Float64Array, FloatArray
+from ...expression_names import EXPRESSIONS
 from .face_landmarks import EXPRESSION_POINTS, FACE_POINTS, FaceEstimate
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ....solver.body_file import BUILT_IN
 from ....solver.errors import ModelFileError
-from ....solver.names import EXPRESSIONS
+from ...expression_names import EXPRESSIONS
 from ...untrusted.body_arrays import Form, check_index
 from .face_file import moves_of, read_face_file, told_to_install
 from .mouth import read_mouth, with_teeth_and_tongue
@@ -43,8 +43,8 @@ class Expression:
 
 
 def expressions_of(body: Body) -> tuple[Expression, ...]:
-    """Return the body's expressions in the order of `solver.names.EXPRESSIONS`; none of a user's
-    own body.
+    """Return the body's expressions in the order of `expression_names.EXPRESSIONS`; none of a
+    user's own body.
 
     :raises ModelFileError: the file of the expressions is damaged.
     """

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError
-from ....solver.names import EXPRESSIONS
+from ...expression_names import EXPRESSIONS
 from ...untrusted.body_arrays import Form, check_arrays, check_finite_array, check_index
 from ...untrusted.files import read_npz
 
@@ -51,7 +51,7 @@ def read_face_file(path: Path, what: str, forms: Mapping[str, Form]) -> dict[str
 
 
 def moves_of(data: Mapping[str, NDArray[Any]], count: int, path: Path) -> tuple[Moves, ...]:
-    """Return what each expression moves, in the order of `solver.names.EXPRESSIONS`.
+    """Return what each expression moves, in the order of `expression_names.EXPRESSIONS`.
 
     :param data: starts (53,), vertices (n,), moves (n, 3) and step_m, see `read_face_file`.
     :param count: number of vertices that it may move.

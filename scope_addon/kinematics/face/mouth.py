@@ -45,7 +45,9 @@ class Mouth:
     face_material: NDArray[np.uint8]  # (F,) indices into material_names
     material_names: tuple[str, ...]
     material_colors: NDArray[np.float64]  # (C, 4) linear RGBA
-    moves: tuple[Moves, ...]  # One for each expression, in the order of `solver.names.EXPRESSIONS`.
+    moves: tuple[
+        Moves, ...
+    ]  # One for each expression, in the order of `expression_names.EXPRESSIONS`.
 
 
 def with_teeth_and_tongue(body: Body) -> Body:

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.names import EXPRESSIONS
 from ....solver.rotations import exp
+from ...expression_names import EXPRESSIONS
 from ..expression_map import MOVED, TURNED, ExpressionMap, load_expression_map
 from .face_frame import FaceFrame, RestBone, measure_face, pivot
 

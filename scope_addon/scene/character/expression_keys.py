@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.names import EXPRESSIONS
+from ...expression_names import EXPRESSIONS
 from ...kinematics.axes import R_WORLD_MODEL
 from ...kinematics.face.expressions import expressions_of, mouth_faces_of
 from ...motion import Motion

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.names import EXPRESSIONS
 from ...errors import UsageError
+from ...expression_names import EXPRESSIONS
 from ...retarget.expression_map import ExpressionMap, guess_expression_map
 from ..animation_data.actions import Channels, check_not_in_nla, fcurves, read_keys, shape_key_path
 from ..animation_data.transaction import all_or_nothing

@@ -26,7 +26,7 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         """Draw one entry: expression, and shape key or control with its channel; see
         `SCOPE_UL_bone_pairs`.
         """
-        from ....solver.names import EXPRESSIONS
+        from ...expression_names import EXPRESSIONS
 
         known = _is_known(settings.face, item)
         split = layout.split(factor=0.5, align=True)

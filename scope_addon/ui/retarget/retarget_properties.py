@@ -46,7 +46,7 @@ def offered_expressions(
     _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
 ) -> list[str]:
     """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
-    from ....solver.names import EXPRESSIONS
+    from ...expression_names import EXPRESSIONS
 
     return [name for name in EXPRESSIONS if typed.lower() in name.lower()]
 

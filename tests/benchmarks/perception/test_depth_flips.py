@@ -18,7 +18,7 @@ from scope.benchmarks.perception.depth_flips import (
 )
 from scope.benchmarks.perception.faces import BLINKS, closures
 from scope.benchmarks.perception.outline import overlap
-from scope.solver.names import EXPRESSIONS
+from scope.scope_addon.expression_names import EXPRESSIONS
 
 RATE = 10.0
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.kinematics.face.expressions import Expression, expressions_of, mouth_faces_of
 from scope.solver.body_file import load_body
-from scope.solver.names import EXPRESSIONS
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.retarget.face.face_controls import (
     built_in,
@@ -13,7 +14,6 @@ from scope.scope_addon.retarget.face.face_controls import (
 )
 from scope.scope_addon.retarget.face.face_frame import RestBone, measure_face
 from scope.solver.errors import InputError
-from scope.solver.names import EXPRESSIONS
 from scope.solver.rotations import exp
 
 # A face that looks along -y with the person's left along +x, as Blender's characters do; metres.

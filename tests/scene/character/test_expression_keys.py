@@ -13,12 +13,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.kinematics.face.expressions import expressions_of
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.character.shape_keys import mixed_vertices
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
-from scope.solver.names import EXPRESSIONS
 
 from ...made_motion import made_face
 from ..exported import read_back

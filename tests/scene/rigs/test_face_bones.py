@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.rigs import face_bones
@@ -20,7 +21,6 @@ from scope.scope_addon.scene.rigs.face_bones import (
     retarget_face_bones,
 )
 from scope.scope_addon.scene.rigs.face_retarget import CapturedExpressions
-from scope.solver.names import EXPRESSIONS
 
 FRAMES = np.array([1.0, 2.0, 3.0])
 

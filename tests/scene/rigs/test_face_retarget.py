@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.retarget.rig_source import RigSource
 from scope.scope_addon.scene.animation_data import actions
@@ -21,7 +22,6 @@ from scope.scope_addon.scene.rigs.face_retarget import (
     retarget_expressions,
 )
 from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
-from scope.solver.names import EXPRESSIONS
 
 from ...edit.walking import motion_of, walk
 from ...made_motion import made_face

@@ -30,9 +30,9 @@ from scope.scope_addon.capture.tracking.face.expression_fit import (
     view_terms,
     with_expressions,
 )
+from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.solver.body_file import load_body
 from scope.solver.errors import ModelFileError
-from scope.solver.names import EXPRESSIONS
 from scope.solver.rotations import exp
 from scope.tools.render_faces.looks import draw_look
 from scope.tools.render_faces.sequences import INDEX, FaceClip
