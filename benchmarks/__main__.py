@@ -54,6 +54,8 @@ def solver(quick: bool) -> dict[str, Any]:
         print(report.experiment_lines(number, rows), end="\n\n", flush=True)
         plots.plot_experiment(OUT, number, rows, suffix)
     figures["experiments"] = experiments
+    figures["many_joints"] = steps.many_joints(3 if quick else 20)
+    print(report.joint_lines(figures["many_joints"]), end="\n\n", flush=True)
     figures["clip"] = clip_steps.clip_table(3 if quick else 10)
     figures["clip_gradients"] = clip_steps.against_gradients(1 if quick else 5)
     figures["clip_dense"] = clip_comparison.against_dense(3 if quick else 20)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -113,6 +114,24 @@ def experiment_lines(number: int, rows: list[dict[str, float]]) -> str:
         text += "\n\nGrowth from N = 120 to 600: " + ", ".join(fits)
     joints = [f"{m}: K^{growth_in_joints(rows, m):.2f}" for m in ("sparse", "dense")]
     return text + "\n\nGrowth from K = 23 to 51: " + ", ".join(joints)
+
+
+def joint_lines(rows: list[dict[str, float]]) -> str:
+    """Return the times of steps with growing K, and their exponents from one K to the next."""
+    lines: list[list[object]] = []
+    before: dict[float, dict[str, float]] = {}
+    for row in rows:
+        exponents = ["", ""]
+        if row["P"] in before:
+            last = before[row["P"]]
+            exponents = [
+                f"{math.log(row[m] / last[m]) / math.log(row['K'] / last['K']):.2f}"
+                for m in ("sparse", "dense")
+            ]
+        lines.append([row["P"], row["K"], row["sparse"], row["dense"], *exponents])
+        before[row["P"]] = row
+    head = ("P", "K", "sparse", "dense", "sparse: exponent of K", "dense: exponent of K")
+    return "Growth with the joints, N = 600, µs per step\n\n" + table(head, lines)
 
 
 def frame_lines(convergence: list[dict[str, Any]]) -> str:

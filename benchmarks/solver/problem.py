@@ -70,9 +70,11 @@ def make_problem(
 ) -> Problem:
     """Return the benchmark problem; with `everything` also a root prior, both joint priors and
     limits.
+
+    :param K: joints, of one of BODIES, or of a random tree that only the step's time is of.
     """
     rng = np.random.default_rng(seed)
-    body = load_body(BODIES[K])
+    body: Any = load_body(BODIES[K]) if K in BODIES else _random_tree(rng, K)
     n2, n3, nd = SPLIT.get(N, (N // 3,) * 3)
     M = max(n2, n3, nd, 20 if N in SPLIT else 0)
     part = np.sort(np.arange(M) % (K + 1))
@@ -125,6 +127,15 @@ def make_problem(
         arrays,
         measurements,
     )
+
+
+def _random_tree(rng: np.random.Generator, K: int) -> Arrays:
+    """Return K joints in branches as long as those of a body, without keypoints."""
+    parents = np.array([-1, *(rng.integers(max(0, i - 4), i) for i in range(1, K + 1))])
+    S = 0.02 * rng.standard_normal((K + 1, 3, 10))
+    offsets = 0.15 * rng.standard_normal((K + 1, 3))
+    nothing = np.zeros((0, 3))
+    return Arrays(parents, S, offsets, np.zeros(0, np.intp), nothing, np.zeros((0, 3, 10)))
 
 
 def _state(rng: np.random.Generator, K: int, P: int) -> State:

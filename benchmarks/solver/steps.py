@@ -27,6 +27,7 @@ TARGETS = {  # name: K, P, N, with the joint prior, target in microseconds
 }
 SIZES = (120, 240, 360, 480, 600)
 SHAPES = tuple(range(11))
+JOINTS = (23, 51, 100, 200)  # the last two of random trees
 SPARSE_BATCH = 40
 DENSE_BATCH = 4
 
@@ -144,6 +145,17 @@ def experiment(which: int, rounds: int, terms: int | None = None) -> list[dict[s
     return [
         {"K": K, "P": P, "N": N, "sparse": sparse[str((K, P, N))], "dense": dense[str((K, P, N))]}
         for K, P, N in problems
+    ]
+
+
+def many_joints(rounds: int) -> list[dict[str, float]]:
+    """Return the times of a sparse and of a dense step in microseconds for growing K, N = 600."""
+    points = [(K, P) for P in (0, 10) for K in JOINTS]
+    problems = {f"K{K}_P{P}": make_problem(K, P, 600) for K, P in points}
+    sparse, _, dense = compare(problems, rounds)
+    return [
+        {"K": K, "P": P, "N": 600, "sparse": sparse[f"K{K}_P{P}"], "dense": dense[f"K{K}_P{P}"]}
+        for K, P in points
     ]
 
 
