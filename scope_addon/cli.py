@@ -213,6 +213,12 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     )
     batch.add_argument("--recursive", action="store_true", help="include subfolders")
     batch.add_argument(
+        "--views",
+        action="store_true",
+        help="the videos in a subfolder are of the same moment, by several cameras: one motion for "
+        "each subfolder",
+    )
+    batch.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="clips captured in parallel (default: 1)"
     )
     batch.add_argument(
@@ -338,7 +344,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
 
     with ExitStack() as stack:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
-        if found := window_report(args, video, options, progress):
+        if not args.views and (found := window_report(args, video, options, progress)):
             return found
         rate_given = options.wanted.fps is not None
         # What several cameras show is not continued after a kill.
@@ -433,7 +439,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
         batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out))
-        footage = batch.clips(args.recursive)
+        footage = batch.clips(args.recursive, args.views)
         videos = [path for path in footage.values() if path.is_file()]
         refuse_inputs(batch.results(footage), [*files_to_read(vars(args)), *videos])
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
@@ -443,6 +449,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         report = batch.run(
             args.jobs,
             recursive=args.recursive,
+            views=args.views,
             again=args.again,
             progress=progress,
             say=print_message,

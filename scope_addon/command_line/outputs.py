@@ -82,7 +82,8 @@ def files_to_read(values: Mapping[str, Any]) -> list[Path]:
     """
     files: list[Path] = []
     footage = [values.get(name) for name in FOOTAGE]
-    for value in [*footage, *values.get(VIEWS, ())]:
+    views = values.get(VIEWS)  # of a batch, only whether there are any
+    for value in [*footage, *(views if isinstance(views, list) else ())]:
         if value is not None and not is_url(value):
             files += files_of_footage(Path(value))
     for name in OTHER_INPUTS:

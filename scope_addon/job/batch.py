@@ -71,10 +71,12 @@ class Batch:
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
 
-    def clips(self, recursive: bool) -> dict[str, Path]:
+    def clips(self, recursive: bool, views: bool = False) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
         several = self.settings.options.get("--people") not in (None, "1", "largest")
-        return find_clips(self.folder, self.out, recursive=recursive, several_people=several)
+        return find_clips(
+            self.folder, self.out, recursive=recursive, several_people=several, views=views
+        )
 
     def results(self, names: Iterable[str]) -> list[Path]:
         """Return the paths of all results of one person that the batch may write for the clips of
@@ -92,6 +94,7 @@ class Batch:
         jobs: int,
         *,
         recursive: bool = False,
+        views: bool = False,
         again: bool = False,
         progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
         say: Callable[[str], None] = lambda text: None,
@@ -102,6 +105,7 @@ class Batch:
 
         :param jobs: number of clips that are captured in parallel, by a runner of this machine.
         :param recursive: include subfolders.
+        :param views: the videos of a subfolder are those of several cameras.
         :param again: capture finished clips as well.
         :param progress: called with the stage, the number of finished clips and that of all clips.
         :param say: called with messages for the user.
@@ -111,7 +115,7 @@ class Batch:
         :raises UsageError: the folder contains no footage.
         :raises OutputError: the output folder cannot be created, or the report cannot be written.
         """
-        clips = self.clips(recursive)
+        clips = self.clips(recursive, views)
         if not clips:
             raise UsageError(
                 f"no footage in {self.folder}: no file ends with one of "

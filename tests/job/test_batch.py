@@ -581,3 +581,19 @@ def test_the_real_capture_of_a_folder(tmp_path, capfd):
     assert "text.mp4" in entries["text.mp4"]["message"]
     assert report["options"] == {"--quality": "fast", "--end": "0.3", "--threads": "1"}
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [REPORT_NAME, "walk.npz"]
+
+
+def test_the_views_of_a_take_are_captured_together_and_once(tmp_path):
+    take = tmp_path / "clips" / "walk"
+    take.mkdir(parents=True)
+    for name in ("right.mp4", "left.mp4"):
+        (take / name).write_text("ok")
+    program = [sys.executable, "-c", PROGRAM]
+    for expected in ("done", "skipped"):
+        batch = Batch(tmp_path / "clips", tmp_path / "out", program, {}, [".npz"])
+        report = batch.run(1, views=True)
+        (entry,) = report["files"]
+        assert (entry["file"], entry["status"]) == ("walk", expected)
+        assert entry["outputs"] == ["walk.npz"]
+    (call,) = (take / "calls.log").read_text("utf-8").splitlines()
+    assert json.loads(call)[1:3] == [str(take / "left.mp4"), str(take / "right.mp4")]

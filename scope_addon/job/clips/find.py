@@ -15,7 +15,7 @@ _PERSON = re.compile(r"(.+)\.person[0-9]+")
 
 
 def find_clips(
-    folder: Path, out: Path, *, recursive: bool, several_people: bool
+    folder: Path, out: Path, *, recursive: bool, several_people: bool, views: bool = False
 ) -> dict[str, Path]:
     """Return the clips in ``folder`` by the name of their results, without suffix, in alphabetical
     order of the files.
@@ -23,8 +23,9 @@ def find_clips(
     :param out: output folder, whose files are not footage.
     :param recursive: include subfolders.
     :param several_people: whether a clip may have one result per person.
+    :param views: whether the videos of a subfolder are views of one take, which is a clip then.
     """
-    found = sorted(_footage_below(folder, out, recursive))
+    found = sorted(_footage_below(folder, out, recursive, views))
     stems = Counter(_stem(folder, path) for path in found)
     names = {}
     for path in found:
@@ -61,7 +62,7 @@ def _stem(folder: Path, path: Path) -> str:
 
 
 def _footage_below(
-    folder: Path, out: Path, recursive: bool, above: tuple[Path, ...] = ()
+    folder: Path, out: Path, recursive: bool, views: bool, above: tuple[Path, ...] = ()
 ) -> list[Path]:
     """Return the videos, pictures and picture sequences in a folder.
 
@@ -75,15 +76,33 @@ def _footage_below(
         if path.name.startswith(".") or path == out or path.stem.endswith(OVERLAY):
             continue
         if path.is_dir():
-            if _is_sequence_folder(path):
+            videos = videos_of_take(path) if views else []
+            if _is_sequence_folder(path) or len(videos) > 1:
                 found.append(path)
             elif recursive and path.resolve() not in above:
-                found += _footage_below(path, out, recursive, above)
+                found += _footage_below(path, out, recursive, views, above)
+            else:
+                found += videos
         # Pipes are skipped, because opening one would block; a broken link is kept, to be reported
         # as a failed clip.
         elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):
             found.append(path)
     return found
+
+
+def videos_of_take(folder: Path) -> list[Path]:
+    """Return the videos in a folder, in alphabetical order; none if it cannot be read."""
+    try:
+        return sorted(
+            path
+            for path in folder.iterdir()
+            if path.suffix.lower() in VIDEO_SUFFIXES
+            and not path.name.startswith(".")
+            and not path.stem.endswith(OVERLAY)
+            and path.is_file()
+        )
+    except OSError:
+        return []
 
 
 def _is_sequence_folder(folder: Path) -> bool:

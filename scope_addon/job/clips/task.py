@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from ...errors import NO_PERSON, system_error_message
 from ...footage import PICTURE_SUFFIXES
-from .find import OVERLAY
+from .find import OVERLAY, videos_of_take
 from .finished import (
     FINISHED_FILE,
     content_of,
@@ -90,7 +90,8 @@ class ClipTask(NamedTuple):
 
     :param name: name of its results below ``out``, without suffix.
     :param file: name of the footage in the report.
-    :param footage: path of a video, an image, or a folder with an image sequence.
+    :param footage: path of a video, an image, or a folder with an image sequence or with the videos
+        of several cameras.
     :param out: output folder.
     :param basis: see `CaptureSettings.basis`.
     :param previous: entry of the previous report, if its files still exist.
@@ -219,7 +220,8 @@ def _arguments(
     """Return the arguments that capture a clip; ``target`` is the path of its results without
     suffix.
     """
-    arguments = ["capture", str(footage), "--json", "--quiet", STOP_WITH_STDIN]
+    videos = [str(path) for path in videos_of_take(footage)] or [str(footage)]
+    arguments = ["capture", *videos, "--json", "--quiet", STOP_WITH_STDIN]
     for suffix in settings.suffixes:
         arguments += ["-o", f"{target}{suffix}"]
     if settings.extras.reports:
@@ -246,9 +248,10 @@ def _window_arguments(task: ClipTask) -> list[str]:
 def _key(basis: str, footage: Path) -> str:
     """Hash the program, the options and the footage."""
     digest = hashlib.sha256(basis.encode())
-    _add_files(
-        digest, filter(Path.is_file, sorted(footage.iterdir())) if footage.is_dir() else [footage]
-    )
+    files = [footage]
+    if footage.is_dir():
+        files = videos_of_take(footage) or list(filter(Path.is_file, sorted(footage.iterdir())))
+    _add_files(digest, files)
     return digest.hexdigest()
 
 

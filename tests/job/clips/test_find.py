@@ -7,13 +7,15 @@ import os
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.job.clips.find import find_clips
+from scope.scope_addon.job.clips.find import find_clips, videos_of_take
 
 
 def found_in(
-    folder: Path, *, recursive: bool = False, several_people: bool = False
+    folder: Path, *, recursive: bool = False, several_people: bool = False, views: bool = False
 ) -> dict[str, Path]:
-    return find_clips(folder, folder / "out", recursive=recursive, several_people=several_people)
+    return find_clips(
+        folder, folder / "out", recursive=recursive, several_people=several_people, views=views
+    )
 
 
 def test_videos_images_and_sequences_are_found_and_results_are_not(tmp_path):
@@ -100,3 +102,24 @@ def test_links_to_a_folder_above_are_not_followed(tmp_path):
     (below / "here").symlink_to(below)
     found = find_clips(tmp_path / "clips", tmp_path / "out", recursive=True, several_people=False)
     assert found == {"day/walk": below / "walk.mp4"}
+
+
+def test_videos_of_a_subfolder_are_one_clip_if_they_are_views(tmp_path):
+    for name in (
+        "alone.mp4",
+        "walk/right.mp4",
+        "walk/left.mov",
+        "walk/.hidden.mp4",
+        "walk/left.overlay.mp4",
+        "single/only.mp4",
+        "day/jump/a.mp4",
+        "day/jump/b.mp4",
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("x")
+    found = found_in(tmp_path, views=True)
+    assert sorted(found) == ["alone", "single/only", "walk"]
+    assert [path.name for path in videos_of_take(found["walk"])] == ["left.mov", "right.mp4"]
+    deep = ["alone", "day/jump", "single/only", "walk"]
+    assert sorted(found_in(tmp_path, views=True, recursive=True)) == deep
+    assert sorted(found_in(tmp_path)) == ["alone"]
