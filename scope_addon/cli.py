@@ -32,7 +32,6 @@ from .command_line.import_command import add_import
 from .command_line.live_command import add_live
 from .command_line.memory_limit import check_memory_limit
 from .command_line.outputs import (
-    MOTION_SUFFIXES,
     check_blender,
     check_outputs,
     checked_rig,
@@ -75,7 +74,7 @@ from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .options.capture import OFF
 from .parent import end_with_parent
 from .private_folder import lasting_folder
-from .scene.export.output_paths import SUFFIXES
+from .scene.export.output_paths import SUFFIXES, WITHOUT_SCENE
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 PROGRAM = (sys.executable, "-m", str(__package__))
@@ -326,9 +325,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         args.save_calibration,
     )
     check_blender(outputs)
-    check_memory_limit(
-        with_scene=any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs)
-    )
+    check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
     rig = checked_rig(args, outputs, args.hands != OFF)
 
     body, options = body_and_options(args)

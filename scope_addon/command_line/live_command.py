@@ -19,7 +19,7 @@ from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths
 from .arguments import add_options, values_in_range
 from .memory_limit import check_memory_limit
-from .outputs import MOTION_SUFFIXES, check_outputs
+from .outputs import check_outputs
 from .signals import interrupted
 from .terminal import ProgressLine, print_message
 
@@ -219,7 +219,7 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
 
     :raises UsageError: a value is impossible, or contradicts another.
     """
-    if values["record"] and values["record"].suffix.lower() not in MOTION_SUFFIXES:
+    if values["record"] and values["record"].suffix.lower() != ".npz":
         raise UsageError(
             "--record writes a motion file: give a name that ends in .npz, not "
             f"{values['record'].name}"

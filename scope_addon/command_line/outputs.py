@@ -21,13 +21,13 @@ from ..installed import check_installed
 from ..motion import Motion
 from ..notices import Notice
 from ..options import option
-from ..scene.export.output_paths import check_output, person_paths
+from ..scene.export.output_paths import WITHOUT_SCENE, check_output, person_paths
+from ..scene.export.trc import write_trc
 from .blender_folder import load_blender
 
 if TYPE_CHECKING:
     from ..retarget.rig_source import RigSource
 
-MOTION_SUFFIXES = (".npz",)
 OVERLAY_SUFFIXES = (".mp4", ".png", ".jpg")
 REPORT_SUFFIXES = (".html",)
 CALIBRATION_SUFFIXES = (".toml",)
@@ -146,11 +146,12 @@ def check_outputs(
 
 
 def check_blender(outputs: list[Path]) -> None:
-    """Check that bpy is installed if an output needs it, as all do except motion files.
+    """Check that bpy is installed if an output needs it, as all do except motion files and
+    markers.
 
     :raises SetupError: it is not installed; the message gives the command that installs it.
     """
-    if any(path.suffix.lower() not in MOTION_SUFFIXES for path in outputs):
+    if any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs):
         check_installed(["bpy"])
 
 
@@ -171,7 +172,7 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
     :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
     """
     if args.skeleton != option("skeleton").default:
-        named = [path for path in outputs if path.suffix.lower() not in (".npz", ".blend")]
+        named = [path for path in outputs if path.suffix.lower() not in (*WITHOUT_SCENE, ".blend")]
         if args.retarget is not None:
             raise UsageError(
                 "--skeleton names the bones of Scope's own body, and a rig keeps its own: give "
@@ -196,7 +197,7 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
     from ..retarget.rig_source import rig_source
 
     rig = rig_source(args.retarget, args.rig_object, args.bone_map, args.expression_map)
-    scene_files = [p for p in outputs if p.suffix.lower() not in MOTION_SUFFIXES]
+    scene_files = [p for p in outputs if p.suffix.lower() not in WITHOUT_SCENE]
     if not scene_files:
         raise UsageError(
             "--retarget needs an output that can contain a rig, such as -o OUT.glb; a "
@@ -226,14 +227,17 @@ def write_outputs(
     :return: the paths of the files, and warnings.
     :raises OutputError: a file cannot be written.
     """
-    motion_files = [p for p in outputs if p.suffix.lower() in MOTION_SUFFIXES]
+    motion_files = [p for p in outputs if p.suffix.lower() in WITHOUT_SCENE]
     scene_files = [p for p in outputs if p not in motion_files]
     written: list[Path] = []
     warnings: list[Notice] = []
     for path in motion_files:
         targets = person_paths(path, len(motions))
         for target, motion in zip(targets, motions, strict=True):
-            motion.save(target)
+            if path.suffix.lower() == ".trc":
+                write_trc(target, motion, body)
+            else:
+                motion.save(target)
         written += targets
     if scene_files:
         load_blender()

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The axis conventions of SMPL, OpenCV and the world, in one place; Blender's and glTF's are in
-``scene/axes.py``.
+"""The axis conventions of SMPL, OpenCV, OpenSim and the world, in one place; those of Blender and
+glTF are in ``scene/axes.py``.
 
 | frame  | right-handed axes                                   | used by                         |
 |--------|-----------------------------------------------------|---------------------------------|
 | camera | OpenCV: x right, y down, z forward                  | solver, joints_cam, intrinsics  |
 | world  | x right, z up, floor at z = 0                       | motion file, Blender scenes     |
 | model  | SMPL: y up, x to the person's left, person faces +z | rest pose of a body             |
+| opensim| x forward, y up, z to the right                      | .trc files                      |
 
 ``R_a_b`` takes coordinates in frame b to coordinates in frame a: ``p_a = R_a_b @ p_b``.
 """
@@ -24,6 +25,8 @@ UP = np.array([0.0, 0.0, 1.0])  # The world's up direction.
 R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # A level OpenCV camera in the world: x right stays, y down is −z, z forward is +y.
 R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+# OpenSim's y points up: (x, y, z) -> (y, z, x), as Pose2Sim converts a world with z up.
+R_OPENSIM_WORLD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 
 def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArray[np.float64]:

@@ -43,8 +43,9 @@ from .export_states import (
     temporary_scene,
     unit_of_captures,
 )
-from .output_paths import check_output, person_paths
+from .output_paths import WITHOUT_SCENE, check_output, person_paths
 from .skeleton_names import OWN, SKELETONS, renamed_bones
+from .trc import write_trc
 
 SHAPES = ("auto", "keys", "baked")
 
@@ -109,6 +110,11 @@ def export(
     """
     path = check_output(path)
     suffix = path.suffix.lower()
+    if suffix == ".trc":
+        raise UsageError(
+            f"cannot write {path.name}: markers follow from a motion file; write one, and convert "
+            "it with scope import"
+        )
     if suffix == ".npz" and motions:
         targets = person_paths(path, len(motions))
         for target, motion in zip(targets, motions, strict=True):
@@ -227,9 +233,15 @@ def export_motions(
         check_output(each)
     written: list[Path] = []
     warnings: list[Notice] = []
-    scene_paths = [p for p in paths if Path(p).suffix.lower() != ".npz"]
-    for each in (p for p in paths if p not in scene_paths):
-        written += export(each, motions=motions)
+    scene_paths = [p for p in paths if Path(p).suffix.lower() not in WITHOUT_SCENE]
+    for each in map(Path, (p for p in paths if p not in scene_paths)):
+        if each.suffix.lower() == ".npz":
+            written += export(each, motions=motions)
+            continue
+        targets = person_paths(each, len(motions))
+        for target, motion in zip(targets, motions, strict=True):
+            write_trc(target, motion, body)
+        written += targets
     if not scene_paths:
         return written, warnings
     build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)

@@ -12,8 +12,9 @@ from pathlib import Path
 from ...atomic_write import reason, resolve_link
 from ...errors import OutputError, UsageError
 
-SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".npz")
-PER_PERSON = (".bvh", ".npz")  # formats with one person per file
+SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".trc", ".npz")
+PER_PERSON = (".bvh", ".trc", ".npz")  # formats with one person per file
+WITHOUT_SCENE = (".trc", ".npz")  # formats that are written from the motion, without Blender
 
 
 def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:

@@ -11,9 +11,9 @@ import pytest
 from scope.scope_addon.errors import OutputError, UsageError
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import export, export_motions
-from scope.scope_addon.scene.export.output_paths import SUFFIXES, person_paths
+from scope.scope_addon.scene.export.output_paths import SUFFIXES, WITHOUT_SCENE, person_paths
 
-SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
+SCENE_SUFFIXES = [suffix for suffix in SUFFIXES if suffix not in WITHOUT_SCENE]
 NOBODY = 65534
 
 
@@ -23,7 +23,7 @@ def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion,
 
 
 def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
-    with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.npz"):
+    with pytest.raises(UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.trc, \.npz"):
         export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
     assert list(tmp_path.iterdir()) == []
 
