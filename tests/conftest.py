@@ -128,6 +128,16 @@ def sessions_are_opened_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True)
+def usual_priority() -> Iterator[None]:
+    """Give the main thread its priority back. Where root encodes AV1, SVT-AV1 leaves its caller
+    with a real-time priority, and all other processes wait for it and its children.
+    """
+    yield
+    if sys.platform == "linux" and os.sched_getscheduler(0) != os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 @pytest.fixture(scope="session")
 def body() -> Body:
     """The built-in body without fingers."""
