@@ -15,7 +15,12 @@ from typing import ClassVar
 
 import pytest
 from scope.scope_addon import options as declarations
-from scope.scope_addon.capture.options import CaptureOptions, capture_options, check_options
+from scope.scope_addon.capture.options import (
+    CaptureOptions,
+    capture_options,
+    check_options,
+    parse_offsets,
+)
 from scope.scope_addon.capture.perception.sessions import CHOICES, LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.cli import build_parser, main
 from scope.scope_addon.command_line.arguments import (
@@ -292,3 +297,11 @@ def test_the_declarations_load_nothing_but_the_standard_library():
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd="/"
     )
     assert done.stdout.strip() == "['scope']"
+
+
+def test_offsets_are_seconds_or_auto():
+    assert parse_offsets("1.25") == (1.25,)
+    assert parse_offsets("-0.5, auto,+2") == (-0.5, None, 2.0)
+    for text in ("1,", "x", "1;2", "nan", "1e3"):
+        with pytest.raises(UsageError, match="is not a list of offsets"):
+            parse_offsets(text)

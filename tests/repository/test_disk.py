@@ -30,6 +30,7 @@ WRITES = {
     "scope_addon/machine_code/code_files.py",
     "scope_addon/private_folder.py",
     "scope_addon/job/cache.py",
+    "scope_addon/job/unfinished.py",
     "scope_addon/job/batch.py",
     "scope_addon/job/clips/task.py",
     "scope_addon/capture/long_clips/kept_estimates.py",

@@ -50,6 +50,7 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
         context.scene.scope.footage = stored_path(context, str(path))
+        context.scene.scope.views.clear()  # which are of other footage
         show_tab(context)
         try:
             bpy.ops.scope.capture("INVOKE_DEFAULT")

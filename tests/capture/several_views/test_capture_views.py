@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.several_views.capture_views import capture_views
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.footage_view import FootageView
 from scope.solver import load_body, rotations
+from scope.solver.errors import InputError
 
 # Of the ground truth's names, those of our joints.
 LIMBS = {
@@ -42,6 +45,11 @@ def test_two_cameras_halve_the_error_of_one(shared):
     first, second = (np.load(folder / f"truth_cam{k}.npz") for k in (1, 4))
     (motion,) = captured.motions
     place = captured.report.views[1]
+    np.testing.assert_allclose(
+        motion.views["view_from_camera"][0, :3, :3], place["R_camera_first"], atol=1e-5
+    )
+    assert motion.views["view_sources"].tolist() == ["cam4.mp4"]
+    assert motion.views["view_frame_rates"] == pytest.approx([60.0])
     R, t = true_place(first, second)
     turned = np.linalg.norm(rotations.log(np.array(place["R_camera_first"]) @ R.T))
     assert np.degrees(turned) < 5.0
@@ -72,3 +80,25 @@ def test_one_video_is_not_several(shared):
         capture_views(
             [video, video.parent / ".." / "pose2sim" / "cam1.mp4"], body, CaptureOptions()
         )
+
+
+def test_what_is_given_of_cameras_has_to_suit_the_videos(shared, tmp_path):
+    folder = shared / "data" / "pose2sim"
+    videos = [folder / "cam1.mp4", folder / "cam4.mp4"]
+    body = load_body("scope")
+    with pytest.raises(UsageError, match="gives 2 offsets, but there are 1 further videos"):
+        capture_views(videos, body, CaptureOptions(offsets_s=(0.0, None)))
+    with pytest.raises(UsageError, match="one video was given"):
+        capture(videos[0], body, CaptureOptions(offsets_s=(0.0,)))
+    lens = "matrix = [[1670.0, 0, 540.0], [0, 1670.0, 960.0], [0, 0, 1]]\nsize = [1080, 1920]"
+    cameras = [
+        f"[cam_{k}]\n{lens}\nrotation = [0, {k}, 0]\ntranslation = [0, 0, 4]" for k in (1, 4)
+    ]
+    file = tmp_path / "calib.toml"
+    file.write_text("\n".join(cameras))
+    mirrored = VideoRange(view=FootageView(is_mirrored=True))
+    with pytest.raises(UsageError, match="--mirror contradicts"):
+        capture_views(videos, body, CaptureOptions(calibration=file, wanted=mirrored))
+    file.write_text("\n".join(cameras).replace("[0, 4, 0]", "[0, 4]"))
+    with pytest.raises(InputError, match="rotation and translation of cam_4"):
+        capture_views(videos, body, CaptureOptions(calibration=file))
