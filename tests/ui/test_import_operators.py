@@ -3,13 +3,18 @@
 sentence.
 """
 
+import shutil
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui.captured_person import captured_armature
+from scope.scope_addon.ui.view.comparison import cameras_of
 
 from ..edit.walking import motion_of, walk
+from ..made_motion import made_views
 from .conftest import inventory
 
 MOTION = motion_of(walk(1.0))
@@ -72,6 +77,20 @@ def test_our_own_file_has_its_camera_and_footage(footage):
     assert len(camera.data.background_images) == 1
     assert bpy.context.scene.scope.result.footage == str(footage)
     assert len(bpy.context.scene.scope.result.warnings) == 0
+
+
+def test_a_file_of_several_cameras_brings_all_with_the_footage_beside_it(footage):
+    own = replace(motion_of(walk(0.3)), source=footage.name)
+    sources = np.array([f"second{footage.suffix}", "gone.mp4"])
+    own = replace(own, views=made_views(0.5, -0.2) | {"view_sources": sources})
+    shutil.copy(footage, footage.with_name(str(sources[0])))
+    own.save(footage.with_name("own.npz"))
+    bpy.ops.scope.import_motion(filepath=str(footage.with_name("own.npz")))
+    shown = [
+        [background.image.name for background in camera.data.background_images]
+        for camera in cameras_of(bpy.context.scene)
+    ]
+    assert shown == [[footage.name], [str(sources[0])], []]
 
 
 def test_several_files_become_several_captures(amass, tmp_path):

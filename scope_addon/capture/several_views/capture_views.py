@@ -26,7 +26,7 @@ from ..media.video import Video, open_video
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..stages.clock import FINDING, Progress, StageClock
+from ..stages.clock import FINDING, PLACING, Progress, StageClock
 from ..stages.observe import Footage, Listeners, Watch, observe
 from ..stages.report import make_report
 from ..stages.solve import progress_of_person, solve_people
@@ -103,7 +103,7 @@ def capture_views(
         for number, (path, (file, _)) in enumerate(zip(paths, files, strict=True))
     ]
     with clock.stage("solver"):
-        progress("placing the cameras", 0, 0)
+        progress(PLACING, 0, 0)
         given = _given([view.camera for view in views], options, [T for _, T in files])
         calibration = calibrate(
             [view.people for view in views], given, bone_lengths(_rest_keypoints(body, options))

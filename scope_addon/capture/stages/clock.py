@@ -10,6 +10,7 @@ from contextlib import contextmanager
 FINDING = "finding the person"  # a stage, in which the footage is decoded and observed
 # A stage of the first capture on a computer for which no machine code is shipped.
 COMPILING = "compiling the solver"
+PLACING = "placing the cameras"  # of several cameras alone
 # Called with the stage's name, the steps done and the total (0: unknown). May raise CancelledError.
 Progress = Callable[[str, int, int], None]
 

@@ -22,10 +22,8 @@ STAGES = {
 }
 
 
-# Stages that not every capture has; they take none of the others' shares. The first are those of
-# the first capture after installation.
+# Stages that only the first capture after installation has; they take none of the others' shares.
 FIRST_ONLY = (COMPILING,)
-PLACING = "placing the cameras"
 BUILDING = "building the scene"  # after the worker has ended
 
 _SHAPE = "finding the shape"  # the first stage for each person; of several people it says how many

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is upright, set through Blender's operator."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.solver.rotations import exp
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
-from ...made_motion import level_camera
+from ...made_motion import level_camera, made_views
 from ...scene import made_rigs
 from ...scene.made_rigs import captured, captured_together
 
@@ -263,3 +265,31 @@ def test_a_refused_line_changes_nothing(rig):
     assert armature["scope_motion"] == path
     assert len(Motion.load(path)) == len(walk(2.0))
     np.testing.assert_allclose(in_image(armature), before, atol=1e-4)
+
+
+def test_all_cameras_of_a_capture_turn_together(tmp_path):
+    motion = motion_of(walk(1.0))
+    line = [tuple(shot_of(motion).project(19, np.array(point))) for point in POST]
+    tilt = np.eye(4)
+    tilt[:3, :3] = exp(np.radians([0.0, 8.0, 0.0]))
+    tilted = replace(moved_motion(motion, BODY, tilt), views=made_views(0.5, -0.2))
+    armature = captured(tilted)
+    pack_motion(armature, tilted.to_bytes())
+    armature["scope_body_file"] = "scope"
+    scene = bpy.context.scene
+    cameras = [o for o in scene.objects if o.type == "CAMERA"]
+    assert len(cameras) == 3
+    scene.camera = cameras[0]
+    scene.frame_set(20)
+
+    def places():
+        bpy.context.view_layer.update()
+        return [np.array(camera.matrix_world) for camera in cameras]
+
+    before = places()
+    bpy.ops.scope.set_upright(start=line[0], end=line[1])
+    after = places()
+    assert tilt_of_camera() < 1.0
+    for was, now in zip(before[1:], after[1:], strict=True):
+        relative = np.linalg.inv(before[0]) @ was
+        np.testing.assert_allclose(np.linalg.inv(after[0]) @ now, relative, atol=1e-4)
