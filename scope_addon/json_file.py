@@ -19,15 +19,21 @@ LARGEST_JSON_BYTES = 1_000_000
 _LARGEST_WHOLE_NUMBER = 1 << 53
 
 
-def read_json_object(path: Path, error: type[InputError], what: str, advice: str) -> dict[str, Any]:
-    """Read a file that holds one JSON object and is not larger than `LARGEST_JSON_BYTES`.
+def read_json_object(
+    path: Path,
+    error: type[InputError],
+    what: str,
+    advice: str,
+    largest_bytes: int = LARGEST_JSON_BYTES,
+) -> dict[str, Any]:
+    """Read a file that holds one JSON object and is not too large.
 
     :param error: class of what is raised.
     :param what: what the file should be, for the messages, e.g. ``bone map``.
     :param advice: how to correct a file that is something else.
     :raises InputError: as `error`, when the file cannot be read or is something else.
     """
-    check_regular(path, error, what, LARGEST_JSON_BYTES)
+    check_regular(path, error, what, largest_bytes)
     try:
         text = path.read_text("utf-8-sig")  # some editors write a byte order mark
         content = json.loads(text, parse_int=_parse_whole_number)

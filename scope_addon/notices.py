@@ -113,6 +113,9 @@ SENTENCES = {
     "floor nor feet at rest are seen; it was left in place, so the people's paths are wrong",
     "zoom": "{footage}: the lens zooms {times:times}, which was mistaken for people who come "
     "nearer or go away; capture the parts without zoom separately, with a start and end time",
+    "given_floor": "{footage}: in the world of the given camera, the feet rest at z = "
+    "{height_m:.2f} m; the capture was moved so that they rest at 0, with its own camera: move it "
+    "by as much, or give the person's height if the floor should be at 0",
     "review": "{person:whose}{reason:phrase}",
     "implausible": "{footage}, {times:times}: {person:whose}{reason:phrase}",
     "bent_knees": "{footage}: no knee of {person:who} is ever straight while standing or walking; "

@@ -13,10 +13,11 @@ from typing import Any
 
 from ...solver.body import Body
 from ..errors import UsageError
-from ..footage_view import FootageView
+from ..footage_view import AS_IN_FILE, FootageView
 from ..options import Place, option, options_at
 from ..options.capture import ALL, AUTO, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
 from .camera.calibration import read_calibration
+from .camera.given_path import read_camera_path
 from .camera.intrinsics import choose_camera
 from .fitting.hand_measurements import require_fingers
 from .fitting.stature import require_stature
@@ -110,7 +111,7 @@ def check_options(body: Body, options: CaptureOptions, has_views: bool = False) 
     :param has_views: whether several cameras are captured.
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit
         the body, or is for several cameras.
-    :raises InputError: the calibration cannot be used.
+    :raises InputError: the calibration or the camera's path cannot be used.
     """
     most_people(options.people)
     landmark_network_name(options.quality)
@@ -128,11 +129,21 @@ def check_options(body: Body, options: CaptureOptions, has_views: bool = False) 
             focal_mm=options.focal_mm,
             fov_deg=options.fov_deg,
             calibration=options.calibration,
+            camera_path=options.camera_path,
         )
+    elif options.calibration and options.camera_path:
+        raise UsageError("--calibration and --camera-path contradict each other: give one of them")
     elif options.calibration and not has_views:
         read_calibration(options.calibration)
     if options.offsets_s and not has_views:
         raise UsageError("--offset is for several cameras, but one video was given")
+    if options.camera_path:
+        read_camera_path(options.camera_path)
+        if options.wanted.view != AS_IN_FILE:
+            raise UsageError(
+                "the path of a camera is for the footage as its file shows it: leave out --rotate "
+                "and --mirror, in the panel Turn and Mirror"
+            )
     for each in options_at(Place.CAPTURE):  # ranges not checked above
         if problem := each.range_error(getattr(options, each.name)):
             raise UsageError(f"{each.flag} {problem}")

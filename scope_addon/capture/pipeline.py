@@ -48,6 +48,7 @@ def capture(
     :raises UsageError: an option has an impossible value, contradicts another one or does not suit
         the body.
     :raises VideoError: the footage cannot be used.
+    :raises InputError: the calibration or the camera's path cannot be used.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``progress`` itself, passed on.
     """
@@ -74,12 +75,15 @@ def repaired(shot: Shot, tracks: list[Track]) -> list[Track]:
 
 def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage) -> Shot:
     """Assemble what is known of observed footage; the camera's path so far contains only its
-    rotation.
+    rotation, unless it is given.
     """
     frames = len(footage.timestamps)
     speed = options.speed or video.recorded_speed
     path = CameraPath.static(frames)
-    if not footage.camera_motion.is_static:
+    poses = footage.world_from_camera
+    if poses is not None:
+        path = CameraPath.given(poses)
+    elif not footage.camera_motion.is_static:
         path = CameraPath.rotating(footage.camera_motion.R_first_camera)
     return Shot(
         body=body,
@@ -94,4 +98,5 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         view=video.wanted.view,
         speed=speed,
         travel=footage.camera_motion.travel,
+        T_world_first=None if poses is None else poses[0],
     )

@@ -69,7 +69,7 @@ def _is_shipped(folder: Path) -> bool:
 FOOTAGE = ("video", "source")
 VIEWS = "views"
 OTHER_INPUTS = (
-    *("motion", "body", "calibration", "retarget", "bone_map", "expression_map"),
+    *("motion", "body", "calibration", "camera_path", "retarget", "bone_map", "expression_map"),
     *("detector", "keypoints"),
 )
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ...solver.rotations import exp, log, matrix_from_quaternion, quaternion_from_matrix
 
 # Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off:
 # at 4.5 Hz it passes as much noise as the 6 Hz Butterworth filter that is usual for marker data.
@@ -79,6 +79,24 @@ def fill_rotation_gaps(
         q = fill_gaps(continuous_quaternions(R[last_valid, joints]), valid, times)
         out[:, joints] = matrix_from_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
     return out
+
+
+def interpolated_rotations(
+    R: NDArray[np.float64], at: NDArray[np.float64], times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return rotations (N, 3, 3) at the times ``at`` (N,), on arcs between them at others (T,)."""
+    k = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(at) - 2)
+    share = (times - at[k]) / (at[k + 1] - at[k])
+    steps = log(np.swapaxes(R[k], 1, 2) @ R[k + 1])
+    between: NDArray[np.float64] = R[k] @ exp(share[:, None] * steps)
+    return between
+
+
+def interpolated_places(
+    places: NDArray[np.float64], at: NDArray[np.float64], times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return places (N, 3) at the times ``at`` (N,), on lines between them at others (T,)."""
+    return np.stack([np.interp(times, at, places[:, axis]) for axis in range(3)], axis=1)
 
 
 def _joint_blocks(R: NDArray[np.floating[Any]]) -> list[slice]:

@@ -64,6 +64,12 @@ LENSES = (
         "Read focal lengths, principal point and distortion from a calibration file",
         3,
     ),
+    Choice(
+        "camera",
+        "Scene Camera",
+        "Use the lens and the motion of a camera in the scene, as Blender's tracker solves it",
+        4,
+    ),
 )
 
 
@@ -383,6 +389,12 @@ class CaptureDeclaration:
         "of several cameras, the time in each further video less that in the first one, of the "
         "same moment, in seconds, or auto",
         argument=Argument(metavar="S[,S...]", default_text="found from the people"),
+    )
+    camera_path: Path | None = declared(
+        None,
+        Place.COMMAND_LINE | Place.WORKER,
+        "JSON file with the lens and the poses of a camera that another program has solved",
+        argument=Argument(metavar="FILE"),
     )
     smoothing: bool = declared(
         True,

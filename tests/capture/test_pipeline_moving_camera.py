@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A real clip of a static camera, filmed again by a virtual camera that pans: the world must stay
-the same.
+the same, whether the pan is estimated or given.
 """
+
+import json
 
 import cv2
 import numpy as np
+import pytest
 from scope.scope_addon.capture.camera.intrinsics import pinhole
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
-from scope.solver import load_body
+from scope.solver import InputError, load_body
 from scope.solver.rotations import exp, log
 
 START = 130
@@ -31,6 +34,39 @@ def film(source, path, turn):
         H = K @ exp(turn(k)).T @ np.linalg.inv(K) @ S
         out.write(cv2.warpPerspective(frame, H, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE))
     out.release()
+
+
+def test_a_given_pan_is_used_and_gives_the_same_path(shared, tmp_path):
+    clip = shared / "data" / "clips" / "walk_side_static.mp4"
+    turns = np.sin(2 * np.pi * np.arange(FRAMES) / FRAMES)[:, None] * [0.02, 0.10, 0.01]
+    film(clip, tmp_path / "pan.mp4", lambda k: turns[k])
+    poses = np.tile(np.eye(4), (FRAMES, 1, 1))
+    poses[:, :3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) @ exp(turns)
+    poses[:, :3, 3] = [5.0, -2.0, 40.0]
+    content = {
+        "intrinsics": pinhole(WIDTH, HEIGHT, WIDTH / (2 * np.tan(np.radians(FOV) / 2))).tolist(),
+        "size": [WIDTH, HEIGHT],
+        "times_s": (np.arange(FRAMES) / 30).tolist(),
+        "world_from_camera": poses.tolist(),
+    }
+    file = tmp_path / "camera.json"
+    file.write_text(json.dumps(content))
+    options = CaptureOptions(quality="fast", camera_path=file)
+    found = capture(tmp_path / "pan.mp4", load_body("scope"), options)
+    motion = found.motions[0]
+    assert (found.report.up, found.report.camera) == ("given", "camera path camera.json")
+    assert [notice.code for notice in found.report.warnings] == ["given_floor"]
+    np.testing.assert_allclose(motion.world_from_camera[:, :3, :3], poses[:, :3, :3], atol=1e-6)
+    np.testing.assert_allclose(motion.world_from_camera[:, :2, 3], poses[:, :2, 3], atol=1e-6)
+    assert 0.5 < motion.world_from_camera[0, 2, 3] < 2.5  # metres above the floor
+    walked = motion.trans[-1] - motion.trans[10]
+    assert 0.8 < np.linalg.norm(walked[:2]) < 2.5
+    assert abs(walked[2]) < 0.1
+
+    content["times_s"] = (np.arange(FRAMES) / 60).tolist()
+    file.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=r"has poses from 0.00 to 0.82 s, but frames"):
+        capture(tmp_path / "pan.mp4", load_body("scope"), options)
 
 
 def test_the_world_of_a_panning_camera_does_not_move(shared, tmp_path):

@@ -39,7 +39,7 @@ from scope.solver.body_file import load_body
 # Listed again on purpose, because users' scripts rely on the flags.
 FLAGS = """
 --quality --people --person --start --end --rotate --mirror --crop --fps --speed --body --hands
---face --height --focal-mm --fov --calibration --offset
+--face --height --focal-mm --fov --calibration --offset --camera-path
 --no-smoothing
 --uneven-ground --shape-keys --bvh-unit --skeleton --file-per-person --retarget --rig-object
 --bone-map --expression-map

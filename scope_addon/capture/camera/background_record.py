@@ -44,6 +44,12 @@ class CameraMotion:
     travel: Odometry | None = None
     zooms: BoolArray | None = None  # (T,) frames in which the lens zooms; None: unknown
 
+    @classmethod
+    def given(cls, world_from_camera: Float64Array) -> CameraMotion:
+        """Return the motion of a camera whose poses (T, 4, 4) are known."""
+        R_world_camera = world_from_camera[:, :3, :3]
+        return cls(R_world_camera[0].T @ R_world_camera, np.ones(len(R_world_camera), bool))
+
     @property
     def is_static(self) -> bool:
         """Whether the camera is static, as far as can be determined."""

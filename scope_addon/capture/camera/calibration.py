@@ -149,6 +149,14 @@ def read_calibration(path: Path) -> Calibration:
         content = _toml_camera(file, camera)
     else:
         content = read_json_object(path, InputError, "calibration", _FORMAT)
+    return calibration_of(path, content)
+
+
+def calibration_of(path: Path, content: dict[str, Any]) -> Calibration:
+    """Return the calibration that a file's content describes.
+
+    :raises InputError: it holds an unknown key or an impossible value.
+    """
     values = _by_our_names(path, content)
     if "intrinsics" not in values:
         raise InputError(f'{path} is not a calibration: it has no "intrinsics"; {_FORMAT}')

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
 from ...footage_view import AS_IN_FILE, FootageView
-from .calibration import read_calibration
+from .calibration import Calibration, read_calibration
+from .given_path import read_camera_path
 
 # The default is a field of view of 60 degrees along the longer side, between a phone's main camera
 # (65-70 degrees, less the crop of its video stabilization) and a camera's standard lens (40-54
@@ -84,6 +85,7 @@ def choose_camera(
     focal_mm: float | None = None,
     fov_deg: float | None = None,
     calibration: str | Path | None = None,
+    camera_path: Path | None = None,
     metadata_focal_mm: float | None = None,
     view: FootageView = AS_IN_FILE,
 ) -> Camera:
@@ -95,23 +97,31 @@ def choose_camera(
         max(width, height).
     :param fov_deg: field of view along the longer side, f_px = max(width, height) / (2 tan(fov /
         2)).
+    :param camera_path: a file with the lens and the path of a camera.
     :param metadata_focal_mm: as ``focal_mm``, from the file's own metadata.
     :param view: how the footage was turned; a calibration is for the frames as they were before.
     :raises UsageError: the user's values contradict each other, or one is impossible.
-    :raises InputError: the calibration cannot be used for footage of this size.
+    :raises InputError: the calibration, or that of the path, cannot be used for footage of this
+        size.
     """
-    options = {"--focal-mm": focal_mm, "--fov": fov_deg, "--calibration": calibration}
+    options = {
+        "--focal-mm": focal_mm,
+        "--fov": fov_deg,
+        "--calibration": calibration,
+        "--camera-path": camera_path,
+    }
     given = [name for name, value in options.items() if value is not None]
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)} contradict each other: give one of them")
     longer = max(width, height)
-    if calibration is not None:
-        known = read_calibration(Path(calibration))
+    lens = _lens_of_file(calibration, camera_path)
+    if lens is not None:
+        known, source = lens
         size = view.size(width, height)
         return Camera(
             view.intrinsics(known.intrinsics_for(*size), *size),
             view.distortion(known.dist),
-            f"calibration {known.path.name}",
+            source,
         )
     if focal_mm is not None:
         if not 1.0 <= focal_mm <= 2000.0:
@@ -135,6 +145,18 @@ def choose_camera(
     else:
         return assumed_camera(width, height, longer)
     return Camera(pinhole(width, height, focal_px), np.zeros(5), source)
+
+
+def _lens_of_file(
+    calibration: str | Path | None, camera_path: Path | None
+) -> tuple[Calibration, str] | None:
+    """Return the calibration that one of two files holds, and its source; None without a file."""
+    if calibration is not None:
+        known = read_calibration(Path(calibration))
+        return known, f"calibration {known.path.name}"
+    if camera_path is not None:
+        return read_camera_path(camera_path).calibration, f"camera path {camera_path.name}"
+    return None
 
 
 def assumed_camera(width: int, height: int, longer_px: float) -> Camera:

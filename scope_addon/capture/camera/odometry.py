@@ -23,6 +23,7 @@ import numpy as np
 
 from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array, IndexArray
+from ...kinematics.smoothing import interpolated_places, interpolated_rotations
 from .bundle_adjustment import Bundle, adjust, projected, refine_pose
 from .corner_tracks import CornerTracks
 from .intrinsics import Camera
@@ -526,24 +527,10 @@ def _joined(
         c_first = (c_map - c_map[0]) @ R_first_map.T
         maps.append((part.places - c_map[0]) @ R_first_map.T)
         R_before = R[seen[-1]].copy()
-        R[inside] = _interpolated(R_first_map @ R_map_camera, times[seen], times[inside])
-        center[inside] = _interpolated_places(c_first, times[seen], times[inside])
+        R[inside] = interpolated_rotations(R_first_map @ R_map_camera, times[seen], times[inside])
+        center[inside] = interpolated_places(c_first, times[seen], times[inside])
         part_of[inside] = number
         after = slice(seen[-1] + 1, frames)
         # What follows keeps its rotation relative to this part's last frame.
         R[after] = R[seen[-1]] @ R_before.T @ R[after]
     return Odometry(R, center, part_of, maps, np.zeros(frames, bool))
-
-
-def _interpolated(R: Float64Array, at: Float64Array, times: Float64Array) -> Float64Array:
-    """Return rotations (n, 3, 3) at the times ``at`` on arcs between them, at other times."""
-    k = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(at) - 2)
-    share = (times - at[k]) / (at[k + 1] - at[k])
-    steps = log(np.swapaxes(R[k], 1, 2) @ R[k + 1])
-    between: Float64Array = R[k] @ exp(share[:, None] * steps)
-    return between
-
-
-def _interpolated_places(c: Float64Array, at: Float64Array, times: Float64Array) -> Float64Array:
-    """Return places (n, 3) at the times ``at`` on straight lines between them, at other times."""
-    return np.stack([np.interp(times, at, c[:, axis]) for axis in range(3)], axis=1)

@@ -134,6 +134,10 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
     :raises UsageError: there are too few or too many, or one was given twice.
     :raises VideoError: footage cannot be read.
     """
+    if options.camera_path is not None:
+        raise UsageError(
+            "the path of a camera cannot be given with several videos, whose cameras stand still"
+        )
     if not 2 <= len(paths) <= MOST_VIEWS:
         raise UsageError(
             f"several cameras are 2 to {MOST_VIEWS} videos of the same moment, but {len(paths)} "

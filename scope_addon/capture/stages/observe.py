@@ -22,6 +22,7 @@ from ...notices import Notice, notice
 from ...options.capture import AUTO, LARGEST, OFF
 from ..camera.background_record import BackgroundRecord, CameraMotion
 from ..camera.camera_rotation import BackgroundTracker
+from ..camera.given_path import read_camera_path
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
 from ..fitting.background_estimators import BackgroundEstimators
@@ -46,6 +47,8 @@ from ..tracking.tracker import MAX_PEOPLE, PeopleTracker
 from ..tracking.turned_footage import needed_turn
 from .clock import COMPILING, FINDING, Progress, StageClock
 
+LENGTH_TOLERANCE_S = 1.0  # by which a container may say that footage is too long
+
 # Called with each decoded frame, its largest person, and the object that fits the body to such an
 # observation.
 Watch = Callable[[Frame, Observation | None, LiveBody], None]
@@ -66,6 +69,8 @@ class Footage:
     timestamps: Float64Array  # (T,) seconds
     camera: Camera
     camera_motion: CameraMotion
+    # (T, 4, 4) metres, z up, where the user gives the camera's path; None: it is estimated
+    world_from_camera: Float64Array | None
     lines: Lines  # of the background, in the first frame's camera axes
     cuts_s: list[float]
     execution: str  # what the networks ran on, for the report
@@ -80,6 +85,7 @@ def given_camera(video: Video, options: CaptureOptions) -> Camera:
         focal_mm=options.focal_mm,
         fov_deg=options.fov_deg,
         calibration=options.calibration,
+        camera_path=options.camera_path,
         metadata_focal_mm=video.focal_35mm,
         view=video.wanted.view,
     )
@@ -313,10 +319,12 @@ def observe(
     :param observe_frames: another way to observe the frames than all in one pass.
     :raises VideoError: there is no frame in the chosen range.
     :raises UsageError: the part of the picture reaches beyond it.
+    :raises InputError: the given path of the camera cannot be used, or leaves frames out.
     :raises NoPersonError: nobody was found.
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
     """
     camera = given_camera(video, options)
+    _check_path(video, options)
     if options.part is not None:
         options.part.check(video.width, video.height)
     live = LiveBody(body, camera, next(iter(options.heights_m), None))
@@ -340,6 +348,18 @@ def observe(
         raise _no_person_error(video, options, len(observed.timestamps))
     footage.warnings.extend(_warnings_about_people(video, tracks, left_out))
     return footage, tracks
+
+
+def _check_path(video: Video, options: CaptureOptions) -> None:
+    """Refuse a given path of the camera that leaves frames out, before they are observed.
+
+    :raises InputError: it does, as far as the container's length is right.
+    """
+    if options.camera_path is None:
+        return
+    start_s = video.wanted.start_s
+    length_s = max(0.0, video.expected_frames / float(video.fps) - LENGTH_TOLERANCE_S)
+    read_camera_path(options.camera_path).at(np.array([start_s, start_s + length_s]))
 
 
 def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = None) -> Observed:
@@ -413,11 +433,18 @@ def _footage(job: ObservationJob, observed: Observed) -> Footage:
     """Return what is known of the footage apart from its people."""
     record = observed.background
     camera = job.background.camera(record)
-    motion = record.motion(job.camera, camera, (job.video.width, job.video.height))
+    times_s = np.array(observed.timestamps)
+    given = None
+    if job.options.camera_path is not None:
+        given = read_camera_path(job.options.camera_path).at(times_s)
+        motion = CameraMotion.given(given)
+    else:
+        motion = record.motion(job.camera, camera, (job.video.width, job.video.height))
     return Footage(
-        timestamps=np.array(observed.timestamps),
+        timestamps=times_s,
         camera=camera,
         camera_motion=motion,
+        world_from_camera=given,
         lines=record.lines(motion, camera),
         cuts_s=[observed.timestamps[row] for row in observed.cut_rows],
         execution=observed.execution,

@@ -22,11 +22,12 @@ from ...options.capture import ON
 from ...plausibility import has_bent_knees, implausible
 from ..media.video import Video
 from ..options import CaptureOptions
-from ..world.world_frame import LINES, UP_DEVIATIONS_DEG
+from ..world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 from .observe import Footage
 from .solve import Solved
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
+GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
 
@@ -127,7 +128,9 @@ def _plausibility_warnings(name: str, person: int, motion: Motion) -> list[Notic
 
 
 def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]:
-    """Say where the camera's zoom or travel is not known, and where strides contradict it."""
+    """Say where the camera's zoom or travel is not known, where strides contradict it, and where
+    the floor is in the world of a given path.
+    """
     times = footage.timestamps
     warnings = []
     zooms = footage.camera_motion.zooms
@@ -136,6 +139,12 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
         warnings.append(notice("zoom", footage=name, times=starts))
     if not solved.has_scale:
         warnings.append(notice("unknown_travel", footage=name))
+    if footage.world_from_camera is not None:
+        lowered_m = (
+            footage.world_from_camera[0, 2, 3] - solved.motions[0].world_from_camera[0, 2, 3]
+        )
+        if abs(lowered_m) > GIVEN_FLOOR_M:
+            warnings.append(notice("given_floor", footage=name, height_m=float(lowered_m)))
     people = numbered(solved.motions)
     for (person, _), contradicts in zip(people, solved.contradictions, strict=True):
         if contradicts is not None:
@@ -153,7 +162,7 @@ def up_warnings(name: str, up_source: str, is_still: bool) -> list[Notice]:
     """Say where the up direction is a guess: in a still image without edges of walls, doors or
     floors.
     """
-    if up_source == LINES or not is_still:
+    if up_source in (LINES, GIVEN) or not is_still:
         return []
     return [notice("guessed_up", footage=name, degrees=UP_DEVIATIONS_DEG[up_source][is_still])]
 

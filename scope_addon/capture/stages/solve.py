@@ -115,7 +115,7 @@ class Person:
     def check_strides(self, shot: Shot) -> None:
         """Let no foot rest where strides contradict the camera's path."""
         placed = self.fitted_places(shot)
-        contradicts = contradicting_strides(placed, find_world([placed], shot.lines).up)
+        contradicts = contradicting_strides(placed, world_of(shot, [placed]).up)
         self.contradicts = contradicts if contradicts.any() else None
 
     def ground(self, shot: Shot, placed: PlacedTrack, T_floor_camera: Float64Array) -> None:
@@ -194,7 +194,7 @@ def solve_people(shot: Shot, people: Sequence[Person], known: int) -> Solved:
     for person in people:
         person.refine(shot)
         person.settle(shot)
-    world = find_world([person.placed for person in people], shot.lines, shot.floor_up)
+    world = world_of(shot, [person.placed for person in people], shot.floor_up)
     motions = [person.finish(shot, world, number) for number, person in enumerate(people)]
     contradictions = [person.contradicts for person in people]
     return Solved(motions, shot.path, iterations, world.up_source, contradictions, shot.has_scale)
@@ -242,7 +242,7 @@ def resize_people(shot: Shot, people: Sequence[Person], known: int) -> None:
     if not 0 < known < len(people) or shot.uneven_ground:
         return
     placed = [person.fitted_places(shot) for person in people]
-    up = find_world(placed, shot.lines).up
+    up = world_of(shot, placed).up
     standers = [stander(each, up, k < known) for k, each in enumerate(placed)]
     del placed
     return_freed_memory()
@@ -252,13 +252,13 @@ def resize_people(shot: Shot, people: Sequence[Person], known: int) -> None:
 
 
 def with_camera_path(shot: Shot, first: Person) -> Shot:
-    """Return the shot with the camera's path; one person tells the scale of a travel that the
-    background shows, and otherwise the travel of a rotating camera.
+    """Return the shot with the camera's path, unless that is given; one person tells the scale of a
+    travel that the background shows, and otherwise the travel of a rotating camera.
     """
-    if shot.path.is_static or shot.is_still:
+    if shot.path.is_static or shot.is_still or shot.T_world_first is not None:
         return shot
     placed = first.fitted_places(shot)
-    up = find_world([placed], shot.lines).up
+    up = world_of(shot, [placed]).up
     if shot.travel is None:
         center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
         return replace(shot, path=replace(shot.path, center=center))
@@ -267,10 +267,20 @@ def with_camera_path(shot: Shot, first: Person) -> Shot:
     return replace(shot, path=path, floor_up=scaled.floor_up, has_scale=scaled.is_known)
 
 
+def world_of(
+    shot: Shot, placed: list[PlacedTrack], floor_up: Float64Array | None = None
+) -> SharedWorld:
+    """Return the world of placed people, see `find_world`.
+
+    :param floor_up: (3,) of the floor that a travelling camera passes, in the first frame's axes.
+    """
+    return find_world(placed, shot.lines, floor_up, shot.T_world_first)
+
+
 def ground_all(shot: Shot, people: Sequence[Person]) -> None:
     """Put the people on the floor that they share; see `Person.ground`."""
     placed = [person.fitted_places(shot) for person in people]
-    world = find_world(placed, shot.lines, shot.floor_up)
+    world = world_of(shot, placed, shot.floor_up)
     return_freed_memory()
     for number, person in enumerate(people):
         person.ground(shot, placed[number], world.floor_from_camera(number))

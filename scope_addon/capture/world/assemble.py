@@ -195,6 +195,9 @@ class Shot:
     travel: Odometry | None = None  # of the camera, up to scale, if the background shows it
     # (3,) of the floor that a travelling camera passes, in the first frame's axes
     floor_up: Float64Array | None = None
+    # (4, 4) of the first frame's camera in the world of the path that the user gives; None: no path
+    # is given
+    T_world_first: Float64Array | None = None
     has_scale: bool = True  # False: how far the camera travels is unknown
 
     @property

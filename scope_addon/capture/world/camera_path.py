@@ -25,6 +25,7 @@ MAX_HEIGHT_M = 0.03  # of such a sole above the median of the lowest soles
 SMOOTH_HZ = 0.5  # a camera that is carried or driven changes its speed slowly
 MEDIAN_WEIGHT = 0.02  # of the median velocity, relative to a frame's sample
 FOOT_CUTOFF_HZ = 6.0
+SAME_POSE = 1e-6  # metres and sines by which given poses of a static camera differ
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,15 @@ class CameraPath:
     def static(cls, frames: int) -> CameraPath:
         """Return the path of a camera that does not move."""
         return cls.rotating(np.tile(np.eye(3), (frames, 1, 1)))
+
+    @classmethod
+    def given(cls, world_from_camera: Float64Array) -> CameraPath:
+        """Return the path of a camera whose poses (T, 4, 4) in a world are known."""
+        if np.ptp(world_from_camera, axis=0).max() < SAME_POSE:
+            return cls.static(len(world_from_camera))
+        R_first_world = world_from_camera[0, :3, :3].T
+        center = world_from_camera[:, :3, 3] - world_from_camera[0, :3, 3]
+        return cls(R_first_world @ world_from_camera[:, :3, :3], center @ R_first_world.T)
 
     def __len__(self) -> int:
         """Return the number of frames."""

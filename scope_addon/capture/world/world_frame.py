@@ -30,15 +30,16 @@ SAME_FLOOR_M = 0.4
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
 FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
 LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
-# What the up direction follows from: edges of the background, how people stand and move, or the
-# floor past which a camera travels.
+# What the up direction follows from: edges of the background, how people stand and move, the floor
+# past which a camera travels, or the path of the camera that the user gives.
 LINES = "lines"
 BODIES = "bodies"
 FLOOR = "floor"
+GIVEN = "given"
 # Standard deviations of the up direction, degrees, in (clips, still images): the root mean square
 # of its errors in five clips and five pictures of people whose true up direction is known, most of
 # them with lines; that of the floor in seven rendered clips with a travelling camera.
-UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0), FLOOR: (0.9, 0.9)}
+UP_DEVIATIONS_DEG = {LINES: (1.5, 4.0), BODIES: (3.5, 11.0), FLOOR: (0.9, 0.9), GIVEN: (0.0, 0.0)}
 
 
 def up_from_standing(people: Sequence[PlacedTrack]) -> Float64Array:
@@ -189,7 +190,7 @@ class SharedWorld:
     """``T_world_camera`` (4, 4) for all people, and the height of each person's own floor in that
     world, metres.
 
-    ``up_source``: what the up direction follows from, `LINES`, `BODIES` or `FLOOR`.
+    ``up_source``: what the up direction follows from, `LINES`, `BODIES`, `FLOOR` or `GIVEN`.
     """
 
     T_world_camera: Float64Array
@@ -209,7 +210,10 @@ class SharedWorld:
 
 
 def find_world(
-    placed: list[PlacedTrack], lines: Lines | None = None, floor_up: FloatArray | None = None
+    placed: list[PlacedTrack],
+    lines: Lines | None = None,
+    floor_up: FloatArray | None = None,
+    T_world_first: Float64Array | None = None,
 ) -> SharedWorld:
     """Estimate the world: z up, the floor at z = 0, the origin below the first position of the most
     prominent person.
@@ -223,11 +227,16 @@ def find_world(
     :param lines: of the background, in the first frame's camera axes.
     :param floor_up: (3,) of the floor that a travelling camera passes, in the same axes. It is
         used instead, except on uneven ground.
+    :param T_world_first: (4, 4) of the first frame's camera in a given world, of which only the
+        floor's height is estimated.
     """
     all_soles = [person.soles[person.valid] for person in placed]
     up = up_from_bodies(placed)
     centered = np.concatenate([soles - _lowest(soles, up).mean(axis=0) for soles in all_soles])
-    if floor_up is not None and not placed[0].uneven_ground:
+    if T_world_first is not None:
+        up = T_world_first[2, :3]
+        up_source = GIVEN
+    elif floor_up is not None and not placed[0].uneven_ground:
         up, up_source = floor_up, FLOOR
     else:
         up, up_source = up_from_scene(up, None if placed[0].uneven_ground else centered, lines)
@@ -240,13 +249,30 @@ def find_world(
             else slice(None)
         )
         heights.append(floor_height(soles[rows], contact[rows], up))
-    T_world_camera = world_from_level_camera(up, height=-heights[0])
-    start = transform_points(T_world_camera, placed[0].joints[placed[0].valid.argmax(), :1])[0]
-    T_world_camera[:2, 3] -= start[:2]
+    T_world_camera = _on_floor(T_world_first, up, heights[0], placed[0])
     relative = [height - heights[0] for height in heights]
     return SharedWorld(
         T_world_camera, [h if abs(h) > SAME_FLOOR_M else 0.0 for h in relative], up_source
     )
+
+
+def _on_floor(
+    T_world_first: Float64Array | None, up: FloatArray, floor_m: float, first: PlacedTrack
+) -> Float64Array:
+    """Return the pose (4, 4) of the first frame's camera in the world whose floor is at z = 0.
+
+    :param T_world_first: (4, 4) in a given world; None: the most prominent person begins at the
+        origin.
+    :param floor_m: the floor's height above the camera.
+    """
+    if T_world_first is not None:
+        T_world_camera = T_world_first.copy()
+        T_world_camera[2, 3] = -floor_m
+        return T_world_camera
+    T_world_camera = world_from_level_camera(up, height=-floor_m)
+    start = transform_points(T_world_camera, first.joints[first.valid.argmax(), :1])[0]
+    T_world_camera[:2, 3] -= start[:2]
+    return T_world_camera
 
 
 def _first_contact(contact: FloatArray, times: Float64Array) -> BoolArray:

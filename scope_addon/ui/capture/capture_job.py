@@ -38,6 +38,7 @@ from ..preferences import cache, preferences
 from . import preview_picture
 from .frame_rate_operators import rate_warnings
 from .result import show_result
+from .scene_camera import scene_camera_path
 
 _ENDING_S = 5.0  # after which a worker that has sent its result is killed
 
@@ -191,8 +192,8 @@ def build_capture(
 def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
-    :raises UsageError: the scene is linked, no footage, calibration or body file is chosen, or the
-        captured part is empty.
+    :raises UsageError: the scene is linked, no footage, calibration, camera or body file is chosen,
+        the captured part is empty, or the camera cannot have filmed the footage.
     :raises VideoError: the footage does not exist.
     """
     settings = scene.scope
@@ -214,6 +215,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
         values["offset"] = ",".join(
             f"{view.offset_s:.6f}" if view.use_offset else AUTO for view in settings.views
         )
+    if settings.lens == "CAMERA":
+        values["camera_path"] = str(scene_camera_path(scene))
     return JobRequest(str(footage), [str(view) for view in views], **values)
 
 

@@ -136,6 +136,8 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
             layout.prop(settings, "fov", text="Angle")
         elif settings.lens == "FILE":
             draw_file(layout, settings, "calibration_file", text="File")
+        elif settings.lens == "CAMERA":
+            layout.prop(settings, "scene_camera", text="Camera")
         draw_section(layout, settings, Section.MOTION)
         draw_section(layout, settings, Section.FOOTAGE)
         layout.prop(settings, "use_range")

@@ -115,6 +115,12 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         set=show_index,
         description="Capture whose result the panel shows",
     )
+    scene_camera: PointerProperty(
+        name="Scene Camera",
+        type=bpy.types.Object,
+        poll=lambda _, owner: owner.type == "CAMERA",
+        description="Camera whose lens and motion are those of the camera that filmed the footage",
+    )
     no_result: PointerProperty(type=SCOPE_PG_result)  # stays empty
 
     @property

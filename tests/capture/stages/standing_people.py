@@ -28,9 +28,16 @@ K = np.array([[900.0, 0, 640], [0, 900.0, 360], [0, 0, 1]])
 T_CAMERA_WORLD = np.linalg.inv(world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.3))
 
 
-def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0) -> Track:
+def steps(
+    height_m: float,
+    betas: np.ndarray | None = None,
+    right_m: float = 0.0,
+    T_camera_world: np.ndarray = T_CAMERA_WORLD,
+) -> Track:
     """Return the track of a person 3.5 m from the camera who stands, steps up by ``height_m``, and
     stands again.
+
+    :param T_camera_world: (4, 4), or (T, 4, 4) of a camera that moves.
     """
     betas = np.zeros(BODY.P) if betas is None else betas
     times = np.arange(round((2 * STAYS_S + STEPS_S) * RATE)) / RATE
@@ -51,11 +58,10 @@ def steps(height_m: float, betas: np.ndarray | None = None, right_m: float = 0.0
     trans = np.stack(
         [right_m + 0.4 * share, 3.5 + DEEPER_M * share, standing_m + height_m * share], axis=1
     )
-    rotations[:, 0] = T_CAMERA_WORLD[:3, :3] @ facing
+    rotations[:, 0] = T_camera_world[..., :3, :3] @ facing
     pelvis = BODY.rest_joints(betas)[0]
-    poses = BODY.forward_kinematics(
-        rotations, transform_points(T_CAMERA_WORLD, trans + pelvis) - pelvis, betas
-    )
+    root = transform_points(T_camera_world, (trans + pelvis)[:, None])[:, 0]
+    poses = BODY.forward_kinematics(rotations, root - pelvis, betas)
     points = with_keypoint_offsets(BODY).keypoints(*poses, betas)[:, BLAZEPOSE]
     pixels = points @ K.T
     return Track(

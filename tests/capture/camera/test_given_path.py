@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The file with the path of a camera that another program has solved."""
+
+import json
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.given_path import read_camera_path
+from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.errors import UsageError
+from scope.solver.errors import InputError
+from scope.solver.rotations import exp, log
+
+RATE = 25.0
+LENS = {"intrinsics": [[1000, 0, 640], [0, 1000, 360], [0, 0, 1]], "size": [1280, 720]}
+
+
+def true_poses(times_s):
+    """A camera that turns at a constant rate while it travels along a line."""
+    poses = np.tile(np.eye(4), (len(times_s), 1, 1))
+    poses[:, :3, :3] = exp(times_s[:, None] * [0.3, -0.2, 0.1])
+    poses[:, :3, 3] = times_s[:, None] * [1.0, 0.5, -0.2] + [0.0, 0.0, 1.6]
+    return poses
+
+
+def content(**changes):
+    times_s = np.arange(50) / RATE
+    poses = true_poses(times_s)
+    values = {"times_s": times_s.tolist(), "world_from_camera": poses.tolist()}
+    return LENS | values | changes
+
+
+def written(tmp_path, **changes):
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(content(**changes)))
+    return path
+
+
+@pytest.mark.parametrize("rows", [3, 4])
+def test_poses_between_those_of_the_file_are_interpolated(tmp_path, rows):
+    poses = true_poses(np.arange(50) / RATE)[:, :rows].tolist()
+    path = read_camera_path(written(tmp_path, world_from_camera=poses))
+    times_s = np.array([0.0, 0.013, 0.5, 1.234, 1.96])
+    found = path.at(times_s)
+    true = true_poses(times_s)
+    np.testing.assert_allclose(found[:, :3, 3], true[:, :3, 3], atol=1e-9)
+    off = log(np.swapaxes(found[:, :3, :3], 1, 2) @ true[:, :3, :3])
+    np.testing.assert_allclose(off, 0.0, atol=1e-9)
+
+
+def test_one_pose_is_that_of_a_camera_that_stands(tmp_path):
+    pose = true_poses(np.array([0.7]))
+    path = read_camera_path(written(tmp_path, times_s=[0.0], world_from_camera=pose.tolist()))
+    np.testing.assert_allclose(path.at(np.array([0.0, 9.0])), np.tile(pose, (2, 1, 1)), atol=1e-9)
+
+
+def test_the_lens_is_that_of_the_file(tmp_path):
+    path = written(tmp_path)
+    camera = choose_camera(1920, 1080, camera_path=path)
+    np.testing.assert_allclose(camera.intrinsics[0], [1500, 0, 960])
+    with pytest.raises(UsageError, match=r"--fov and --camera-path contradict each other"):
+        choose_camera(1920, 1080, camera_path=path, fov_deg=50)
+
+
+@pytest.mark.parametrize("times_s", [[2.5], [-0.5]])
+def test_frames_without_a_pose_are_refused(tmp_path, times_s):
+    path = read_camera_path(written(tmp_path))
+    with pytest.raises(InputError, match=r"has poses from 0.00 to 1.96 s, but frames"):
+        path.at(np.array(times_s))
+
+
+def test_a_gap_in_the_captured_part_is_refused(tmp_path):
+    times_s = np.delete(np.arange(50) / RATE, np.arange(10, 30))
+    poses = true_poses(times_s).tolist()
+    path = read_camera_path(written(tmp_path, times_s=times_s.tolist(), world_from_camera=poses))
+    path.at(np.array([0.1, 1.5]))
+    with pytest.raises(InputError, match=r"has no pose from 0.36 to 1.20 s"):
+        path.at(np.array([0.1, 0.8]))
+
+
+def changed(row, pose):
+    poses = true_poses(np.arange(50) / RATE)
+    poses[row] = pose(poses[row])
+    return poses.tolist()
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"world_from_camera": None}, "must be a list of matrices"),
+        ({"world_from_camera": []}, "must be a list of matrices"),
+        ({"world_from_camera": [[1, 2], [3]]}, "must be a list of matrices"),
+        ({"times_s": [0.0, 1.0]}, "must be a list of 50 numbers"),
+        ({"times_s": [*np.arange(49.0), 3.0]}, "numbers that ascend"),
+        ({"times_s": [*np.arange(49.0), float("nan")]}, "numbers that ascend"),
+        ({"world_from_camera": changed(3, lambda T: T * np.nan)}, "pose 3 .* not a finite number"),
+        ({"world_from_camera": changed(4, lambda T: T.T)}, "pose 4 .* last row 0, 0, 0, 1"),
+        (
+            {"world_from_camera": changed(5, lambda T: T @ np.diag([2.0, 2.0, 2.0, 1.0]))},
+            "pose 5 .* is scaled",
+        ),
+        (
+            {"world_from_camera": changed(6, lambda T: T @ np.diag([-1.0, 1.0, 1.0, 1.0]))},
+            "pose 6 .* sheared or mirrored",
+        ),
+        ({"focal_px": [1000.0]}, "'focal_px' is unknown"),
+        ({"intrinsics": None}, "intrinsics"),
+    ],
+)
+def test_what_is_no_path_is_refused(tmp_path, changes, says):
+    with pytest.raises(InputError, match=says):
+        read_camera_path(written(tmp_path, **changes))
