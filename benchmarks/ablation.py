@@ -145,7 +145,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "without contact": {
         "replacements": (
             _stance_without("resting"),
-            (solve_module, "raise_feet", _as_given),
+            (solve_module, "raise_body", _as_given),
         )
     },
     "without smoothing: every frame alone": {"smoothing": False},

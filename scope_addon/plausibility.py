@@ -127,8 +127,10 @@ def _leans(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _floats(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
     if motion.uneven_ground:
         return np.zeros(len(motion), bool)
-    ankles = joints[:, [_AT["left_ankle"], _AT["right_ankle"]], 2].min(axis=1)
-    return _held(motion, ankles > _ANKLE_M + FLOATING_M, FLOATING_S)
+    # The ankles of people on their feet, and hands or pelvis of others.
+    above_feet = [k for name, k in _AT.items() if not name.endswith("foot")]
+    lowest = joints[:, above_feet, 2].min(axis=1)
+    return _held(motion, lowest > _ANKLE_M + FLOATING_M, FLOATING_S)
 
 
 _FOOT = ("ankle", "foot")

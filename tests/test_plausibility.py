@@ -88,6 +88,12 @@ def test_a_person_who_floats_is_found_but_not_one_who_jumps() -> None:
     assert floats[40:120].all()
     assert floats.sum() == 80
     assert not implausible(lifted(slice(40, 60)))["floating"].any()
+    # On the hands, somebody is not in the air.
+    wrists = [AT["left_wrist"], AT["right_wrist"]]
+    on_hands = lifted(slice(40, 120))
+    joints = on_hands.joints_cam.copy()
+    joints[:, wrists] = WALK.joints_cam[:, [AT["left_foot"], AT["right_foot"]]]
+    assert not implausible(replace(on_hands, joints_cam=joints))["floating"].any()
     uneven = replace(lifted(slice(40, 120)), uneven_ground=True)
     assert not implausible(uneven)["floating"].any()
 

@@ -9,6 +9,7 @@ whether a foot is under the floor.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,16 +34,19 @@ _DIRECTIONS = 400  # Directions in which the skin's outermost points are kept.
 
 
 class FootSkin:
-    """The skin of the feet, for one shape of a body; the four parts are those of `FOOT_PARTS`."""
+    """The skin of the feet, for one shape of a body, or that of other parts."""
 
-    def __init__(self, body: Body, betas: NDArray[np.floating[Any]]) -> None:
+    def __init__(
+        self, body: Body, betas: NDArray[np.floating[Any]], parts: Sequence[str] = FOOT_PARTS
+    ) -> None:
         """Collect the vertices that move with each part, of which only the outermost matter.
 
         :param betas: (P,) shape coefficients.
+        :param parts: their joints' names.
         """
         v = body.rest_vertices(betas)
         J = body.rest_joints(betas)
-        self.parts = [body.joint_names.index(name) for name in FOOT_PARTS]
+        self.parts = [body.joint_names.index(name) for name in parts]
         self.points: list[NDArray[np.float64]] = []  # One (n, 3) for each part, from its joint.
         for part in self.parts:
             own = v[body.strongest_joints == part] - J[part]
@@ -55,7 +59,7 @@ class FootSkin:
         t: NDArray[np.floating[Any]],
         up: NDArray[np.floating[Any]],
     ) -> NDArray[np.float64]:
-        """Return the (T, 4) heights of each part's lowest point, relative to the origin.
+        """Return the (T, N) heights of each part's lowest point, relative to the origin.
 
         :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame.
         :param up: (3,) unit vector, in the same frame.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Moving the feet of a body by bending or stretching its legs, while the rest of it and the feet's
-rotations stay.
+rotations stay; and its hands by its arms in the same way.
 
 The knee turns by θ about n, then the whole leg turns so that the ankle lies in the direction of its
 goal. With thigh u, shin s and the wanted distance d from hip to ankle, θ follows from
@@ -10,7 +10,8 @@ goal. With thigh u, shin s and the wanted distance d from hip to ankle, θ follo
 
 A nearly straight knee hardly determines its plane, so n is the sum of the knee's present axis
 u×s/(|u||s|) and of the thigh's sideways axis times `HINGE`: straight knees bend forwards, bent ones
-in their plane.
+in their plane. Of an arm, the axis about which the elbow of a hanging arm brings the hand forwards
+takes its place.
 """
 
 from __future__ import annotations
@@ -29,6 +30,14 @@ LONGEST = 0.995
 SHORTEST = 0.35  # Share of the stretched leg's length: a knee bent by 140 degrees.
 
 
+# Of a limb's two bones and its end: the joints, and the axis of the upper bone's part about which
+# the limb bends, on the left and on the right.
+_LEG = ("hip", "knee", "ankle")
+_LEG_HINGES = (np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+_ARM = ("shoulder", "elbow", "wrist")
+_ARM_HINGES = (np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+
+
 def move_feet(
     body: Body,
     rotations: NDArray[np.floating[Any]],
@@ -41,12 +50,36 @@ def move_feet(
     :param poses: (T, K+1, 3, 3) and (T, K+1, 3) part poses of this motion, in any frame.
     :param shift: (T, 2, 3) of the left and the right ankle, in that frame, metres.
     """
+    return _move_ends(body, rotations, poses, shift, _LEG, _LEG_HINGES)
+
+
+def move_hands(
+    body: Body,
+    rotations: NDArray[np.floating[Any]],
+    poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
+    shift: NDArray[np.floating[Any]],
+) -> NDArray[np.float64]:
+    """Return the rotations (T, K+1, 3, 3) that move both wrists as far as the arms reach.
+
+    :param rotations: (T, K+1, 3, 3), as of `move_feet`.
+    :param poses: (T, K+1, 3, 3) and (T, K+1, 3) part poses of this motion, in any frame.
+    :param shift: (T, 2, 3) of the left and the right wrist, in that frame, metres.
+    """
+    return _move_ends(body, rotations, poses, shift, _ARM, _ARM_HINGES)
+
+
+def _move_ends(
+    body: Body,
+    rotations: NDArray[np.floating[Any]],
+    poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
+    shift: NDArray[np.floating[Any]],
+    limb: tuple[str, str, str],
+    hinges: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> NDArray[np.float64]:
     R, t = poses
     out = np.array(rotations, float)
     for side, name in enumerate(("left", "right")):
-        hip, knee, ankle = (
-            body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle")
-        )
+        hip, knee, ankle = (body.joint_names.index(f"{name}_{part}") for part in limb)
         moved = np.flatnonzero(np.linalg.norm(shift[:, side], axis=1) > 1e-6)
         if not len(moved):
             continue
@@ -58,7 +91,8 @@ def move_feet(
         wanted = np.linalg.norm(goal, axis=1)
         shortest = np.minimum(now, SHORTEST * length)
         longest = np.maximum(now, LONGEST * length)
-        bend = knee_turn(upper, lower, R[moved, hip, :, 0], np.clip(wanted, shortest, longest))
+        sideways = R[moved, hip] @ hinges[side]
+        bend = knee_turn(upper, lower, sideways, np.clip(wanted, shortest, longest))
         reached = upper + np.einsum("tij,tj->ti", bend, lower)
         swing = shortest_turn(reached, goal)
         thigh = swing @ R[moved, hip]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....solver.body import Body
 from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.axes import transform_points, world_from_level_camera
 from ...kinematics.contact_points import SOLES
@@ -28,6 +29,10 @@ MIN_CONTACT = 1e-3  # added to the contact probability of a frame
 # The feet of people on one floor may differ so much in height, as their distances are uncertain.
 SAME_FLOOR_M = 0.4
 UP_NOISE_RAD = np.radians(5.0)  # σ_up, error of an up direction estimated from bodies
+# How far under the soles the rest of a body has to be for it to rest on something else than the
+# feet: in part, and entirely.
+PARTLY_UNDER_M = 0.1
+WHOLLY_UNDER_M = 0.2
 FIRST_S = 0.5  # on uneven ground, of the contact that determines the floor
 LEVEL_UP = (0.0, -1.0, 0.0)  # up in the axes of a level camera
 # What the up direction follows from: edges of the background, how people stand and move, the floor
@@ -178,11 +183,49 @@ def floor_height(soles_cam: FloatArray, contact: FloatArray, up: FloatArray) -> 
     :param contact: (T, F) contact probability of each point.
     :param up: (3,) unit vector, camera axes.
     """
-    lowest = (soles_cam @ up).min(axis=1)
+    return _weighted_median((soles_cam @ up).min(axis=1), contact)
+
+
+def resting_height(person: PlacedTrack, contact: FloatArray, up: FloatArray) -> float:
+    """Estimate the height of a person's floor above the camera from whatever they rest on.
+
+    The soles determine it (`floor_height`), unless the rest of the body is clearly under them, as
+    that of somebody who lies, stands on the hands, or does push-ups with raised feet. With d from
+    the floor of the whole body up to that of the soles, the floor is lower than that of the soles
+    by 0 up to d = a, by d from d = b on, and in between by b (d − a)/(b − a).
+
+    :param contact: (n, F) contact probability of each sole point in the n frames they were seen in.
+    :param up: (3,) unit vector, camera axes.
+    """
+    seen = person.valid
+    height_of_soles = floor_height(person.soles[seen], contact, up)
+    lowest_joints = (person.joints[seen] @ up - flesh_radii(person.body, person.betas)).min(axis=1)
+    lowest = np.minimum((person.contact_points[seen] @ up).min(axis=1), lowest_joints)
+    under_m = height_of_soles - _weighted_median(lowest, contact)
+    share = (under_m - PARTLY_UNDER_M) / (WHOLLY_UNDER_M - PARTLY_UNDER_M)
+    return height_of_soles - min(max(share, 0.0) * WHOLLY_UNDER_M, max(under_m, 0.0))
+
+
+def flesh_radii(body: Body, betas: FloatArray) -> Float64Array:
+    """Return the (K+1,) distance of each joint from the nearest skin that moves with it, metres; 0
+    of a joint without skin.
+    """
+    vertices = body.rest_vertices(betas)
+    joints = body.rest_joints(betas)
+    radii = np.zeros(len(joints))
+    for k, joint in enumerate(joints):
+        own = vertices[body.strongest_joints == k]
+        if len(own):
+            radii[k] = np.linalg.norm(own - joint, axis=1).min()
+    return radii
+
+
+def _weighted_median(heights: FloatArray, contact: FloatArray) -> float:
+    """Return the median of the heights (T,), weighted by the contact (T, F) in each frame."""
     weight = contact.max(axis=1) + MIN_CONTACT
-    order = np.argsort(lowest)
+    order = np.argsort(heights)
     sums = np.cumsum(weight[order])
-    return float(lowest[order[np.searchsorted(sums, 0.5 * sums[-1])]])
+    return float(heights[order[np.searchsorted(sums, 0.5 * sums[-1])]])
 
 
 @dataclass(frozen=True)
@@ -243,12 +286,11 @@ def find_world(
     contacts = [person.contact(up)[person.valid, : len(SOLES)] for person in placed]
     heights = []
     for person, soles, contact in zip(placed, all_soles, contacts, strict=True):
-        rows = (
-            _first_contact(contact, person.times[person.valid])
-            if person.uneven_ground
-            else slice(None)
-        )
-        heights.append(floor_height(soles[rows], contact[rows], up))
+        if person.uneven_ground:
+            rows = _first_contact(contact, person.times[person.valid])
+            heights.append(floor_height(soles[rows], contact[rows], up))
+        else:
+            heights.append(resting_height(person, contact, up))
     T_world_camera = _on_floor(T_world_first, up, heights[0], placed[0])
     relative = [height - heights[0] for height in heights]
     return SharedWorld(

@@ -5,11 +5,12 @@ skinning.
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world.above_floor import raise_feet
+from scope.scope_addon.capture.world.above_floor import raise_body
 from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.kinematics import standing
 from scope.scope_addon.kinematics.axes import transform_points
 from scope.scope_addon.kinematics.contact_points import contact_point_positions
+from scope.scope_addon.kinematics.leg_reach import move_hands
 from scope.solver import rotations
 
 from ...kinematics.posed_people import FPS, plank_person, stepping_person
@@ -34,7 +35,7 @@ def raised(person, omega, root, visible=1.0):
     contact = (
         standing.resting_probability(points, T_world_camera[2, :3], times, np.zeros(3)) * visible
     )
-    return placed, raise_feet(placed, contact, T_world_camera)
+    return placed, raise_body(placed, contact, T_world_camera)
 
 
 def skin_heights(person, omega, root):
@@ -174,6 +175,67 @@ def test_resting_palms_rise_less_than_the_toes():
     assert after[:, :4, 2].min() > -0.012
     rise = (after - before)[..., 2]
     assert rise[:, 4:].max() < 0.6 * rise[:, [1, 3]].max()
+
+
+def skin_of(person, names):
+    """(V,) the vertices that move with these parts."""
+    body = person[0]
+    return np.isin(body.strongest_joints, [body.joint_names.index(name) for name in names])
+
+
+def test_hands_under_the_floor_are_raised_by_their_arms_alone():
+    """The arms of a plank, bent at first, stretch until the hands are 3 cm under the floor."""
+    plank = plank_person()
+    supported, omega, root, _, _, times = plank
+    root = root + supported.rest_joints()[0]
+    sunk = omega.copy()
+    for side, sign in (("left", 1), ("right", -1)):
+        elbow = supported.joint_names.index(f"{side}_elbow")
+        shoulder = supported.joint_names.index(f"{side}_shoulder")
+        sunk[:, elbow] = rotations.exp(np.radians([0, -sign * 20.0, 0]))
+        sunk[:, shoulder] = sunk[:, shoulder] @ rotations.exp(np.radians([0, sign * 10.0, 0]))
+    hands = skin_of(plank, ["left_wrist", "left_hand", "right_wrist", "right_hand"])
+    lowest = skin_heights(plank, sunk[:1], root[:1])[:, hands].min()
+    up = plank[4][2, :3]
+    down = lowest + 0.12 * bump(times, 0.3, 1.7)
+    shift = np.repeat(-down[:, None, None] * up, 2, axis=1)
+    poses = supported.forward_kinematics(sunk, root - supported.rest_joints()[0])
+    _, on_floor = raised(plank, sunk, root)
+    sunk = move_hands(supported, sunk, poses, shift)
+    before = skin_heights(plank, sunk, root)[:, hands].min(axis=1)
+    assert before.min() < -0.03
+    _, found = raised(plank, sunk, root)
+    after = skin_heights(plank, found.rotations, found.root)[:, hands].min(axis=1)
+    assert after.min() > -0.011
+    arms = [k for k, name in enumerate(supported.joint_names) if "shoulder" in name]
+    arms += [k for k, name in enumerate(supported.joint_names) if name.endswith(("elbow", "wrist"))]
+    others = np.setdiff1d(np.arange(supported.K + 1), arms)
+    # The toes' skin is a little under the floor, and hands that move carry less.
+    expected = on_floor.rotations[:, others]
+    np.testing.assert_allclose(found.rotations[:, others], expected, atol=5e-3)
+    np.testing.assert_allclose(found.root, on_floor.root, atol=1e-3)
+
+
+def test_somebody_who_lies_is_not_pushed_under_the_floor(step):
+    supported, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    lying = omega.copy()
+    lying[:, 1:] = np.eye(3)
+    for side in ("left", "right"):  # The legs are in the air.
+        hip = supported.joint_names.index(f"{side}_hip")
+        lying[:, hip] = rotations.exp(np.radians([-60.0, 0, 0]))
+    back = T_world_camera[:3, :3].T @ rotations.exp(np.radians([0, 0, 90.0]))
+    lying[:, 0] = back @ rotations.exp(np.radians([0, 90.0, 0]))
+    person = (supported, lying, root, place, T_world_camera, times)
+    root = root + supported.rest_joints()[0]
+    root = root - skin_heights(person, lying[:1], root[:1]).min() * up
+    depth = 0.15 * bump(times, 0.5, 2.5)
+    _, found = raised(person, lying, root - depth[:, None] * up)
+    trunk = skin_of(person, ["pelvis", "spine1", "spine2", "spine3", "left_hip", "right_hip"])
+    heights = skin_heights(person, found.rotations, found.root)[:, trunk].min(axis=1)
+    assert heights.min() > -0.011
+    still = depth < 0.005
+    np.testing.assert_allclose(found.root[still], (root - depth[:, None] * up)[still], atol=0.01)
 
 
 def test_a_single_frame_is_raised(step):

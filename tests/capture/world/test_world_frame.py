@@ -226,6 +226,33 @@ def test_people_lying_on_the_floor_do_not_tilt_the_world(standing):
     assert angle < (5 if standing else 12)
 
 
+@pytest.mark.parametrize("turned_deg", [180.0, 100.0])
+def test_the_floor_is_under_the_hands_of_somebody_whose_feet_are_above_them(turned_deg):
+    """In a handstand, and in push-ups with the feet on a box, with straight arms."""
+    body = load_body("scope")
+    omega = np.tile(np.eye(3), (60, body.K + 1, 1, 1))
+    for side, sign in (("left", 1), ("right", -1)):
+        shoulder = body.joint_names.index(f"{side}_shoulder")
+        # Along the trunk in a handstand, and across it in push-ups.
+        to_head = np.radians([0, 0, sign * 85.0])
+        omega[:, shoulder] = rotations.exp(
+            to_head if turned_deg > 150 else np.radians([0, -sign * 90.0, 0])
+        )
+    omega[:, 0] = rotations.exp(np.radians([0, turned_deg, 0])) @ R_WORLD_MODEL
+    if turned_deg < 150:  # The chest looks down.
+        omega[:, 0] = omega[:, 0] @ rotations.exp(np.radians([0, 90.0, 0]))
+    R, t = body.forward_kinematics(omega, np.zeros((60, 3)))
+    skin = body.skin(R[0], t[0])
+    t = t + np.array([0, 4.0, -skin[:, 2].min()])
+    feet = [body.joint_names.index(f"{side}_ankle") for side in ("left", "right")]
+    hands = [body.joint_names.index(f"{side}_hand") for side in ("left", "right")]
+    assert (t[0, feet, 2] > t[0, hands, 2] + 0.2).all()
+    truth = world_from_level_camera(np.array([0, -1.0, 0]), height=1.2)
+    found = find_world([seen_by(body, R, t, np.linalg.inv(truth))])
+    # The distance from the hands' joints to their skin depends on which way they point.
+    assert found.T_world_camera[2, 3] == pytest.approx(1.2, abs=0.07)
+
+
 def test_soles_lie_under_the_ankles_on_the_ground():
     body = load_body("scope")
     R, t = body.forward_kinematics(np.tile(np.eye(3), (1, body.K + 1, 1, 1)), np.zeros((1, 3)))
