@@ -24,8 +24,8 @@ SOURCE = {
 # Prints the kernel's result, and whether its code came from disk.
 RUN = """
 from package.solver.kernel import announce_compilation
-from package.solver.outer import outer
-announce_compilation(outer); announce_compilation(outer)
+from package.solver.outer import inner, outer
+announce_compilation(outer, inner); announce_compilation(inner)
 print(outer(0.0), len(outer.stats.cache_hits))
 announce_compilation(outer)
 """
