@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import inspect
 import logging
-import pickle
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -20,7 +19,7 @@ from numba.core.caching import _Cache
 
 from ..temporary import remove, remove_abandoned
 from .code_files import SUFFIX, read_code, write_code
-from .code_folders import PACKAGE, SOLVER, Area, digest_of, mark_used
+from .code_folders import SOLVER, Area, digest_of, mark_used, name_in_package
 from .numba_internals import load_result, payload_of, use_cache, use_kernel_compiler
 
 _LOG = logging.getLogger(__name__)
@@ -61,7 +60,8 @@ class CodeCache(_Cache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         code = function.__code__
-        self._function = function.__module__, function.__qualname__, code.co_firstlineno
+        module = name_in_package(function.__module__)
+        self._function = module, function.__qualname__, code.co_firstlineno
         self._source = Path(inspect.getfile(function)).parent
         self._area = _area_of(function.__module__, self._source)
         name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
@@ -92,7 +92,7 @@ class CodeCache(_Cache):
             if payload is None:
                 continue
             try:
-                result = load_result(target_context, *pickle.loads(payload))
+                result = load_result(target_context, payload)
             except Exception:  # whatever an unusable file leads to, compiling it again mends it
                 remove(path)
                 continue
@@ -153,8 +153,8 @@ class CodeCache(_Cache):
 def _area_of(module: str, sources: Path) -> Area:
     """Return the area of a module: the whole solver, or the package that contains the module."""
     if sources == SOLVER or SOLVER in sources.parents:
-        return Area(f"{PACKAGE}.{SOLVER.name}" if PACKAGE else SOLVER.name, SOLVER)
-    return Area(module.rpartition(".")[0], sources)
+        return Area(SOLVER.name, SOLVER)
+    return Area(name_in_package(module).rpartition(".")[0], sources)
 
 
 @cache

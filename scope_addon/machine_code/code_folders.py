@@ -81,7 +81,7 @@ class Area:
     def __init__(self, package: str, sources: Path) -> None:
         """Make the names of the folders.
 
-        :param package: of the kernels; part of the code, which imports its types from there.
+        :param package: of the kernels, as `name_in_package` returns it.
         :param sources: folder of the package's sources. All of the solver's count as well.
         """
         self._name = package.rpartition(".")[2]
@@ -117,6 +117,13 @@ class Area:
     def _folder_name(self, processor: str) -> str:
         environment = sys.implementation.cache_tag, sys.platform, _machine(), processor
         return f"{self._name}-{digest_of(environment)[:8]}-{self._program}"
+
+
+def name_in_package(module: str) -> str:
+    """Return a module's name within the package, whose own name depends on who has loaded it; the
+    name of a module of another package as it is.
+    """
+    return module.removeprefix(f"{PACKAGE}.")
 
 
 def keep_in(folder: Path) -> None:

@@ -10,6 +10,8 @@ one name, and the process may run one that was loaded before. Results then depen
 digits, on what a process has compiled or called earlier.
 """
 
+import io
+import pickle
 from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
@@ -19,8 +21,11 @@ import numba
 import numba.core.codegen
 import numba.core.compiler
 import numba.core.compiler_machinery
+import numba.core.environment
 import numba.core.typed_passes
 from numba.core import serialize
+
+from .code_folders import PACKAGE
 
 # The versions whose internals this file was written for and tested with: from the first on, and
 # before the second. Also in pyproject.toml.
@@ -38,6 +43,7 @@ _compiler: Any = numba.core.compiler
 _machinery: Any = numba.core.compiler_machinery
 _passes: Any = numba.core.typed_passes
 _rebuild: Any = _compiler.CompileResult._rebuild
+_rebuild_environment: Any = numba.core.environment._rebuild_env
 _dumps: Callable[[Any], bytes] = serialize.dumps
 # Index of the annotated source in what numba reduces a result to: of no use, and with the paths of
 # the machine.
@@ -100,28 +106,61 @@ def use_cache(kernel: Any, code_cache: Any) -> None:
 
 
 def payload_of(result: Any) -> bytes:
-    """Return the machine code, what else numba keeps of a result, and the names that the code
-    defines.
+    """Return the machine code, what else numba keeps of a result, the names that the code defines,
+    and the name of the package, for `load_result`.
     """
     reduced = list(result._reduce())
     reduced[_ANNOTATION] = ""
     module = result.library._get_module_for_linking()
     values = [*module.functions, *module.global_variables]
-    return _dumps((tuple(reduced), {value.name for value in values if not value.is_declaration}))
+    names = {value.name for value in values if not value.is_declaration}
+    return _dumps((PACKAGE, _dumps((tuple(reduced), names))))
 
 
-def load_result(target_context: Any, reduced: tuple[Any, ...], names: set[str]) -> Any:
-    """Return what was kept of a result; as numba's `_rebuild`, but without reading LLVM's code.
+def load_result(target_context: Any, payload: bytes) -> Any:
+    """Return what `payload_of` kept of a result; as numba's `_rebuild`, but without reading LLVM's
+    code.
 
     Only kernels that are compiled later and call this one need that, and to read it takes a third
     of the time.
     """
-    (name, kind, (code, bitcode)), *others = reduced
+    compiled_as, content = pickle.loads(payload)
+    reduced, names = _OwnUnpickler(content, compiled_as).load()
+    (name, kind, (code, bitcode)), descriptor, *others = reduced
+    descriptor.modname = _own_name(descriptor.modname, compiled_as)
     target_context.codegen()._engine._defined_symbols |= names
-    result = _rebuild(target_context, (name, kind, (code, _no_bitcode())), *others)
+    library = name, kind, (code, _no_bitcode())
+    result = _rebuild(target_context, library, descriptor, *others)
     result.library._shared_module = None
     result.library._get_module_for_linking = partial(_read_bitcode, result.library, bitcode)
     return result
+
+
+class _OwnUnpickler(pickle.Unpickler):
+    """Reads what was kept under another name of this package: in a shell and a worker it is called
+    ``scope``, and inside Blender ``bl_ext.<repository>.scope``.
+    """
+
+    def __init__(self, content: bytes, compiled_as: str) -> None:
+        super().__init__(io.BytesIO(content))
+        self._compiled_as = compiled_as
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a class or function of a module."""
+        found = super().find_class(_own_name(module, self._compiled_as), name)
+        return self._rebuild_environment if found is _rebuild_environment else found
+
+    def _rebuild_environment(self, module: str, *others: Any) -> Any:
+        """Return the constants of a kernel, with the variables of its module."""
+        return _rebuild_environment(_own_name(module, self._compiled_as), *others)
+
+
+def _own_name(module: str, compiled_as: str) -> str:
+    """Return the name in this process of a module of the package that was called ``compiled_as``;
+    other modules have the same.
+    """
+    inside = module.removeprefix(f"{compiled_as}.")
+    return module if inside == module else f"{PACKAGE}.{inside}"
 
 
 def _read_bitcode(library: Any, bitcode: bytes) -> Any:

@@ -15,7 +15,6 @@ import bpy
 
 from . import (
     command,
-    compiled_solver,
     export_operators,
     import_operators,
     keymap,
@@ -119,7 +118,6 @@ def unregister() -> None:
     capture_operators.end_capture()
     live_operators.end_live()
     pin_tool.detach()
-    compiled_solver.detach()
     for _, detach in reversed(_attachments()):
         detach()
     for module in reversed(_MODULES):

@@ -4,9 +4,6 @@
 from __future__ import annotations
 
 import os
-import sys
-from importlib import import_module
-from pathlib import Path
 
 import bpy
 
@@ -17,14 +14,10 @@ def run(argv: list[str]) -> int:
     """Run the command line with the arguments after ``scope``; return the exit status. Blender
     calls this.
     """
-    from ..job.start_worker import load_package
     from .preferences import cache
 
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().kernels))
-    # Compiled code contains the package's name: with the worker's, its code serves here too.
-    if "scope" not in sys.modules:
-        load_package(Path(__file__).resolve().parents[2])
-    main = import_module("scope.scope_addon.cli").main
+    from ..cli import main
 
     # A batch starts one Blender process per clip, because exports need Blender.
     return int(main(argv, program=(bpy.app.binary_path, "--background", "--command", "scope")))

@@ -138,6 +138,16 @@ def cache() -> Cache:
     return Cache(user_folder() / "cache")
 
 
+def keep_machine_code() -> None:
+    """Keep what the solver compiles inside Blender in the cache, never in the extension's folder.
+
+    Operators that solve call this first: it loads numba.
+    """
+    from ..machine_code.code_folders import keep_in
+
+    keep_in(cache().kernels)
+
+
 def user_folder() -> Path:
     """Return a folder that upgrades keep; one among the user's caches if Scope is not enabled as an
     extension.

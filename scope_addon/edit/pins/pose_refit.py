@@ -12,19 +12,30 @@ others are stiff. The skin of the feet has a one-sided residual, which keeps it 
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass, field
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .... import solver as own_solver
-from ....solver import PosePriors, Priors
+from ....solver import (
+    Floor,
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    Options,
+    PosePriors,
+    Priors,
+    Stage,
+    State,
+    Weights,
+    fit_tree,
+    make_tree,
+)
 from ....solver.body import Body
+from ....solver.measurements import SIGMA_3D
 from ....solver.residuals import joint_limits
+from ....solver.tree import with_fixed_shape
 from ...errors import UsageError
 from ...kinematics.contact_points import SOLES, with_contact_points
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
@@ -91,16 +102,8 @@ def _bent_by(joints: tuple[str, ...]) -> set[str]:
     return {"left_leg", "right_leg"} if moved else set()
 
 
-def compiled_solver() -> ModuleType:
-    """Return the solver; inside Blender, where it is loaded as ``scope`` as well, that one, which
-    has machine code.
-    """
-    loaded = sys.modules.get("scope.solver")
-    return loaded if loaded is not None and loaded.__file__ == own_solver.__file__ else own_solver
-
-
-def _options(solver: ModuleType) -> Any:
-    weights = solver.Weights(
+def _options() -> Options:
+    weights = Weights(
         keypoints2d=1.0,
         keypoints3d=1.0,
         joint_prior=1.0,
@@ -108,8 +111,8 @@ def _options(solver: ModuleType) -> Any:
         shape=1.0,
         floor=ABOVE_FLOOR,
     )
-    return solver.Options(
-        stages=(solver.Stage(weights, 1e-9, 60),),
+    return Options(
+        stages=(Stage(weights, 1e-9, 60),),
         robust_keypoints2d=math.inf,
         robust_keypoints3d=math.inf,
         damping=0.1,
@@ -129,11 +132,8 @@ class PoseRefit:
         self.skin = FootSkin(body, betas)
         self.body, self._skin_points = self.skin.as_keypoints(with_contact_points(body, betas))
         self.names = list(body.joint_names)
-        self._solver = compiled_solver()
-        tree = import_module(".tree", self._solver.__name__)
-        self._tree = tree.with_fixed_shape(self._solver.make_tree(self.body), self.betas)
-        self._options = _options(self._solver)
-        self._sigma_m = import_module(".measurements", self._solver.__name__).SIGMA_3D
+        self._tree = with_fixed_shape(make_tree(self.body), self.betas)
+        self._options = _options()
         self._points = len(self.body.keypoint_names)
         self._priors: dict[tuple[str, ...], Priors] = {}
         self._limits = joint_limits.hinges_of(self.names)
@@ -199,38 +199,30 @@ class PoseRefit:
         in_image = [k for k, v in enumerate(points.values) if len(v) == 2]
         numbers = np.array(points.numbers, int)
         weights = np.array(points.weights)
-        measured = self._solver.Measurements(
+        measured = Measurements(
             pose_priors=self._root_prior(
                 R_camera_world @ rotations[0], R_camera_world @ (root_prior - center), joints
             )
         )
         if in_space:
             xyz = (np.array([points.values[k] for k in in_space]) - center) @ R_camera_world.T
-            measured.keypoints3d = self._solver.Keypoints3D(
-                numbers[in_space], xyz, weights[in_space], self._sigma_m
-            )
+            measured.keypoints3d = Keypoints3D(numbers[in_space], xyz, weights[in_space], SIGMA_3D)
         if in_image and camera is not None:
             uv = np.array([points.values[k] for k in in_image])
             measured.intrinsics = camera[1]
-            measured.keypoints2d = self._solver.Keypoints2D(
-                numbers[in_image], uv, weights[in_image]
-            )
+            measured.keypoints2d = Keypoints2D(numbers[in_image], uv, weights[in_image])
         if points.floor is not None:
             numbers = self._skin_points
             up = R_camera_world[:, 2]
-            measured.floor = self._solver.Floor(
-                numbers, up, points.floor - center[2], np.zeros(len(numbers))
-            )
-        state = self._solver.State(
+            measured.floor = Floor(numbers, up, points.floor - center[2], np.zeros(len(numbers)))
+        state = State(
             R_camera_world @ rotations[0],
             R_camera_world @ (root - center),
             rotations[1:].copy(),
             np.zeros(0),
         )
-        priors = self._solver.Priors(
-            rotations[1:].copy(), self._weights(joints), limits=self._limits_of(joints)
-        )
-        found = self._solver.fit_tree(self._tree, measured, state, priors, self._options).state
+        priors = Priors(rotations[1:].copy(), self._weights(joints), limits=self._limits_of(joints))
+        found = fit_tree(self._tree, measured, state, priors, self._options).state
         out = np.concatenate([(R_camera_world.T @ found.R_camera_root)[None], found.Omega])
         return out, R_camera_world.T @ found.t_camera_root + center
 
@@ -266,9 +258,7 @@ class PoseRefit:
         # Legs bend rather than let the body move away.
         share = 0.1 if trunk and not _bent_by(joints) else 1.0
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)
-        posed: PosePriors = self._solver.PosePriors(
-            [0], R[None], t[None], [rotation], [PELVIS_POSITION * share]
-        )
+        posed: PosePriors = PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
         return posed
 
     def _weights(self, joints: tuple[str, ...]) -> NDArray[np.float64]:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from .. import compiled_solver
 from ..captured_person import motion_of, set_motion_of
+from ..preferences import keep_machine_code
 from .edit_base import EditOperator
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class SCOPE_OT_smooth(EditOperator):
 
         motion = motion_of(armature)
         if motion.corrections:  # which are solved again
-            compiled_solver.load()
+            keep_machine_code()
         frames = key_frames(motion.timestamps, rate, start_frame(armature))
         clip = smoothed(body, motion, self.strength)
         if motion.corrections:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ...scene.character.correction_list import store_corrections
-from .. import compiled_solver
 from ..captured_person import body_of, motion_of, set_motion_of
 from ..edit.edit_base import EditOperator
+from ..preferences import keep_machine_code
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,7 +54,7 @@ def change_corrections(
     from ...scene.character.corrections.corrected_keys import pinned_places, rewrite_changed_keys
     from ...scene.packed_motion import stored_keys
 
-    compiled_solver.load()
+    keep_machine_code()
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
     keys = rewrite_changed_keys(
