@@ -132,6 +132,11 @@ def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, l
     armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
 
 
+def is_cycle(armature: bpy.types.Object) -> bool:
+    """Return whether an armature's motion was cut to a cycle."""
+    return bool(_stored_ranges(armature)[0])
+
+
 def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: Retiming) -> None:
     """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of
     the cycle.

@@ -56,17 +56,7 @@ def key_measurements(
 
     The curves are hidden in the graph editor, where they would obscure those of the rotations.
     """
-    columns = {
-        (name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)
-    }
-    columns |= {
-        (name, CONTACT): motion.foot_contact[:, i]
-        for i, name in enumerate(CONTACT_BONES)
-        if name in body.joint_names
-    }
-    sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
-    columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
-    for (bone_name, name), values in columns.items():
+    for (bone_name, name), values in measurements_of(body, motion).items():
         # deviations are unknown in frames that are filled in, and in some motions
         known = np.isfinite(values)
         if not known.any():
@@ -81,6 +71,21 @@ def key_measurements(
             bone_property_path(bone_name, name), frames[known], values[known], group=name.title()
         ):
             curve.hide = True
+
+
+def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """Return the values (T,) by bone and property; NaN where one is not known."""
+    columns = {
+        (name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)
+    }
+    columns |= {
+        (name, CONTACT): motion.foot_contact[:, i]
+        for i, name in enumerate(CONTACT_BONES)
+        if name in body.joint_names
+    }
+    sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
+    columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
+    return columns
 
 
 def add_review_markers(

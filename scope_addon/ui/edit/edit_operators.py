@@ -47,11 +47,17 @@ class SCOPE_OT_smooth(EditOperator):
         """Replace the keys by those of the captured motion, smoothed."""
         from ...edit.pins.corrected_motion import uncorrected
         from ...edit.smooth import smoothed
-        from ...scene.animation_data.actions import remove_cycles
+        from ...scene.animation_data.actions import animated_together, remove_cycles
         from ...scene.animation_data.stored_values import start_frame
-        from ...scene.animation_data.timing import key_frames, restore_scene_range, store_rate
+        from ...scene.animation_data.timing import (
+            is_cycle,
+            key_frames,
+            restore_scene_range,
+            store_rate,
+        )
         from ...scene.character.corrections.uncorrected_keys import write_both
         from ...scene.character.keys import bake_whole_frames, write_clip
+        from ...scene.character.other_curves import restore_whole_motion
         from ...scene.character.root_object import remove_root_object
 
         motion = motion_of(armature)
@@ -67,7 +73,10 @@ class SCOPE_OT_smooth(EditOperator):
             write_clip(armature, body, clip, frames)
         armature["scope_smoothing"] = self.strength
         store_rate(armature, rate)
-        remove_cycles(armature)  # a loop becomes the whole motion again
+        if is_cycle(armature):  # a loop becomes the whole motion again
+            restore_whole_motion(armature, body, motion, frames)
+        for block in animated_together(armature, None):
+            remove_cycles(block)
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
         restore_scene_range(context.scene, armature)

@@ -66,9 +66,10 @@ class SCOPE_OT_loop(SpanOperator):
         """Replace the keys by those of the closed cycle."""
         from ...edit.clip import Clip
         from ...edit.loop import best_cycle, close_cycle
-        from ...scene.animation_data.actions import add_cycles
+        from ...scene.animation_data.actions import add_cycles, animated_together
         from ...scene.animation_data.timing import play_cycle
         from ...scene.character.keys import location_path, read_clip, write_clip
+        from ...scene.character.other_curves import cut_to_cycle
         from ...scene.character.root_object import clip_with_root_motion, remove_root_object
 
         clip, frames = read_clip(armature, body, rate)
@@ -81,12 +82,15 @@ class SCOPE_OT_loop(SpanOperator):
         first = float(frames[cycle.first])
         last = float(frames[cycle.last])
         write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
+        cut_to_cycle(armature, body, first, last)
         if self.repeat:
             add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
+            for face in animated_together(armature, None)[1:]:
+                add_cycles(face)
         play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
         remove_root_object(armature)
         return rpt_(
-            "Cycle of {seconds:.2f} s; before closing, its ends were {distance:.1f} cm apart",
+            "Cycle of {seconds:.2f} s, whose ends were {distance:.1f} cm apart",
             seconds=closed.times[-1],
             distance=100 * cycle.error_m,
         )

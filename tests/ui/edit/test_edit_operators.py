@@ -338,6 +338,45 @@ def test_smoothing_a_loop_restores_the_frame_range(rig):
     assert (scene.frame_start, scene.frame_end) == (1, cycle[1])
 
 
+def test_a_loops_action_and_its_strip_are_as_long_as_the_cycle(rig):
+    """Whatever the action animates: confidence, deviations, contact and shape too."""
+    before = {c.data_path: read_keys(c) for c in _all_curves(rig) if _is_beside(c)}
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    cycle = bpy.context.scene.frame_start, bpy.context.scene.frame_end + 1
+    assert cycle[1] - cycle[0] < 70
+    for action in {rig.animation_data.action, _shape_keys(rig).animation_data.action}:
+        assert tuple(action.frame_range) in (cycle, (cycle[0], cycle[0]))
+    beside = {c.data_path: c for c in _all_curves(rig) if _is_beside(c)}
+    assert len(beside) == len(before) > 30
+    for path, curve in beside.items():  # what is inside the cycle is as it was
+        kept = read_keys(curve)
+        was = before[path]
+        np.testing.assert_allclose(
+            kept[:, 1], np.interp(kept[:, 0], was[:, 0], was[:, 1]), atol=1e-5
+        )
+    strips = rig.animation_data.nla_tracks
+    bpy.ops.scope.smooth()
+    for curve in _all_curves(rig):
+        if _is_beside(curve):
+            np.testing.assert_allclose(read_keys(curve), before[curve.data_path], atol=1e-5)
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    bpy.ops.scope.push_to_nla()
+    strip = strips[0].strips[0]
+    assert (strip.frame_start, strip.frame_end) == cycle
+
+
+def _shape_keys(rig):
+    return next(child.data.shape_keys for child in rig.children if child.type == "MESH")
+
+
+def _all_curves(rig):
+    return [*fcurves(rig), *fcurves(_shape_keys(rig))]
+
+
+def _is_beside(curve):
+    return not curve.data_path.endswith(("rotation_quaternion", "location"))
+
+
 @pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
 def test_only_the_loop_is_exported(rig, tmp_path, suffix):
     """Neither cyclic curves nor confidence keys outside the cycle make the file longer."""
