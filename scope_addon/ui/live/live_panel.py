@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 
 from ..capture.capture_panel import Tab, draw_text
@@ -12,6 +14,9 @@ from ..reporting import iface_
 from . import camera_formats
 from .live_state import state
 
+if TYPE_CHECKING:
+    from .live_job import LiveJob
+
 
 class SCOPE_PT_live(Tab, bpy.types.Panel):
     """Source, buttons and state of live captures."""
@@ -20,6 +25,21 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
     bl_label = "Live"
     bl_order = 1
     bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Draw what is running, and the button that stops it, in the header, which is visible while
+        the panel is closed.
+        """
+        layout = self.layout
+        job = state.job
+        if job is not None:
+            text, icon = _status(job)
+            if job.recording and icon != "ERROR":
+                text, icon = _recorded(job), "REC"
+            layout.label(text=text, translate=False, icon=icon)
+            layout.operator("scope.stop_live", text="", icon="SNAP_FACE", emboss=False)
+        elif state.message and state.scene_uid == context.scene.session_uid:
+            layout.label(text="", icon="ERROR")
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
@@ -64,7 +84,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
             )
             row.operator("scope.stop_live", icon="SNAP_FACE")
             row.operator("scope.cancel_live", text="", icon="CANCEL")
-            _draw_status(context, layout)
+            _draw_status(context, layout, job)
         if state.message and state.scene_uid == context.scene.session_uid:
             draw_text(context, layout.box(), state.message, "ERROR")
 
@@ -85,30 +105,33 @@ def _draw_rig(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         row.prop(context.scene.scope_retarget, "rig", text="")
 
 
-def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
-    job = state.job
-    assert job is not None
+def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, job: LiveJob) -> None:
+    text, icon = _status(job)
+    draw_text(context, layout.box() if icon == "ERROR" else layout, text, icon)
+    presence = job.status.presence
+    if icon != "ERROR" and presence not in ("", "seen") and not job.finishing:
+        seen = iface_("Nobody is seen" if presence == "lost" else "Not seen for a moment")
+        draw_text(context, layout, seen, "INFO")
+    if job.recording:
+        draw_text(context, layout, _recorded(job), "REC")
+
+
+def _status(job: LiveJob) -> tuple[str, str]:
+    """Return what a running capture does, and its icon."""
     status = job.status
     if job.finishing:
-        draw_text(context, layout, iface_("Writing the recording"))
-    elif status.notice:
-        draw_text(context, layout.box(), status.notice, "ERROR")
-    elif not status.presence:
-        draw_text(context, layout, iface_("Waiting for the source"))
-    elif job.quiet_s:
-        text = iface_("No image from the source for {seconds:.0f} s", seconds=job.quiet_s)
-        draw_text(context, layout.box(), text, "ERROR")
-    else:
-        draw_text(context, layout, _speed(status.rate, status.latency_ms))
-        if status.presence != "seen":
-            text = iface_(
-                "Nobody is seen" if status.presence == "lost" else "Not seen for a moment"
-            )
-            draw_text(context, layout, text, "INFO")
-    if job.recording:
-        draw_text(
-            context, layout, iface_("Recorded: {seconds:.1f} s", seconds=status.recorded_s), "REC"
-        )
+        return iface_("Writing the recording"), "NONE"
+    if status.notice:
+        return status.notice, "ERROR"
+    if not status.presence:
+        return iface_("Waiting for the source"), "NONE"
+    if job.quiet_s:
+        return iface_("No image from the source for {seconds:.0f} s", seconds=job.quiet_s), "ERROR"
+    return _speed(status.rate, status.latency_ms), "NONE"
+
+
+def _recorded(job: LiveJob) -> str:
+    return iface_("Recorded: {seconds:.1f} s", seconds=job.status.recorded_s)
 
 
 def _speed(rate: float, latency_ms: float) -> str:

@@ -9,7 +9,7 @@ import bpy
 import pytest
 from scope.scope_addon.ui.capture.capture_operators import state as capture_state
 from scope.scope_addon.ui.live.live_operators import end_live
-from scope.scope_addon.ui.live.live_panel import _speed
+from scope.scope_addon.ui.live.live_panel import SCOPE_PT_live, _speed
 from scope.scope_addon.ui.live.live_state import state
 
 
@@ -83,6 +83,39 @@ def test_disabling_the_extension_ends_the_process(job):
     end_live()
     assert job.done == ["close"]
     assert state.job is None
+
+
+def header(job):
+    """Return what the header of the panel shows, which may be closed."""
+    shown = []
+    layout = SimpleNamespace(
+        label=lambda **given: shown.append((given["text"], given["icon"])),
+        operator=lambda name, **_: shown.append(name),
+    )
+    SCOPE_PT_live.draw_header_preset(SimpleNamespace(layout=layout), bpy.context)
+    return shown
+
+
+def test_the_header_of_the_panel_shows_what_runs_while_it_is_closed(job):
+    job.quiet_s = 0
+    job.status = SimpleNamespace(notice="", presence="", rate=0.0, latency_ms=0.0, recorded_s=0.0)
+    stop = "scope.stop_live"
+    assert header(job) == [("Waiting for the source", "NONE"), stop]
+    job.status.presence = "seen"
+    job.status.rate = 24.0
+    job.status.latency_ms = 71.0
+    assert header(job) == [("24 poses/s, latency 71 ms", "NONE"), stop]
+    job.recording = True
+    job.status.recorded_s = 2.54
+    assert header(job) == [("Recorded: 2.5 s", "REC"), stop]
+    job.quiet_s = 3
+    assert header(job) == [("No image from the source for 3 s", "ERROR"), stop]
+    state.job = None
+    assert header(job) == []
+    state.message = "the camera was unplugged"
+    state.scene_uid = bpy.context.scene.session_uid
+    assert header(job) == [("", "ERROR")]
+    state.message = ""
 
 
 def test_one_pose_per_second_is_singular():
