@@ -15,7 +15,9 @@ from .sidebar import redraw_sidebars_twice, viewport_of
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
-    """Hide the unmodified default cube of an unsaved file, which is where the person stands."""
+    """Hide the unmodified default cube of an unsaved file, which is where the person stands, in
+    viewports and renders.
+    """
     cube = context.scene.objects.get("Cube")
     if bpy.data.filepath or cube is None or cube.type != "MESH" or len(cube.data.vertices) != 8:
         return
@@ -26,6 +28,7 @@ def hide_startup_cube(context: bpy.types.Context) -> None:
         and cube.name in context.view_layer.objects
     ):
         cube.hide_set(True)
+        cube.hide_render = True
 
 
 def frame_selected(context: bpy.types.Context) -> None:

@@ -168,7 +168,9 @@ def test_the_default_cube_is_hidden(empty):
     own = cube("Box")
     hide_startup_cube(bpy.context)
     assert startup.hide_get()
+    assert startup.hide_render
     assert not own.hide_get()
+    assert not own.hide_render
 
 
 @pytest.mark.parametrize("touch", [
@@ -183,6 +185,7 @@ def test_a_modified_cube_stays(empty, touch):
     bpy.context.view_layer.update()
     hide_startup_cube(bpy.context)
     assert not startup.hide_get()
+    assert not startup.hide_render
 
 
 def test_the_cube_of_a_saved_file_stays(empty, tmp_path):
@@ -190,6 +193,7 @@ def test_the_cube_of_a_saved_file_stays(empty, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "mine.blend"))
     hide_startup_cube(bpy.context)
     assert not startup.hide_get()
+    assert not startup.hide_render
 
 
 class Region:
