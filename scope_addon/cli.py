@@ -34,7 +34,7 @@ from .command_line.memory_limit import check_memory_limit
 from .command_line.outputs import (
     check_blender,
     check_outputs,
-    checked_rig,
+    checked_rigs,
     default_outputs,
     distinct_paths,
     files_to_read,
@@ -326,7 +326,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     )
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
-    rig = checked_rig(args, outputs, args.hands != OFF)
+    rigs = checked_rigs(args, outputs, args.hands != OFF)
 
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
@@ -363,7 +363,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         with interrupted("some results may have been written already, each of them complete"):
             placed = result.report.placed_videos(args.views)
             written, warnings = write_outputs(
-                outputs, result.motions, body, video, args, rig, placed
+                outputs, result.motions, body, video, args, rigs, placed
             )
             warnings = [*result.report.warnings, *unfinished.warnings, *warnings]
             captured = replace(result.report, warnings=warnings)
@@ -422,7 +422,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    checked_rig(args, clips, args.hands != OFF)
+    checked_rigs(args, clips, args.hands != OFF)
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
     extras = Extras(args.overlays, args.reports)

@@ -68,6 +68,7 @@ def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:
     text = argument.default_text or (str(default) if default else "")
     parser.add_argument(
         option.flag,
+        action="append" if argument.repeated else "store",
         type=_argument_type(option),
         choices=None if argument.parse is not None else option.values or None,
         default=default,
@@ -129,6 +130,8 @@ def non_default_arguments(args: argparse.Namespace) -> dict[str, str | None]:
     for option in options_at(Place.COMMAND_LINE):
         value = _argument(option, args)
         if value != _default(option) and option.argument.inherited:
+            if option.argument.repeated:
+                (value,) = value  # a batch takes one rig
             arguments[option.flag] = None if option.value_type is bool else _text(option, value)
     return arguments
 
@@ -149,12 +152,14 @@ def _default(option: Option) -> Any:
     """Return what argparse returns for an argument that is not given."""
     if option.value_type is bool:
         return False
-    return None if option.several else option.default
+    return None if option.several or option.argument.repeated else option.default
 
 
 def _value(option: Option, given: Any) -> Any:
     if option.value_type is bool:
         return given != option.default  # --no-smoothing turns off smoothing, which is on by default
+    if option.argument.repeated:
+        return tuple(given or ())
     if given is None or option.argument.parse is None:
         return option.default if given is None else given
     try:

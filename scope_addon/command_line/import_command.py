@@ -17,7 +17,7 @@ from .arguments import add_options, path_argument, values_in_range
 from .outputs import (
     check_blender,
     check_outputs,
-    checked_rig,
+    checked_rigs,
     distinct_paths,
     stem_of,
     write_outputs,
@@ -62,8 +62,8 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     people = import_motions(args.motion, values["body"], values["up_axis"], values["motion_rate"])
     motions = [person.motion for person in people]
     body = people[0].body
-    rig = checked_rig(args, outputs, motions[0].joint_count > len(SKELETONS[24].joint_names))
-    written, warnings = write_outputs(outputs, motions, body, args.motion, args, rig)
+    rigs = checked_rigs(args, outputs, motions[0].joint_count > len(SKELETONS[24].joint_names))
+    written, warnings = write_outputs(outputs, motions, body, args.motion, args, rigs)
     notes = dict.fromkeys(note for person in people for note in person.notes)
     warnings = [*notes, *warnings]
     for warning in warnings:

@@ -87,8 +87,8 @@ def files_to_read(values: Mapping[str, Any]) -> list[Path]:
         if value is not None and not is_url(value):
             files += files_of_footage(Path(value))
     for name in OTHER_INPUTS:
-        if values.get(name) is not None:
-            path = Path(values[name])
+        value = values.get(name)
+        for path in map(Path, value if isinstance(value, list) else [value] if value else []):
             if name == "calibration" and ".toml#" in path.name:
                 path = path.with_name(path.name.partition("#")[0])
             # A network's description lies beside it.
@@ -165,15 +165,15 @@ def distinct_paths(outputs: list[Path]) -> list[Path]:
     return list(by_real_path.values())
 
 
-def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) -> RigSource | None:
-    """Check the user's rig before the capture starts and return it; None without --retarget.
+def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -> list[RigSource]:
+    """Check the user's rigs before the capture starts and return them; none without --retarget.
 
     :param fingers: whether the motion has fingers.
-    :raises ScopeError: the rig cannot be used, or the arguments contradict each other.
+    :raises ScopeError: a rig cannot be used, or the arguments contradict each other.
     """
     if args.skeleton != option("skeleton").default:
         named = [path for path in outputs if path.suffix.lower() not in (*WITHOUT_SCENE, ".blend")]
-        if args.retarget is not None:
+        if args.retarget:
             raise UsageError(
                 "--skeleton names the bones of Scope's own body, and a rig keeps its own: give "
                 "either --skeleton or --retarget"
@@ -183,33 +183,54 @@ def checked_rig(args: argparse.Namespace, outputs: list[Path], fingers: bool) ->
                 "--skeleton needs an output whose bones it can name, such as -o OUT.fbx; motion "
                 "files and .blend files keep Scope's names"
             )
-    if args.retarget is None:
-        given = {
-            "--bone-map": args.bone_map,
-            "--rig-object": args.rig_object,
-            "--expression-map": args.expression_map,
-        }
-        given["--retarget-root"] = args.retarget_root != option("retarget_root").default
-        for flag, value in given.items():
+    of_rigs = {
+        "--rig-object": args.rig_object,
+        "--bone-map": args.bone_map,
+        "--expression-map": args.expression_map,
+    }
+    count = len(args.retarget or ())
+    if not count:
+        of_rigs["--retarget-root"] = args.retarget_root != option("retarget_root").default
+        for flag, value in of_rigs.items():
             if value:
                 raise UsageError(f"{flag} applies to a rig: give the rig's file with --retarget")
-        return None
-    from ..retarget.rig_source import rig_source
-
-    rig = rig_source(args.retarget, args.rig_object, args.bone_map, args.expression_map)
+        return []
     scene_files = [p for p in outputs if p.suffix.lower() not in WITHOUT_SCENE]
     if not scene_files:
         raise UsageError(
             "--retarget needs an output that can contain a rig, such as -o OUT.glb; a "
             "motion file cannot"
         )
+    if count > 1 and args.command == "batch":
+        raise UsageError("a batch takes one rig: run it again with the next one")
+    if count > 1 and count != len(scene_files):
+        raise UsageError(
+            f"{count} rigs need {count} outputs, one for each in the same order, but there "
+            f"{'is' if len(scene_files) == 1 else 'are'} {len(scene_files)}; give -o for each rig"
+        )
+    for flag, values in of_rigs.items():
+        if values and len(values) != count:
+            raise UsageError(
+                f"{flag} is given {len(values)} times for {counted(count, 'rig')}: give it once "
+                "for each rig, in the same order, or not at all"
+            )
+    from ..retarget.rig_source import rig_source
+
+    names, bone_maps, expression_maps = (values or [None] * count for values in of_rigs.values())
+    rigs = [
+        rig_source(path, name or "", bones, expressions)
+        for path, name, bones, expressions in zip(
+            args.retarget, names, bone_maps, expression_maps, strict=True
+        )
+    ]
     load_blender()
     from ..scene.rigs.rig_file import check_rig
     from .bounded_import import bounded_import
 
-    with bounded_import(rig.path):
-        check_rig(rig, fingers=fingers)
-    return rig
+    for rig in rigs:
+        with bounded_import(rig.path):
+            check_rig(rig, fingers=fingers)
+    return rigs
 
 
 def write_outputs(
@@ -218,11 +239,12 @@ def write_outputs(
     body: Body,
     video: Path,
     args: argparse.Namespace,
-    rig: RigSource | None = None,
+    rigs: Sequence[RigSource] = (),
     views: Sequence[Path] = (),
 ) -> tuple[list[Path], list[Notice]]:
     """Write every output; bpy is loaded only if an output needs a scene.
 
+    :param rigs: one for all outputs that can contain a rig, or one for each of these.
     :param views: videos of the motions' further cameras.
     :return: the paths of the files, and warnings.
     :raises OutputError: a file cannot be written.
@@ -256,14 +278,18 @@ def write_outputs(
         separate = ExportOptions(
             separate=args.file_per_person, bvh_unit=args.bvh_unit, skeleton=args.skeleton
         )
-        if rig is not None:
+        if rigs:
             from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
 
             rig_options = RigExportOptions(options, args.retarget_root, separate)
-            files, warnings = export_on_rig(motions, body, scene_files, rig, rig_options, footage)
+            shares = [scene_files] if len(rigs) == 1 else [[path] for path in scene_files]
+            for rig, paths in zip(rigs, shares, strict=True):
+                files, more = export_on_rig(motions, body, paths, rig, rig_options, footage)
+                written += files
+                warnings += more
         else:
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
-        written += files
+            written += files
     return written, warnings
 
 

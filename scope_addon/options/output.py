@@ -113,8 +113,9 @@ OUTPUT_OPTIONS = (
         Path,
         None,
         Place.COMMAND_LINE | Place.IMPORT,
-        "retarget the motion to the rig in this .blend, .fbx, .glb or .vrm file",
-        argument=Argument(metavar="RIG"),
+        "retarget the motion to the rig in this .blend, .fbx, .glb or .vrm file; given several "
+        "times, each rig has an output of its own, in the same order",
+        argument=Argument(metavar="RIG", repeated=True),
     ),
     Option(
         "rig_object",
@@ -122,7 +123,7 @@ OUTPUT_OPTIONS = (
         "",
         Place.COMMAND_LINE | Place.IMPORT,
         "name of the armature, if RIG contains several",
-        argument=Argument(metavar="NAME"),
+        argument=Argument(metavar="NAME", repeated=True),
     ),
     Option(
         "bone_map",
@@ -130,7 +131,7 @@ OUTPUT_OPTIONS = (
         None,
         Place.COMMAND_LINE | Place.IMPORT,
         "bone assignments, a JSON file saved in the panel",
-        argument=Argument(metavar="FILE"),
+        argument=Argument(metavar="FILE", repeated=True),
     ),
     Option(
         "expression_map",
@@ -138,7 +139,7 @@ OUTPUT_OPTIONS = (
         None,
         Place.COMMAND_LINE | Place.IMPORT,
         "shape keys that follow the captured expressions, a JSON file saved in the panel",
-        argument=Argument(metavar="FILE"),
+        argument=Argument(metavar="FILE", repeated=True),
     ),
     Option(
         "retarget_root",

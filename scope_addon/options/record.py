@@ -68,6 +68,8 @@ class Argument(NamedTuple):
     :param inherited: whether a batch passes the argument on to the process of each clip.
     :param bare: the value of the flag alone, where none of the choices follows it; empty: one has
         to.
+    :param repeated: whether the flag may be given several times; the value is then a tuple of what
+        it was given with.
     """
 
     flag: str = ""
@@ -77,6 +79,7 @@ class Argument(NamedTuple):
     default_text: str | None = None
     inherited: bool = True
     bare: str = ""
+    repeated: bool = False
 
 
 class Property(NamedTuple):

@@ -12,6 +12,8 @@ from ..edit.walking import motion_of, walk
 
 MOTION = motion_of(walk(0.5))
 
+TWO_RIGS = ["--retarget", "rig.glb", "--retarget", "other.glb"]
+
 
 @pytest.fixture
 def amass(tmp_path):
@@ -65,6 +67,13 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
         (["walk.npz", "--bone-map", "bones.json"], 2, "--retarget"),
         (["walk.npz", "--expression-map", "face.json"], 2, "--retarget"),
         (["walk.npz", "--retarget", "rig.glb"], 1, "rig.glb"),
+        (["walk.npz", *TWO_RIGS], 2, "2 rigs need 2 outputs"),
+        (["walk.npz", *TWO_RIGS, "-o", "a.glb", "-o", "a.npz"], 2, "but there is 1"),
+        (
+            ["walk.npz", *TWO_RIGS, "-o", "a.glb", "-o", "b.glb", "--rig-object", "Rig"],
+            2,
+            "--rig-object is given 1 times for 2 rigs",
+        ),
         ([""], 2, "MOTION: the path is empty"),
         (["."], 1, "not a readable motion file"),
     ],

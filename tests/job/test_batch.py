@@ -325,7 +325,7 @@ def test_a_value_may_begin_with_a_hyphen(folder, tmp_path):
     batch(folder, tmp_path / "out", options).run(1)
     passed = json.loads((folder / "calls.log").read_text("utf-8").splitlines()[0])
     args = cli.build_parser().parse_args(passed)
-    assert (args.rig_object, args.quality, args.hands) == ("-Rig", "fast", "on")
+    assert (args.rig_object, args.quality, args.hands) == (["-Rig"], "fast", "on")
 
 
 def test_overlays_and_pages_of_a_batch_lie_next_to_the_results(folder, tmp_path):

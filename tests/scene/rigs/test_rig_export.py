@@ -379,6 +379,28 @@ def test_the_command_line_checks_the_rig_before_the_capture(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["rig.blend"]
 
 
+def test_several_rigs_have_an_output_each(tmp_path):
+    motion_of(walk(0.5)).save(tmp_path / "walk.npz")
+    given = []
+    for skeleton in ("mixamo", "nameless"):
+        rig = save_rig(tmp_path / f"{skeleton}_rig.glb", skeleton)
+        given += ["--retarget", rig, "-o", tmp_path / f"{skeleton}.glb"]
+    done = shell("import", tmp_path / "walk.npz", "--json", *given, "-o", tmp_path / "out.npz")
+    assert done.returncode == 0, done.stderr
+    written = [str(tmp_path / name) for name in ("out.npz", "mixamo.glb", "nameless.glb")]
+    assert json.loads(done.stdout)["outputs"] == written
+    for skeleton in ("mixamo", "nameless"):
+        (rig,) = read(tmp_path / f"{skeleton}.glb")
+        assert set(names_of(skeleton).values()) <= set(rig.data.bones.keys())
+
+
+def test_a_batch_takes_one_rig(tmp_path):
+    rigs = ["--retarget", "a.glb", "--retarget", "b.glb"]
+    done = shell("batch", tmp_path, "--out", tmp_path / "out", "--formats", "glb,fbx", *rigs)
+    assert done.returncode == 2
+    assert "a batch takes one rig" in done.stderr
+
+
 def test_a_batch_refuses_a_bad_rig_once(tmp_path):
     (tmp_path / "clips").mkdir()
     done = shell(
