@@ -317,6 +317,7 @@ class Motion:
 CORRECTION_KEYS = (
     *("pin_frames", "pin_joints", "pin_uv", "pin_xyz", "pin_reach"),
     *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs", "upright"),
+    *("depth_spans", "depth_parts"),
     *(
         "floor_frames",
         "floor_heights",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import bpy
 
 from .export_operators import FORMATS, is_available
+from .pins.correction_panel import draw_corrections
 from .reporting import iface_
 
 
@@ -50,11 +51,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.operator_menu_enum("scope.root_motion", "mode")
         layout.separator()
         layout.operator("scope.pin_limb", icon="PINNED")
-        layout.operator("scope.foot_stands", text="Left Foot Stands").foot = "left"
-        layout.operator("scope.foot_stands", text="Right Foot Stands").foot = "right"
-        layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
-        layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
-        layout.operator("scope.floor_here", icon="GRID")
+        draw_corrections(layout, layout)
         layout.separator()
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")

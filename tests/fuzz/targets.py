@@ -201,6 +201,7 @@ def _motions(_: Path) -> list[bytes]:
     from scope.scope_addon.edit.pins.corrected_motion import with_corrections
     from scope.scope_addon.edit.pins.corrections import (
         Contact,
+        DepthFlip,
         Exchange,
         FeetOnFloor,
         Interpolation,
@@ -219,6 +220,7 @@ def _motions(_: Path) -> list[bytes]:
         Pin(2, "head", (320.0, 200.0)),
         Contact(1, 3, "left"),
         Exchange(4, 5),
+        DepthFlip(2, 3, "left_leg"),
         Upright.of(np.eye(4)),
     )
     corrections = (*measured, Interpolation(1, 2), FeetOnFloor(lift=False))

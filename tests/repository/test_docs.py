@@ -28,6 +28,7 @@ from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
 from scope.scope_addon.edit.pins.corrections import (
     Contact,
+    DepthFlip,
     Exchange,
     FeetOnFloor,
     Floor,
@@ -201,6 +202,9 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
         Contact(1, 3, "left"),
         Exchange(1, 2),
         Exchange(4, 5),
+        DepthFlip(0, 2, "left_arm"),
+        DepthFlip(1, 4, "right_shin"),
+        DepthFlip(2, 6, "body"),
         Interpolation(2, 3),
         Upright.of(np.eye(4)),
         Floor(3, 0.1),
@@ -215,6 +219,7 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
         "J": motion.keypoints2d.shape[1],
         "N": 1,
         "C": 1,
+        "D": 3,
         "E": 2,
         "V": 1,
         "B": 1,

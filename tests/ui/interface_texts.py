@@ -51,7 +51,9 @@ CORRECTIONS = {
         "Floor",
         "Feet on the Floor",
         "Interpolated",
+        "Turned Around",
     ),
+    *(f"{side} {part}" for side in ("Left", "Right") for part in ("Arm", "Leg", "Forearm", "Shin")),
     *(f"{what} Exchanged" for what in ("Sides", "Arms", "Legs")),
 }
 _STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, PLACING, BUILDING)}

@@ -25,6 +25,7 @@ from ..spans import swap_sides
 from .corrections import (
     Contact,
     Correction,
+    DepthFlip,
     Exchange,
     Pin,
     floor_height,
@@ -32,6 +33,7 @@ from .corrections import (
     to_arrays,
     world_of,
 )
+from .depth_flips import flipped
 from .edits import edited
 from .moved import moved_clip, moved_motion
 from .rays import pixel_of
@@ -155,7 +157,8 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
 
 
 def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the motion's edits, contacts, pins, upright line and floor to another smoothing of it.
+    """Apply the motion's flips in depth, edits, contacts, pins, upright line and floor to another
+    smoothing of it.
 
     :param clip: the motion in the captured world, with its sides exchanged already.
     :raises MotionFileError: the motion's corrections are damaged.
@@ -166,9 +169,11 @@ def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
 
 
 def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the edits, then the contacts and pins, in the captured world."""
+    """Apply the flips in depth, the edits, then the contacts and pins, in the captured world."""
     corrections = corrections_of(motion)
     shot = shot_of(uncorrected(motion))
+    flips = [c for c in corrections if isinstance(c, DepthFlip)]
+    clip = flipped(clip, body, motion.betas, flips, shot)
     clip = edited(clip, body, motion.betas, corrections, shot)
     wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
     if not wanted:

@@ -19,6 +19,12 @@ from ...untrusted.files import in_one_line
 
 REACH_S = 0.4  # Time over which a correction fades out on each side.
 FEET = ("left", "right")
+BODY = "body"
+# What can be mirrored in depth: whole limbs, their lower bones alone, and the body.
+DEPTH_PARTS = (
+    *(f"{side}_{part}" for part in ("arm", "leg", "forearm", "shin") for side in FEET),
+    BODY,
+)
 _HIGHEST_M = 1e3
 _LAST_FRAME = 1 << 53
 _MAX_INTERPOLATIONS = 1000
@@ -86,6 +92,26 @@ class Exchange:
         """
         if self.limbs not in ("arms", "legs", "both"):
             raise UsageError(f"limbs must be arms, legs or both, not {self.limbs!r}")
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class DepthFlip:
+    """A limb or the body is mirrored in depth, as the camera sees it, from one frame to another,
+    both inclusive.
+    """
+
+    first: int
+    last: int
+    part: str  # One of `DEPTH_PARTS`.
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the part is unknown, or the span is empty.
+        """
+        if self.part not in DEPTH_PARTS:
+            raise UsageError(f"part must be one of {', '.join(DEPTH_PARTS)}, not {self.part!r}")
         _check_span(self.first, self.last)
 
 
@@ -187,7 +213,7 @@ class Floor:
         return out
 
 
-Correction = Pin | Contact | Exchange | Interpolation | Upright | Floor | FeetOnFloor
+Correction = Pin | Contact | Exchange | DepthFlip | Interpolation | Upright | Floor | FeetOnFloor
 
 
 def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
@@ -225,16 +251,16 @@ def _check_span(first: int, last: int) -> None:
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
-    The same exchange a second time undoes the first, so that neither remains. An upright line and a
-    floor move the world that those before have made, so that one of each remains. An interpolation
-    replaces those within its span. Feet are put on the floor that was corrected last.
+    The same exchange or flip a second time undoes the first, so that neither remains. An upright
+    line and a floor move the world that those before have made, so that one of each remains. An
+    interpolation replaces those within its span. Feet are put on the floor that was corrected last.
     """
     if isinstance(new, Upright | Floor):
         return _moved_on(corrections, new)
     if isinstance(new, FeetOnFloor):
         others = tuple(c for c in corrections if not isinstance(c, FeetOnFloor))
         return (*others, replace(new, height=floor_height(corrections)))
-    if isinstance(new, Exchange) and new in corrections:
+    if isinstance(new, Exchange | DepthFlip) and new in corrections:
         return tuple(c for c in corrections if c != new)
     if isinstance(new, Interpolation):
         corrections = tuple(
@@ -293,6 +319,7 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
     pins = [c for c in corrections if isinstance(c, Pin)]
     contacts = [c for c in corrections if isinstance(c, Contact)]
     exchanges = [c for c in corrections if isinstance(c, Exchange)]
+    flips = [c for c in corrections if isinstance(c, DepthFlip)]
     upright = [c for c in corrections if isinstance(c, Upright)]
     floors = [c for c in corrections if isinstance(c, Floor)]
     interpolations = [c for c in corrections if isinstance(c, Interpolation)]
@@ -308,6 +335,8 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
         "contact_feet": np.array([c.foot for c in contacts], np.str_),
         "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
         "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
+        "depth_spans": np.array([(f.first, f.last) for f in flips], np.int64).reshape(-1, 2),
+        "depth_parts": np.array([f.part for f in flips], np.str_),
         "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
         "floor_frames": np.array([f.frame for f in floors], np.int64),
         "floor_heights": np.array([f.height for f in floors], np.float64),
@@ -334,6 +363,7 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
         return array
 
     spans = column("contact_spans", 2), column("exchange_spans", 2)
+    flips = column("depth_spans", 2).tolist(), column("depth_parts").tolist()
     floors = column("floor_frames"), column("floor_heights")
     interpolated = column("interpolated_spans", 2)
     snaps = (column("snap_level"), column("snap_lift"))
@@ -366,6 +396,7 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
             ),
             *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
+            *(DepthFlip(int(a), int(b), str(part)) for (a, b), part in zip(*flips, strict=True)),
             *(Interpolation(int(a), int(b)) for a, b in interpolated),
             *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
             *(Floor(int(f), float(h)) for f, h in [*zip(*floors, strict=True)][:1]),

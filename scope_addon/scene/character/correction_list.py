@@ -83,7 +83,15 @@ def _entry(
     armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float
 ) -> dict[str, Any]:
     """Describe a correction."""
-    from ...edit.pins.corrections import Contact, FeetOnFloor, Floor, Interpolation, Pin, Upright
+    from ...edit.pins.corrections import (
+        Contact,
+        DepthFlip,
+        FeetOnFloor,
+        Floor,
+        Interpolation,
+        Pin,
+        Upright,
+    )
     from .corrections.corrected_keys import scene_frame
 
     whole = int(motion.frames[0]), int(motion.frames[-1])
@@ -94,6 +102,11 @@ def _entry(
     elif isinstance(correction, Contact):
         kind = "CONTACT"
         text = f"{correction.foot.title()} Foot Stands"
+        span = (correction.first, correction.last)
+    elif isinstance(correction, DepthFlip):
+        kind = "FLIP"
+        part = correction.part.replace("_", " ").title()
+        text = "Turned Around" if correction.part == "body" else part
         span = (correction.first, correction.last)
     elif isinstance(correction, Interpolation):
         kind = "INTERPOLATION"

@@ -220,6 +220,57 @@ class SCOPE_OT_exchange_sides(ExchangeOperator):
     bl_label = "Exchange Left and Right"
 
 
+class SCOPE_OT_flip_limb(CorrectSpanOperator):
+    """Mirror a limb in depth, as the camera sees it; applying it again undoes it"""
+
+    bl_description = (
+        "Mirror a limb in depth from the first to the last frame: it stays where it is in the "
+        "image, and points away from the camera instead of towards it, or the reverse. Applying "
+        "it again undoes it"
+    )
+    bl_idname = "scope.flip_limb"
+    bl_label = "Flip Limb in Depth"
+
+    limb: EnumProperty(
+        name="Limb",
+        items=(
+            ("left_arm", "Left Arm", "The whole left arm", 0),
+            ("right_arm", "Right Arm", "The whole right arm", 1),
+            ("left_leg", "Left Leg", "The whole left leg", 2),
+            ("right_leg", "Right Leg", "The whole right leg", 3),
+            ("left_forearm", "Left Forearm", "The left arm from the elbow on", 4),
+            ("right_forearm", "Right Forearm", "The right arm from the elbow on", 5),
+            ("left_shin", "Left Shin", "The left leg from the knee on", 6),
+            ("right_shin", "Right Shin", "The right leg from the knee on", 7),
+        ),
+        default="left_leg",
+        description="Which limb is mirrored",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the flip."""
+        from ...edit.pins.corrections import DepthFlip
+
+        return DepthFlip(first, last, self.limb)
+
+
+class SCOPE_OT_turn_around(CorrectSpanOperator):
+    """Turn the person to show the other side to the camera; applying it again undoes it"""
+
+    bl_description = (
+        "Mirror the whole person in depth from the first to the last frame, for frames in which "
+        "front and back are mistaken for each other. Applying it again undoes it"
+    )
+    bl_idname = "scope.turn_around"
+    bl_label = "Turn Around"
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the flip of the whole body."""
+        from ...edit.pins.corrections import BODY, DepthFlip
+
+        return DepthFlip(first, last, BODY)
+
+
 class SCOPE_OT_remove_correction(CorrectionOperator):
     """Remove the correction and restore the motion around it"""
 
@@ -267,5 +318,7 @@ CLASSES = (
     SCOPE_OT_add_pin,
     SCOPE_OT_foot_stands,
     SCOPE_OT_exchange_sides,
+    SCOPE_OT_flip_limb,
+    SCOPE_OT_turn_around,
     SCOPE_OT_remove_correction,
 )

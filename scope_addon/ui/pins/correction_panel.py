@@ -14,6 +14,7 @@ _ICONS = {
     "PIN": "PINNED",
     "CONTACT": "SNAP_FACE",
     "EXCHANGE": "MOD_MIRROR",
+    "FLIP": "ARROW_LEFTRIGHT",
     "UPRIGHT": "EMPTY_SINGLE_ARROW",
     "FLOOR": "GRID",
     "INTERPOLATION": "IPO_EASE_IN_OUT",
@@ -42,12 +43,7 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
         if armature is None:
             return
         layout.operator("scope.pin_limb", icon="PINNED", depress=is_running())
-        row = layout.row(align=True)
-        for text, foot in (("Left Foot Stands", "left"), ("Right Foot Stands", "right")):
-            row.operator("scope.foot_stands", text=text).foot = foot
-        layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
-        layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
-        layout.operator("scope.floor_here", icon="GRID")
+        draw_corrections(layout, layout.row(align=True))
         listed = listed_corrections(armature)
         if not listed:
             return
@@ -68,6 +64,20 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
             row.operator("scope.remove_correction", text="", icon="X", emboss=False).index = index
         if len(listed) > 1:
             column.operator("scope.remove_correction", text="Remove All").index = -1
+
+
+def draw_corrections(layout: bpy.types.UILayout, feet: bpy.types.UILayout) -> None:
+    """Draw the buttons that add corrections, in the panel or a menu.
+
+    :param feet: where both feet's buttons are.
+    """
+    for text, foot in (("Left Foot Stands", "left"), ("Right Foot Stands", "right")):
+        feet.operator("scope.foot_stands", text=text).foot = foot
+    layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
+    layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
+    layout.operator("scope.floor_here", icon="GRID")
+    layout.operator("scope.flip_limb", icon="ARROW_LEFTRIGHT")
+    layout.operator("scope.turn_around", icon="FILE_REFRESH")
 
 
 def draw_in_pose_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:

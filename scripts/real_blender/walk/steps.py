@@ -185,7 +185,16 @@ class Steps(FileSteps):
         span = {"start": first, "end": first + chance.randrange(1, 12)}
         place = [chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(0.2, 1.5)]
         values: dict[str, dict[str, object]] = {
-            **dict.fromkeys(("interpolate_span", "exchange_sides", "foot_stands"), span),
+            **dict.fromkeys(
+                (
+                    "interpolate_span",
+                    "exchange_sides",
+                    "foot_stands",
+                    "flip_limb",
+                    "turn_around",
+                ),
+                span,
+            ),
             **dict.fromkeys(("choose_footage", "import_video"), {"filepath": self.footage}),
             "import_motion": {
                 "filepath": str(folder / "kept.npz"),

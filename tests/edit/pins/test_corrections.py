@@ -12,6 +12,7 @@ import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.pins.corrections import (
     Contact,
+    DepthFlip,
     Exchange,
     FeetOnFloor,
     Floor,
@@ -34,6 +35,8 @@ ALL = (
     Pin(9, "head", position=(0.1, -0.2, 1.7), reach=0.25),
     Contact(4, 8, "left"),
     Exchange(2, 6, "legs"),
+    DepthFlip(3, 5, "left_forearm"),
+    DepthFlip(7, 9, "body"),
     Interpolation(4, 7),
     Interpolation(1, 2),
     Upright((1.0, 0, 0, 0.5, 0, 0, -1.0, 0, 0, 1.0, 0, 2.0, 0, 0, 0, 1.0)),
@@ -57,6 +60,10 @@ def test_damaged_arrays_are_an_error():
         ("pin_uv", np.zeros((2, 3))),
         ("pin_frames", np.zeros(5)),
         ("contact_feet", np.array(["none"])),
+        ("depth_parts", np.array(["body"])),
+        ("depth_parts", np.array(["body", "tail"])),
+        ("depth_spans", np.array([[5, 4], [1, 2]])),
+        ("depth_spans", np.array([["a", "b"]] * 2)),
         ("upright", 2 * np.eye(4)[None]),
         ("upright", np.full((1, 4, 4), np.nan)),
         ("floor_heights", np.array([np.inf])),
@@ -88,6 +95,8 @@ def test_damaged_arrays_are_an_error():
         lambda: Contact(5, 4, "left"),
         lambda: Contact(1, 4, "both"),
         lambda: Exchange(1, 4, "feet"),
+        lambda: DepthFlip(1, 4, "head"),
+        lambda: DepthFlip(5, 4, "body"),
         lambda: Interpolation(5, 4),
         lambda: FeetOnFloor(height=np.inf),
     ],
@@ -117,7 +126,7 @@ def test_the_same_exchange_again_undoes_the_first():
 
 
 def test_an_interpolation_replaces_those_within_its_span():
-    assert added(ALL, Interpolation(3, 8)) == (*ALL[:4], *ALL[5:], Interpolation(3, 8))
+    assert added(ALL, Interpolation(3, 8)) == (*ALL[:6], *ALL[7:], Interpolation(3, 8))
     assert added(ALL, Interpolation(5, 8)) == (*ALL, Interpolation(5, 8))
 
 
@@ -128,7 +137,7 @@ def test_feet_are_put_on_the_floor_that_was_corrected_last():
 
 def test_without_the_corrected_floor_feet_are_put_on_the_captured_one():
     assert removed(ALL, (Floor,)) == (*ALL[:-2], FeetOnFloor(level=True, lift=False))
-    assert removed(ALL, (Upright,)) == (*ALL[:6], *ALL[7:])
+    assert removed(ALL, (Upright,)) == (*ALL[:8], *ALL[9:])
 
 
 def test_an_upright_line_replaces_what_was_levelled():

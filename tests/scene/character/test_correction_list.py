@@ -8,6 +8,7 @@ import pytest
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
 from scope.scope_addon.edit.pins.corrections import (
     Contact,
+    DepthFlip,
     Exchange,
     FeetOnFloor,
     Interpolation,
@@ -35,6 +36,8 @@ def test_a_corrected_file_brings_its_list(tmp_path):
         Pin(20, "left_wrist", (300.0, 200.0)),
         Contact(30, 34, "right"),
         Exchange(3, 5, "legs"),
+        DepthFlip(6, 8, "right_forearm"),
+        DepthFlip(9, 10, "body"),
     )
     changes = (*changes, Interpolation(40, 42), FeetOnFloor())
     with_corrections(plain, BODY, changes).save(tmp_path / "a.npz")
@@ -45,6 +48,8 @@ def test_a_corrected_file_brings_its_list(tmp_path):
         ("Left Wrist", 51, 51),
         ("Right Foot Stands", 71, 79),
         ("Legs Exchanged", 17, 21),
+        ("Right Forearm", 23, 27),
+        ("Turned Around", 29, 31),
         ("Interpolated", 91, 95),
         ("Feet on the Floor", 11, 131),
     ]

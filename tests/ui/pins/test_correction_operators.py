@@ -284,6 +284,35 @@ def test_a_pin_on_edited_keys_is_met_where_it_was_placed(rig):
     assert np.linalg.norm(seen(rig)[0, WRIST] - target) < 0.01
 
 
+def test_a_flip_mirrors_depth_and_once_more_mirrors_it_back(rig):
+    """The camera looks along y, and the person walks towards it."""
+    before = seen(rig, [30, 46, 70])
+    flips = (
+        lambda: bpy.ops.scope.flip_limb(start=40, end=52, limb="left_leg"),
+        lambda: bpy.ops.scope.turn_around(start=40, end=52),
+    )
+    hip, knee = NAMES.index("left_hip"), NAMES.index("left_knee")
+    toes = NAMES.index("left_foot"), NAMES.index("left_ankle")
+    for flip, text, bone in zip(
+        flips, ("Left Leg", "Turned Around"), ((hip, knee), toes), strict=True
+    ):
+        flip()
+        after = seen(rig, [30, 46, 70])
+        np.testing.assert_allclose(after[[0, 2]], before[[0, 2]], atol=1e-6)
+        was, now = (at[1, bone[1], 1] - at[1, bone[0], 1] for at in (before, after))
+        assert was * now < 0
+        assert [(e["text"], e["first"], e["last"]) for e in listed_corrections(rig)] == [
+            (text, 40, 52)
+        ]
+        bpy.ops.scope.smooth(strength=2.0)
+        smooth = seen(rig, [46])[0]
+        assert was * (smooth[bone[1], 1] - smooth[bone[0], 1]) < 0
+        bpy.ops.scope.smooth(strength=1.0)
+        flip()
+        np.testing.assert_allclose(seen(rig, [30, 46, 70]), before, atol=1e-5)
+        assert listed_corrections(rig) == []
+
+
 def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
     left = NAMES.index("left_knee")
     right = NAMES.index("right_knee")
@@ -331,7 +360,10 @@ def test_a_span_is_corrected_as_far_as_there_is_a_motion(rig, start, end):
     assert (entry["first"], entry["last"]) == (start, 91)
 
 
-@pytest.mark.parametrize("operator", ["foot_stands", "exchange_sides", "interpolate_span", "loop"])
+@pytest.mark.parametrize(
+    "operator",
+    ["foot_stands", "exchange_sides", "flip_limb", "turn_around", "interpolate_span", "loop"],
+)
 def test_a_span_the_wrong_way_round_is_said_with_the_frames_of_the_scene(rig, operator):
     with pytest.raises(
         RuntimeError, match="The span ends in frame 30, before it begins in frame 40; swap them"
