@@ -24,7 +24,7 @@ from .rig_action import BoneKeys
 _LIMBS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand", ""))
 # Sine of the bend below which a limb counts as straight: the degree or two that people's legs are
 # bent sideways, and noise, would determine the roll of its base. Such a limb hardly rolls, and
-# Blender's solver moves its middle joint by a few millimetres.
+# Blender's solver moves its middle joint by up to a centimetre.
 _MIN_BEND = 0.1
 
 
@@ -144,11 +144,16 @@ def _hinge(rig: bpy.types.Object, limb: _Limb, bases: dict[str, list[Matrix]]) -
     )
     middle = np.arctan2(L[1, 2], L[1, 1])
     spread = np.arccos(np.clip(wanted[1] / np.hypot(L[1, 1], L[1, 2]), -1, 1))
+    # A straight limb leaves the roll undetermined; of one that is folded, it decides where the
+    # middle joint is.
+    sine = float(np.hypot(wanted[0], wanted[2]))
+    share = np.clip(1.5 - sine / _MIN_BEND, 0.0, 1.0) if wanted[1] > 0 else 0.0
+    natural = share * _MIN_BEND
     found = []
     for bend in (middle + spread, middle - spread):
         has = L @ (0.0, np.cos(bend), np.sin(bend))
         across = has[[0, 2]] / max(float(np.hypot(has[0], has[2])), 1e-9)
-        x, z = wanted[[0, 2]] + _MIN_BEND * across  # a straight limb leaves the roll undetermined
+        x, z = wanted[[0, 2]] + natural * across
         roll = np.arctan2(x, z) - np.arctan2(across[0], across[1])
         found.append((float(np.angle(np.exp(1j * roll))), float(np.angle(np.exp(1j * bend)))))
     roll, bend = min(found, key=lambda pair: abs(pair[0]))

@@ -99,6 +99,29 @@ def test_a_leg_that_is_straight_or_overstretched_does_not_turn_about_itself(rigi
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 15.0
 
 
+def test_limbs_that_are_folded_and_bent_aside_are_where_fk_has_them(rigify_rigs):
+    """A hand at the shoulder, a heel at the seat: the roll decides where elbow and knee are."""
+    motion = motion_of(walk(1.0))
+    turns = motion.poses.reshape(len(motion), -1, 3)
+    folded = np.linspace(0.1, 2.9, len(motion))
+    aside = 0.6 * np.sin(np.linspace(0.0, 9.0, len(motion)))
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        elbow = np.stack([0.0 * folded, sign * folded, aside], axis=1)
+        knee = np.stack([0.9 * folded, 0.0 * folded, 0.4 * aside], axis=1)
+        turns[:, NAMES.index(f"{side}_elbow")] = elbow
+        turns[:, NAMES.index(f"{side}_knee")] = knee
+    rig = rigify_rigs[1][0]
+    source = captured(motion)
+    options = RetargetOptions(feet=False)
+    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, options)
+    frames = range(1, 32)
+    switch(rig, IK_FK=1.0)
+    by_fk = posed(rig, frames)
+    for pole in (False, True):
+        switch(rig, IK_FK=0.0, pole_vector=pole)
+        assert np.linalg.norm(posed(rig, frames) - by_fk, axis=-1).max() < 0.01
+
+
 def turned(rig, names, frames):
     """Return the orientations (T, B, 3, 3) of bones in the armature's space."""
     out = []
