@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -66,13 +67,14 @@ class Seen:
     )
     size: tuple[int, int] = (0, 0)
 
-    def watch(self, frame: Frame, largest: Observation | None, _: LiveBody) -> None:
+    def watch(self, frame: Frame, people: Sequence[Observation], _: LiveBody) -> None:
         """Keep the mask of this frame, if it is due; a region in which nobody may be has none."""
         self.frames += 1
         height, width = frame.image_rgb.shape[:2]
         self.size = width, height
-        if largest is None or (self.frames - 1) % self.stride or largest.presence < SURE:
+        if not people or (self.frames - 1) % self.stride or people[0].presence < SURE:
             return
+        largest = people[0]
         mask = self.network.mask(frame.image_rgb, largest.region) >= SURE
         self.masks[frame.index] = largest.region, mask, largest.keypoints_px
 

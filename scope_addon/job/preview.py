@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The preview that the panel shows during a capture: the current frame, scaled down, with the
-fitted body over it.
+fitted bodies over it.
 
 Until the solver and the rasterizer are compiled, and where no body could be fitted, the keypoints'
-skeleton is drawn.
+skeletons are drawn.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -88,7 +88,7 @@ class PreviewWriter:
             remove(self._path)  # unless the parent reads it, on Windows: it stays in its folder
         self._pool.shutdown(wait=False, cancel_futures=True)
 
-    def __call__(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
+    def __call__(self, frame: Frame, people: Sequence[Observation], live: LiveBody) -> None:
         """Write the preview of a frame, unless it is too early or the previous one is not
         finished.
         """
@@ -98,13 +98,14 @@ class PreviewWriter:
         ):
             return
         self._last = now
-        self._drawing = self._pool.submit(self._show, frame, observation, live)
+        self._drawing = self._pool.submit(self._show, frame, people, live)
 
-    def _show(self, frame: Frame, observation: Observation | None, live: LiveBody) -> None:
+    def _show(self, frame: Frame, people: Sequence[Observation], live: LiveBody) -> None:
         # After installation the rasterizer takes a while to compile; the preview does not wait for
         # it.
-        pose = _pose(observation, live) if self._rasterizer.done() else None
-        picture = draw(frame.image_rgb, observation, pose)
+        is_compiled = self._rasterizer.done()
+        poses = [_pose(person, live) if is_compiled else None for person in people]
+        picture = draw(frame.image_rgb, people, poses)
         height, width = picture.shape[:2]
         with self._writing:
             if not self._open:
@@ -131,8 +132,8 @@ def load_rasterizer() -> None:
     )
 
 
-def _pose(observation: Observation | None, live: LiveBody) -> LivePose | None:
-    if observation is None or not live.is_ready:
+def _pose(observation: Observation, live: LiveBody) -> LivePose | None:
+    if not live.is_ready:
         return None
     try:
         return live.fit(observation)
@@ -142,11 +143,15 @@ def _pose(observation: Observation | None, live: LiveBody) -> LivePose | None:
 
 
 def draw(
-    image_rgb: NDArray[np.uint8], observation: Observation | None, pose: LivePose | None = None
+    image_rgb: NDArray[np.uint8],
+    people: Sequence[Observation],
+    poses: Sequence[LivePose | None] = (),
 ) -> NDArray[np.uint8]:
-    """Draw the body, or else the skeleton, over a frame that is scaled down to ``LONGER_SIDE``.
+    """Draw everybody's body, or else skeleton, over a frame that is scaled down to ``LONGER_SIDE``.
 
     :param image_rgb: (H, W, 3) the frame.
+    :param people: the largest first, who is drawn last, over the others.
+    :param poses: of the people; none, or None where no body could be fitted.
     :return: (h, w, 4) RGBA.
     """
     height, width = image_rgb.shape[:2]
@@ -154,10 +159,11 @@ def draw(
     size = max(1, round(width * scale)), max(1, round(height * scale))
     large_size = size[0] * _SUPERSAMPLE, size[1] * _SUPERSAMPLE
     large: NDArray[Any] = cv2.resize(image_rgb, large_size, interpolation=cv2.INTER_AREA)
-    if pose is not None:
-        large = _with_body(large, pose, scale * _SUPERSAMPLE)
-    elif observation is not None:
-        _draw_skeleton(large, observation, scale * _SUPERSAMPLE)
+    for person, pose in reversed([*zip(people, poses or [None] * len(people), strict=True)]):
+        if pose is not None:
+            large = _with_body(large, pose, scale * _SUPERSAMPLE)
+        else:
+            _draw_skeleton(large, person, scale * _SUPERSAMPLE)
     rgba: NDArray[Any] = cv2.cvtColor(
         cv2.resize(large, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2RGBA
     )

@@ -36,13 +36,30 @@ def test_lines_join_the_keypoints():
     pixels = np.full((33, 2), -1000.0)
     pixels[KEYPOINT_NAMES.index("left_hip")] = 640, 100
     pixels[KEYPOINT_NAMES.index("left_knee")] = 640, 600
-    picture = draw(image, observation(pixels))
+    picture = draw(image, [observation(pixels)])
     assert picture.shape == (144, 256, 4)
     assert (picture[..., 3] == 255).all()
     assert picture[70, 128, 0] > 200  # half-way down the thigh
     assert picture[70, 100, :3].max() == 0
-    assert draw(image, observation(pixels, confidence=0.0))[..., :3].max() == 0
-    assert draw(image, None)[..., :3].max() == 0
+    assert draw(image, [observation(pixels, confidence=0.0)])[..., :3].max() == 0
+    assert draw(image, [])[..., :3].max() == 0
+
+
+def test_everybody_is_drawn_with_a_body_or_a_skeleton():
+    image = np.zeros((720, 1280, 3), np.uint8)
+    places = {"hip": 100, "knee": 600}
+    people = []
+    for x in (300, 900):
+        pixels = np.full((33, 2), -1000.0)
+        confidence = np.zeros(33)
+        for name, y in places.items():
+            pixels[KEYPOINT_NAMES.index(f"left_{name}")] = x, y
+            confidence[KEYPOINT_NAMES.index(f"left_{name}")] = 1.0
+        people.append(observation(pixels, confidence))
+    picture = draw(image, people)
+    assert picture[70, 60, 0] > 200
+    assert picture[70, 180, 0] > 200
+    assert picture[70, 120, :3].max() == 0
 
 
 class NotReady:
@@ -57,8 +74,8 @@ def test_the_file_is_complete_and_bottom_row_first(tmp_path, monkeypatch):
     image[50:] = 200  # the lower half
     sent = []
     with PreviewWriter(tmp_path, lambda event, **values: sent.append((event, values))) as writer:
-        writer(Frame(7, 0.1, image), None, NotReady())
-        writer(Frame(8, 0.2, image), None, NotReady())  # too soon
+        writer(Frame(7, 0.1, image), [], NotReady())
+        writer(Frame(8, 0.2, image), [], NotReady())  # too soon
         wait_for(lambda: sent)
         assert sent == [("preview", {"file": FILE, "width": 128, "height": 256, "frame": 7})]
         pixels = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(256, 128, 4)
@@ -73,11 +90,11 @@ def test_a_full_disk_does_not_stop_the_capture(tmp_path, monkeypatch):
     sent = []
     image = np.zeros((10, 10, 3), np.uint8)
     with PreviewWriter(tmp_path / "gone", lambda event, **values: sent.append(event)) as writer:
-        writer(Frame(0, 0.0, image), None, NotReady())
+        writer(Frame(0, 0.0, image), [], NotReady())
         wait_for(writer._drawing.done)
         assert sent == []
         (tmp_path / "gone").mkdir()
-        writer(Frame(1, 0.1, image), None, NotReady())
+        writer(Frame(1, 0.1, image), [], NotReady())
         wait_for(lambda: sent == ["preview"])
 
 
@@ -91,7 +108,7 @@ def test_a_preview_that_is_being_read_does_not_stop_the_capture(tmp_path, monkey
         raise PermissionError(13, "it is being used by another process")
 
     with PreviewWriter(tmp_path, lambda event, **values: sent.append(event)) as writer:
-        writer(Frame(0, 0.0, np.zeros((10, 10, 3), np.uint8)), None, NotReady())
+        writer(Frame(0, 0.0, np.zeros((10, 10, 3), np.uint8)), [], NotReady())
         wait_for(lambda: sent == ["preview"])
         monkeypatch.setattr(preview.Path, "unlink", in_use)
     assert refused == [tmp_path / FILE]
@@ -110,12 +127,12 @@ def test_the_skeleton_is_drawn_if_the_body_cannot_be_fitted(tmp_path):
         writer._rasterizer.result()
         image = np.zeros((50, 50, 3), np.uint8)
         seen = observation(np.linspace([5.0, 5.0], [45.0, 40.0], 33))
-        writer(Frame(0, 0.0, image), seen, Broken())
+        writer(Frame(0, 0.0, image), [seen], Broken())
         wait_for(lambda: sent == ["preview"])
         shown = np.frombuffer((tmp_path / FILE).read_bytes(), np.uint8).reshape(
             LONGER_SIDE, LONGER_SIDE, 4
         )
-    np.testing.assert_array_equal(shown[::-1], draw(image, seen))
+    np.testing.assert_array_equal(shown[::-1], draw(image, [seen]))
     assert shown[..., :3].max() > 200
 
 
@@ -134,7 +151,7 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
         for k, expected in ((0, ["preview"]), (1, ["preview", "fitted", "preview"])):
             writer(
                 Frame(k, 0.0, np.zeros((50, 50, 3), np.uint8)),
-                observation(np.full((33, 2), 20.0)),
+                [observation(np.full((33, 2), 20.0))],
                 Ready(),
             )
             writer._drawing.result()
@@ -149,8 +166,8 @@ def test_the_preview_shows_the_body_at_the_ground_truth(body):
     checked = []
 
     def watch(frame, seen, live):
-        bare = draw(frame.image_rgb, None)
-        shown = draw(frame.image_rgb, None, live.fit(seen))
+        bare = draw(frame.image_rgb, [])
+        shown = draw(frame.image_rgb, seen, [live.fit(person) for person in seen])
         changed = (bare != shown).any(axis=2)
         pixels = truth["joints_cam"][frame.index] @ truth["intrinsics"].T
         pixels = pixels[:, :2] / pixels[:, 2:] * (LONGER_SIDE / max(frame.image_rgb.shape))

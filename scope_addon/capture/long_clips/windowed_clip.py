@@ -150,7 +150,7 @@ class WindowedClip:
             self._begin,
             frame_pairs(self._frames(windows[0]), self._clock),
             seam,
-            lambda frame, largest: progress(FINDING, frames, 0),
+            lambda frame, people: progress(FINDING, frames, 0),
         )
         return files, frames
 
@@ -177,10 +177,10 @@ class WindowedClip:
             regions = self._joined.missed(following.record())
             return self._warmed_up(following, regions) if regions else following
 
-        def watch(frame: Frame, largest: Observation | None) -> None:
+        def watch(frame: Frame, people: Sequence[Observation]) -> None:
             nonlocal done
             done += 1
-            job.listeners.watch(frame, largest, job.live)
+            job.listeners.watch(frame, people, job.live)
             job.listeners.progress(FINDING, done, max(expected, done))
 
         run, pairs = self._first_run(self._windows[known])
@@ -315,13 +315,13 @@ def run_windows(
     begin: Callable[[Window], WindowRun],
     pairs: Iterator[tuple[Frame, Frame | None]],
     seam: Seam,
-    watch: Callable[[Frame, Observation | None], None],
+    watch: Callable[[Frame, Sequence[Observation]], None],
 ) -> None:
     """Observe the windows until their frames end.
 
     :param windows: at least one, in order.
     :param pairs: from the first window's anchor on; see `frame_pairs`.
-    :param watch: called with each frame and its largest person.
+    :param watch: called with each frame and its people, the largest first.
     """
     left = deque(windows)
     current: WindowRun | None = begin(left.popleft())
@@ -336,10 +336,10 @@ def run_windows(
             return
         if following is None and left and left[0].warms_up(frame.timestamp_s):
             following = begin(left.popleft())
-        largest = current.add(frame, upcoming)
+        people = current.add(frame, upcoming)
         if following is not None:
             following.add(frame, upcoming)
-        watch(frame, largest)
+        watch(frame, people)
     if current is not None:
         seam(current, None)
 

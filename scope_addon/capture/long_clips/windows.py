@@ -25,7 +25,7 @@ from ..media.frame import Frame
 from ..media.video import Video
 from ..perception.observation import Observation, PendingReference
 from ..perception.region import Region
-from ..stages.observe import FrameObserver, largest_person
+from ..stages.observe import FrameObserver, largest_first
 from ..tracking.track import Tracklet
 
 WARM_UP_S = 1.5
@@ -133,8 +133,8 @@ class WindowRun:
         self._anchor_regions: dict[int, Region] = {}
         self._checksums: list[int] = []
 
-    def add(self, frame: Frame, upcoming: Frame | None) -> Observation | None:
-        """Observe the next frame, and return its largest person.
+    def add(self, frame: Frame, upcoming: Frame | None) -> list[Observation]:
+        """Observe the next frame, and return its people, the largest first.
 
         :param upcoming: the frame after it, also if that is in the next window; None at the end of
             the clip.
@@ -157,7 +157,7 @@ class WindowRun:
         )
         if is_anchor:
             self._anchor_regions = {number: each.region for number, each in observations}
-        return largest_person(observations)
+        return largest_first(observations)
 
     def record(self, execution: str = "", warnings: Sequence[Notice] = ()) -> WindowRecord:
         """Return what was found so far."""

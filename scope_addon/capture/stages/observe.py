@@ -6,7 +6,7 @@ is kept.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,9 +49,9 @@ from .clock import COMPILING, FINDING, Progress, StageClock
 
 LENGTH_TOLERANCE_S = 1.0  # by which a container may say that footage is too long
 
-# Called with each decoded frame, its largest person, and the object that fits the body to such an
-# observation.
-Watch = Callable[[Frame, Observation | None, LiveBody], None]
+# Called with each decoded frame, its people, the largest first, and the object that fits the body
+# to such an observation.
+Watch = Callable[[Frame, Sequence[Observation], LiveBody], None]
 
 
 @dataclass(frozen=True)
@@ -375,10 +375,11 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
     trackers = open_trackers(job.options, threads, execution, memory)
     observer = new_observer(video, trackers, job.camera, job.background.pool, job.clock)
     for done, (frame, upcoming) in enumerate(frame_pairs(iter(video), job.clock), start=1):
-        largest = largest_person(observer.add(frame, upcoming))
+        people = largest_first(observer.add(frame, upcoming))
         with job.clock.stage("background"):
+            largest = people[0] if people else None
             job.background.add(frame.timestamp_s, largest, observer.background)
-        job.listeners.watch(frame, largest, job.live)
+        job.listeners.watch(frame, people, job.live)
         job.listeners.progress(FINDING, done, max(expected, done))
     observer.finish()
     return Observed(
@@ -403,10 +404,10 @@ def new_observer(
     return FrameObserver(trackers, masks, background, pool, clock)
 
 
-def largest_person(observations: list[tuple[int, Observation]]) -> Observation | None:
-    """Return the largest person of a frame; None if nobody was seen."""
+def largest_first(observations: list[tuple[int, Observation]]) -> list[Observation]:
+    """Return the people of a frame, the largest first."""
     people = [observation for _, observation in observations]
-    return max(people, key=lambda observation: observation.region.side_px, default=None)
+    return sorted(people, key=lambda observation: -observation.region.side_px)
 
 
 def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:

@@ -29,9 +29,9 @@ def watched(body):
     """
     seen = []
 
-    def watch(frame, observation, live):
-        if frame.index % 6 == 0 and observation is not None:
-            seen.append((frame.index, frame.image_rgb, live.fit(observation)))
+    def watch(frame, people, live):
+        if frame.index % 6 == 0 and people:
+            seen.append((frame.index, frame.image_rgb, live.fit(people[0])))
 
     return capture(SAMPLE, body, WANTED, watch=watch), seen
 
@@ -102,10 +102,10 @@ def test_a_body_is_ready_once_it_is_loaded(name):
 def test_an_observation_that_is_not_finite_gives_no_body(body, watched):
     seen = []
 
-    def watch(frame, observation, live):
-        if not seen and observation is not None:
-            observation.keypoints_px[5] = np.nan
-            seen.append(live.fit(observation))
+    def watch(frame, people, live):
+        if not seen and people:
+            people[0].keypoints_px[5] = np.nan
+            seen.append(live.fit(people[0]))
             raise CancelledError("enough")
 
     with pytest.raises(CancelledError):
