@@ -14,6 +14,7 @@ from contextlib import ExitStack
 import bpy
 
 from . import (
+    after_append,
     command,
     export_operators,
     import_operators,
@@ -134,6 +135,7 @@ def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
         (command.register, command.unregister),
         (correction_panel.attach, correction_panel.detach),
         (view_after_undo.attach, view_after_undo.detach),
+        (after_append.attach, after_append.detach),
         (import_operators.attach, import_operators.detach),
         (menus.attach, menus.detach),
         (keymap.attach, keymap.detach),

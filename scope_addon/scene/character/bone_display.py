@@ -3,7 +3,8 @@
 each side.
 
 A ring is a custom shape, so an animator can select a bone outside the body. Exporters ignore it,
-because the ring's object is in no scene.
+because the ring's object is in no scene. Blender puts it into one with an armature that is
+appended, and `unlink_rings` takes it out again.
 """
 
 from __future__ import annotations
@@ -80,6 +81,15 @@ def surface_radii(
         reach = np.linalg.norm((middle if len(middle) else local)[:, [0, 2]], axis=1)
         radii[i] = max(float(np.quantile(reach, 0.9)) if len(reach) else 0.3 * length, _MIN_RADIUS)
     return radii
+
+
+def unlink_rings() -> None:
+    """Take rings out of all collections of this file, where bones still show them."""
+    for obj in bpy.data.objects:
+        is_ring = obj.name == RING or obj.name.startswith(f"{RING}.")
+        for collection in obj.users_collection if is_ring and obj.library is None else ():
+            if collection.library is None:
+                collection.objects.unlink(obj)
 
 
 def remove_if_unused() -> None:

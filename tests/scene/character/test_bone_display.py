@@ -2,6 +2,7 @@
 import bpy
 import numpy as np
 import pytest
+import scope
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.character import bone_display
 
@@ -82,3 +83,22 @@ def test_captures_share_one_ring_that_is_in_no_scene(body, make_motion):
 )
 def test_side_of_a_joint(name, side):
     assert bone_display.side_of(name) == side
+
+
+def test_an_armature_that_is_appended_leaves_no_ring_in_the_scene(body, make_motion, tmp_path):
+    scope.register()
+    try:
+        build_scene([make_motion(body, 2)], body)
+        name = bpy.context.view_layer.objects.active.name
+        path = tmp_path / "person.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        for _ in range(2):
+            bpy.ops.wm.append(directory=f"{path}/Object/", filename=name)
+            ring = bpy.data.objects[name].pose.bones["head"].custom_shape
+            if hasattr(bpy.app.handlers, "blend_import_post"):  # from Blender 4.3 on
+                assert not ring.users_collection
+                rings = [o for o in bpy.context.scene.objects if bone_display.RING in o.name]
+                assert rings == []
+    finally:
+        scope.unregister()
