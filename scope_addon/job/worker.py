@@ -99,7 +99,9 @@ def run(
             reporter.send("error", message=system_error_message(MemoryError()))
             return 1
         reporter.send(
-            "error", message=f"a part of Scope cannot be loaded ({error}); reinstall the extension"
+            "error",
+            message=f"a part of Scope cannot be loaded ({error}): disable Scope in the preferences "
+            "and enable it again; if that does not help, reinstall it",
         )
     except (OSError, MemoryError) as error:
         reporter.send("error", message=system_error_message(error))

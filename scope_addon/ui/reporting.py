@@ -65,10 +65,12 @@ class ReportingOperator(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Run ``work`` and report."""
         from ...solver.errors import ScopeError
+        from .libraries import restore_libraries
 
         try:
+            restore_libraries()
             message = self.work(context)
-        except (ScopeError, OSError) as error:
+        except (ScopeError, OSError, ImportError) as error:
             self.report({"ERROR"}, sentence(error))
             return {"CANCELLED"}
         if message:

@@ -10,6 +10,7 @@ import bpy
 from .. import warm_up
 from ..capture.capture_operators import state as capture_state
 from ..capture.job_operator import JobOperator
+from ..libraries import restore_libraries
 from ..preferences import cache
 from ..reporting import tip_, warning_text
 from ..view.sidebar import redraw_sidebars
@@ -57,12 +58,14 @@ class _LiveOperator(JobOperator):
         """Start the job; return whether that worked."""
         state.message = ""
         state.scene_uid = context.scene.session_uid
+        from ....solver.errors import ScopeError
+
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
+            restore_libraries()
             from .live_job import LiveJob
-        except ImportError as error:
-            return self.fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
-        from ....solver.errors import ScopeError
+        except (ScopeError, ImportError) as error:
+            return self.fail(error)
 
         camera_formats.end()  # the camera is needed
         warm_up.stop()  # its processor time is the capture's; what it has compiled is kept
