@@ -121,6 +121,10 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         poll=lambda _, owner: owner.type == "CAMERA",
         description="Camera whose lens and motion are those of the camera that filmed the footage",
     )
+    smooth_everyone: BoolProperty(
+        name="All People",
+        description="Raw, Normal and Strong act on everybody of the capture",
+    )
     no_result: PointerProperty(type=SCOPE_PG_result)  # stays empty
 
     @property

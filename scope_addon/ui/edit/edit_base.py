@@ -83,10 +83,19 @@ class EditOperator(ReportingOperator):
         from ...scene.animation_data.timing import scene_rate
         from ...scene.animation_data.transaction import all_or_nothing
 
+        message = ""
+        people = self.people(context)
+        rate = scene_rate(context.scene)
+        with all_or_nothing(context.scene, *people):
+            for armature in people:
+                message = self.edit(context, armature, body_of(armature), rate)
+        return message
+
+    def people(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        """Return the captured armatures to edit: the active one."""
         armature = captured_armature(context)
         assert armature is not None  # checked by poll
-        with all_or_nothing(context.scene, armature):
-            return self.edit(context, armature, body_of(armature), scene_rate(context.scene))
+        return [armature]
 
 
 class SpanOperator(EditOperator):

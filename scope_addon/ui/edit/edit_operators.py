@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ..captured_person import motion_of, set_motion_of
+from ...scene.datablock_names import holds
+from ..capture.captures import captures_of, people_of
+from ..captured_person import library_of, motion_of, set_motion_of
 from ..preferences import keep_machine_code
 from .edit_base import EditOperator
 
@@ -40,6 +42,18 @@ class SCOPE_OT_smooth(EditOperator):
         description="0 keeps every frame as captured, 1 is the default of a capture, higher values "
         "smooth more",
     )
+    everyone: BoolProperty(
+        name="All People",
+        description="Smooth everybody of the capture, and not only the selected person",
+    )
+
+    def people(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        """Return the active captured armature, or all local ones of its capture."""
+        (active,) = super().people(context)
+        capture = next((c for c in captures_of(context.scene) if holds(c, active)), None)
+        if not self.everyone or capture is None:
+            return [active]
+        return [person for person in people_of(capture) if library_of(person) is None]
 
     def edit(
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float

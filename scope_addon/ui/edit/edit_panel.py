@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..capture.capture_panel import Tab
+from ..capture.captures import people_of, shown_capture
 from ..captured_person import draw_active_person, has_captured_person
 from ..translations import CONTEXT
 
@@ -26,9 +27,15 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
         layout = self.layout
         if draw_active_person(layout, context) is None:
             return
+        settings = context.scene.scope
         row = layout.row(align=True)
         for text, strength in (("Raw", 0.0), ("Normal", 1.0), ("Strong", 2.5)):
-            row.operator("scope.smooth", text=text).strength = strength
+            smooth = row.operator("scope.smooth", text=text)
+            smooth.strength = strength
+            smooth.everyone = settings.smooth_everyone
+        shown = shown_capture(context.scene)
+        if shown is not None and len(people_of(shown)) > 1:
+            layout.prop(settings, "smooth_everyone")
         column = layout.column(align=True)
         column.operator("scope.interpolate_span", icon="IPO_EASE_IN_OUT")
         column.operator("scope.refloor", icon="TRIA_DOWN_BAR")

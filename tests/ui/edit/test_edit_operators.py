@@ -313,6 +313,25 @@ def test_each_cycle_of_a_loop_continues_from_the_previous_one(rig):
     np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
 
 
+def test_all_people_are_smoothed_at_once_on_request(tmp_path):
+    motions = [motion_of(walk(1.0), noise=0.05, seed=seed) for seed in (0, 1)]
+    for number, motion in enumerate(motions):
+        motion.save(tmp_path / f"{number}.npz")
+    built = build_scene(motions, BODY, None, BuildOptions())
+    people = [person.armature for person in built.people]
+    for number, person in enumerate(people):
+        person["scope_motion"] = str(tmp_path / f"{number}.npz")
+        person["scope_body_file"] = "scope"
+    bpy.context.view_layer.objects.active = people[1]
+    bpy.ops.scope.smooth(strength=0.0)
+    assert [person.get("scope_smoothing") for person in people] == [None, 0.0]
+    bpy.ops.scope.smooth(strength=0.0, everyone=True)
+    assert [person["scope_smoothing"] for person in people] == [0.0, 0.0]
+    for person, motion in zip(people, motions, strict=True):
+        raw = exp(motion.poses_raw.reshape(len(motion), -1, 3).astype(float))
+        assert turned(keys(person)[0].rotations, raw) < 0.01
+
+
 def test_smoothing_a_loop_restores_the_whole_motion(rig):
     last = 1 + round(SECONDS * RATE)
     bpy.ops.scope.smooth()
