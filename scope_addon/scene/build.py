@@ -41,6 +41,8 @@ from .datablock_names import short_name
 from .local_scene import check_local
 
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
+# Custom property of a capture's collection: the names of its markers on the timeline, by lines.
+MARKERS = "scope_markers"
 Progress = Callable[[float, str], None]
 
 
@@ -162,11 +164,13 @@ def _build(
         label = name if len(motions) == 1 else f"{name}_person{index + 1}"
         people.append(_build_person(label, motion, body, collection, rate, options))
     if options.with_markers:
+        names: list[str] = []
         for index, person in enumerate(people):
             prefix = "" if len(people) == 1 else f"person {index + 1} "
-            confidence_curves.add_review_markers(
+            names += confidence_curves.add_review_markers(
                 scene, prefix, person.motion, person.frames, person.under_floor
             )
+        collection[MARKERS] = "\n".join(names)
     if options.with_camera:
         warnings += _build_cameras(name, people, collection, footage, options)
     unit = scene.unit_settings.scale_length

@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
 from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
+from .capture.captures import captures_of, hide_others
 from .declared_properties import blender_property
 from .preferences import preferences
 from .reporting import ReportingOperator, iface_, rpt_, sentence
@@ -71,9 +72,12 @@ class SCOPE_OT_import_motion(ReportingOperator):
             for path in paths
             for imported in import_motions(path, body, self.up_axis.lower(), self.motion_rate)
         ]
+        before = captures_of(context.scene)
         with all_or_nothing(context.scene):
             for path, imported in found:
                 _build(context.scene, path, imported, self._build_options(context.scene))
+        new = [each for each in captures_of(context.scene) if each not in before]
+        hide_others(context.scene, new)
         show_new_capture(context)
         notes = list(dict.fromkeys(note for _, imported in found for note in imported.notes))
         if notes:

@@ -55,6 +55,7 @@ class SCOPE_MT_motion_capture(bpy.types.Menu):
         layout.separator()
         layout.operator("scope.retarget", text="Retarget to Rig", icon="ARMATURE_DATA")
         layout.operator("scope.rename_take", icon="GREASEPENCIL")
+        layout.operator("scope.delete_capture", icon="TRASH")
         layout.operator("scope.push_to_nla", icon="NLA_PUSHDOWN")
         layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
         layout.menu(SCOPE_MT_export.bl_idname, text="Export", icon="EXPORT")

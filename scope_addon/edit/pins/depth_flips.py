@@ -77,11 +77,11 @@ def flipped(
         centers = shot.world_from_camera[cameras, :3, 3]
         part = out.rows(span)
         if flip.part == BODY:
-            changed = list(range(body.K + 1))
+            changed = np.arange(body.K + 1)
             out.rotations[span] = _turned_around(part, body, centers)
         else:
             limb = _limb(body, flip.part)
-            changed = list(limb[:2])
+            changed = np.array(limb[:2])
             upper = _UPPER[flip.part.partition("_")[2]]
             out.rotations[np.ix_(span, changed)] = _mirrored_limb(
                 part, body, betas, centers, limb, upper=upper
@@ -112,7 +112,7 @@ def _turned_around(clip: Clip, body: Body, centers: NDArray[np.float64]) -> NDAr
     is_level = np.linalg.norm(level, axis=1, keepdims=True) > _LEAST_HORIZONTAL
     v = _unit(np.where(is_level, level, sight))
     M = np.eye(3) - 2.0 * v[:, :, None] * v[:, None, :]
-    rotations = _SIDES @ clip.rotations[:, opposite] @ _SIDES
+    rotations: NDArray[np.float64] = _SIDES @ clip.rotations[:, opposite] @ _SIDES
     rotations[:, 0] = M @ clip.rotations[:, 0] @ _SIDES
     return rotations
 
@@ -153,7 +153,8 @@ def _mirrored_limb(
         twist = _twists(rotations[:, 0], rest[second] - rest[first])
         found.append((float(twist.mean()), rotations))
     is_unnatural = len(found) == 2 and found[0][0] > found[1][0] + _MORE_TWIST
-    return found[1][1] if is_unnatural else found[0][1]
+    chosen: NDArray[np.float64] = found[1][1] if is_unnatural else found[0][1]
+    return chosen
 
 
 def _on_ray(
@@ -177,7 +178,8 @@ def _on_ray(
     side = np.where((ray * bone).sum(axis=1) >= 0.0, 1.0, -1.0) * (-1.0 if mirrored else 1.0)
     depth = np.maximum(nearest + side * half, _NEAREST_M)
     direction = _unit(depth[:, None] * ray - start)
-    return start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
+    place: NDArray[np.float64] = start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
+    return place
 
 
 def _turned_bones(
@@ -213,7 +215,10 @@ def _angle_about(
     """
     axis = _unit(axis)
     across = np.cross(axis, start)
-    return np.arctan2((across * end).sum(axis=1), (np.cross(axis, across) * -end).sum(axis=1))
+    sine = (across * end).sum(axis=1)
+    cosine = (np.cross(across, axis) * end).sum(axis=1)
+    angle: NDArray[np.float64] = np.arctan2(sine, cosine)
+    return angle
 
 
 def _twists(rotations: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -223,10 +228,12 @@ def _twists(rotations: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArra
     swing = shortest_turn(
         np.broadcast_to(bone, (len(rotations), 3)), (rotations @ bone[:, None])[..., 0]
     )
-    return np.linalg.norm(log(np.swapaxes(swing, -1, -2) @ rotations), axis=-1)
+    twist: NDArray[np.float64] = log(np.swapaxes(swing, -1, -2) @ rotations)
+    angles: NDArray[np.float64] = np.linalg.norm(twist, axis=-1)
+    return angles
 
 
-def _blend_ends(clip: Clip, span: NDArray[np.intp], joints: list[int]) -> None:
+def _blend_ends(clip: Clip, span: NDArray[np.intp], joints: NDArray[np.intp]) -> None:
     """Blend the joints of a span of keys into those before and after it."""
     times = clip.times
     inside_s = min(_BLEND_S, 0.25 * float(times[span[-1]] - times[span[0]]))
@@ -247,4 +254,5 @@ def _blend_ends(clip: Clip, span: NDArray[np.intp], joints: list[int]) -> None:
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.maximum(length, 1e-12)
+    directions: NDArray[np.float64] = vectors / np.maximum(length, 1e-12)
+    return directions

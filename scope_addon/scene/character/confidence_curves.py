@@ -94,8 +94,8 @@ def add_review_markers(
     motion: Motion,
     frames: NDArray[np.float64],
     under_floor: NDArray[np.bool_] | None = None,
-) -> int:
-    """Add a timeline marker at the start of each review span; return how many.
+) -> list[str]:
+    """Add a timeline marker at the start of each review span; return the names of the new ones.
 
     If there are too many spans, the longest get a marker. Its name states the reason: "not seen
     12-18".
@@ -107,13 +107,15 @@ def add_review_markers(
     spans = sorted(
         find_review_spans(motion, _GAP_S, under_floor), key=lambda span: span.first - span.last
     )[:_MAX_MARKERS]
+    names = []
     there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
     for span in sorted(spans, key=lambda span: span.first):
         at = in_scene(span, frames)
         name = f"{prefix}{MARKER_NAMES[span.reason]} {at}"
         if (name, at.first) not in there:
             scene.timeline_markers.new(name, frame=at.first)
-    return len(spans)
+            names.append(name)
+    return names
 
 
 assert MARKER_NAMES.keys() == REASONS.keys()

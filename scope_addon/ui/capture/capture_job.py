@@ -36,6 +36,7 @@ from ...untrusted.body_file import load_body
 from ..declared_properties import option_values
 from ..preferences import cache, preferences
 from . import preview_picture
+from .captures import hide_others
 from .frame_rate_operators import rate_warnings
 from .result import show_result
 from .scene_camera import scene_camera_path
@@ -186,6 +187,7 @@ def build_capture(
     report = replace(report, warnings=warnings + result.warnings)
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
+    hide_others(scene, [result.collection])
     return result
 
 

@@ -15,11 +15,13 @@ from bpy.props import CollectionProperty, IntProperty, StringProperty
 
 from .. import warm_up
 from ..files.file_field import FootageBrowser, stored_path
+from ..libraries import restore_libraries
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
 from ..view.view_operators import show_new_capture
 from . import preview_picture
+from .captures import unit_text
 from .job_operator import JobOperator, clear_status_bar
 
 if TYPE_CHECKING:
@@ -193,12 +195,14 @@ class SCOPE_OT_capture(JobOperator):
         state.message = ""
         state.scene_uid = context.scene.session_uid
         state.started = time.monotonic()
+        from ....solver.errors import ScopeError
+
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
+            restore_libraries()
             from .capture_job import CaptureJob
-        except ImportError as error:
-            return self.fail(f"a part of Scope cannot be loaded ({error}); reinstall the extension")
-        from ....solver.errors import ScopeError
+        except (ScopeError, ImportError) as error:
+            return self.fail(error)
 
         warm_up.detach()  # the capture compiles what is left; what it has compiled is kept
         try:
@@ -247,7 +251,14 @@ class SCOPE_OT_capture(JobOperator):
             self.fail(error)
             return {"CANCELLED"}
         self.report({"INFO"}, "Capture finished")
+        self._report_unit()
         return {"FINISHED"}
+
+    def _report_unit(self) -> None:
+        """Warn at once of a scene in whose unit the person is not life-size."""
+        scene = next((s for s in bpy.data.scenes if s.session_uid == state.scene_uid), None)
+        if scene is not None and (text := unit_text(scene)):
+            self.report({"WARNING"}, text)
 
     def ask_to_cancel(self) -> None:
         """Ask, if the capture has run for long, and cancel it."""

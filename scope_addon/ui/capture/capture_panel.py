@@ -21,7 +21,7 @@ from ..translations import CONTEXT
 from ..view.comparison import camera_of, cameras_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import state
-from .captures import draw_captures, people_of, people_text, shown_capture
+from .captures import draw_captures, people_of, people_text, shown_capture, unit_text
 from .frame_rate_operators import differs, keyed_for
 from .stored_warnings import stored_warning
 
@@ -178,6 +178,8 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         """Draw the panel."""
         layout = self.layout
         draw_captures(layout, context)
+        if text := unit_text(context.scene):
+            draw_text(context, layout.box(), text, "ERROR")
         camera = camera_of(context.scene)
         if camera is not None:
             back = is_looking_through(context)
@@ -197,7 +199,9 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
             cell = row.column()
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
-        layout.operator("scope.mark_asset", icon="ASSET_MANAGER")
+        row = layout.row(align=True)
+        row.operator("scope.mark_asset", icon="ASSET_MANAGER")
+        row.operator("scope.delete_capture", text="", icon="TRASH")
 
 
 def _draw_compared(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
@@ -221,9 +225,8 @@ def _draw_frame_rate(context: bpy.types.Context, layout: bpy.types.UILayout) -> 
     was = keyed_for(scene)
     if was:
         text = iface_(
-            "The scene's frame rate was changed from {was:.5g} to {now:.5g}, which changed the "
-            "motion's speed; "
-            "importing an FBX file does that",
+            "The motion's keys are for {was:.5g} frames/s, and the scene has {now:.5g}: it plays "
+            "at another speed",
             was=was,
             now=scene.render.fps / scene.render.fps_base,
         )

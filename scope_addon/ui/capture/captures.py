@@ -13,19 +13,22 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import StringProperty
 
+from ...notices import notice
 from ...scene.datablock_names import is_in_layer
 from ..captured_person import captured_armature
-from ..reporting import iface_, tip_
+from ..reporting import iface_, sentence, tip_
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
 CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
+_HIDDEN = "scope_hidden"  # custom property of a collection that was hidden here, not by the user
 # Widths in pixels at a scale of 1: what surrounds a row of the list in the sidebar, an icon, and
 # what the text may be.
 _AROUND = 62.0
 _ICON = 22.0
 _DEFAULT_WIDTH = 260.0
+_SAME_SIZE = 0.01
 # of a text; of a sidebar with room for the words beside the number of people
 _PADDING = 10.0
 _WIDE = 340.0
@@ -49,9 +52,42 @@ def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
     return found[-1] if found else None
 
 
+def hide_others(scene: bpy.types.Scene, shown: Collection[bpy.types.Collection]) -> None:
+    """Hide all captures but the new ones, in whose place they are, in viewports and renders.
+
+    Whoever selects one in the list shows it again.
+    """
+    for capture in captures_of(scene):
+        is_local = capture.library is None and not capture.hide_viewport
+        if capture not in shown and is_local:
+            capture.hide_viewport = capture.hide_render = True
+            capture[_HIDDEN] = True
+
+
+def show_again(capture: bpy.types.Collection) -> None:
+    """Show a capture that `hide_others` has hidden."""
+    if capture.library is None and _HIDDEN in capture:
+        del capture[_HIDDEN]
+        capture.hide_viewport = capture.hide_render = False
+
+
 def people_of(capture: bpy.types.Collection) -> list[bpy.types.Object]:
     """Return the captured armatures of a capture; empty if they were deleted."""
     return [obj for obj in capture.all_objects if obj.type == "ARMATURE" and "scope_source" in obj]
+
+
+def unit_text(scene: bpy.types.Scene) -> str:
+    """Return what to say of a scene whose unit is not a metre; empty if the shown people have their
+    size in it.
+    """
+    unit_m = scene.unit_settings.scale_length
+    capture = shown_capture(scene)
+    people = people_of(capture) if capture else []
+    scales = [person.matrix_world.median_scale * unit_m for person in people]
+    if all(abs(scale - 1.0) < _SAME_SIZE for scale in scales):
+        return ""
+    warning = notice("scene_unit", unit_m=unit_m, scale=1.0 / unit_m)
+    return sentence(warning.text(iface_))
 
 
 def people_text(count: int) -> str:
@@ -74,6 +110,7 @@ def show_index(settings: bpy.types.PropertyGroup, index: int) -> None:
     """Show the capture at an index among the file's collections."""
     if 0 <= index < len(bpy.data.collections):
         settings.capture = bpy.data.collections[index]
+        show_again(settings.capture)
         _make_active(settings.capture)
 
 
@@ -148,6 +185,7 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
         if capture not in captures_of(context.scene):
             return {"CANCELLED"}
         context.scene.scope.capture = capture
+        show_again(capture)
         _make_active(capture)
         return {"FINISHED"}
 

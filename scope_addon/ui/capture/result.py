@@ -54,7 +54,8 @@ def show_result(
     shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
     for warning in report.warnings:
-        if warning.code != "implausible":  # its frames are among the spans
+        # The frames of the first are among the spans; the panel itself says the second.
+        if warning.code not in ("implausible", "scene_unit"):
             add_warning(shown, warning)
     for index, person in enumerate(result.people, 1):
         number = 0 if len(result.people) == 1 else index

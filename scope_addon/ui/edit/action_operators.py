@@ -6,8 +6,10 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from ..capture.captures import show_again, shown_capture
 from ..captured_person import PERSON, captured_armature
 from ..reporting import ReportingOperator, rpt_, tip_
+from ..view import comparison
 
 
 def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -82,13 +84,8 @@ class SCOPE_OT_push_to_nla(ActionOperator):
         )
 
 
-class SCOPE_OT_rename_take(ReportingOperator):
-    """Rename the capture with its objects and actions; exported animation has the same name"""
-
-    bl_idname = "scope.rename_take"
-    bl_label = "Rename Take"
-
-    name: StringProperty(name="Name", description="New name of the take")
+class CaptureOperator(ReportingOperator):
+    """An operator on the capture that the panel shows. Not registered"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -104,6 +101,15 @@ class SCOPE_OT_rename_take(ReportingOperator):
             )
             return False
         return True
+
+
+class SCOPE_OT_rename_take(CaptureOperator):
+    """Rename the capture with its objects and actions; exported animation has the same name"""
+
+    bl_idname = "scope.rename_take"
+    bl_label = "Rename Take"
+
+    name: StringProperty(name="Name", description="New name of the take")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the name."""
@@ -128,6 +134,29 @@ class SCOPE_OT_rename_take(ReportingOperator):
             raise UsageError("the take has no name; enter one")
         _rename(context.scene.scope.result.collection, short_name(self.name.strip()))
         return ""
+
+
+class SCOPE_OT_delete_capture(CaptureOperator):
+    """Remove the shown capture: its people, their motion, the camera and its footage"""
+
+    bl_description = (
+        "Remove the shown capture: its people, their motion, the camera and its footage. Rigs that "
+        "it was retargeted to keep their motion"
+    )
+    bl_idname = "scope.delete_capture"
+    bl_label = "Delete Capture"
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Remove it, and show the capture before it."""
+        from ...scene.delete_capture import delete_capture
+
+        collection = context.scene.scope.result.collection
+        name = collection.name
+        comparison.end_of(collection)
+        delete_capture(context.scene, collection)
+        if (before := shown_capture(context.scene)) is not None:
+            show_again(before)
+        return rpt_("Removed '{name}'", name=name)
 
 
 def _rename(collection: bpy.types.Collection, name: str) -> None:
@@ -157,4 +186,4 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     follow_renaming({before: obj.name for before, obj in armatures.items()})
 
 
-CLASSES = (SCOPE_OT_push_to_nla, SCOPE_OT_rename_take)
+CLASSES = (SCOPE_OT_push_to_nla, SCOPE_OT_rename_take, SCOPE_OT_delete_capture)

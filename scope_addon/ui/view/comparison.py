@@ -108,6 +108,16 @@ def end_others(scene: bpy.types.Scene, shown: bpy.types.Collection) -> None:
                 _close_later(side)
 
 
+def end_of(shown: bpy.types.Collection) -> None:
+    """End every comparison of a capture."""
+    for window, area in viewports():
+        space = area.spaces.active
+        if space.local_view and space.camera is not None and holds(shown, space.camera):
+            end(window, area)
+            if side := side_area(window.screen):
+                _close_later(side)
+
+
 def _close_later(side: bpy.types.Area) -> None:
     """Close the side view when no operator runs: Blender crashes when a running one's context was
     closed.

@@ -5,7 +5,13 @@ armatures.
 
 import bpy
 import pytest
-from scope.scope_addon.ui.capture.captures import captures_of, elided, people_of, shown_capture
+from scope.scope_addon.ui.capture.captures import (
+    captures_of,
+    elided,
+    people_of,
+    shown_capture,
+    unit_text,
+)
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
 
 
@@ -257,3 +263,103 @@ def test_a_text_without_its_middle_is_as_long_as_it_may_be(width):
         assert "abcdefghij".endswith(tail)
     elif width >= 10:
         assert text == "abcdefghij"
+
+
+def is_visible(name: str) -> bool:
+    bpy.context.view_layer.update()
+    people = people_of(bpy.data.collections[name])
+    in_renders = not bpy.data.collections[name].hide_render
+    assert in_renders == all(person.visible_get() for person in people)
+    return in_renders
+
+
+def test_a_new_capture_hides_the_earlier_ones_and_the_list_shows_them_again(two, tmp_path):
+    assert (is_visible("person"), is_visible("other")) == (False, True)
+    select("person")
+    assert (is_visible("person"), is_visible("other")) == (True, True)
+    # Hidden by the user, a capture stays so.
+    bpy.data.collections["other"].hide_viewport = True
+    select("other")
+    assert bpy.data.collections["other"].hide_viewport
+
+
+def test_several_motions_that_are_imported_together_do_not_hide_each_other(two, standing, tmp_path):
+    for number in (1, 2):
+        standing.save(tmp_path / f"take{number}.npz")
+    files = [{"name": f"take{number}.npz"} for number in (1, 2)]
+    bpy.ops.scope.import_motion(
+        filepath=str(tmp_path / "take1.npz"), directory=str(tmp_path), files=files
+    )
+    visible = {c.name for c in captures_of(bpy.context.scene) if is_visible(c.name)}
+    assert visible == {"take1", "take2"}
+
+
+def test_a_deleted_capture_leaves_nothing_and_the_one_before_it_is_shown(two, contents):
+    scene = bpy.context.scene
+    scene.timeline_markers.new("mine", frame=3)
+    before = set(scene.timeline_markers.keys())
+    person = bpy.data.objects["person"]
+    own = bpy.data.objects.new("prop", None)
+    bpy.data.collections["other"].objects.link(own)
+    own.parent = people_of(bpy.data.collections["other"])[0]
+    own.location = (1.0, 2.0, 3.0)
+    bpy.context.view_layer.update()
+    assert bpy.ops.scope.delete_capture() == {"FINISHED"}
+    assert listed() == ["person"]
+    assert shown() == ("person", 1, "First")
+    assert is_visible("person")
+    found = contents()
+    assert found["collections"] == ["person"]
+    assert found["armatures"] == ["person"]
+    assert found["cameras"] == ["person_camera"]
+    assert found["actions"] == ["person"]
+    assert not [name for name in found["images"] + found["movieclips"] if "other" in name]
+    assert sorted(scene.objects.keys()) == ["person", "person_body", "person_camera", "prop"]
+    assert tuple(own.matrix_world.translation) == (1.0, 2.0, 3.0)
+    # Of both captures, only the first had markers that were not there before.
+    assert set(scene.timeline_markers.keys()) <= before
+    assert "mine" in scene.timeline_markers
+    person.name = "hero"
+    assert bpy.ops.scope.delete_capture() == {"FINISHED"}
+    found = contents()
+    del found["range"], found["rate"]
+    assert {kind for kind, names in found.items() if names} == {"objects"}
+    assert found["objects"] == ["prop"]
+    assert [marker.name for marker in scene.timeline_markers] == ["mine"]
+    assert not bpy.data.texts
+    assert not bpy.ops.scope.delete_capture.poll()
+
+
+def test_a_capture_whose_armature_was_deleted_can_be_deleted(fake_worker, footage, contents):
+    capture(fake_worker, footage)
+    bpy.data.objects.remove(bpy.data.objects["person"])
+    assert "person_body" in bpy.data.objects
+    bpy.ops.scope.delete_capture()
+    assert contents()["objects"] == []
+    assert contents()["collections"] == []
+
+
+def test_data_that_something_else_uses_stays(fake_worker, footage):
+    capture(fake_worker, footage)
+    copy = bpy.data.objects["person"].copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.ops.scope.delete_capture()
+    assert copy.animation_data.action.name == "person"
+    assert copy.data.name == "person"
+    assert isinstance(copy["scope_motion"], bpy.types.Text)
+
+
+@pytest.mark.parametrize("unit", [0.01, 1.0, 0.3048])
+def test_a_scene_with_another_unit_is_said_at_once(fake_worker, footage, unit):
+    scene = bpy.context.scene
+    scene.unit_settings.scale_length = unit
+    capture(fake_worker, footage)
+    text = unit_text(scene)
+    assert bool(text) == (unit != 1.0)
+    if text:
+        assert f"unit is {unit:g} m" in text
+        assert f"by {1 / unit:g}" in text
+        assert not any("unit" in warning.text for warning in scene.scope.result.warnings)
+        bpy.data.objects["person"].scale = [1.0 / unit] * 3
+        bpy.context.view_layer.update()
+        assert unit_text(scene) == ""
