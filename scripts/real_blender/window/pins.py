@@ -170,6 +170,8 @@ def pressed() -> Iterator[float]:
         )
         assert keys() != before
         yield from undone(before)
+    # Blender's preferences would warn of the extension.
+    assert not [name for name in sys.modules if name.partition(".")[0] == "scope"]
     yield from press(FLOOR_HERE, lambda: [entry["kind"] for entry in listed()] == ["FLOOR"])
     yield from undone(before)
 

@@ -159,6 +159,9 @@ def edits() -> dict[str, Callable[[], object]]:
             scope.set_upright_in_view, end=(0.0, 0.1, 1.5), direction=(1.0, 0.0, 0.0)
         ),
         "floor here": lambda: use(scope.floor_here),
+        "flip limb": lambda: use(scope.flip_limb, start=10, end=20, limb="left_leg"),
+        "turn around": lambda: use(scope.turn_around, start=10, end=20),
+        "delete capture": lambda: use(scope.delete_capture),
         "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }
 
