@@ -137,6 +137,13 @@ def check_options(body: Body, options: CaptureOptions, has_views: bool = False) 
         read_calibration(options.calibration)
     if options.offsets_s and not has_views:
         raise UsageError("--offset is for several cameras, but one video was given")
+    if options.belt_speed_m_s and not options.treadmill:
+        raise UsageError("--belt-speed is for people on a treadmill: add --treadmill")
+    if options.belt_speed_m_s and (options.camera_path or has_views):
+        raise UsageError(
+            "--belt-speed moves the camera along with the people, which contradicts a given path "
+            "of the camera, and several cameras: leave out one of them"
+        )
     if options.camera_path:
         read_camera_path(options.camera_path)
         if options.wanted.view != AS_IN_FILE:

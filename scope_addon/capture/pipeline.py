@@ -95,6 +95,8 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         source=display_text(Path(video.path).name),
         smoothing=options.smoothing and frames > 1,
         uneven_ground=options.uneven_ground,
+        treadmill=options.treadmill,
+        belt_m_s=options.belt_speed_m_s,
         view=video.wanted.view,
         speed=speed,
         travel=footage.camera_motion.travel,

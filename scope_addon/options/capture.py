@@ -411,6 +411,28 @@ class CaptureDeclaration:
         argument=Argument(help="feet rest at any height, as on stairs or slopes, not on one floor"),
         blender=Property(section=Section.MOTION),
     )
+    treadmill: bool = declared(
+        False,
+        _EVERYWHERE,
+        "people walk or run on a treadmill or on the spot: they stay there, and no foot is held in "
+        "place",
+        blender=Property(section=Section.MOTION),
+    )
+    belt_speed_m_s: float = declared(
+        0.0,
+        _EVERYWHERE,
+        "speed of the treadmill's belt, with which people then walk over the floor; 0: they stay",
+        unit="m/s",
+        minimum=0.0,
+        maximum=15.0,
+        argument=Argument("--belt-speed", "M/S", default_text="0, people stay"),
+        blender=Property(
+            "belt_speed",
+            "Belt Speed (m/s)",
+            value=lambda settings: settings.belt_speed if settings.treadmill else 0.0,
+            section=Section.MOTION,
+        ),
+    )
 
 
 CAPTURE_OPTIONS = options_of(CaptureDeclaration)

@@ -41,7 +41,8 @@ FLAGS = """
 --quality --people --person --start --end --rotate --mirror --crop --fps --speed --body --hands
 --face --height --focal-mm --fov --calibration --offset --camera-path
 --no-smoothing
---uneven-ground --shape-keys --bvh-unit --skeleton --file-per-person --retarget --rig-object
+--uneven-ground --treadmill --belt-speed
+--shape-keys --bvh-unit --skeleton --file-per-person --retarget --rig-object
 --bone-map --expression-map
 --retarget-root --detector --keypoints --provider --threads --json --quiet
 """.split()

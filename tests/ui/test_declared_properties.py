@@ -65,6 +65,8 @@ LABELS = {
     "range_end": "To",
     "smoothing": "Smooth",
     "uneven_ground": "Uneven Ground",
+    "treadmill": "Treadmill",
+    "belt_speed": "Belt Speed (m/s)",
     "frame_rate": "Frame Rate",
     "start_frame": "First Frame",
     "set_frame_range": "Set Frame Range",

@@ -26,7 +26,7 @@ from ..world.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
 from ..world.stance import stance_on_ground
-from ..world.strides import contradicting_strides
+from ..world.strides import belt_travel, contradicting_strides
 from ..world.travel_scale import scaled_travel
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
@@ -113,7 +113,13 @@ class Person:
         )
 
     def check_strides(self, shot: Shot) -> None:
-        """Let no foot rest where strides contradict the camera's path."""
+        """Let no foot rest where strides contradict the camera's path, nor on a treadmill whose
+        speed is unknown.
+        """
+        if shot.treadmill:
+            is_sliding = np.ones(len(self.track), bool)
+            self.contradicts = None if shot.belt_m_s else is_sliding
+            return
         placed = self.fitted_places(shot)
         contradicts = contradicting_strides(placed, world_of(shot, [placed]).up)
         self.contradicts = contradicts if contradicts.any() else None
@@ -196,7 +202,7 @@ def solve_people(shot: Shot, people: Sequence[Person], known: int) -> Solved:
         person.settle(shot)
     world = world_of(shot, [person.placed for person in people], shot.floor_up)
     motions = [person.finish(shot, world, number) for number, person in enumerate(people)]
-    contradictions = [person.contradicts for person in people]
+    contradictions = [None if shot.treadmill else person.contradicts for person in people]
     return Solved(motions, shot.path, iterations, world.up_source, contradictions, shot.has_scale)
 
 
@@ -253,17 +259,25 @@ def resize_people(shot: Shot, people: Sequence[Person], known: int) -> None:
 
 def with_camera_path(shot: Shot, first: Person) -> Shot:
     """Return the shot with the camera's path, unless that is given; one person tells the scale of a
-    travel that the background shows, and otherwise the travel of a rotating camera.
+    travel that the background shows, and otherwise the travel of a rotating camera. Feet on a
+    treadmill do not tell it; where its speed is given, the camera travels along with the person.
     """
-    if shot.path.is_static or shot.is_still or shot.T_world_first is not None:
+    is_known = shot.path.is_static or shot.T_world_first is not None
+    if shot.is_still or (is_known and not shot.belt_m_s):
         return shot
     placed = first.fitted_places(shot)
     up = world_of(shot, [placed]).up
+    if shot.treadmill and shot.travel is None:
+        center = belt_travel(placed, up, shot.belt_m_s)
+        return replace(shot, path=replace(shot.path, center=center))
     if shot.travel is None:
         center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
         return replace(shot, path=replace(shot.path, center=center))
     scaled = scaled_travel(placed.soles, placed.valid, up, placed.times, shot.travel)
-    path = replace(shot.path, center=scaled.center)
+    center = scaled.center
+    if shot.belt_m_s:
+        center = center + belt_travel(placed, up, shot.belt_m_s)
+    path = replace(shot.path, center=center)
     return replace(shot, path=path, floor_up=scaled.floor_up, has_scale=scaled.is_known)
 
 

@@ -190,6 +190,8 @@ class Shot:
     source: str  # name of the footage
     smoothing: bool = True  # False: every frame is fitted alone
     uneven_ground: bool = False  # True: feet rest at any height
+    treadmill: bool = False  # people walk in place
+    belt_m_s: float = 0.0  # speed with which they travel instead, if it is not 0
     view: FootageView = AS_IN_FILE  # how the footage was turned
     speed: float = 1.0  # how many times as fast as the footage plays everything happened
     travel: Odometry | None = None  # of the camera, up to scale, if the background shows it

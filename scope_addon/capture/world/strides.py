@@ -9,7 +9,8 @@ walker travels at
 each foot stands while the other overtakes it, so a changes by twice a step for every step. Somebody
 who does that and does not travel is on a treadmill, or the camera moves and the background does not
 show it, which look the same. Feet that were locked there would stretch or stop the strides, so
-nothing is held in place, and the capture says so.
+nothing is held in place, and the capture says so, unless the user has said that it is a treadmill.
+On the belt itself, people travel at its speed, and feet rest as on a floor.
 """
 
 from __future__ import annotations
@@ -32,6 +33,18 @@ MIN_STEP_M = 0.12
 ALTERNATION_S = 0.8  # to either side
 SHORTEST_S = 1.5
 MARGIN_S = 0.3  # by which such times are prolonged at both ends
+
+
+def belt_travel(placed: PlacedTrack, up: FloatArray, belt_m_s: float) -> Float64Array:
+    """Return the (T, 3) displacement since the first frame of a camera that stands beside a
+    treadmill, in the axes in which the belt is at rest: the camera then goes where a person faces.
+
+    :param up: (3,) unit vector.
+    """
+    ahead = _facing(placed, up)[placed.valid].mean(axis=0)
+    ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
+    travel: Float64Array = belt_m_s * (placed.times - placed.times[0])[:, None] * ahead
+    return travel
 
 
 def contradicting_strides(placed: PlacedTrack, up: FloatArray) -> BoolArray:

@@ -58,6 +58,23 @@ def steps(
     trans = np.stack(
         [right_m + 0.4 * share, 3.5 + DEEPER_M * share, standing_m + height_m * share], axis=1
     )
+    return track_of(rotations, facing, trans, betas, T_camera_world)
+
+
+def track_of(
+    rotations: np.ndarray,
+    facing: np.ndarray,
+    trans: np.ndarray,
+    betas: np.ndarray,
+    T_camera_world: np.ndarray = T_CAMERA_WORLD,
+) -> Track:
+    """Return the exact track of a body whose root (3, 3) keeps its direction in the world.
+
+    :param rotations: (T, K + 1, 3, 3), of which the root's are replaced.
+    :param trans: (T, 3) in the world, as SMPL means it.
+    """
+    times = np.arange(len(trans)) / RATE
+    rotations = rotations.copy()
     rotations[:, 0] = T_camera_world[..., :3, :3] @ facing
     pelvis = BODY.rest_joints(betas)[0]
     root = transform_points(T_camera_world, (trans + pelvis)[:, None])[:, 0]
