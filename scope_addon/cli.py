@@ -40,7 +40,6 @@ from .command_line.outputs import (
     files_to_read,
     refuse_inputs,
     summary,
-    write_calibration,
     write_outputs,
 )
 from .command_line.problem_command import add_problem_report
@@ -331,6 +330,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
+    from .capture.camera.calibration import write_calibration
     from .capture.long_clips.windowed_clip import lasting
     from .capture.overlay.overlay_video import write_overlay
     from .capture.pipeline import capture

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ...solver.body_file import ASSETS
-from ..atomic_write import atomic_path, reason
 from ..counts import counted
-from ..errors import OutputError, UsageError
+from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
@@ -291,20 +290,6 @@ def write_outputs(
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
             written += files
     return written, warnings
-
-
-def write_calibration(path: Path, motion: Motion) -> None:
-    """Write the cameras of a motion as a TOML file.
-
-    :raises OutputError: the file cannot be written.
-    """
-    from ..capture.camera.calibration import calibration_text
-
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_text(calibration_text(motion), encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
 def _footage(video: Path, args: argparse.Namespace) -> Path | None:

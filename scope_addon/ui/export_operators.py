@@ -12,10 +12,11 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
 from ..scene.datablock_names import holds
-from .capture.captures import captures_of, shown_capture
+from .capture.captures import captures_of, people_of, shown_capture
 from .captured_person import PERSON, motion_of
 from .declared_properties import with_options
 from .reporting import ReportingOperator, rpt_, tip_
+from .view.comparison import cameras_of
 
 FORMATS = (
     (
@@ -119,10 +120,7 @@ class SCOPE_OT_export(ReportingOperator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
         suffix = _SUFFIX[self.format]
-        shown = shown_capture(context.scene)
-        name = re.sub(r'[\\/:*?"<>|]', "_", shown.name) if shown else "capture"
-        folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
-        self.filepath = str(folder / f"{name}{suffix}")
+        self.filepath = str(_proposed(context, suffix))
         self.filter_glob = f"*{suffix}"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -201,6 +199,54 @@ class SCOPE_OT_export(ReportingOperator):
         )
 
 
+class SCOPE_OT_save_calibration(ReportingOperator):
+    """Save the lenses and places of the cameras, for further takes of the same cameras"""
+
+    bl_idname = "scope.save_calibration"
+    bl_label = "Save Calibration"
+    bl_options = {"REGISTER"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN", "SKIP_SAVE"})
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a capture with several cameras."""
+        return len(cameras_of(context.scene)) > 1
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        self.filepath = str(_proposed(context, ".toml"))
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write the file.
+
+        :raises UsageError: the file has no name or folder, or the captured person was deleted.
+        """
+        from ..capture.camera.calibration import write_calibration
+        from ..errors import UsageError
+        from ..scene.export.output_paths import check_output
+        from .files.output_file import output_file
+
+        path = check_output(output_file(self.filepath, ".toml"), (".toml",))
+        people = people_of(shown_capture(context.scene))
+        if not people:
+            raise UsageError("the captured person was deleted; undo that or capture again")
+        write_calibration(path, motion_of(people[0]))
+        return rpt_("Wrote {files} in {folder}", files=path.name, folder=path.parent)
+
+
+def _proposed(context: bpy.types.Context, suffix: str) -> Path:
+    """Return the file that is proposed for the shown capture."""
+    shown = shown_capture(context.scene)
+    name = re.sub(r'[\\/:*?"<>|]', "_", shown.name) if shown else "capture"
+    folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
+    return folder / f"{name}{suffix}"
+
+
 def is_available(kind: str) -> bool:
     """Return whether this build of Blender can write a format, a key of ``FORMATS``."""
     return kind != "USDC" or "usd_export" in dir(bpy.ops.wm)
@@ -216,4 +262,4 @@ def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> 
     )
 
 
-CLASSES = (SCOPE_OT_export,)
+CLASSES = (SCOPE_OT_export, SCOPE_OT_save_calibration)

@@ -44,7 +44,7 @@ WRITES = {
     # a recording that grows
     "scope_addon/live/outputs/journal.py",
     # the content of temporary files
-    "scope_addon/command_line/outputs.py",
+    "scope_addon/capture/camera/calibration.py",
     "scope_addon/scene/export/trc.py",
     "scope_addon/capture/media/file_names.py",
     "scope_addon/capture/overlay/overlay_video.py",

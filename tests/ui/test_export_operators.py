@@ -3,16 +3,22 @@
 
 import os
 import sys
+from dataclasses import replace
 
 import bpy
 import pytest
+from scope.scope_addon.capture.camera.calibration import calibration_text
+from scope.scope_addon.capture_report import Report
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.build import BuildOptions
 from scope.scope_addon.scene.visibility import hide
+from scope.scope_addon.ui.capture.capture_job import build_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
 from scope.scope_addon.ui.live.live_job import live_rig
 from scope.solver.body_file import load_body
 
 from ..edit.walking import motion_of, walk
+from ..made_motion import made_views
 from ..scene.made_rigs import captured
 
 
@@ -88,3 +94,27 @@ def test_what_the_view_layer_excludes_is_not_taken_for_the_other(both, which):
     assert not bpy.ops.scope.retarget.poll()
     with pytest.raises(UsageError, match="no rig of this scene's view layer is chosen"):
         live_rig(context.scene, load_body("scope"))
+
+
+def test_the_cameras_of_a_capture_are_saved_as_a_calibration(standing, tmp_path):
+    scene = bpy.context.scene
+    motion = replace(standing, views=made_views(0.5))
+    build_capture(
+        scene, [(tmp_path / "a.npz", motion.to_bytes())], "scope", "", Report(), BuildOptions()
+    )
+    path = tmp_path / "found.toml"
+    assert bpy.ops.scope.save_calibration(filepath=str(path)) == {"FINISHED"}
+    assert path.read_text("utf-8") == calibration_text(motion)
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.scope.save_calibration(filepath=str(tmp_path / "none" / "found.toml"))
+    mirrored = replace(motion, footage_mirrored=True).to_bytes()
+    build_capture(scene, [(tmp_path / "b.npz", mirrored)], "scope", "", Report(), BuildOptions())
+    with pytest.raises(RuntimeError, match="was mirrored"):
+        bpy.ops.scope.save_calibration(filepath=str(tmp_path / "b.toml"))
+    assert sorted(each.name for each in tmp_path.glob("*.toml")) == ["found.toml"]
+
+
+def test_one_camera_has_no_calibration_to_save(standing, tmp_path):
+    content = [(tmp_path / "a.npz", standing.to_bytes())]
+    build_capture(bpy.context.scene, content, "scope", "", Report(), BuildOptions())
+    assert not bpy.ops.scope.save_calibration.poll()

@@ -36,6 +36,8 @@ import numpy as np
 from ....solver.errors import InputError
 from ....solver.rotations import exp, log
 from ...arrays import Float64Array
+from ...atomic_write import atomic_path, reason
+from ...errors import OutputError, UsageError
 from ...json_file import read_json_object
 from ...motion import Motion
 from ...untrusted.files import check_regular, in_one_line
@@ -224,6 +226,23 @@ def _world_to_camera(path: Path, name: str, table: dict[str, Any]) -> Float64Arr
     T[:3, :3] = exp(rotation.ravel())
     T[:3, 3] = translation.ravel()
     return T
+
+
+def write_calibration(path: Path, motion: Motion) -> None:
+    """Write the cameras of a motion; see `calibration_text`.
+
+    :raises UsageError: the footage is mirrored, as which no camera has seen it.
+    :raises OutputError: the file cannot be written.
+    """
+    if motion.view.is_mirrored:
+        raise UsageError(
+            "the footage was mirrored, so its cameras have no places; capture without --mirror"
+        )
+    try:
+        with atomic_path(path) as temporary:
+            temporary.write_text(calibration_text(motion), encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
 def calibration_text(motion: Motion) -> str:

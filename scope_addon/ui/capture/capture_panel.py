@@ -269,6 +269,8 @@ class SCOPE_PT_figures(Tab, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
         _draw_figures(context, self.layout, context.scene.scope.result)
+        if len(cameras_of(context.scene)) > 1:
+            self.layout.operator("scope.save_calibration", icon="FILE_TICK")
 
 
 def _draw_figures(
