@@ -61,10 +61,9 @@ class GivenPath:
                 "poses of all frames, or capture the part that has them"
             )
         after = np.clip(np.searchsorted(known, times_s, side="right"), 1, len(steps))
-        is_alone = np.abs(times_s[:, None] - known[np.stack([after - 1, after], axis=1)]).min(
-            axis=1
-        )
-        in_gap = (steps[after - 1] > LONGEST_GAP_S) & (is_alone > margin)
+        around = known[np.stack([after - 1, after], axis=1)]
+        nearest_s = np.abs(times_s[:, None] - around).min(axis=1)
+        in_gap = (steps[after - 1] > LONGEST_GAP_S) & (nearest_s > margin)
         if in_gap.any():
             gap = int(after[in_gap.argmax()])
             raise InputError(
