@@ -33,8 +33,9 @@ def restore_libraries() -> None:
     importlib.invalidate_caches()
     if missing := _missing():
         raise SetupError(
-            f"{', '.join(missing)} is missing, which another Blender may have removed: disable "
-            "Scope in the preferences and enable it again; if that does not help, reinstall it"
+            f"a part of Scope is missing ({', '.join(missing)}), which another Blender may have "
+            "removed: disable Scope in the preferences and enable it again; if that does not help, "
+            "reinstall it"
         )
 
 

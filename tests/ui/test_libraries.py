@@ -52,7 +52,7 @@ def test_a_removed_library_is_put_back(enabled, monkeypatch):
 
 def test_one_that_stays_missing_is_said_with_what_to_do(enabled, monkeypatch):
     use_blender(monkeypatch, lambda ensure_wheels: None)
-    with pytest.raises(SetupError, match=r"scope_needs_this is missing.*disable Scope.*enable it"):
+    with pytest.raises(SetupError, match=r"missing \(scope_needs_this\).*disable Scope.*enable it"):
         libraries.restore_libraries()
 
 
