@@ -10,7 +10,7 @@ and the errors, the body files and the command line do without it.
 
 import ast
 import tomllib
-from importlib import import_module, metadata
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,6 +105,8 @@ if not TYPE_CHECKING:
         manifest = Path(__file__).parents[1] / "blender_manifest.toml"
         if manifest.is_file():
             return str(tomllib.loads(manifest.read_text("utf-8"))["version"])
+        from importlib import metadata  # which takes long to load, as Blender starts
+
         return metadata.version("scope-mocap")
 
     def __dir__() -> list[str]:
