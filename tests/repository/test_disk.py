@@ -25,6 +25,8 @@ REMOVES = {
     "scope_addon/cluster/remote.py": "in stores",
 }
 WRITES = {
+    # in the folder that Blender removes with its session
+    "scope_addon/ui/capture/scene_camera.py",
     # folders
     "scope_addon/temporary.py",
     "scope_addon/machine_code/code_files.py",

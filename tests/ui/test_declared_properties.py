@@ -40,7 +40,16 @@ STORED = {
 }
 # of paths; they store nothing themselves
 _TEXTS = ("footage_text", "body_file_text", "calibration_file_text")
-_NOT_OPTIONS = ("rna_type", "name", "views", "capture", "capture_index", "no_result", *_TEXTS)
+_NOT_OPTIONS = (
+    "rna_type",
+    "name",
+    "views",
+    "capture",
+    "capture_index",
+    "no_result",
+    "smooth_everyone",
+    *_TEXTS,
+)
 LABELS = {
     "footage": "Footage",
     "quality": "Quality",
