@@ -92,7 +92,7 @@ def _entry(
         Pin,
         Upright,
     )
-    from .corrections.corrected_keys import scene_frame
+    from .corrections.corrected_keys import frames_that_show, scene_frame
 
     whole = int(motion.frames[0]), int(motion.frames[-1])
     if isinstance(correction, Pin):
@@ -129,7 +129,10 @@ def _entry(
         kind = "EXCHANGE"
         text = f"{what} Exchanged"
         span = (correction.first, correction.last)
-    first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
+    if span[0] == span[1]:
+        first, last = frames_that_show(armature, motion, span[0], rate)
+    else:
+        first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
     joint = correction.joint if isinstance(correction, Pin) else ""
     return {"kind": kind, "text": text, "first": first, "last": last, "joint": joint}
 

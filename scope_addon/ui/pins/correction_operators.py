@@ -73,7 +73,8 @@ def _unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
     does.
     """
     for entry in listed_corrections(armature):
-        if entry["joint"] == joint and abs(entry["first"] - frame) <= 1 and entry["missed"]:
+        is_here = entry["first"] - 1 <= frame <= entry["last"] + 1
+        if entry["joint"] == joint and is_here and entry["missed"]:
             return rpt_(
                 "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or "
                 "pin the pelvis too",

@@ -264,7 +264,11 @@ def _draw(session: _Session) -> None:
     here = context.area.as_pointer() == session.area
     frame = context.scene.frame_current
     scale = context.preferences.system.ui_scale
-    pins = [e for e in listed_corrections(armature) if e["kind"] == "PIN" and e["first"] == frame]
+    pins = [
+        each
+        for each in listed_corrections(armature)
+        if each["kind"] == "PIN" and each["first"] <= frame <= each["last"]
+    ]
     # how far away the joint stays; empty where it does not
     missed = {e["joint"]: e["missed"] for e in pins}
     gpu.state.blend_set("ALPHA")

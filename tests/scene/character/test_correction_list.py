@@ -2,8 +2,10 @@
 """The corrections of a motion file are listed with the armature that is built from it."""
 
 import json
+from dataclasses import replace
 
 import bpy
+import numpy as np
 import pytest
 from scope.scope_addon.edit.pins.corrected_motion import with_corrections
 from scope.scope_addon.edit.pins.corrections import (
@@ -14,9 +16,16 @@ from scope.scope_addon.edit.pins.corrections import (
     Interpolation,
     Pin,
 )
+from scope.scope_addon.errors import UsageError
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.character.corrections.corrected_keys import (
+    frames_that_show,
+    scene_frame,
+    source_frame,
+    whole_span,
+)
 
 from ...edit.walking import BODY, motion_of, walk
 
@@ -45,7 +54,7 @@ def test_a_corrected_file_brings_its_list(tmp_path):
     options = BuildOptions(start_frame=11.0)
     rig = build_scene([Motion.load(tmp_path / "a.npz")], BODY, None, options).people[0].armature
     assert [(e["text"], e["first"], e["last"]) for e in listed_corrections(rig)] == [
-        ("Left Wrist", 51, 51),
+        ("Left Wrist", 51, 52),
         ("Right Foot Stands", 71, 79),
         ("Legs Exchanged", 17, 21),
         ("Right Forearm", 23, 27),
@@ -54,6 +63,28 @@ def test_a_corrected_file_brings_its_list(tmp_path):
         ("Feet on the Floor", 11, 131),
     ]
     assert listed_corrections(build_scene([plain], BODY, None, options).people[0].armature) == []
+
+
+@pytest.mark.parametrize("rate", [24, 30, 60])
+def test_a_pin_is_listed_at_the_scene_frame_where_it_was_placed(rate):
+    """In footage of variable frame rate, whose keys lie between whole frames of the scene."""
+    plain = motion_of(walk(2.0))
+    rng = np.random.default_rng(4)
+    times = plain.timestamps + rng.uniform(-0.012, 0.012, len(plain))
+    times[30:] += 0.1  # The footage lacks three frames.
+    motion = replace(plain, timestamps=times)
+    bpy.context.scene.render.fps = rate
+    rig = build_scene([motion], BODY, None, BuildOptions()).people[0].armature
+    first, last = whole_span(rig, motion, rate)
+    for frame in range(first, last + 1):
+        try:
+            source = source_frame(rig, motion, frame, rate)
+        except UsageError:  # A gap.
+            continue
+        shown = frames_that_show(rig, motion, source, rate)
+        assert shown[0] <= frame <= shown[1]
+        exact = scene_frame(rig, motion, source, rate)
+        assert shown[0] - 1 < exact < shown[1] + 1
 
 
 @pytest.mark.parametrize(

@@ -208,15 +208,52 @@ def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate:
             f"{last}; go to one of these"
         )
     time = frame / rate - _start(armature, rate)
-    row = int(np.abs(motion.timestamps - time).argmin())
-    spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
-    if abs(motion.timestamps[row] - time) > max(spacing, 1.0 / rate):
+    row = int(_nearest_rows(motion, np.array([time]))[0])
+    if abs(motion.timestamps[row] - time) > _longest_shown(motion, rate):
         raise UsageError(
             f"frame {frame:g} is in a gap of the captured motion of '{armature.name}', where the "
             "footage has no "
             "frames; go to a frame beside it"
         )
     return int(motion.frames[row])
+
+
+def frames_that_show(
+    armature: bpy.types.Object, motion: Motion, frame: int, rate: float
+) -> tuple[int, int]:
+    """Return the first and the last whole scene frame at which a frame of the footage is shown; if
+    there is none, twice the nearest one.
+
+    More than one shows it where the scene has a higher rate, or the footage lacks a frame.
+
+    :param rate: scene frames per second.
+    """
+    at = scene_frame(armature, motion, frame, rate)
+    reach = math.ceil(_longest_shown(motion, rate) * rate)
+    first, last = whole_span(armature, motion, rate)
+    near = range(max(first, math.floor(at) - reach), min(last, math.ceil(at) + reach) + 1)
+    times = np.array(near) / rate - _start(armature, rate)
+    rows = _nearest_rows(motion, times)
+    late = np.abs(motion.timestamps[rows] - times) > _longest_shown(motion, rate)
+    shown = np.flatnonzero((motion.frames[rows] == frame) & ~late)
+    if len(shown) == 0:
+        return round(at), round(at)
+    return near[shown[0]], near[shown[-1]]
+
+
+def _nearest_rows(motion: Motion, times: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the row of a motion that is nearest to each of the times (N,); of two, the earlier
+    one, in spite of rounding.
+    """
+    distance = np.abs(motion.timestamps[:, None] - times)
+    nearest: NDArray[np.intp] = (distance <= distance.min(axis=0) + _SAME_S).argmax(axis=0)
+    return nearest
+
+
+def _longest_shown(motion: Motion, rate: float) -> float:
+    """Return for how many seconds around its time a frame of the footage counts as shown."""
+    spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
+    return max(spacing, 1.0 / rate)
 
 
 def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple[int, int]:
