@@ -105,7 +105,11 @@ class Video:
         length = self.frame_count / self.average_fps
         start = Fraction(self.wanted.start_s)
         end = Fraction(min(self.wanted.end_s, float(length)))
-        return max(1, round((min(end, length) - start) * min(self.fps, self.average_fps)))
+        # Where the rate varies, there can be more frames than at the usual rate, and all count.
+        rate = self.average_fps
+        if self.wanted.fps is not None:
+            rate = min(self.wanted.fps, rate)
+        return max(1, round((min(end, length) - start) * rate))
 
     @property
     def most_frames(self) -> int:

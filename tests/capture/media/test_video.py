@@ -139,6 +139,17 @@ def test_a_variable_rate_keeps_presentation_times(tmp_path):
     assert [warning.code for warning in video.warnings] == ["variable_frame_rate"]
 
 
+def test_as_many_frames_are_expected_as_a_slightly_varying_rate_gives(tmp_path):
+    """Mostly 30 per second, and some at half the distance."""
+    path = write_video(tmp_path / "a.mp4", ramp(100))
+    with_time_table(path, 600, [(48, 20), (4, 10), (48, 20)])
+    with open_video(path) as video:
+        assert video.fps == 30
+        assert video.expected_frames == len(list(video)) == 100
+    with open_video(path, VideoRange(fps=Fraction(15))) as video:
+        assert abs(video.expected_frames - len(list(video))) <= 1
+
+
 @pytest.mark.parametrize(
     ("matrix", "expected", "size"),
     [
