@@ -23,7 +23,6 @@ STEPS = 8
 POSE_STEPS = 8
 _NEAREST = 1e-3  # depth of a corner, in units of the path
 _TOLERANCE = 1e-4  # relative decrease of the cost by the last step
-_LEAST_DAMPING = 1e-8
 _LARGEST_DAMPING = 1e3
 _State = TypeVar("_State")
 
@@ -72,6 +71,8 @@ def damped_steps(
     linearize: Callable[[_State], Callable[[float], _State | None]],
     damping: float,
     most_trials: int,
+    rise: float = 20.0,
+    least_damping: float = 1e-8,
 ) -> tuple[_State, float]:
     """Return the best state that Gauss-Newton steps find, and its cost. A step that raises the cost
     is tried again with more damping (Levenberg-Marquardt).
@@ -79,6 +80,7 @@ def damped_steps(
     :param linearize: returns, for a state, a function that gives the state after a step with some
         damping; None where its equations cannot be solved.
     :param damping: of the first step. :param most_trials: steps, also those that are not kept.
+    :param rise: of the damping after a step that is not kept. :param least_damping: of all steps.
     """
     now = start
     cost = cost_of(now)
@@ -90,12 +92,12 @@ def damped_steps(
             is_done = cost_after > (1.0 - _TOLERANCE) * cost
             now = after
             cost = cost_after
-            damping = max(damping * 0.2, _LEAST_DAMPING)
+            damping = max(damping * 0.2, least_damping)
             if is_done:
                 break
             step = linearize(now)
         else:
-            damping *= 20.0
+            damping *= rise
             if damping > _LARGEST_DAMPING:
                 break
     return now, cost

@@ -52,7 +52,7 @@ _UNKNOWNS = 8  # of a camera: rotation 3, position 3, logarithm of the focal sca
 _FOCAL = 6
 _CLOCK = 7
 _CLOCK_SIGMA_S = 0.1  # of the offset that the bundle starts from
-_MOST_TRIALS = 100
+_MOST_TRIALS = 60
 NEAREST_M = 0.2  # the least distance of a keypoint from a camera
 
 
@@ -143,7 +143,9 @@ def adjust(
     problem = _Problem(people, times, list(cameras), given, mean_lengths)
     start = triangulate(*problem.observed(cameras), cameras)
     now = _Unknowns(list(cameras), mean_lengths.copy(), start)
-    best, cost = damped_steps(now, problem.cost, problem.step_from, 1e-3, _MOST_TRIALS)
+    best, cost = damped_steps(
+        now, problem.cost, problem.step_from, 1e-3, _MOST_TRIALS, rise=10.0, least_damping=1e-9
+    )
     return problem.result(best, cost)
 
 
