@@ -166,6 +166,8 @@ def listing_of_zips(listing: dict[str, Any], zips_at: str) -> dict[str, Any]:
 
 def build_wheel(folder: Path) -> None:
     """Build the wheel from a copy of the tracked sources: setuptools leaves files beside them."""
+    if not (ROOT / ".git").exists():
+        raise SystemExit(f"release: {ROOT} is no Git checkout, and the wheel is of tracked files")
     environment = os.environ | {"SOURCE_DATE_EPOCH": str(int(source_time().timestamp()))}
     listed = subprocess.run(
         ["git", "-C", str(ROOT), "ls-files", "-z"], capture_output=True, text=True, check=True

@@ -53,8 +53,10 @@ def test_an_hour_of_zeros_is_refused(tmp_path: Path) -> None:
     assert motion.stat().st_size < 40_000
     done = run("import", motion, "-o", tmp_path / "out.glb")
     assert done.returncode == 1
-    assert "hardly any movement" in done.stderr
-    assert done.stderr.count("\n") == 1
+    # Some versions of Blender's module say first where they look for colour spaces.
+    said = [line for line in done.stderr.splitlines() if "color_management" not in line]
+    assert len(said) == 1
+    assert "hardly any movement" in said[0]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["zeros.npz"]
 
 

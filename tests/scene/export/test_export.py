@@ -16,12 +16,12 @@ from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, captures, export, export_motions
-from scope.scope_addon.scene.export.output_paths import SUFFIXES
+from scope.scope_addon.scene.export.output_paths import SUFFIXES, WITHOUT_SCENE
 
 from ...required import package
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, glb_json, read_back
 
-SCENE_SUFFIXES = [s for s in SUFFIXES if s != ".npz"]
+SCENE_SUFFIXES = [suffix for suffix in SUFFIXES if suffix not in WITHOUT_SCENE]
 
 
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
