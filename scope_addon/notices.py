@@ -106,9 +106,9 @@ SENTENCES = {
     "in {under} of {total:frames}",
     # the camera
     "strides": "{footage}: the legs of {person:who} walk, but neither the body nor the background "
-    "moves accordingly {times:times}: either on a treadmill, or the camera moves before a "
-    "background that does not show it. No foot was held in place there; check how far the person "
-    "travels",
+    "moves accordingly {times:times}: either on a treadmill, then capture with Treadmill, or the "
+    "camera moves before a background that does not show it. No foot was held in place there; "
+    "check how far the person travels",
     "unknown_travel": "{footage}: the camera travels, but how far is unknown, because neither a "
     "floor nor feet at rest are seen; it was left in place, so the people's paths are wrong",
     "zoom": "{footage}: the lens zooms {times:times}, which was mistaken for people who come "

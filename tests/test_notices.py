@@ -134,7 +134,7 @@ def codes(argument: ast.expr) -> list[str]:
 
 
 def test_phrases_and_ways_to_write_values_are_known() -> None:
-    known = {"", "g", ".0f", ".1f", ".5g"}
+    known = {"", "g", ".0f", ".1f", ".2f", ".5g"}
     known |= {"who", "whose", "frames", "times", "phrase", "names"}
     assert {spec for text in SENTENCES.values() for spec in fields(text).values()} == known
     assert not any(fields(phrase) for phrase in PHRASES.values())
