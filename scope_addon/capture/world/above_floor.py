@@ -12,11 +12,11 @@ one does, and a foot at rest a few millimetres below it hardly moves. Where h st
 `UNDER_FLOOR_M`, nothing changes at all.
 
 Body and legs share the lift. The root rises by what the deeper foot needs, except as far as the
-other foot or a palm rests on the floor and would leave it; the legs bend by the rest. Feet that are
-not in the image are a guess, and do not move the body. Trunk, head and thighs, on which somebody
-sits, kneels or lies, go up with the root alone, and hands by their arms. Where a foot rests on
-something clearly below the floor, as after a leap from a wall, the floor is another one and the
-motion stays.
+other foot or a palm rests on the floor and would leave it; the legs bend by the rest. Trunk, head
+and thighs, on which somebody sits, kneels or lies, go up with the root alone, and hands by their
+arms. Feet that are not in the image are a guess, and so is the floor then: they do not move the
+body, and nothing else is raised. Where a foot rests on something clearly below the floor, as after
+a leap from a wall, the floor is another one and the motion stays.
 """
 
 from __future__ import annotations
@@ -66,17 +66,19 @@ def raise_body(
     for first, end in lower_floors(feet, contact[:, : len(SOLES)], placed.times):
         elsewhere[first:end] = True
     lifts = _lifts(np.minimum(feet[:, [0, 2]], feet[:, [1, 3]]), elsewhere, placed.times)
-    trunk_lift = _lifts(trunk.min(axis=1, keepdims=True), elsewhere, placed.times)[:, 0]
+    seen = placed.contact_points_visible[:, : len(SOLES)].reshape(-1, 2, 2).max(axis=2)
+    # Without feet in the image, the floor is a guess.
+    floor_seen = seen.max(axis=1, keepdims=True)
+    trunk_lift = floor_seen * _lifts(trunk.min(axis=1, keepdims=True), elsewhere, placed.times)
     sides = hands.reshape(len(hands), 2, -1).min(axis=2)
-    hand_lifts = _lifts(sides, elsewhere, placed.times)
+    hand_lifts = floor_seen * _lifts(sides, elsewhere, placed.times)
     if not (lifts.any() or trunk_lift.any() or hand_lifts.any()):
         return placed
     supports = np.stack(
         [contact[:, :2].max(1), contact[:, 2:4].max(1), contact[:, len(SOLES) :].max(1)], axis=1
     )
     supports = np.minimum(supports / RESTING, 1.0)
-    seen = placed.contact_points_visible[:, : len(SOLES)].reshape(-1, 2, 2).max(axis=2)
-    rise = np.maximum(_root_rise(lifts, seen, supports, placed.times), trunk_lift)
+    rise = np.maximum(_root_rise(lifts, seen, supports, placed.times), trunk_lift[:, 0])
     # A foot in the air goes up with the body, one that rests stays where it is.
     wanted = lifts + (1 - supports[:, :2]) * np.maximum(rise[:, None] - lifts, 0.0)
     foot_shift = wanted - rise[:, None]

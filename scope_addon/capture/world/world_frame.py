@@ -202,6 +202,8 @@ def resting_height(person: PlacedTrack, contact: FloatArray, up: FloatArray) -> 
     lowest_joints = (person.joints[seen] @ up - flesh_radii(person.body, person.betas)).min(axis=1)
     lowest = np.minimum((person.contact_points[seen] @ up).min(axis=1), lowest_joints)
     under_m = height_of_soles - _weighted_median(lowest, contact)
+    # Soles that are not in the image are a guess, and so is what lies under them.
+    under_m *= float(np.median(person.contact_points_visible[seen, : len(SOLES)].max(axis=1)))
     share = (under_m - PARTLY_UNDER_M) / (WHOLLY_UNDER_M - PARTLY_UNDER_M)
     return height_of_soles - min(max(share, 0.0) * WHOLLY_UNDER_M, max(under_m, 0.0))
 

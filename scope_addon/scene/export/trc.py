@@ -9,16 +9,18 @@ for them. Free of bpy.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import rotations
-from ....solver.body import Body
 from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...kinematics.axes import R_OPENSIM_WORLD
 from ...motion import Motion
+
+if TYPE_CHECKING:
+    from ....solver.body import Body
 
 # Pose2Sim's names of joints, without their side, and ours.
 _JOINTS = {
@@ -78,6 +80,8 @@ def trc_text(name: str, motion: Motion, body: Body) -> str:
 
 def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.float64]]:
     """Return the names of the M markers, and where they are (T, M, 3), world, metres."""
+    from ....solver import rotations  # Loads numba, and the command line starts without it.
+
     betas = np.asarray(motion.betas, float)
     R = rotations.exp(np.asarray(motion.poses, float).reshape(len(motion), -1, 3))
     R_parts, joints = body.forward_kinematics(R, np.asarray(motion.trans, float), betas)
