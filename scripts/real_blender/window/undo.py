@@ -161,8 +161,9 @@ def edits() -> dict[str, Callable[[], object]]:
         "floor here": lambda: use(scope.floor_here),
         "flip limb": lambda: use(scope.flip_limb, start=10, end=20, limb="left_leg"),
         "turn around": lambda: use(scope.turn_around, start=10, end=20),
+        # The last ones, because they leave no action to edit, and no capture.
+        "push to NLA": lambda: use(scope.push_to_nla),
         "delete capture": lambda: use(scope.delete_capture),
-        "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }
 
 
