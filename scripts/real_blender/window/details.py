@@ -40,7 +40,7 @@ from shared.session import (
 FBX_BUTTON = (1090, 453)
 RAW_BUTTON = (1085, 622)
 FOLD = 768
-FOLDER_BUTTON = (1252, 128)  # beside the footage
+FOLDER_BUTTON = (1231, 128)  # beside the footage, before that which adds a camera
 # Names of files, and by operator which of them the file browser shows at first.
 FOOTAGE_FILES = ("a.mp4", "b.MTS", "c.ts", "d.webm", "e.flv", "f.heic", "g_0001.png")
 FILES = (*FOOTAGE_FILES, "net.onnx", "notes.txt", "odd.xyz", "pose.npz", "x.json")

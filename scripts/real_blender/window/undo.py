@@ -293,14 +293,14 @@ def steps() -> Iterator[float]:
         action()
         yield 0.2
         stack.append(state())
-    for expected in reversed(stack[:-1]):
+    for name, expected in zip(reversed(edits()), reversed(stack[:-1]), strict=True):
         undo()
         yield 0.1
-        same(state(), expected, "undoing one after the other")
-    for expected in stack[1:]:
+        same(state(), expected, f"undoing one after the other, as far as {name}")
+    for name, expected in zip(edits(), stack[1:], strict=True):
         redo()
         yield 0.1
-        same(state(), expected, "redoing one after the other")
+        same(state(), expected, f"redoing one after the other, as far as {name}")
     report["in_a_row"] = list(edits())
     picture("13_all_redone")
     (OUT / "undo.json").write_text(json.dumps(report))
