@@ -161,9 +161,7 @@ def edits() -> dict[str, Callable[[], object]]:
         "floor here": lambda: use(scope.floor_here),
         "flip limb": lambda: use(scope.flip_limb, start=10, end=20, limb="left_leg"),
         "turn around": lambda: use(scope.turn_around, start=10, end=20),
-        # The last ones, because they leave no action to edit, and no capture.
-        "push to NLA": lambda: use(scope.push_to_nla),
-        "delete capture": lambda: use(scope.delete_capture),
+        "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }
 
 
@@ -260,6 +258,7 @@ def steps() -> Iterator[float]:
     yield 0.5
     for name, action in edits().items():
         yield from tried(name, action)
+    yield from tried("delete capture", lambda: use(bpy.ops.scope.delete_capture))
     yield from tried("frame rate by hand", set_rate, keep=True)
     yield from tried("frame rate from footage", lambda: use(bpy.ops.scope.match_frame_rate))
     undo()
