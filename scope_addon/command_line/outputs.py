@@ -20,8 +20,8 @@ from ..installed import check_installed
 from ..motion import Motion
 from ..notices import Notice
 from ..options import option
-from ..scene.export.output_paths import WITHOUT_SCENE, check_output, person_paths
-from ..scene.export.trc import write_trc
+from ..scene.export.output_paths import WITHOUT_SCENE, check_output
+from ..scene.export.without_scene import write_without_scene
 from .blender_folder import load_blender
 
 if TYPE_CHECKING:
@@ -253,13 +253,7 @@ def write_outputs(
     written: list[Path] = []
     warnings: list[Notice] = []
     for path in motion_files:
-        targets = person_paths(path, len(motions))
-        for target, motion in zip(targets, motions, strict=True):
-            if path.suffix.lower() == ".trc":
-                write_trc(target, motion, body)
-            else:
-                motion.save(target)
-        written += targets
+        written += write_without_scene(path, motions, body)
     if scene_files:
         load_blender()
         from ..scene.build import NEW_SCENE

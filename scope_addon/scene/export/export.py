@@ -45,7 +45,7 @@ from .export_states import (
 )
 from .output_paths import WITHOUT_SCENE, check_output, person_paths
 from .skeleton_names import OWN, SKELETONS, renamed_bones
-from .trc import write_trc
+from .without_scene import write_without_scene
 
 SHAPES = ("auto", "keys", "baked")
 
@@ -235,13 +235,7 @@ def export_motions(
     warnings: list[Notice] = []
     scene_paths = [p for p in paths if Path(p).suffix.lower() not in WITHOUT_SCENE]
     for each in map(Path, (p for p in paths if p not in scene_paths)):
-        if each.suffix.lower() == ".npz":
-            written += export(each, motions=motions)
-            continue
-        targets = person_paths(each, len(motions))
-        for target, motion in zip(targets, motions, strict=True):
-            write_trc(target, motion, body)
-        written += targets
+        written += write_without_scene(each, motions, body)
     if not scene_paths:
         return written, warnings
     build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)
