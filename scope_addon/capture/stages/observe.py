@@ -22,7 +22,7 @@ from ...notices import Notice, notice
 from ...options.capture import AUTO, LARGEST, OFF
 from ..camera.background_record import BackgroundRecord, CameraMotion
 from ..camera.camera_rotation import BackgroundTracker
-from ..camera.given_path import read_camera_path
+from ..camera.given_path import GivenPath, read_camera_path
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
 from ..fitting.background_estimators import BackgroundEstimators
@@ -156,6 +156,7 @@ class ObservationJob:
     clock: StageClock
     listeners: Listeners
     camera: Camera  # as options and footage describe it
+    path: GivenPath | None  # of the camera, where the user gives it
     live: LiveBody
     background: BackgroundEstimators
 
@@ -324,7 +325,7 @@ def observe(
     :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
     """
     camera = given_camera(video, options)
-    _check_path(video, options)
+    path = _given_path(video, options)
     if options.part is not None:
         options.part.check(video.width, video.height)
     live = LiveBody(body, camera, next(iter(options.heights_m), None))
@@ -334,7 +335,7 @@ def observe(
         ) as background,
         opencv_in_one_thread(),
     ):
-        job = ObservationJob(video, options, clock, listeners, camera, live, background)
+        job = ObservationJob(video, options, clock, listeners, camera, path, live, background)
         observed = (observe_frames or observe_in_one_pass)(job)
         if not observed.timestamps:
             raise no_frames_error(video)
@@ -350,16 +351,20 @@ def observe(
     return footage, tracks
 
 
-def _check_path(video: Video, options: CaptureOptions) -> None:
-    """Refuse a given path of the camera that leaves frames out, before they are observed.
+def _given_path(video: Video, options: CaptureOptions) -> GivenPath | None:
+    """Return the path of the camera that is given, and refuse one that leaves frames out, before
+    they are observed.
 
-    :raises InputError: it does, as far as the container's length is right.
+    :raises InputError: it cannot be read, or leaves frames out, as far as the container's length is
+        right.
     """
     if options.camera_path is None:
-        return
+        return None
+    path = read_camera_path(options.camera_path)
     start_s = video.wanted.start_s
     length_s = max(0.0, video.expected_frames / float(video.fps) - LENGTH_TOLERANCE_S)
-    read_camera_path(options.camera_path).at(np.array([start_s, start_s + length_s]))
+    path.at(np.array([start_s, start_s + length_s]))
+    return path
 
 
 def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = None) -> Observed:
@@ -436,8 +441,8 @@ def _footage(job: ObservationJob, observed: Observed) -> Footage:
     camera = job.background.camera(record)
     times_s = np.array(observed.timestamps)
     given = None
-    if job.options.camera_path is not None:
-        given = read_camera_path(job.options.camera_path).at(times_s)
+    if job.path is not None:
+        given = job.path.at(times_s)
         motion = CameraMotion.given(given)
     else:
         motion = record.motion(job.camera, camera, (job.video.width, job.video.height))
