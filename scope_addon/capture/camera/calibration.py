@@ -339,13 +339,20 @@ def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
-def _numbers(value: Any) -> Float64Array | None:
-    """Return an array of finite numbers of any shape, or None if the value is something else."""
+def array_of(value: Any) -> Float64Array | None:
+    """Return an array of numbers of any shape, finite or not; None if the value is something
+    else.
+    """
     try:
-        array = np.asarray(value, float)
+        return np.array(value, float)
     except (ValueError, TypeError):
         return None
-    return array if np.isfinite(array).all() else None
+
+
+def _numbers(value: Any) -> Float64Array | None:
+    """Return an array of finite numbers of any shape, or None if the value is something else."""
+    array = array_of(value)
+    return array if array is not None and np.isfinite(array).all() else None
 
 
 def _intrinsics(path: Path, value: Any) -> Float64Array:

@@ -20,10 +20,11 @@ from typing import Any
 import numpy as np
 
 from ....solver.errors import InputError
+from ....solver.rotations import nearest_rotation
 from ...arrays import Float64Array
 from ...json_file import read_json_object
 from ...kinematics.smoothing import interpolated_places, interpolated_rotations
-from .calibration import Calibration, calibration_of
+from .calibration import Calibration, array_of, calibration_of
 
 _FORMAT = (
     'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "size": [w, h], '
@@ -89,7 +90,7 @@ def read_camera_path(path: Path) -> GivenPath:
 
 
 def _times(path: Path, value: Any, count: int) -> Float64Array:
-    times = _numbers(value)
+    times = array_of(value)
     if times is None or times.shape != (count,):
         raise InputError(
             f'{path}: "times_s" must be a list of {count} numbers, one for each pose, in seconds; '
@@ -102,7 +103,7 @@ def _times(path: Path, value: Any, count: int) -> Float64Array:
 
 def _poses(path: Path, value: Any) -> Float64Array:
     """Return the poses (N, 4, 4), N at least 1."""
-    poses = _numbers(value)
+    poses = array_of(value)
     if (
         poses is None
         or poses.ndim != 3
@@ -125,8 +126,7 @@ def _poses(path: Path, value: Any) -> Float64Array:
     products = np.swapaxes(R, 1, 2) @ R - np.eye(3)
     is_skewed = np.abs(products).max(axis=(1, 2)) > 3.0 * MAX_SCALE
     _refuse(path, is_skewed | (np.linalg.det(R) < 0), "is sheared or mirrored, not a rotation")
-    U, _, Vt = np.linalg.svd(R)
-    poses[:, :3, :3] = U @ Vt
+    poses[:, :3, :3] = nearest_rotation(R)
     return poses
 
 
@@ -135,11 +135,3 @@ def _refuse(path: Path, is_wrong: Any, what: str) -> None:
     if is_wrong.any():
         number = int(is_wrong.argmax())
         raise InputError(f'{path}: pose {number} of "world_from_camera" {what}')
-
-
-def _numbers(value: Any) -> Float64Array | None:
-    """Return an array of numbers, also of those that are not finite; None if it is none."""
-    try:
-        return np.array(value, float)
-    except (ValueError, TypeError):
-        return None

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from ....solver.rotations import exp, log
+from ....solver.rotations import exp, log, nearest_rotation
 from ...arrays import BoolArray, Float64Array, IndexArray
 from ...kinematics.smoothing import interpolated_places, interpolated_rotations
 from .bundle_adjustment import Bundle, adjust, projected, refine_pose
@@ -481,9 +481,7 @@ def _continued(before: _Part, after: _Part) -> _Part | None:
     if common < COMMON[0]:
         return None
     kept = before.R[-common:]
-    U, _, Vt = np.linalg.svd(np.einsum("nji,njk->ik", kept, after.R[:common]))
-    U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
-    G = U @ Vt
+    G = nearest_rotation(np.einsum("nji,njk->ik", kept, after.R[:common]))
     center = before.centers[-common:]
     center_after = after.centers @ G.T
     way = center - center.mean(axis=0)
