@@ -190,9 +190,9 @@ def resting_height(person: PlacedTrack, contact: FloatArray, up: FloatArray) -> 
     """Estimate the height of a person's floor above the camera from whatever they rest on.
 
     The soles determine it (`floor_height`), unless the rest of the body is clearly under them, as
-    that of somebody who lies, stands on the hands, or does push-ups with raised feet. With d from
-    the floor of the whole body up to that of the soles, the floor is lower than that of the soles
-    by 0 up to d = a, by d from d = b on, and in between by b (d − a)/(b − a).
+    when somebody lies on the floor, does a handstand, or does push-ups with raised feet. With d
+    from the floor of the whole body up to that of the soles, the floor is lower than that of the
+    soles by 0 up to d = a, by d from d = b on, and in between by b (d − a)/(b − a).
 
     :param contact: (n, F) contact probability of each sole point in the n frames they were seen in.
     :param up: (3,) unit vector, camera axes.

@@ -26,7 +26,7 @@ CHAINS = {
 
 
 def posed(**rotations):
-    """A person who stands still for two seconds before the camera, with some joints turned."""
+    """A person standing still in front of the camera for two seconds, with some joints turned."""
     clip = walk(2.0, speed=0.0)
     w = np.zeros((len(NAMES), 3))
     for name, value in (ARMS_DOWN | rotations).items():
@@ -98,7 +98,7 @@ def test_keys_beside_a_span_are_blended_and_others_are_the_same_to_the_bit(part)
 
 @pytest.mark.parametrize("kind", ["arm", "leg"])
 def test_elbows_and_knees_stay_hinges(kind):
-    """A person who stands sideways to the camera, with all limbs bent as they bend."""
+    """A person standing sideways to the camera, with every limb bent in its natural direction."""
     axis = np.array([1.0, 0, 0]) if kind == "leg" else np.array([0, -1.0, 0])
     hinge = NAMES.index(f"left_{CHAINS[kind][1]}")
     turned = {f"left_{CHAINS[kind][0]}": [-0.7, 0.2, -0.4], f"left_{CHAINS[kind][1]}": 0.9 * axis}
