@@ -54,6 +54,9 @@ CORRECTIONS = {
         "Turned Around",
     ),
     *(f"{side} {part}" for side in ("Left", "Right") for part in ("Arm", "Leg", "Forearm", "Shin")),
+    *(f"{side} {part}" for side in ("Left", "Right") for part in ("Hand", "Elbow", "Knee")),
+    "Seat",
+    "Back",
     *(f"{what} Exchanged" for what in ("Sides", "Arms", "Legs")),
 }
 _STAGES = {stage.capitalize() for stage in (*STAGES, *FIRST_ONLY, PLACING, BUILDING)}

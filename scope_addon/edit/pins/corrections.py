@@ -19,6 +19,12 @@ from ...untrusted.files import in_one_line
 
 REACH_S = 0.4  # Time over which a correction fades out on each side.
 FEET = ("left", "right")
+# What can rest on the floor beside feet.
+RESTING_PARTS = (
+    *(f"{side}_{part}" for part in ("hand", "elbow", "knee") for side in FEET),
+    "seat",
+    "back",
+)
 BODY = "body"
 # What can be mirrored in depth: whole limbs, their lower bones alone, and the body.
 DEPTH_PARTS = (
@@ -61,19 +67,24 @@ class Pin:
 
 @dataclass(frozen=True)
 class Contact:
-    """A foot that stands still on the floor from one frame to another, both inclusive."""
+    """A foot that stands still on the floor from one frame to another, both inclusive, or another
+    part that rests there.
+    """
 
     first: int
     last: int
-    foot: str  # "left" or "right"
+    part: str  # "left" or "right" for the foot, or one of `RESTING_PARTS`
 
     def __post_init__(self) -> None:
         """Check the values.
 
-        :raises UsageError: the foot is neither left nor right, or the span is empty.
+        :raises UsageError: the part cannot rest, or the span is empty.
         """
-        if self.foot not in FEET:
-            raise UsageError(f"the foot must be left or right, not {self.foot!r}")
+        if self.part not in (*FEET, *RESTING_PARTS):
+            raise UsageError(
+                f"the foot must be left or right, or what rests one of {', '.join(RESTING_PARTS)}, "
+                f"not {self.part!r}"
+            )
         _check_span(self.first, self.last)
 
 
@@ -332,7 +343,7 @@ def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
         "pin_xyz": np.array([p.position or (nan,) * 3 for p in pins], np.float64).reshape(-1, 3),
         "pin_reach": np.array([p.reach for p in pins], np.float64),
         "contact_spans": np.array([(c.first, c.last) for c in contacts], np.int64).reshape(-1, 2),
-        "contact_feet": np.array([c.foot for c in contacts], np.str_),
+        "contact_feet": np.array([c.part for c in contacts], np.str_),
         "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
         "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
         "depth_spans": np.array([(f.first, f.last) for f in flips], np.int64).reshape(-1, 2),
@@ -394,7 +405,7 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
                 Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r))
                 for f, j, uv, xyz, r in pins
             ),
-            *(Contact(int(a), int(b), str(foot)) for a, b, foot in contacts),
+            *(Contact(int(a), int(b), str(part)) for a, b, part in contacts),
             *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
             *(DepthFlip(int(a), int(b), str(part)) for (a, b), part in zip(*flips, strict=True)),
             *(Interpolation(int(a), int(b)) for a, b in interpolated),

@@ -31,7 +31,7 @@ from ...kinematics.axes import UP
 from ...kinematics.contact_points import FOOT_PARTS
 from ...kinematics.standing import standing_probability
 from ..clip import Clip, sample
-from .corrections import Contact, Pin
+from .corrections import FEET, Contact, Pin
 from .fade import faded
 from .pose_refit import FLOOR_M, HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
 from .rays import pixel_of
@@ -40,6 +40,7 @@ from .reach import SLACK_M, within_reach
 _CONTACT_REACH_S = 0.25
 _FLOOR_M = 0.12  # A foot that stands within this height of z = 0 is put on it.
 _SWEEPS = 6
+_RESTING_ROUNDS = 5
 _MET_M = 0.002
 _MET_PX = 0.5
 _STANDS = 0.05  # Least standing probability of a sole point that is held.
@@ -103,9 +104,11 @@ def resolve(
     out = clip.copy()
     refit = PoseRefit(body, betas)
     for contact in (c for c in corrections if isinstance(c, Contact)):
-        track = _contact_track(refit, out, contact, shot, floor)
-        if track is not None:
-            _Correction(refit, out, [track], slack, floor).run()
+        # What rests turns while it is moved, and another part of its skin is the lowest then.
+        for _ in range(1 if contact.part in FEET else _RESTING_ROUNDS):
+            track = _contact_track(refit, out, contact, shot, floor)
+            if track is not None:
+                _Correction(refit, out, [track], slack, floor).run()
     tracks = _pin_tracks(refit, out, [c for c in corrections if isinstance(c, Pin)], shot)
     for together in _clusters(out, tracks):
         _Correction(refit, out, together, slack, floor).run()
@@ -435,13 +438,15 @@ def _contact_track(
     refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, floor: float
 ) -> _Track | None:
     """Return the track of a foot that stands: its sole stays at its median position, on the floor
-    if that is near.
+    if that is near. Other parts rest as `_resting_track` says.
     """
     span = keys_of_span(clip, contact.first, contact.last, shot)
     if not len(span):
         return None
+    if contact.part not in FEET:
+        return _resting_track(refit, clip, contact.part, span, floor)
     which = [
-        k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.foot}")
+        k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.part}")
     ]
     soles = refit.place(clip.rotations[span], clip.root[span])[2][:, which]
     where = np.median(soles, axis=0)
@@ -452,7 +457,64 @@ def _contact_track(
     for k, number in enumerate(refit.number(refit.sole_names[w]) for w in which):
         points.add(number, where[k], PINNED)
     n = len(span)
-    joint = f"{contact.foot}_foot"
+    joint = f"{contact.part}_foot"
     return _Track(
         [joint], [int(k) for k in span], [{joint: points}] * n, [None] * n, [_CONTACT_REACH_S] * n
     )
+
+
+def _resting_track(
+    refit: PoseRefit, clip: Clip, part: str, span: NDArray[np.intp], floor: float
+) -> _Track:
+    """Return the track of a part that rests: its joints stay at their median position, as high as
+    the lowest skin that moves with them has to be moved to the floor. Without a floor, that skin
+    stays at its median height.
+
+    :param part: one of `RESTING_PARTS`.
+    :param span: keys in which it rests.
+    """
+    joints = resting_joints(part)
+    at = refit.place(clip.rotations[span], clip.root[span])[1]
+    points: list[dict[str, Points]] = [{} for _ in span]
+    for joint in joints:
+        lowest = lowest_skin(clip.rows(span), refit.body, refit.betas, joint)
+        ground = floor if np.isfinite(floor) else float(np.median(lowest))
+        places = np.tile(np.median(at[:, refit.joint(joint)], axis=0), (len(span), 1))
+        places[:, 2] = at[:, refit.joint(joint), 2] + ground - lowest
+        for by_joint, place in zip(points, places, strict=True):
+            by_joint[joint] = Points([refit.number(joint)], [place], [PINNED])
+    n = len(span)
+    return _Track(joints, [int(k) for k in span], points, [None] * n, [_CONTACT_REACH_S] * n)
+
+
+def resting_joints(part: str) -> list[str]:
+    """Return the joints, from the trunk outwards, that are moved so that a part rests.
+
+    :param part: one of `RESTING_PARTS`.
+    """
+    if part in ("seat", "back"):
+        return ["pelvis"] if part == "seat" else ["pelvis", "spine3"]
+    return [part.replace("hand", "wrist")]
+
+
+def lowest_skin(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], joint: str
+) -> NDArray[np.float64]:
+    """Return the heights z (T,) of the lowest skin that rests on the floor where a joint does: that
+    of its own part, with a wrist the hand's, and with the pelvis the thighs'.
+
+    :param betas: (P,) shape coefficients.
+    """
+    names = list(body.joint_names)
+    found = {joint}
+    if joint == "pelvis":
+        found |= {"left_hip", "right_hip"}
+    if joint.endswith("wrist"):
+        for part in range(names.index(joint) + 1, len(names)):
+            if names[int(body.parents[part])] in found:
+                found.add(names[part])
+    own = np.isin(body.strongest_joints, [names.index(name) for name in found])
+    pelvis_at_rest = body.rest_joints(betas)[0]
+    R, t = body.forward_kinematics(clip.rotations, clip.root - pelvis_at_rest, betas)
+    heights = [body.skin(*pose, betas)[own, 2].min() for pose in zip(R, t, strict=True)]
+    return np.array(heights)

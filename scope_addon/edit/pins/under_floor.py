@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far pins put feet under the floor. The fit keeps them above it unless a pin asks for more."""
+"""How far pins put feet under the floor, and how far from it parts stay that shall rest there. The
+fit keeps feet above it unless a pin asks for more.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,10 @@ import numpy as np
 from ....solver.body import Body
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ...motion import Motion
+from ..clip import clip_from_motion
 from .corrected_motion import corrections_of, with_corrections
 from .corrections import Contact, Pin
+from .solve_pins import lowest_skin, resting_joints
 
 _NOTICED_M = 0.002
 
@@ -32,3 +36,20 @@ def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
     lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
     under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
     return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)
+
+
+def distance_from_floor(motion: Motion, body: Body, contact: Contact) -> float:
+    """Return how far from the floor a part stays at most that rests there, metres; 0 on uneven
+    ground, whose height is unknown.
+
+    :param body: the motion's body.
+    :param contact: of a part other than a foot.
+    """
+    rows = np.flatnonzero((motion.frames >= contact.first) & (motion.frames <= contact.last))
+    if motion.uneven_ground or not len(rows):
+        return 0.0
+    clip = clip_from_motion(body, motion, raw=False).rows(rows)
+    heights = [
+        lowest_skin(clip, body, motion.betas, joint) for joint in resting_joints(contact.part)
+    ]
+    return float(np.abs(heights).max())

@@ -84,6 +84,7 @@ def _entry(
 ) -> dict[str, Any]:
     """Describe a correction."""
     from ...edit.pins.corrections import (
+        FEET,
         Contact,
         DepthFlip,
         FeetOnFloor,
@@ -101,7 +102,8 @@ def _entry(
         span = (correction.frame,) * 2
     elif isinstance(correction, Contact):
         kind = "CONTACT"
-        text = f"{correction.foot.title()} Foot Stands"
+        part = correction.part.replace("_", " ").title()
+        text = f"{part} Foot Stands" if correction.part in FEET else part
         span = (correction.first, correction.last)
     elif isinstance(correction, DepthFlip):
         kind = "FLIP"

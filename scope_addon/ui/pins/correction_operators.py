@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ....solver.body import Body
     from ...edit.pins.corrections import Correction
 
+_RESTS_M = 0.02  # from the floor, within which what shall rest there does
 _NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the current one
 
 # Of the last pin. Blender does not show what an operator reports that another one has called, so
@@ -193,6 +194,63 @@ class SCOPE_OT_foot_stands(CorrectSpanOperator):
         return Contact(first, last, self.foot)
 
 
+class SCOPE_OT_this_rests(CorrectSpanOperator):
+    """Let a part of the body rest on the floor, in one place, from the first to the last frame"""
+
+    bl_idname = "scope.this_rests"
+    bl_label = "This Rests"
+
+    part: EnumProperty(
+        name="Part",
+        items=(
+            ("left_hand", "Left Hand", "The lowest point of the hand is on the floor", 0),
+            ("right_hand", "Right Hand", "The lowest point of the hand is on the floor", 1),
+            ("left_elbow", "Left Elbow", "The lowest point of the forearm is on the floor", 2),
+            ("right_elbow", "Right Elbow", "The lowest point of the forearm is on the floor", 3),
+            ("left_knee", "Left Knee", "The lowest point of the shin is on the floor", 4),
+            ("right_knee", "Right Knee", "The lowest point of the shin is on the floor", 5),
+            ("seat", "Seat", "The person sits on the floor", 6),
+            ("back", "Back", "The person lies with seat and back on the floor", 7),
+        ),
+        default="left_hand",
+        description="What rests on the floor",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the contact."""
+        from ...edit.pins.corrections import Contact
+
+        return Contact(first, last, self.part)
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Add the correction, and say where the body cannot reach the floor."""
+        message = super().edit(context, armature, body, rate)
+        if warning := self._off_floor(armature, body):
+            self.report({"WARNING"}, warning)
+        return message
+
+    def _off_floor(self, armature: bpy.types.Object, body: Body) -> str:
+        """Return the message about a part that stays away from the floor; empty if it rests."""
+        from ...edit.pins.corrected_motion import corrections_of
+        from ...edit.pins.corrections import Contact
+        from ...edit.pins.under_floor import distance_from_floor
+
+        motion = motion_of(armature)
+        own = [c for c in corrections_of(motion) if isinstance(c, Contact) and c.part == self.part]
+        distance = max((distance_from_floor(motion, body, each) for each in own), default=0.0)
+        if distance < _RESTS_M:
+            return ""
+        name = self.properties.bl_rna.properties["part"].enum_items[self.part].name
+        return rpt_(
+            "{part} stays up to {distance:.0f} cm from the floor: pin the pelvis, or what keeps it "
+            "there",
+            part=iface_(name),
+            distance=100 * distance,
+        )
+
+
 class ExchangeOperator(CorrectSpanOperator):
     """An exchange of left and right limbs. Not registered."""
 
@@ -318,6 +376,7 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
 CLASSES = (
     SCOPE_OT_add_pin,
     SCOPE_OT_foot_stands,
+    SCOPE_OT_this_rests,
     SCOPE_OT_exchange_sides,
     SCOPE_OT_flip_limb,
     SCOPE_OT_turn_around,

@@ -45,7 +45,10 @@ ALL = (
 )
 
 
-@pytest.mark.parametrize("corrections", [ALL, ALL[:1], ALL[2:3], ()])
+RESTS = (Contact(4, 8, "right_knee"), Contact(5, 9, "back"))
+
+
+@pytest.mark.parametrize("corrections", [ALL, ALL[:1], ALL[2:3], RESTS, ()])
 def test_arrays_give_the_corrections_back(tmp_path, corrections):
     arrays = to_arrays(corrections)
     np.savez(tmp_path / "a.npz", **arrays)

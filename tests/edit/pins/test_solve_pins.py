@@ -209,6 +209,73 @@ def test_a_foot_that_stands_stays_on_the_floor():
     assert changed[-1] < 62 + 0.25 * RATE
 
 
+# Poses, by the rotation vectors of joints and of the whole body, the height of their lowest vertex,
+# metres, and the parts whose skin rests.
+RESTS = {
+    "left_hand": (
+        {
+            "spine1": (0.9, 0.0, 0.0),
+            "spine2": (0.6, 0.0, 0.0),
+            **{f"{side}_hip": (-1.7, 0.0, 0.0) for side in ("left", "right")},
+            **{f"{side}_knee": (2.2, 0.0, 0.0) for side in ("left", "right")},
+            "left_shoulder": (0.0, -0.5, -1.2),
+        },
+        (0.0, 0.0, 0.0),
+        0.0,
+        ("left_wrist", "left_hand"),
+    ),
+    "right_elbow": (
+        {"right_shoulder": (0.0, 1.4, 0.0), "right_elbow": (0.0, 0.0, 1.3)},
+        (1.5, 0.0, 0.0),
+        -0.1,
+        ("right_elbow",),
+    ),
+    "left_knee": (
+        {"left_knee": (1.7, 0.0, 0.0), "right_hip": (-1.5, 0.0, 0.0)},
+        (0.0, 0.0, 0.0),
+        -0.07,
+        ("left_knee",),
+    ),
+    "seat": (
+        {f"{side}_hip": (-1.6, 0.0, 0.0) for side in ("left", "right")},
+        (0.0, 0.0, 0.0),
+        0.15,
+        ("pelvis", "left_hip", "right_hip"),
+    ),
+    "back": ({}, (-1.5, 0.0, 0.0), 0.12, ("pelvis", "left_hip", "right_hip", "spine3")),
+}
+
+
+@pytest.mark.parametrize("part", RESTS)
+def test_what_rests_stays_in_one_place_on_the_floor(part):
+    turns, turn, height, parts = RESTS[part]
+    rotations = np.tile(np.eye(3), (T, len(NAMES), 1, 1))
+    rotations[:, 0] = TRUTH.rotations[0, 0] @ exp(np.array(turn))
+    sway = 1.0 + 0.03 * np.sin(np.linspace(0.0, 12.0, T))
+    for name, vector in turns.items():
+        rotations[:, NAMES.index(name)] = exp(sway[:, None] * np.array(vector))
+    clip = Clip(TRUTH.times, rotations, np.zeros((T, 3)))
+    clip.root[:, 2] += depth(clip) + height
+    rests = resolve(clip, BODY, BETAS, [Contact(40, 46, part)], SHOT)
+    own = np.isin(BODY.strongest_joints, [NAMES.index(name) for name in parts])
+    R, t = BODY.forward_kinematics(rests.rotations, rests.root - BODY.rest_joints(BETAS)[0], BETAS)
+    lowest = [BODY.skin(R[k], t[k], BETAS)[own, 2].min() for k in range(40, 47)]
+    assert np.abs(lowest).max() < 0.004
+    joint = NAMES.index(parts[0])
+    assert np.ptp(t[40:47, joint, :2], axis=0).max() < 0.002
+    changed = np.flatnonzero((rests.root != clip.root).any(1))
+    assert changed[0] > 40 - 0.25 * RATE
+    assert changed[-1] < 46 + 0.25 * RATE
+
+
+def test_what_rests_on_uneven_ground_keeps_its_height():
+    still = standing()
+    rests = resolve(still, BODY, BETAS, [Contact(40, 46, "left_hand")], SHOT, floor=-np.inf)
+    hand = NAMES.index("left_wrist")
+    moved = rests.joints(BODY, BETAS)[:, hand] - still.joints(BODY, BETAS)[:, hand]
+    assert np.linalg.norm(moved, axis=-1).max() < 0.01
+
+
 WAYS = {
     "side": (1.0, 0.0, 0.0),
     "front": (0.0, -1.0, 0.0),

@@ -44,6 +44,7 @@ def test_a_corrected_file_brings_its_list(tmp_path):
     changes = (
         Pin(20, "left_wrist", (300.0, 200.0)),
         Contact(30, 34, "right"),
+        Contact(36, 38, "left_hand"),
         Exchange(3, 5, "legs"),
         DepthFlip(6, 8, "right_forearm"),
         DepthFlip(9, 10, "body"),
@@ -56,6 +57,7 @@ def test_a_corrected_file_brings_its_list(tmp_path):
     assert [(e["text"], e["first"], e["last"]) for e in listed_corrections(rig)] == [
         ("Left Wrist", 51, 52),
         ("Right Foot Stands", 71, 79),
+        ("Left Hand", 83, 87),
         ("Legs Exchanged", 17, 21),
         ("Right Forearm", 23, 27),
         ("Turned Around", 29, 31),

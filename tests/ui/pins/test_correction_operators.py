@@ -7,6 +7,7 @@ exported.
 Pins in frames in which the person was not seen, and where the footage has no frames.
 """
 
+import re
 from dataclasses import replace
 
 import bpy
@@ -155,6 +156,7 @@ CORRECTIONS = {
         joint="left_wrist", frame=FRAME, location=wrist + [0.1, 0.05, 0.15]
     ),
     "foot": lambda _: bpy.ops.scope.foot_stands(start=FRAME - 4, end=FRAME + 4, foot="right"),
+    "rests": lambda _: bpy.ops.scope.this_rests(start=FRAME, end=FRAME + 1, part="left_knee"),
     "sides": lambda _: bpy.ops.scope.exchange_sides(start=FRAME - 8, end=FRAME + 2),
 }
 
@@ -311,6 +313,24 @@ def test_a_flip_mirrors_depth_and_once_more_mirrors_it_back(rig):
         flip()
         np.testing.assert_allclose(seen(rig, [30, 46, 70]), before, atol=1e-5)
         assert listed_corrections(rig) == []
+
+
+def test_what_rests_is_on_the_floor_or_it_is_said_how_far_it_stays_away(rig, capfd):
+    """The person walks upright: the body can sit down, but no hand reaches the floor."""
+    bpy.ops.scope.this_rests(start=46, end=48, part="left_hand")
+    said = capfd.readouterr().out
+    assert re.search(r"Left Hand stays up to \d\d cm from the floor", said)
+    (entry,) = listed_corrections(rig)
+    assert (entry["text"], entry["first"], entry["last"]) == ("Left Hand", 46, 48)
+    bpy.ops.scope.remove_correction(index=0)
+    bpy.ops.scope.this_rests(start=46, end=48, part="seat")
+    assert "from the floor" not in capfd.readouterr().out
+    body = next(child for child in rig.children if child.type == "MESH")
+    bpy.context.scene.frame_set(47)
+    evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    heights = np.array([(evaluated.matrix_world @ v.co).z for v in evaluated.data.vertices])
+    parts = [NAMES.index(name) for name in ("pelvis", "left_hip", "right_hip")]
+    assert abs(heights[np.isin(BODY.strongest_joints, parts)].min()) < 0.02
 
 
 def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
