@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from .errors import OutputError
-from .temporary import claim, discard
+from .temporary import claim, discard, sync_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,6 +65,8 @@ def complete_file(target: Path, durable: bool = True, mode: int | None = None) -
         os.close(handle)
         yield temporary
         if durable:
+            # The lock's name first: btrfs would write the content alone, which nobody would remove.
+            sync_folder(target.parent)
             _sync(temporary)
         # A library may have replaced the file by one of its own.
         os.chmod(temporary, of_new_files if mode is None else mode)
@@ -122,19 +124,7 @@ def replace_durably(source: Path, target: Path) -> None:
     :raises OSError: the file cannot be renamed.
     """
     os.replace(source, target)
-    _sync_folder(target.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Wait until a folder's names are on the disk, where the system can: Windows opens no folder,
-    and some network file systems refuse.
-    """
-    with contextlib.suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+    sync_folder(target.parent)
 
 
 def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool = False) -> None:

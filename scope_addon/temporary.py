@@ -134,6 +134,8 @@ def system_folder() -> Path:
 def hold(lock: Path) -> bool:
     """Lock a file, which is made if it does not exist, until this process ends or `release`.
 
+    It survives a power cut, because what it protects is otherwise found without it.
+
     :return: False if another process holds it, or it is no file of this user's own.
     :raises OSError: the file cannot be made, or the file system has no locks.
     """
@@ -143,6 +145,7 @@ def hold(lock: Path) -> bool:
     if handle is None:
         return False
     _locks[lock] = handle
+    sync_folder(lock.parent)
     return True
 
 
@@ -158,6 +161,18 @@ def is_abandoned(lock: Path) -> bool:
         return False
     os.close(handle)
     return True
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until a folder's names are on the disk, where the system can: Windows opens no folder,
+    and some network file systems refuse.
+    """
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def remove(path: Path) -> None:

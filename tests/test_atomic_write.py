@@ -209,7 +209,9 @@ def test_an_archive_that_the_disk_refuses_is_one_error(tmp_path, monkeypatch, ca
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs the names of open files")
 def test_content_and_name_are_on_the_disk_before_success_is_said(tmp_path, monkeypatch):
-    """A power cut after a rename that was not preceded by a sync leaves an empty file."""
+    """A power cut after a rename that was not preceded by a sync leaves an empty file, and one after
+    a sync of the content that was not preceded by one of the lock's name leaves it for ever.
+    """
     done = []
     real_sync = os.fsync
     real_replace = os.replace
@@ -227,8 +229,9 @@ def test_content_and_name_are_on_the_disk_before_success_is_said(tmp_path, monke
     monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(os, "replace", replace)
     write(tmp_path / "walk.txt", "whole")
-    temporary = done[0][1]
+    temporary = done[1][1]
     assert done == [
+        ("sync", tmp_path.name, None),
         ("sync", temporary, 5),
         ("rename", temporary, "walk.txt"),
         ("sync", tmp_path.name, None),
