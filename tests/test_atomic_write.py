@@ -209,8 +209,8 @@ def test_an_archive_that_the_disk_refuses_is_one_error(tmp_path, monkeypatch, ca
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs the names of open files")
 def test_content_and_name_are_on_the_disk_before_success_is_said(tmp_path, monkeypatch):
-    """A power cut after a rename that was not preceded by a sync leaves an empty file, and one after
-    a sync of the content that was not preceded by one of the lock's name leaves it for ever.
+    """Without a sync before the rename, a power cut leaves an empty file; without one of the lock's
+    name before the content's, a temporary file that nobody removes.
     """
     done = []
     real_sync = os.fsync

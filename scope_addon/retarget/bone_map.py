@@ -19,7 +19,23 @@ PARTS = (
     *(f"{side}_{part}" for side in ("left", "right") for part in (*SIDED_PARTS, *PHALANGES)),
 )
 REQUIRED = ("pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in ("hip", "knee")))
+# Of a rig. Avatars have some hundred; the time that Blender takes grows with their square, and is
+# 40 s for an FBX file with 10,000.
+MOST_BONES = 4096
 _KIND = "bone map"
+
+
+def check_bone_count(rig: str, count: int) -> None:
+    """Check that a rig can be used in reasonable time.
+
+    :param rig: name of the rig or of its file, for the message.
+    :raises InputError: it has too many bones.
+    """
+    if count > MOST_BONES:
+        raise InputError(
+            f"{rig} has {count} bones, with which Blender would take minutes; a rig may have "
+            f"{MOST_BONES}: choose another, or remove those that move nothing, such as leaf bones"
+        )
 
 
 @dataclass

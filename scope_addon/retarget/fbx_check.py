@@ -15,8 +15,10 @@ import zlib
 from pathlib import Path
 
 from ...solver.errors import InputError
+from .bone_map import check_bone_count
 
 _HEADER_BYTES = 27
+_BONES = (b"LimbNode", b"Limb")  # kinds of the nodes named Model
 _SCALAR_BYTES = {"C": 1, "B": 1, "Y": 2, "I": 4, "F": 4, "D": 8, "L": 8}
 _ELEMENT_BYTES = {"b": 1, "c": 1, "i": 4, "f": 4, "d": 8, "l": 8}
 _LARGEST_UNPACKED = 1 << 30  # bytes of all arrays together
@@ -26,24 +28,27 @@ _STEP = 1 << 20
 
 
 def check_fbx(path: Path) -> None:
-    """Check that nodes lie within the file, and that arrays unpack to what they say, a gigabyte in
-    all at most.
+    """Check that nodes lie within the file, that arrays unpack to what they say, a gigabyte in all
+    at most, and that there are not too many bones.
 
     :raises InputError: they do not.
     :raises OSError: the file cannot be read.
     """
     try:
-        _Checker(memoryview(path.read_bytes())).check()
+        checker = _Checker(memoryview(path.read_bytes()))
+        checker.check()
     except (ValueError, IndexError, struct.error, zlib.error) as error:
         raise InputError(
             f"{path}: this FBX file is damaged ({error}); export it again or choose another"
         ) from error
+    check_bone_count(str(path), checker.bones)
 
 
 class _Checker:
     def __init__(self, data: memoryview) -> None:
         self._data = data
         self._unpacked = self._nodes = 0
+        self.bones = 0
         (version,) = struct.unpack_from("<I", data, 23)
         self._node = struct.Struct("<QQQB" if version >= 7500 else "<IIIB")
 
@@ -70,6 +75,8 @@ class _Checker:
             if not start + size <= node_end <= end:
                 raise ValueError("a node does not lie within its parent")
             self._check_properties(start, start + size, count)
+            if bytes(self._data[start - name : start]) == b"Model":
+                self.bones += bytes(self._data[start : start + size]).endswith(_BONES)
             self._check_nodes(start + size, node_end, depth + 1)
             at = node_end
 

@@ -18,13 +18,13 @@ from typing import Any
 
 from ...solver.errors import InputError
 from ..untrusted.files import check_regular
+from .bone_map import check_bone_count
 
 _COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 # Of compressed meshes; Blender reads Draco's.
 _UNREADABLE_EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _LARGEST_JSON = 200_000_000
-_MOST_BONES = 4096  # Blender takes a minute for 10,000 to import them; avatars have some hundred
 _LARGEST_FILE = 2 << 30
 _MAX_ELEMENTS = 50_000_000  # Of an accessor without data: its elements are all zero.
 _DAMAGED = (
@@ -59,11 +59,7 @@ def check_gltf(path: Path) -> None:
             if "uri" in image:
                 _uri_bytes(path, image["uri"])
         joints = {node for skin in gltf.get("skins", ()) for node in skin["joints"]}
-        if len(joints) > _MOST_BONES:
-            raise InputError(
-                f"{path} has {len(joints)} bones, with which Blender would take minutes; a rig may "
-                f"have {_MOST_BONES}: choose another, or export it with fewer bones"
-            )
+        check_bone_count(str(path), len(joints))
         views = gltf.get("bufferViews", [])
         for view in views:
             _require(

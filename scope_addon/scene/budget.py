@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import MotionFileError, OutputError
+from .animation_data import actions
 
 if TYPE_CHECKING:
     import bpy
@@ -25,6 +26,7 @@ LAST_FRAME = 1_048_574  # of a scene, which Blender does not let it exceed
 _BYTES_PER_BONE = 2900  # of a frame, by the exporter of .glb; the others need less
 _BYTES_PER_BYTE = 1000  # of compressed content; captures need 300, from 100 to 400
 _SAMPLES_PER_KEY = 5  # of a scene whose rate is higher than the footage's
+_CURVES_PER_BONE = 4  # of a rotation
 
 
 def check_content(motion: Motion) -> None:
@@ -55,18 +57,26 @@ def check_last_frame(frame: float) -> None:
         )
 
 
-def check_samples(scene: bpy.types.Scene, rigs: Sequence[bpy.types.Object], keys: int) -> None:
-    """Refuse to sample far more frames of a scene than have keys, if that needs much memory.
+def check_samples(scene: bpy.types.Scene, rigs: Sequence[bpy.types.Object]) -> None:
+    """Refuse to sample every bone of rigs at every frame of a scene, if that needs far more memory
+    than the movement of their keys explains: few keys that years lie between, or a still motion on
+    a rig of thousands of bones.
 
-    :param keys: most keys of one channel of the rigs.
-    :raises OutputError: there are too many.
+    :raises OutputError: it does.
     """
     frames = scene.frame_end - scene.frame_start + 1
     bones = sum(len(rig.data.bones) for rig in rigs)
     needed_bytes = frames * bones * _BYTES_PER_BONE
-    if needed_bytes > BASE_BYTES and frames > _SAMPLES_PER_KEY * keys:
+    if needed_bytes <= BASE_BYTES or any(actions.nla_strips(rig) for rig in rigs):
+        return
+    keys = [actions.read_keys(curve)[:, 1] for rig in rigs for curve in actions.fcurves(rig)]
+    content = zlib.compress(np.concatenate([*keys, np.empty(0, np.float32)]).tobytes(), 1)
+    # The other bones of a rig follow those that have keys, and are sampled like them.
+    bones_per_keyed_bone = bones / max(1.0, len(keys) / _CURVES_PER_BONE)
+    explained_bytes = _SAMPLES_PER_KEY * _BYTES_PER_BYTE * len(content) * bones_per_keyed_bone
+    if needed_bytes > BASE_BYTES + explained_bytes:
         raise OutputError(
-            f"{keys} keyframes are spread over {frames} frames, each of which the file would have; "
-            f"that would need {needed_bytes / 1e9:.0f} GB of memory: choose a shorter range of the "
-            "footage, or write an .npz or a .blend"
+            f"{frames} frames of {bones} bones would need {needed_bytes / 1e9:.0f} GB of memory, "
+            "for a motion with hardly any movement: choose a shorter range of the footage or a rig "
+            "with fewer bones, or write an .npz or a .blend"
         )

@@ -9,7 +9,9 @@ next run.
 from __future__ import annotations
 
 import itertools
+import math
 import os
+import random
 import re
 import sys
 import tempfile
@@ -211,7 +213,11 @@ def _may_be_empty(path: Path) -> bool:
 
 
 def check_command(
-    command: Command, action: str, calls: Iterable[int] | None = None, kind: str = "ext4"
+    command: Command,
+    action: str,
+    calls: Iterable[int] | None = None,
+    kind: str = "ext4",
+    longest_s: float = math.inf,
 ) -> tuple[int, list[str]]:
     """Run a command with a fault at each of its calls, again after each kill that leaves something
     else.
@@ -220,6 +226,7 @@ def check_command(
 
     :param calls: only these; negative ones count from the last.
     :param kind: of the disk whose power is cut, see `DISKS`.
+    :param longest_s: after which no further fault begins; calls are then drawn at random.
     :return: how many faults there were, and what was not as it should be.
     """
     with ExitStack() as stack:
@@ -231,14 +238,19 @@ def check_command(
         )
         place = Workplace(folder, command, disk)
         count = place.prepare()
-        numbers = (
-            itertools.count(1) if calls is None else (n if n > 0 else count + 1 + n for n in calls)
-        )
+        numbers: Iterable[int] = itertools.count(1)
+        if calls is not None:
+            numbers = (n if n > 0 else count + 1 + n for n in calls)
+        elif longest_s < math.inf:
+            numbers = random.sample(range(1, count + 1), count)
+        end_s = time.monotonic() + longest_s
         done = 0
         problems = []
         seen = set[object]()
         ran_again = False
         for n in numbers:
+            if time.monotonic() > end_s:
+                break
             ran_again = False
             try:
                 if not place.fault(n, action):
@@ -281,20 +293,39 @@ def chosen(names: list[str]) -> list[tuple[Command, str]]:
 
 
 def main(names: list[str]) -> int:
-    """Run all commands with all faults, or those named; return the exit status."""
+    """Run all commands with all faults, or those named; return the exit status.
+
+    :param names: a number among them is of minutes, which all have together: each command and
+        fault gets an equal share of what is left, and tries as many calls as it can in it.
+    """
+    minutes = [float(name) for name in names if name.isdecimal()]
+    runs = [
+        (command, action, kind)
+        for command, action in chosen([name for name in names if not name.isdecimal()])
+        for kind in (DISKS if action == CUT else ("",))
+    ]
+    if minutes:
+        random.shuffle(runs)  # as there may not be time for all
     failed = False
-    for command, action in chosen(names):
-        for kind in DISKS if action == CUT else ("",):
-            what = f"{command.name}, {action} {kind}".rstrip()
-            if kind and (problem := problem_with(kind)):
-                print(f"{what}: not tried, since {problem}", flush=True)
-                continue
-            start = time.monotonic()
-            count, problems = check_command(command, action, kind=kind)
-            print(f"{what}: {count} faults in {time.monotonic() - start:.0f} s", flush=True)
-            for problem in problems:
-                print(f"    {problem}", flush=True)
-            failed = failed or bool(problems)
+    total = 0
+    end_s = time.monotonic() + 60 * sum(minutes)
+    for number, (command, action, kind) in enumerate(runs):
+        what = f"{command.name}, {action} {kind}".rstrip()
+        if kind and (problem := problem_with(kind)):
+            print(f"{what}: not tried, since {problem}", flush=True)
+            continue
+        start = time.monotonic()
+        if minutes and start > end_s:
+            print(f"{what}: not tried, since the time is over", flush=True)
+            continue
+        share_s = max(0.0, end_s - start) / (len(runs) - number) if minutes else math.inf
+        count, problems = check_command(command, action, kind=kind or "ext4", longest_s=share_s)
+        print(f"{what}: {count} faults in {time.monotonic() - start:.0f} s", flush=True)
+        for problem in problems:
+            print(f"    {problem}", flush=True)
+        failed = failed or bool(problems)
+        total += count
+    print(f"{total} faults in all", flush=True)
     return int(failed)
 
 

@@ -12,7 +12,7 @@ from scope.scope_addon.retarget import fbx_check
 from scope.scope_addon.retarget.fbx_check import check_fbx
 from scope.solver.errors import InputError
 
-from .made_files import array, fbx
+from .made_files import array, fbx, node
 
 
 def test_a_whole_file_passes(tmp_path):
@@ -52,6 +52,25 @@ def test_nodes_without_end_are_refused(tmp_path, monkeypatch):
         check_fbx(path)
     monkeypatch.setattr(fbx_check, "_DEEPEST", 0)
     with pytest.raises(InputError, match="nested too deeply"):
+        check_fbx(path)
+
+
+def model(number: int, kind: bytes):
+    """An object of a scene, as a function of its offset."""
+    name = f"bone {number}".encode()
+    texts = [b"S" + struct.pack("<I", len(text)) + text for text in (name, kind)]
+    return lambda at: node(at, b"Model", [b"L" + struct.pack("<q", number), *texts])
+
+
+@pytest.mark.parametrize(("kind", "bones"), [(b"LimbNode", 4096), (b"Limb", 4097), (b"Null", 4097)])
+def test_bones_are_counted_before_blender_imports_them(tmp_path, kind, bones):
+    path = fbx(tmp_path / "rig.fbx")
+    made = node(27, b"Objects", [], [model(number, kind) for number in range(bones)])
+    path.write_bytes(path.read_bytes()[:27] + made + bytes(13))
+    if kind == b"Null" or bones <= 4096:
+        check_fbx(path)
+        return
+    with pytest.raises(InputError, match="has 4097 bones, with which Blender would take minutes"):
         check_fbx(path)
 
 

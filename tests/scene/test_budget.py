@@ -10,10 +10,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.scene.budget import check_content, check_last_frame
+from scope.scope_addon.scene.animation_data.actions import Channels, bone_path
+from scope.scope_addon.scene.budget import check_content, check_last_frame, check_samples
 from scope.scope_addon.scene.export.export import export_motions
 from scope.solver.body import Body
 
@@ -93,9 +96,39 @@ def test_few_keys_over_many_frames_are_refused_before_they_are_sampled(
 ) -> None:
     motion = made_motion(body, np.zeros((12, 72)), np.zeros((12, 3)))
     motion.timestamps[:] = np.linspace(0.0, 20_000.0, len(motion))
-    with pytest.raises(OutputError, match="12 keyframes are spread over [0-9]{6} frames"):
+    with pytest.raises(
+        OutputError, match="^[0-9]{6} frames of 24 bones would need .* GB of memory"
+    ):
         export_motions([motion], body, tmp_path / f"out{suffix}")
     assert list(tmp_path.iterdir()) == []
+
+
+def keyed_rig(bones: int, values: NDArray[np.float64]) -> bpy.types.Object:
+    """A rig whose first bone has these keys (T, 4), one per frame of the scene."""
+    data = bpy.data.armatures.new("Rig")
+    rig = bpy.data.objects.new("Rig", data)
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    for _ in range(bones):
+        data.edit_bones.new("bone").tail = (0.0, 0.0, 1.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    channels = Channels(rig, bpy.data.actions.new("Action"))
+    frames = np.arange(len(values), dtype=float)
+    channels.write(bone_path("bone", "rotation_quaternion"), frames, values)
+    bpy.context.scene.frame_start = 0
+    bpy.context.scene.frame_end = len(values) - 1
+    return rig
+
+
+def test_a_still_motion_on_a_rig_of_many_bones_is_refused_and_a_real_one_is_not() -> None:
+    """The exporter of .glb samples all bones at all frames: 1.6 million times 1800 bytes."""
+    random = np.random.default_rng(0)
+    real = random.normal(size=(4000, 4))
+    check_samples(bpy.context.scene, [keyed_rig(400, real)])
+    check_samples(bpy.context.scene, [keyed_rig(180, np.zeros_like(real))])
+    with pytest.raises(OutputError, match="4000 frames of 400 bones would need 5 GB of memory"):
+        check_samples(bpy.context.scene, [keyed_rig(400, np.zeros_like(real))])
 
 
 def test_a_motion_that_blender_has_no_frames_for_is_refused(body: Body, tmp_path: Path) -> None:

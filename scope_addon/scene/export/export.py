@@ -187,7 +187,7 @@ def _write_one(
                 f"cannot write {path.name}: the capture's armature is not in a scene; capture again"
             )
         if suffix != ".blend":  # which has keys alone
-            check_samples(scene, rigs, _most_keys(rigs, scene))
+            check_samples(scene, rigs)
         writers = {
             ".bvh": lambda temporary: formats.write_bvh(temporary, scene, rig, options.bvh_unit),
             ".glb": lambda temporary: formats.write_glb(temporary, options.camera, take),
@@ -196,16 +196,6 @@ def _write_one(
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }
         _write(path, writers[suffix])
-
-
-def _most_keys(rigs: Sequence[bpy.types.Object], scene: bpy.types.Scene) -> int:
-    """Return the most keys that a channel of a rig has; of a rig with NLA strips, those of a scene
-    with a key on every frame.
-    """
-    if any(actions.nla_strips(rig) for rig in rigs):
-        return int(scene.frame_end - scene.frame_start + 1)
-    keys: list[int] = [len(curve.keyframe_points) for rig in rigs for curve in actions.fcurves(rig)]
-    return max(keys, default=0)
 
 
 def export_motions(

@@ -15,7 +15,7 @@ from mathutils import Matrix
 
 from ....solver.errors import InputError
 from ...errors import UsageError
-from ...retarget.bone_map import PHALANGES, BoneMap
+from ...retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ...retarget.guess import from_humanoid
 from ...retarget.rig_source import RigSource
 from ..animation_data.removal import NewDatablocks
@@ -36,7 +36,7 @@ _KINDS = (
 def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
     """Load the rig into ``collection`` of the active scene, without animation; return its armature.
 
-    :raises InputError: when the file cannot be read or has no armature.
+    :raises InputError: when the file cannot be read, has no armature, or one of too many bones.
     :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
     """
     path = source.path
@@ -46,6 +46,7 @@ def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.O
     else:
         loaded = _import(path)
     rig = _choose(path, [obj for obj in loaded if obj.type == "ARMATURE"], source.armature)
+    check_bone_count(str(path), len(rig.data.bones))
     _check_finite(path, rig)
     keep = with_meshes(rig, loaded)
     for obj in loaded:

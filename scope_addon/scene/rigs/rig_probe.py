@@ -47,6 +47,7 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
         0.
     """
     names = list(parts)
+    whole = rest_pose(rig, with_skin=True)
     rest = _matrices(rig, names)
     if min(map(abs, rig.matrix_world.to_scale())) < 1e-9:
         raise InputError(
@@ -67,7 +68,6 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
     ordered = [names[b] for b in order]
     _check_carried(rig, ordered, carriers, parts)
     matrices = rest[order]
-    whole = rest_pose(rig, with_skin=True)
     return Skeleton(
         ordered,
         parents,

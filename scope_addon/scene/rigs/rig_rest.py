@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import InputError
+from ...retarget.bone_map import check_bone_count
 from ...retarget.rest_pose import RestPose
 
 
@@ -15,11 +16,12 @@ def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
     """Return all bones of a rig at rest, in the world.
 
     :param with_skin: read the meshes that the rig deforms, too; the rig must be ``at_rest``.
-    :raises InputError: when the rig has no bones.
+    :raises InputError: when the rig has no bones, or too many.
     """
     bones = list(rig.data.bones)
     if not bones:
         raise InputError(f"'{rig.name}' has no bones; choose another armature as the rig")
+    check_bone_count(f"'{rig.name}'", len(bones))
     names = [bone.name for bone in bones]
     row = {name: index for index, name in enumerate(names)}
     parents = np.array([row[bone.parent.name] if bone.parent else -1 for bone in bones], int)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
@@ -207,6 +208,15 @@ def test_a_file_without_an_armature_is_refused(tmp_path):
     save_rig(tmp_path / "rig.blend", armatures=0)
     with pytest.raises(InputError, match="no armature"):
         check_rig(rig_source(tmp_path / "rig.blend"))
+
+
+def test_a_file_with_thousands_of_bones_is_refused_before_they_are_probed(tmp_path, monkeypatch):
+    """A .blend file says it only when it is read, unlike the formats that are imported."""
+    save_rig(tmp_path / "rig.blend", armatures=1)
+    monkeypatch.setattr(bone_map, "MOST_BONES", 5)
+    with pytest.raises(InputError, match=r"rig\.blend has \d+ bones, with which .* may have 5: "):
+        check_rig(rig_source(tmp_path / "rig.blend"))
+    assert not bpy.data.armatures
 
 
 def test_a_rig_with_blocked_bones_is_refused_before_the_capture(tmp_path):

@@ -6,6 +6,7 @@ import re
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import PARTS
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import root_object
@@ -344,6 +345,18 @@ def test_a_bone_map_without_legs_is_an_error(rig):
             pair.bone = ""
     with pytest.raises(RuntimeError, match="left_knee"):
         bpy.ops.scope.retarget()
+    assert rig.animation_data is None or rig.animation_data.action is None
+
+
+@pytest.mark.parametrize("operator", ["guess_bones", "retarget"])
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_rig_of_thousands_of_bones_is_refused(rig, monkeypatch, operator, listed):
+    """Whether the map is listed or guessed, and before anything is posed."""
+    if listed:
+        bpy.ops.scope.guess_bones()
+    monkeypatch.setattr(bone_map, "MOST_BONES", 5)
+    with pytest.raises(RuntimeError, match=r"'unreal' has \d+ bones, .* may have 5: choose"):
+        getattr(bpy.ops.scope, operator)()
     assert rig.animation_data is None or rig.animation_data.action is None
 
 
