@@ -6,6 +6,7 @@ lists.
 import ast
 import hashlib
 import importlib.util
+import inspect
 import os
 import shutil
 import sys
@@ -250,14 +251,63 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
         changed(tmp_path / "other.zip", archive, {wheel: b"other"}), "av-.* is not the locked file"
     )
     refused(changed(tmp_path / "other.zip", archive, {wheel: None}), "is listed but not there")
+    compiler = next(n for n in names if n.startswith("wheels/llvmlite-"))
+    with zipfile.ZipFile(archive) as file:
+        (tmp_path / "llvmlite.whl").write_bytes(file.read(compiler))
+    with zipfile.ZipFile(tmp_path / "llvmlite.whl", "a") as file:
+        file.writestr("added.py", "")
+    refused(
+        changed(
+            tmp_path / "other.zip", archive, {compiler: (tmp_path / "llvmlite.whl").read_bytes()}
+        ),
+        "llvmlite-.* is not the locked file",
+    )
     refused(archive, "made for linux-x64, not for windows-x64", platform="windows-x64")
     refused(archive, "not made for Blender 5.1.0", python="3.13")
     monkeypatch.setattr(builder, "LIMIT_MB", 0.1)
     refused(archive, "more than the limit of 0.1 MB")
-    monkeypatch.setattr(builder, "LIMIT_MB", 240)
+    monkeypatch.setattr(builder, "LIMIT_MB", 200)
     builder.check(archive, target)
     monkeypatch.setattr(builder, "PACKAGES", (*builder.PACKAGES, "forgotten"))
     refused(archive, "0 wheels of forgotten")
+
+
+def test_blender_installs_a_wheel_that_is_compressed_again(builder, tmp_path):
+    module = "answer = 42\n" * 1000
+    record = "small/__init__.py,,\nsmall-1.0.dist-info/RECORD,,\n"
+    files = {
+        "small/__init__.py": module,
+        "small-1.0.dist-info/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\n",
+        "small-1.0.dist-info/RECORD": record,
+    }
+    wheel = tmp_path / "small-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, content in files.items():
+            file.writestr(name, content)
+    again = builder.repacked(wheel)
+    first = again.read_bytes()
+    again.unlink()
+    assert builder.repacked(wheel).read_bytes() == first
+    with zipfile.ZipFile(again) as file:
+        assert {entry.compress_type for entry in file.infolist()} == {zipfile.ZIP_LZMA}
+        assert {name: file.read(name).decode() for name in file.namelist()} == files
+    (installer,) = Path(bpy.utils.resource_path("LOCAL")).rglob("wheel_manager.py")
+    spec = importlib.util.spec_from_file_location("wheel_manager", installer)
+    manager = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(manager)
+    problems = []
+    settings = {
+        "local_dir": str(tmp_path / "local"),
+        "local_dir_site_packages": str(tmp_path / "local" / "packages"),
+        "wheel_list": [("scope", [str(again)])],
+        "error_fn": problems.append,
+        "remove_error_fn": lambda _, error: problems.append(error),
+        "debug": False,
+    }
+    known = inspect.signature(manager.apply_action).parameters
+    manager.apply_action(**{name: value for name, value in settings.items() if name in known})
+    assert problems == []
+    assert (tmp_path / "local" / "packages" / "small" / "__init__.py").read_text() == module
 
 
 @pytest.mark.usefixtures("networks")
