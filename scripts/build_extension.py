@@ -51,8 +51,9 @@ PLATFORMS = {
     ],
 }
 # The Python of Blender's own builds: the first Blender with it, and the first after it.
-# Distributions use others.
 BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
+# Distributions use others as well. The newest lock has the hashes of their wheels, too.
+OTHER_PYTHONS = ("3.14",)
 # All imported packages. onnxruntime's metadata also requires flatbuffers, packaging and protobuf,
 # but running a network imports none of them. numpy is always Blender's own.
 PACKAGES = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
@@ -107,7 +108,9 @@ def main() -> int:
         "platforms", nargs="*", metavar="PLATFORM", help=f"of {', '.join(PLATFORMS)} (default: all)"
     )
     parser.add_argument(
-        "--python", choices=sorted(BLENDERS), help="build for this Python alone (default: each)"
+        "--python",
+        choices=[*sorted(BLENDERS), *OTHER_PYTHONS],
+        help="build for this Python alone (default: each of Blender's own)",
     )
     parser.add_argument(
         "--any-blender",
@@ -135,6 +138,12 @@ def main() -> int:
     if unknown:
         print(
             f"build: unknown platform {', '.join(unknown)}; choose of {', '.join(PLATFORMS)}",
+            file=sys.stderr,
+        )
+        return 2
+    if args.python in OTHER_PYTHONS and not args.any_blender:
+        print(
+            f"build: no Blender has Python {args.python} but a distribution's; add --any-blender",
             file=sys.stderr,
         )
         return 2
@@ -255,7 +264,8 @@ def download_wheels(target: Target) -> list[Path]:
 
 def locked(python: str) -> str:
     """Return the entries of the shipped packages in a Python's lock, with their hashes."""
-    text = (ROOT / "scripts" / "requirements" / f"{python}.txt").read_text("utf-8")
+    lock = max(BLENDERS) if python in OTHER_PYTHONS else python
+    text = (ROOT / "scripts" / "requirements" / f"{lock}.txt").read_text("utf-8")
     entries = re.finditer(r"^(\S+?)==\S+(?:.*\\\n)*.*$", text, flags=re.M)
     found = {entry[1]: entry[0] for entry in entries if entry[1] in PACKAGES}
     missing = sorted(set(PACKAGES) - set(found))

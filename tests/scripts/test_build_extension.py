@@ -148,7 +148,7 @@ def test_wheels_keep_their_names_except_where_a_blender_would_skip_them(builder)
 
 
 def test_the_lock_files_list_every_wheel_with_hashes(builder):
-    for python in builder.BLENDERS:
+    for python in (*builder.BLENDERS, *builder.OTHER_PYTHONS):
         entries = builder.locked(python)
         assert [line.split("==")[0] for line in entries.splitlines() if "==" in line] == list(
             builder.PACKAGES
@@ -168,6 +168,13 @@ def test_every_blender_since_4_2_fits_one_zip_of_a_platform(builder):
     other = builder.Target("linux-x64", "3.13", any_blender=True)
     assert "blender_version_max" not in tomllib.loads(builder.manifest(other, []))
     assert tomllib.loads(builder.manifest(other, []))["blender_version_min"] == "4.2.0"
+
+
+def test_a_python_of_distributions_alone_needs_a_zip_for_any_blender(builder, monkeypatch, capsys):
+    assert run(builder, monkeypatch, "linux-x64", "--python", "3.14") == 2
+    assert "--any-blender" in capsys.readouterr().err
+    name = builder.Target("linux-x64", "3.14", any_blender=True).file_name("1.0.0")
+    assert name == "scope-1.0.0-python_3.14-linux_x64.zip"
 
 
 def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(builder):

@@ -23,6 +23,7 @@ from live.session import (
     start,
     state,
 )
+from shared.file_state import curves_of
 from shared.session import FOOTAGE, OUT, addon, captured, invoke, picture, until, use
 
 SAVED = OUT / "live.blend"
@@ -80,13 +81,14 @@ def take() -> dict:
     """Return what a recorded take is made of."""
     person = next(o for o in captures()[0].all_objects if o.type == "ARMATURE")
     action = person.animation_data.action
-    curves = action.fcurves
+    curves = curves_of(action)
     bone = 'pose.bones["left_hip"].rotation_quaternion'
+    hip = next(each for each in curves if (each.data_path, each.array_index) == (bone, 1))
     return {
         "range": tuple(action.frame_range),
         "curves": len(curves),
         "keys": sum(len(curve.keyframe_points) for curve in curves),
-        "left_hip": [round(point.co[1], 5) for point in curves.find(bone, index=1).keyframe_points],
+        "left_hip": [round(point.co[1], 5) for point in hip.keyframe_points],
         "packed": hashlib.sha256(person["scope_motion"]["motion"]).hexdigest(),
     }
 

@@ -64,7 +64,7 @@ def state() -> State:
         found[kind] = sorted(block.name_full for block in getattr(bpy.data, kind) if block.users)
     for action in bpy.data.actions:
         found[f"action {action.name_full}"] = _digest(
-            sorted(_keys(curve) for curve in _curves(action))
+            sorted(_keys(curve) for curve in curves_of(action))
         )
         found[f"asset {action.name_full}"] = _asset(action)
     for name in ("frame_start", "frame_end", "frame_current"):
@@ -126,7 +126,8 @@ def _digest(value: object) -> str:
     return hashlib.sha256(repr(value).encode()).hexdigest()[:12]
 
 
-def _curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+def curves_of(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+    """Return an action's curves; since Blender 5 they are in its layers alone."""
     if hasattr(action, "fcurves"):
         return list(action.fcurves)
     bags = (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags)

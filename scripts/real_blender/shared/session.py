@@ -122,6 +122,12 @@ def captured(seconds: float = 600.0) -> Iterator[float]:
     yield 0.5
 
 
+def strips() -> list:
+    """Return the strips of the scene's sequencer, which Blender 5 calls so."""
+    editor = bpy.context.scene.sequence_editor
+    return list(editor.strips_all if hasattr(editor, "strips_all") else editor.sequences_all)
+
+
 def inventory() -> dict:
     """Return the file's data-blocks, which cancelling must not change."""
     kinds = (

@@ -20,6 +20,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.file_state import curves_of
 from shared.session import (
     FOOTAGE,
     OUT,
@@ -30,6 +31,7 @@ from shared.session import (
     press,
     run,
     show_tab,
+    strips,
     until,
     use,
     viewport,
@@ -159,7 +161,7 @@ def above_the_fold() -> Iterator[float]:
 def curve() -> list[float]:
     """Return the keys of one curve of the second capture."""
     action = bpy.data.objects["second"].animation_data.action
-    found = next(each for each in action.fcurves if "left_elbow" in each.data_path)
+    found = next(each for each in curves_of(action) if "left_elbow" in each.data_path)
     return [point.co[1] for point in found.keyframe_points]
 
 
@@ -346,7 +348,7 @@ def sequencer() -> None:
     counts = []
     for _ in range(2):
         use(bpy.ops.scope.footage_to_sequencer)
-        counts.append(len(bpy.context.scene.sequence_editor.sequences_all))
+        counts.append(len(strips()))
     assert counts[0] == counts[1] > 0, counts
     report["strips"] = counts
 

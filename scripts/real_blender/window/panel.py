@@ -31,6 +31,7 @@ from shared.session import (
     press,
     run,
     show_tab,
+    strips,
     until,
     viewport,
 )
@@ -270,9 +271,7 @@ def steps() -> Iterator[float]:
     picture("7_bones")
     invoke(bpy.ops.object.mode_set, mode="OBJECT")
     invoke(bpy.ops.scope.footage_to_sequencer)
-    editor = scene.sequence_editor
-    strips = editor.strips_all if hasattr(editor, "strips_all") else editor.sequences_all
-    report["strips"] = sorted(strip.type for strip in strips)
+    report["strips"] = sorted(strip.type for strip in strips())
     report["markers"] = [marker.name for marker in scene.timeline_markers]
     invoke(bpy.ops.scope.root_motion, mode="BONES")
     invoke(bpy.ops.scope.smooth, strength=1.0)

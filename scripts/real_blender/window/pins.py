@@ -21,6 +21,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from shared.file_state import curves_of
 from shared.session import (
     FOOTAGE,
     OUT,
@@ -573,7 +574,7 @@ def place(joint: str) -> Vector:
 def keys() -> list[list[float]]:
     """Return the keys of all curves of the captured armature."""
     found = []
-    for curve in rig().animation_data.action.fcurves:
+    for curve in curves_of(rig().animation_data.action):
         values = [0.0] * (2 * len(curve.keyframe_points))
         curve.keyframe_points.foreach_get("co", values)
         found.append(values)

@@ -18,7 +18,7 @@ import bpy
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from shared.file_state import State, identities, same, state
+from shared.file_state import State, curves_of, identities, same, state
 from shared.session import (
     FOOTAGE,
     OUT,
@@ -125,7 +125,7 @@ def add_face(rig: bpy.types.Object) -> None:
 def jaw_moves() -> bool:
     """Return whether the action of the rig opens and closes its mouth."""
     data = bpy.data.objects["rig"].animation_data
-    return data is not None and any('"jaw"' in curve.data_path for curve in data.action.fcurves)
+    return data is not None and any('"jaw"' in curve.data_path for curve in curves_of(data.action))
 
 
 def retarget_face() -> None:
