@@ -41,7 +41,7 @@ in_window() { # a script below this folder in a Blender
     on_screen blender --python-exit-code 1 --python "parts/$script" -- "$@"
 }
 
-case $1 in install | startup) ;; *) separate_home "$1" ;; esac
+case $1 in install | startup | update) ;; *) separate_home "$1" ;; esac
 case $1 in
     install)
         blender --background --command extension install-file --repo user_default --enable scope.zip >"$log" 2>&1 ||
@@ -58,6 +58,9 @@ case $1 in
         [ $status = 0 ] || tail -n 40 "$log" >&2
         exit $status
         ;;
+    update)
+        python3 parts/without_window/update.py scope.zip >"$log" 2>&1 || { tail -n 60 "$log" >&2; exit 1; }
+        ;;
     headless) python3 parts/without_window/headless.py 2>&1 | tee "$log" >&2 ;;
-    *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, startup, reload and walk" >&2; exit 2 ;;
+    *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, update, startup, reload and walk" >&2; exit 2 ;;
 esac

@@ -138,6 +138,7 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         "details",
         "live",
         "first",
+        "update",
         "startup",
         "reload",
         "walk",
