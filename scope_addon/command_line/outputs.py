@@ -145,8 +145,8 @@ def check_outputs(
 
 
 def check_blender(outputs: list[Path]) -> None:
-    """Check that bpy is installed if an output needs it, as all do except motion files and
-    markers.
+    """Check that bpy is installed if an output needs it, as all do except those of
+    `WITHOUT_SCENE`.
 
     :raises SetupError: it is not installed; the message gives the command that installs it.
     """
@@ -253,7 +253,7 @@ def write_outputs(
     written: list[Path] = []
     warnings: list[Notice] = []
     for path in motion_files:
-        written += write_without_scene(path, motions, body)
+        written += write_without_scene(path, motions, [body] * len(motions))
     if scene_files:
         load_blender()
         from ..scene.build import NEW_SCENE

@@ -7,7 +7,7 @@ glTF are in ``scene/axes.py``.
 | camera | OpenCV: x right, y down, z forward                  | solver, joints_cam, intrinsics  |
 | world  | x right, z up, floor at z = 0                       | motion file, Blender scenes     |
 | model  | SMPL: y up, x to the person's left, person faces +z | rest pose of a body             |
-| opensim| x forward, y up, z to the right                      | .trc files                      |
+| opensim| x forward, y up, z to the right                      | .trc and .mot files             |
 
 ``R_a_b`` takes coordinates in frame b to coordinates in frame a: ``p_a = R_a_b @ p_b``.
 """
@@ -27,6 +27,9 @@ R_WORLD_MODEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 # OpenSim's y points up: (x, y, z) -> (y, z, x), as Pose2Sim converts a world with z up.
 R_OPENSIM_WORLD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+# The axes of a person who stands in the rest pose, in OpenSim's: forward, up, and to the right.
+R_OPENSIM_MODEL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArray[np.float64]:

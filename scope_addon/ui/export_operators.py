@@ -13,7 +13,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..options import Place
 from ..scene.datablock_names import holds
 from .capture.captures import captures_of, people_of, shown_capture
-from .captured_person import PERSON, motion_of
+from .captured_person import PERSON, body_of, motion_of
 from .declared_properties import with_options
 from .reporting import ReportingOperator, rpt_, tip_
 from .view.comparison import cameras_of
@@ -35,9 +35,23 @@ FORMATS = (
         "file per person",
         4,
     ),
+    (
+        "TRC",
+        "TRC",
+        "For OpenSim and Pose2Sim: markers of the captured motion before any editing, one file per "
+        "person",
+        5,
+    ),
+    (
+        "MOT",
+        "MOT",
+        "For OpenSim: joint angles of the captured motion before any editing, one file per person",
+        6,
+    ),
 )
+_OF_MOTION = ("NPZ", "TRC", "MOT")  # formats that hold the captured motion, not the scene's
 _NO_USD = "This Blender was built without USD; use a build from blender.org, or another format"
-_SUFFIX = {"FBX": ".fbx", "GLB": ".glb", "BVH": ".bvh", "USDC": ".usdc", "NPZ": ".npz"}
+_SUFFIX = {key: f".{key.lower()}" for key, *_ in FORMATS}
 
 
 @with_options(Place.EXPORT)
@@ -140,7 +154,7 @@ class SCOPE_OT_export(ReportingOperator):
         layout.prop(self, "which")
         if self.format == "BVH":
             layout.prop(self, "bvh_unit")
-        elif self.format != "NPZ":
+        elif self.format not in _OF_MOTION:
             layout.prop(self, "shape")
             if self.which != "RIG":
                 layout.prop(self, "camera")
@@ -154,6 +168,8 @@ class SCOPE_OT_export(ReportingOperator):
         """
         from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
+        from ..scene.export.output_paths import check_output
+        from ..scene.export.without_scene import write_without_scene
         from ..scene.rigs.rig_export import export_rig
         from .files.output_file import output_file
 
@@ -168,9 +184,10 @@ class SCOPE_OT_export(ReportingOperator):
         )
         collections = captures(context.scene)
         rig = context.scene.scope_retarget.rig
-        if self.which == "RIG" and self.format == "NPZ":
+        if self.which == "RIG" and self.format in _OF_MOTION:
             raise UsageError(
-                "a motion file contains the captured motion, not a rig; choose another format"
+                f"a file of the format {self.format} contains the captured motion, not a rig; "
+                "choose another format"
             )
         if self.which == "RIG" and rig is None:
             raise UsageError(
@@ -185,9 +202,13 @@ class SCOPE_OT_export(ReportingOperator):
                 raise UsageError(
                     "the active object belongs to no capture; select one of a capture's objects"
                 )
-        if self.format == "NPZ":
+        if self.format in _OF_MOTION:
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
-            written = export(path, collections, [motion_of(obj) for obj in people])
+            if not people:
+                raise UsageError("the captured person was deleted; undo that or capture again")
+            motions = [motion_of(obj) for obj in people]
+            bodies = [body_of(obj) for obj in people]
+            written = write_without_scene(check_output(path), motions, bodies)
         elif self.which == "RIG":
             written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
         else:

@@ -32,6 +32,8 @@ UNTRANSLATED = {
     "BVH",
     "USD",
     "NPZ",
+    "TRC",
+    "MOT",
     "CPU",
     "CUDA",
     "TensorRT",

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exporting captures: .glb, .fbx, .blend, .bvh and .usdc from the scene, .npz from the captured
-motion.
+"""Exporting captures from the scene: .glb, .fbx, .blend, .bvh and .usdc. Files that follow from the
+captured motion alone are written by ``without_scene``.
 
 Captures are linked to a temporary scene, so that nothing else of the user's file is exported and
 the result does not depend on selection or visibility. Files are written atomically.
@@ -95,31 +95,23 @@ def captures(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
 def export(
     path: str | Path,
     collections: Sequence[bpy.types.Collection] | None = None,
-    motions: Sequence[Motion] = (),
     options: ExportOptions | None = None,
 ) -> list[Path]:
-    """Write captures in the format of the suffix, to one file, or one per person for .bvh, .npz and
-    on request.
+    """Write captures in the format of the suffix, to one file, or one per person for .bvh and on
+    request.
 
     :param collections: the captures; by default those of the active scene.
-    :param motions: required for .npz, which holds the captured motion without changes made in the
-        scene.
     :return: the files written.
     :raises UsageError: when the suffix is unknown, or there is nothing to export.
     :raises OutputError: when a file cannot be written.
     """
     path = check_output(path)
     suffix = path.suffix.lower()
-    if suffix == ".trc":
+    if suffix in WITHOUT_SCENE:
         raise UsageError(
-            f"cannot write {path.name}: markers follow from a motion file; write one, and convert "
-            "it with scope import"
+            f"cannot write {path.name} from a scene: it follows from a motion file; write one, and "
+            "convert it with scope import"
         )
-    if suffix == ".npz" and motions:
-        targets = person_paths(path, len(motions))
-        for target, motion in zip(targets, motions, strict=True):
-            motion.save(target)
-        return targets
     chosen = list(collections) if collections is not None else captures(bpy.context.scene)
     if not chosen:
         raise UsageError(
@@ -133,10 +125,6 @@ def export(
         raise UsageError(
             f"cannot write {path.name}: the capture's armature was removed; undo that "
             "or capture again"
-        )
-    if suffix == ".npz":
-        raise UsageError(
-            f"cannot write {path.name}: a motion file holds the captured motion; pass the motions"
         )
     targets = person_paths(path, len(rigs), options.separate)
     if len(targets) == 1:
@@ -225,7 +213,7 @@ def export_motions(
     warnings: list[Notice] = []
     scene_paths = [p for p in paths if Path(p).suffix.lower() not in WITHOUT_SCENE]
     for each in map(Path, (p for p in paths if p not in scene_paths)):
-        written += write_without_scene(each, motions, body)
+        written += write_without_scene(each, motions, [body] * len(motions))
     if not scene_paths:
         return written, warnings
     build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)
@@ -236,7 +224,7 @@ def export_motions(
                 for person in result.people:
                     pack_motion(person.armature, person.motion.to_bytes())
             for each in scene_paths:
-                written += export(each, [result.collection], motions, export_options)
+                written += export(each, [result.collection], export_options)
         finally:
             _remove(result)
     return written, result.warnings

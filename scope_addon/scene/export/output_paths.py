@@ -12,9 +12,10 @@ from pathlib import Path
 from ...atomic_write import reason, resolve_link
 from ...errors import OutputError, UsageError
 
-SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", ".trc", ".npz")
-PER_PERSON = (".bvh", ".trc", ".npz")  # formats with one person per file
-WITHOUT_SCENE = (".trc", ".npz")  # formats that are written from the motion, without Blender
+# Formats that are written from the motion, without Blender.
+WITHOUT_SCENE = (".trc", ".mot", ".csv", ".npz")
+SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", *WITHOUT_SCENE)
+PER_PERSON = (".bvh", *WITHOUT_SCENE)  # formats with one person per file
 
 
 def check_output(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:

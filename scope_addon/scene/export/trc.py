@@ -18,6 +18,7 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError
 from ...kinematics.axes import R_OPENSIM_WORLD
 from ...motion import Motion
+from .one_rate import at_one_rate
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -52,17 +53,13 @@ def write_trc(path: Path, motion: Motion, body: Body) -> None:
 def trc_text(name: str, motion: Motion, body: Body) -> str:
     """Return the content of the file.
 
-    The format has one rate, so that a motion with a variable rate is interpolated linearly.
-
     :param name: of the file, which stands in it.
     """
     names, markers = world_markers(motion, body)
     rate = motion.mocap_framerate
-    start_s = float(motion.timestamps[0])
-    count = 1 + round(float(motion.timestamps[-1] - start_s) * rate)
-    times_s = start_s + np.arange(count) / rate
     columns = (markers @ R_OPENSIM_WORLD.T).reshape(len(motion), -1).T
-    rows = np.array([np.interp(times_s, motion.timestamps, column) for column in columns]).T
+    times_s, rows = at_one_rate(motion, list(columns))
+    count = len(times_s)
     numbers = range(1, len(names) + 1)
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{name}",

@@ -209,7 +209,7 @@ class Steps(FileSteps):
             },
             "export": {
                 "filepath": str(folder / "made"),
-                "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ")),
+                "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT")),
                 "which": chance.choice(("ALL", "ALL", "ALL", "ACTIVE", "RIG")),
             },
             "loop": {"start": 1, "end": 60, "shortest": 0.5, "movement": 0.0},

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Joint angles, by where joints and points of the body are in single poses, and the files."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.axes import R_OPENSIM_WORLD, R_WORLD_MODEL
+from scope.scope_addon.scene.export.joint_angles import joint_angles, write_angles
+from scope.solver.rotations import exp, log
+
+# By joint: a rotation about an axis of the rest pose (x to the left, y up, z forward), degrees, and
+# the angles that it is, by OpenSim's names. Arms are spread in the rest pose.
+POSES = {
+    "right_hip": (("x", -40.0), {"hip_flexion_r": 40.0}),
+    "left_hip": (("z", 25.0), {"hip_adduction_l": -25.0}),
+    "right_knee": (("x", 70.0), {"knee_angle_r": 70.0}),
+    "left_ankle": (("x", -15.0), {"ankle_angle_l": 15.0}),
+    "spine1": (("x", 30.0), {"lumbar_extension": -30.0}),
+    "spine2": (("y", 20.0), {"lumbar_rotation": 20.0}),
+    "left_elbow": (("y", -90.0), {"elbow_flex_l": 90.0}),
+    "right_elbow": (("y", 90.0), {"elbow_flex_r": 90.0}),
+    "right_shoulder": (("z", 90.0), {"arm_add_r": 0.0, "arm_flex_r": 0.0, "arm_rot_r": 0.0}),
+    "left_shoulder": (("z", -60.0), {"arm_add_l": -30.0}),
+    "left_wrist": (("z", -35.0), {"wrist_flex_l": 35.0}),
+    "right_wrist": (("x", 30.0), {"pro_sup_r": 120.0}),
+}
+
+
+@pytest.fixture
+def posed(whole_body, make_motion):
+    """Return what gives a motion of one pose, upright in the world and turned about z."""
+
+    def pose(turns, heading=0.0):
+        motion = make_motion(whole_body, 3)
+        vectors = np.zeros((3, whole_body.K + 1, 3))
+        vectors[:, 0] = log(exp(np.array([0.0, 0.0, heading])) @ R_WORLD_MODEL)
+        for name, (axis, degrees) in turns.items():
+            vectors[:, whole_body.joint_names.index(name), "xyz".index(axis)] = np.radians(degrees)
+        return replace(motion, poses=vectors.reshape(3, -1).astype(np.float32))
+
+    return pose
+
+
+@pytest.mark.parametrize("joint", POSES)
+def test_a_joint_that_turns_has_the_angle_that_is_named(joint, posed, whole_body):
+    turn, expected = POSES[joint]
+    angles = joint_angles(posed({joint: turn}), whole_body)
+    at_rest = joint_angles(posed({}), whole_body)
+    for name, degrees in expected.items():
+        np.testing.assert_allclose(angles[name], degrees, atol=1e-3)
+    side = {"left": "_l", "right": "_r"}.get(joint.partition("_")[0], "")
+    others = [n for n in angles if not n.endswith(side) and not n.startswith("lumbar")]
+    for name in others if side else ():
+        np.testing.assert_allclose(angles[name], at_rest[name], atol=1e-3)
+
+
+def test_flexion_is_where_the_limbs_go(posed, whole_body):
+    """A thigh that flexes goes to the front, a shin to the back, whichever way a person faces."""
+    turns = {"right_hip": ("x", -40.0), "right_knee": ("x", 70.0)}
+    for heading in (0.0, 1.0, -2.5):
+        motion = posed(turns, heading)
+        vectors = motion.poses[0].reshape(-1, 3).astype(float)
+        at = whole_body.forward_kinematics(exp(vectors), motion.trans[0], motion.betas)[1]
+        hip, knee, ankle, left = (
+            at[whole_body.joint_names.index(name)]
+            for name in ("right_hip", "right_knee", "right_ankle", "left_hip")
+        )
+        front = np.cross(np.array([0.0, 0.0, 1.0]), hip - left)
+        assert front @ (knee - hip) > 0
+        assert front @ (ankle - knee) < 0
+        angles = joint_angles(motion, whole_body)
+        assert angles["hip_flexion_r"][0] == pytest.approx(40.0, abs=1e-3)
+        assert angles["knee_angle_r"][0] == pytest.approx(70.0, abs=1e-3)
+
+
+def test_the_pelvis_is_in_the_world(posed, whole_body, joints_world):
+    """In the rest pose a person faces the world's −y, which is backwards for OpenSim."""
+    motion = posed({}, heading=np.pi + 0.3)
+    angles = joint_angles(motion, whole_body)
+    np.testing.assert_allclose(angles["pelvis_rotation"] % 360.0, np.degrees(0.3), atol=1e-3)
+    np.testing.assert_allclose(angles["pelvis_tilt"], 0.0, atol=1e-3)
+    place = joints_world(motion)[:, 0] @ R_OPENSIM_WORLD.T
+    for k, axis in enumerate("xyz"):
+        np.testing.assert_allclose(angles[f"pelvis_t{axis}"], place[:, k], atol=1e-5)
+
+
+def test_a_turn_through_a_half_does_not_jump(make_motion, whole_body):
+    motion = make_motion(whole_body, 40)
+    poses = np.zeros((40, whole_body.K + 1, 3))
+    headings = np.linspace(0.0, 3.0 * np.pi, 40)
+    turned = exp(headings[:, None] * np.array([0.0, 0.0, 1.0])) @ R_WORLD_MODEL
+    poses[:, 0] = log(turned)
+    angles = joint_angles(replace(motion, poses=poses.reshape(40, -1)), whole_body)
+    np.testing.assert_allclose(np.diff(angles["pelvis_rotation"]), 540.0 / 39, atol=1e-2)
+
+
+def test_the_files_hold_the_angles_at_one_rate(tmp_path, posed, whole_body):
+    motion = posed({"right_knee": ("x", 50.0)})
+    expected = joint_angles(motion, whole_body)
+    write_angles(tmp_path / "a.mot", motion, whole_body)
+    write_angles(tmp_path / "a.csv", motion, whole_body)
+    header, _, table = (tmp_path / "a.mot").read_text().partition("endheader\n")
+    assert header.split("\n")[1:-1] == [
+        "version=1",
+        "nRows=3",
+        f"nColumns={len(expected) + 1}",
+        "inDegrees=yes",
+    ]
+    of_mot = [line.split("\t") for line in table.splitlines()]
+    of_csv = list(csv.reader((tmp_path / "a.csv").read_text().splitlines()))
+    assert of_mot == of_csv
+    assert of_csv[0] == ["time", *expected]
+    values = np.array(of_csv[1:], float)
+    np.testing.assert_allclose(values[:, 0], motion.timestamps, atol=1e-6)
+    np.testing.assert_allclose(values[:, 1:], np.array([*expected.values()]).T, atol=1e-5)
