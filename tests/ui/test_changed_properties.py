@@ -90,12 +90,12 @@ def try_all():
     listed_corrections(bpy.context.object)
 
 
-@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
-def test_no_operator_fails_with_a_traceback(rig, value):
+@pytest.mark.parametrize("kind", ["text", "list", "group", "nan", "many"])
+def test_no_operator_fails_with_a_traceback(rig, kind):
     for name in PROPERTIES:
         before = rig.get(name)
         kept = before.to_list() if hasattr(before, "to_list") else before
-        rig[name] = value
+        rig[name] = VALUES[kind]
         if name in ("scope_start", "scope_cycle"):
             try_all()
         else:
