@@ -47,7 +47,7 @@ case $1 in
         blender --background --command extension install-file --repo user_default --enable scope.zip >"$log" 2>&1 ||
             { cat "$log" >&2; exit 1; }
         ;;
-    panel) in_window window/panel.py "/scope/$2" /scope/out ;;
+    panel | tour) in_window "window/$1.py" "/scope/$2" /scope/out ;;
     undo | trouble | stored | pins | details | reload) in_window "window/$1.py" /scope/clips/walk.mp4 /scope/out ;;
     live) in_window live/live.py /scope/clips/walk.mp4 /scope/out ;;
     startup) on_screen python3 parts/window/startup.py 15 ;;
@@ -62,5 +62,5 @@ case $1 in
         python3 parts/without_window/update.py scope.zip >"$log" 2>&1 || { tail -n 60 "$log" >&2; exit 1; }
         ;;
     headless) python3 parts/without_window/headless.py 2>&1 | tee "$log" >&2 ;;
-    *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, update, startup, reload and walk" >&2; exit 2 ;;
+    *) echo "run.sh: no part '$1'; there are panel, headless, undo, trouble, stored, pins, details, live, first, update, startup, reload, walk and tour" >&2; exit 2 ;;
 esac

@@ -19,7 +19,7 @@ from ...solver.body_file import ASSETS
 from . import animation, photographs, pictures
 from .clips import DATA
 
-ANIMATIONS = tuple(animation.CUTS)
+ANIMATIONS = ("talk",)
 PICTURES = {
     "capture": pictures.sample,
     "against_truth": pictures.against_truth,
@@ -90,11 +90,11 @@ def write_jpeg(path: Path, picture: NDArray[np.uint8], most_bytes: int = MAX_BYT
 
 
 def _write_animation(name: str, path: Path) -> None:
-    frames = animation.animation_frames(name)
+    frames = animation.talk_frames()
     most_bytes = animation.LARGEST_BYTES[name]
     with atomic_path(path) as temporary:
         quality = animation.write_webp(
-            temporary, frames, animation.CUTS[name].frames_per_second, most_bytes
+            temporary, frames, animation.TALK.frames_per_second, most_bytes
         )
     height, width = frames[0].shape[:2]
     size_kb = path.stat().st_size / 1000

@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.errors import OutputError
-from ...scope_addon.motion import Motion
-from ...solver import Body
-from .clips import SAMPLE, body_with_face, captured, captured_in_total, default_body, talk
+from .clips import body_with_face, captured_in_total, talk
 from .footage import cropped
 from .panel import OURS, Panel, next_to_each_other
 from .shapes import colors_with_face, joints, posed
 from .view import from_around
 
-LARGEST_BYTES = {"sample": 410_000, "talk": 390_000}
+# That in Blender's window is made by ./scripts/blender --sid --guide --part tour.
+LARGEST_BYTES = {"blender": 900_000, "talk": 390_000}
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,8 @@ class Cut:
     tall: float
     middle: tuple[float, float, float]  # of the side view, metres
     height_m: float  # of the side view
-    turn: float = 90.0  # of the side view, degrees
-    step: int = 2  # frames of the footage for one of the animation
+    turn: float  # of the side view, degrees
+    step: int  # frames of the footage for one of the animation
 
     @property
     def frames_per_second(self) -> float:
@@ -44,42 +43,30 @@ class Cut:
         return 30 / self.step
 
 
-CUTS = {  # the person stays inside
-    "sample": Cut((300, 306), (300, 306), (60.0, 0.0), 480.0, (0.35, 0.0, 0.93), 2.35),
-    "talk": Cut((308, 240), (204, 240), (0.0, 26.0), 400.0, (0.0, -0.15, 1.375), 0.84, 60.0, 3),
-}
+# The person stays inside.
+TALK = Cut((308, 240), (204, 240), (0.0, 26.0), 400.0, (0.0, -0.15, 1.375), 0.84, 60.0, 3)
 
 
-def animation_frames(name: str) -> list[NDArray[np.uint8]]:
-    """Return (H, W, 3) RGB frames of an animation: footage, overlay and side view next to each
+def talk_frames() -> list[NDArray[np.uint8]]:
+    """Return (H, W, 3) RGB frames of a talking person: footage, overlay and side view next to each
     other.
     """
-    if name == "sample":
-        return _frames(SAMPLE, captured(SAMPLE)[0], None, CUTS[name])
-    return _frames(talk(), captured_in_total(talk()), body_with_face(), CUTS[name])
-
-
-def _frames(clip: Path, motion: Motion, body: Body | None, cut: Cut) -> list[NDArray[np.uint8]]:
-    """Return an animation's frames; a body that is given has eyes and mouth in their own
-    colours.
-    """
+    clip = talk()
+    motion = captured_in_total(clip)
+    body = body_with_face()
     rows = {int(frame): row for row, frame in enumerate(motion.frames)}
-    view = from_around(motion, 0, np.array(cut.middle), cut.side, cut.turn, cut.height_m)
+    view = from_around(motion, 0, np.array(TALK.middle), TALK.side, TALK.turn, TALK.height_m)
     frames = []
     with open_video(clip) as video:
         for frame in video:
-            if frame.index % cut.step or frame.index not in rows:
+            if frame.index % TALK.step or frame.index not in rows:
                 continue
             row = rows[frame.index]
-            footage = cropped(frame.image_rgb, cut.corner, cut.tall, cut.size)
-            overlay = cropped(frame.image_rgb, cut.corner, cut.tall, cut.size, motion, row, body)
+            part = (TALK.corner, TALK.tall, TALK.size)
+            footage = cropped(frame.image_rgb, *part)
+            overlay = cropped(frame.image_rgb, *part, motion, row, body)
             side = Panel(view, joints(motion, 0)[0])
-            shown = body or default_body()
-            side.body(
-                shown,
-                posed(motion, shown, row),
-                OURS if body is None else colors_with_face(body, OURS),
-            )
+            side.body(body, posed(motion, body, row), colors_with_face(body, OURS))
             frames.append(next_to_each_other([footage, overlay, side.finished()]))
     return frames
 

@@ -142,6 +142,7 @@ def main(video: Path, work: Path, parts: list[str]) -> int:
         "startup",
         "reload",
         "walk",
+        "tour",
     ):
         if part in parts:
             report[part] = json.loads((work / "out" / f"{part}.json").read_text("utf-8"))

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Crop the pictures of docs/guide.md and docs/live.md (assets/guide) from the screenshots of a real
-Blender.
+Blender, and join those of the tour to the README's moving picture.
 """
 
 from pathlib import Path
 
 import cv2
+from scope.tools.readme_pictures.animation import LARGEST_BYTES, write_webp
 
 # Name of the picture: screenshot, and the part of it to show (left, top, right, bottom in pixels).
 PICTURES = {
@@ -19,6 +20,8 @@ PICTURES = {
 }
 _SCALE = 0.6  # of wide pictures
 _MAX_BYTES = 60_000
+_TOUR_SIZE = (880, 550)  # of a screen of 1600 x 1000
+_TOUR_RATE = 7.5  # pictures a second: every fourth frame of the sample
 ROOT = Path(__file__).resolve().parents[3]
 
 made = []
@@ -35,4 +38,13 @@ for name, (screenshot, (left, top, right, bottom)) in PICTURES.items():
             break
     (ROOT / "assets" / "guide" / f"{name}.jpg").write_bytes(jpeg)
     made.append(name)
+tour = sorted((ROOT / "build" / "screenshots").glob("tour_*.png"))
+if tour:
+    frames = []
+    for path in tour:
+        small = cv2.resize(cv2.imread(str(path)), _TOUR_SIZE, interpolation=cv2.INTER_AREA)
+        frames.append(cv2.cvtColor(small, cv2.COLOR_BGR2RGB))
+    webp = ROOT / "assets" / "pictures" / "blender.webp"
+    write_webp(webp, frames, _TOUR_RATE, LARGEST_BYTES["blender"])
+    made.append(webp.name)
 print(f"New in assets/guide: {', '.join(made)}. Look at them.")
