@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import CollectionProperty, IntProperty, StringProperty
@@ -17,7 +17,7 @@ from .. import warm_up
 from ..files.file_field import FootageBrowser, stored_path
 from ..libraries import restore_libraries
 from ..live.live_state import state as live_state
-from ..reporting import iface_, rpt_, tip_
+from ..reporting import iface_, rpt_, sentence, tip_
 from ..view.sidebar import redraw_sidebars, show_tab
 from ..view.view_operators import show_new_capture
 from . import preview_picture
@@ -31,6 +31,8 @@ SAMPLE = Path(__file__).resolve().parents[3] / "assets" / "sample" / "sample.mp4
 MOST_FURTHER_VIEWS = 7
 DRAWN_EVERY_S = 0.3  # between two drawings of a stage's progress; previews come as often
 ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
+# States of a clip of the queue.
+WAITING, DONE, FAILED = "WAITING", "DONE", "FAILED"
 
 
 class _State:
@@ -53,11 +55,16 @@ def end_capture() -> None:
 
 
 class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
-    """Choose a video or image of a person"""
+    """Choose a video or image of a person, or several that are captured one after the other"""
 
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Use a dropped file, or ask for one."""
@@ -66,12 +73,21 @@ class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
         return self.ask(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set the footage to the file."""
-        path = Path(bpy.path.abspath(self.filepath))
-        if not os.path.isfile(path):  # Path.is_file raises where a name is too long
-            self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
-            return {"CANCELLED"}
-        context.scene.scope.footage = stored_path(context, str(path))
+        """Set the footage to the file, and queue the files if there are several."""
+        names = [each.name for each in self.files if each.name]
+        chosen = [os.path.join(self.directory, name) for name in names] or [self.filepath]
+        paths = [Path(bpy.path.abspath(path)) for path in chosen]
+        for path in paths:
+            if not os.path.isfile(path):  # Path.is_file raises where a name is too long
+                self.report(
+                    {"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path)
+                )
+                return {"CANCELLED"}
+        settings = context.scene.scope
+        settings.footage = stored_path(context, str(paths[0]))
+        settings.queue.clear()
+        for path in paths[1:] and paths:
+            settings.queue.add().footage = stored_path(context, str(path))
         show_tab(context)
         return {"FINISHED"}
 
@@ -155,12 +171,8 @@ class SCOPE_OT_use_sample(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_capture(JobOperator):
-    """Capture the person in the footage as an animated body, while Blender stays usable"""
-
-    bl_idname = "scope.capture"
-    bl_label = "Capture"
-    bl_options = {"UNDO"}
+class CapturingOperator(JobOperator):
+    """An operator that captures footage. Not registered."""
 
     timer_s = 0.1
     job_state = state
@@ -192,8 +204,12 @@ class SCOPE_OT_capture(JobOperator):
 
     def start(self, context: bpy.types.Context) -> bool:
         """Start the job; return whether that worked."""
+        return self.begin(context.scene)
+
+    def begin(self, scene: bpy.types.Scene) -> bool:
+        """Start the job for a scene with its settings; return whether that worked."""
         state.message = ""
-        state.scene_uid = context.scene.session_uid
+        state.scene_uid = scene.session_uid
         state.started = time.monotonic()
         from ....solver.errors import ScopeError
 
@@ -206,7 +222,7 @@ class SCOPE_OT_capture(JobOperator):
 
         warm_up.detach()  # the capture compiles what is left; what it has compiled is kept
         try:
-            state.job = CaptureJob(context.scene)
+            state.job = CaptureJob(scene)
         except (ScopeError, OSError) as error:
             return self.fail(error)
         return True
@@ -256,7 +272,7 @@ class SCOPE_OT_capture(JobOperator):
 
     def _report_unit(self) -> None:
         """Warn at once of a scene in whose unit the person is not life-size."""
-        scene = next((s for s in bpy.data.scenes if s.session_uid == state.scene_uid), None)
+        scene = _scene_of_job()
         if scene is not None and (text := unit_text(scene)):
             self.report({"WARNING"}, text)
 
@@ -277,6 +293,110 @@ class SCOPE_OT_capture(JobOperator):
         if "FINISHED" in outcome:
             show_new_capture(context)
         return super().end(context, outcome)
+
+
+class SCOPE_OT_capture(CapturingOperator):
+    """Capture the person in the footage as an animated body, while Blender stays usable"""
+
+    bl_idname = "scope.capture"
+    bl_label = "Capture"
+    bl_options = {"UNDO"}
+
+
+class SCOPE_OT_capture_queue(CapturingOperator):
+    """Capture all clips of the list that wait, one after the other, with the same options"""
+
+    bl_idname = "scope.capture_queue"
+    bl_label = "Capture All"
+
+    _row = -1  # of the clip that is being captured
+    _finished = 0  # clips so far
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a clip that waits, of one camera, and that nothing is running."""
+        if not super().poll(context):
+            return False
+        settings = context.scene.scope
+        if settings.views:
+            cls.poll_message_set(tip_("Remove the other cameras' videos first"))
+            return False
+        if not any(clip.status == WAITING for clip in settings.queue):
+            cls.poll_message_set(tip_("All clips of the list have been captured; choose others"))
+            return False
+        return True
+
+    def begin(self, scene: bpy.types.Scene) -> bool:
+        """Start the first clip that waits and can be started; return whether there is one."""
+        queue = scene.scope.queue
+        for row, clip in enumerate(queue):
+            if clip.status == WAITING:
+                self._row = row
+                scene.scope.footage = clip.footage
+                if super().begin(scene):
+                    return True
+        return False
+
+    def fail(self, error: Exception | str) -> bool:
+        """Note why the clip cannot be captured, and go on; return False."""
+        queue = self._queue()
+        if 0 <= self._row < len(queue):
+            queue[self._row].status = FAILED
+            queue[self._row].message = sentence(error)
+        stop_job()
+        self.report({"WARNING"}, sentence(error))
+        return False
+
+    def _advance(self) -> set[str] | None:
+        """Advance the clip's job, and begin the next clip when it has ended."""
+        outcome = super()._advance()
+        if outcome is None:
+            return None
+        scene = _scene_of_job()
+        if "FINISHED" in outcome:
+            self._finished += 1
+            queue = self._queue()
+            if 0 <= self._row < len(queue):
+                queue[self._row].status = DONE
+            stop_job()
+            if not bpy.app.background:  # so that each capture can be undone alone
+                bpy.ops.ed.undo_push(message="Capture")
+        if scene is not None and self.begin(scene):
+            return None
+        return {"FINISHED"} if self._finished else {"CANCELLED"}
+
+    def step(self, context: bpy.types.Context) -> set[str] | None:
+        """Advance, and show the progress of the clip that is captured."""
+        outcome = super().step(context)
+        redraw_sidebars()
+        return outcome
+
+    def _queue(self) -> Any:
+        scene = _scene_of_job()
+        return scene.scope.queue if scene is not None else ()
+
+
+class SCOPE_OT_remove_clip(bpy.types.Operator):
+    """Remove this clip from the list; the file and its capture stay"""
+
+    bl_idname = "scope.remove_clip"
+    bl_label = "Remove Clip"
+    bl_options = {"UNDO"}
+
+    index: IntProperty(min=0, options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove the clip."""
+        queue = context.scene.scope.queue
+        if self.index >= len(queue):
+            return {"CANCELLED"}
+        queue.remove(self.index)
+        return {"FINISHED"}
+
+
+def _scene_of_job() -> bpy.types.Scene | None:
+    """Return the scene that the running job belongs to; None if it was removed."""
+    return next((s for s in bpy.data.scenes if s.session_uid == state.scene_uid), None)
 
 
 class SCOPE_OT_cancel(bpy.types.Operator):
@@ -367,6 +487,8 @@ CLASSES = (
     SCOPE_OT_remove_view,
     SCOPE_OT_use_sample,
     SCOPE_OT_capture,
+    SCOPE_OT_capture_queue,
+    SCOPE_OT_remove_clip,
     SCOPE_OT_cancel,
     SCOPE_OT_keep_capturing,
     SCOPE_PT_stop_capture,

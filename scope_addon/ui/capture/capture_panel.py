@@ -20,7 +20,7 @@ from ..reporting import iface_, warning_text
 from ..translations import CONTEXT
 from ..view.comparison import camera_of, cameras_of, is_looking_through, side_area
 from . import preview_picture
-from .capture_operators import state
+from .capture_operators import DONE, FAILED, WAITING, state
 from .captures import draw_captures, people_of, people_text, shown_capture, unit_text
 from .frame_rate_operators import differs, keyed_for
 from .stored_warnings import stored_warning
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ...job.progress.job_progress import JobProgress
 
 _PIXELS_PER_CHARACTER = 7.0
+_STATUS_ICONS = {WAITING: "TIME", DONE: "CHECKMARK", FAILED: "ERROR"}
 
 
 class Tab:
@@ -71,13 +72,16 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
         row.operator("scope.import_motion", text="", icon="IMPORT")
         for index, view in enumerate(settings.views):
             _draw_view(column, view, index)
+        if settings.queue:
+            _draw_queue(context, column.box(), settings.queue)
         column.row(align=True).prop(settings, "quality", expand=True)
         if state.job is not None:
             _draw_progress(context, layout, state.job.progress)
         else:
             row = layout.row()
             row.scale_y = 1.6
-            row.operator("scope.capture", icon="ARMATURE_DATA")
+            name = "scope.capture_queue" if settings.queue else "scope.capture"
+            row.operator(name, icon="ARMATURE_DATA")
             warm_up.draw(layout)
         if state.message and state.scene_uid == context.scene.session_uid:
             draw_text(context, layout.box(), state.message, "ERROR")
@@ -91,6 +95,20 @@ def _draw_view(layout: bpy.types.UILayout, view: bpy.types.PropertyGroup, index:
     row.operator("scope.remove_view", text="", icon="X").index = index
     if view.use_offset:
         layout.prop(view, "offset_s")
+
+
+def _draw_queue(
+    context: bpy.types.Context, layout: bpy.types.UILayout, queue: bpy.types.CollectionProperty
+) -> None:
+    """Draw the clips that are captured one after the other, and why some were not."""
+    column = layout.column(align=True)
+    for index, clip in enumerate(queue):
+        row = column.row(align=True)
+        name = display_text(Path(clip.footage).name)
+        row.label(text=name, icon=_STATUS_ICONS.get(clip.status, "DOT"), translate=False)
+        row.operator("scope.remove_clip", text="", icon="X", emboss=False).index = index
+        if clip.message:
+            draw_text(context, column, clip.message, "BLANK1")
 
 
 def _draw_progress(

@@ -20,7 +20,7 @@ from bpy.props import (
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
 from ..files.file_field import path_text
-from .capture_operators import state
+from .capture_operators import WAITING, state
 from .captures import show_index, shown_capture, shown_index
 
 _VIEW = {"name": "View", "description": "Video of the same moment, by another camera"}
@@ -91,6 +91,14 @@ class SCOPE_PG_view(bpy.types.PropertyGroup):
     )
 
 
+class SCOPE_PG_clip(bpy.types.PropertyGroup):
+    """A clip of several that are captured one after the other."""
+
+    footage: StringProperty(subtype="FILE_PATH", options=PATH_OPTIONS, **_FOOTAGE)
+    status: StringProperty(default=WAITING)
+    message: StringProperty()  # why it failed
+
+
 @with_options(Place.PANEL)
 class SCOPE_PG_settings(bpy.types.PropertyGroup):
     """The settings of a capture: the footage, the declared options of the panel, and the capture
@@ -103,6 +111,9 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     footage_text: path_text("footage", **_FOOTAGE)
     views: CollectionProperty(
         type=SCOPE_PG_view, description="Further videos of the same moment, by other cameras"
+    )
+    queue: CollectionProperty(
+        type=SCOPE_PG_clip, description="Clips that are captured one after the other"
     )
     capture: PointerProperty(
         name="Capture",
@@ -135,7 +146,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         return result
 
 
-CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_view, SCOPE_PG_settings)
+CLASSES = (SCOPE_PG_warning, SCOPE_PG_result, SCOPE_PG_view, SCOPE_PG_clip, SCOPE_PG_settings)
 
 
 def attach() -> None:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operators of a capture: drawing its progress, cancelling, failures."""
 
+import os
+import shutil
 import time
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -17,6 +20,7 @@ from scope.scope_addon.ui.capture.capture_operators import (
     end_capture,
     state,
 )
+from scope.scope_addon.ui.capture.captures import captures_of
 from scope.scope_addon.ui.capture.job_operator import JobOperator
 
 
@@ -191,3 +195,54 @@ def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, second
     finally:
         monkeypatch.undo()
         state.job = None
+
+
+def choose_several(paths):
+    """Choose several clips in the file browser."""
+    files = [{"name": path.name} for path in paths]
+    return bpy.ops.scope.choose_footage(directory=f"{paths[0].parent}{os.sep}", files=files)
+
+
+def queued():
+    return [(Path(clip.footage).name, clip.status) for clip in bpy.context.scene.scope.queue]
+
+
+def test_clips_of_a_queue_are_captured_one_after_the_other_and_a_bad_one_stops_none(
+    fake_worker, footage
+):
+    paths = [footage.with_name(f"{name}.png") for name in ("a", "b", "c")]
+    for path in paths:
+        shutil.copy(footage, path)
+    fake_worker(
+        """
+        if request["footage"].endswith("b.png"):
+            send("error", message="b.png is damaged; choose another")
+        else:
+            finish()
+        """
+    )
+    assert choose_several(paths) == {"FINISHED"}
+    assert queued() == [("a.png", "WAITING"), ("b.png", "WAITING"), ("c.png", "WAITING")]
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert queued() == [("a.png", "DONE"), ("b.png", "FAILED"), ("c.png", "DONE")]
+    assert "b.png is damaged" in bpy.context.scene.scope.queue[1].message
+    names = sorted(each.name for each in captures_of(bpy.context.scene))
+    assert names == ["a", "c"]
+    assert not bpy.ops.scope.capture_queue.poll()
+    assert bpy.ops.scope.remove_clip(index=1) == {"FINISHED"}
+    assert queued() == [("a.png", "DONE"), ("c.png", "DONE")]
+
+
+def test_one_chosen_clip_is_no_queue(footage):
+    assert choose_several([footage]) == {"FINISHED"}
+    settings = bpy.context.scene.scope
+    assert Path(settings.footage).name == footage.name
+    assert not settings.queue
+    assert not bpy.ops.scope.capture_queue.poll()
+
+
+def test_a_queue_with_a_missing_file_is_refused(footage):
+    choose_several([footage])
+    with pytest.raises(RuntimeError, match="is not a file"):
+        choose_several([footage, footage.with_name("gone.png")])
+    assert not bpy.context.scene.scope.queue
