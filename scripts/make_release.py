@@ -179,11 +179,11 @@ def build_wheel(folder: Path) -> None:
             target = Path(name) / path
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / path, target)
-            # The wheel states the mode of each file, and a umask must not show in it.
             target.chmod(0o644)
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check"]
         command += ["--no-deps", "--no-build-isolation", "--wheel-dir", str(folder), name]
-        if subprocess.run(command, env=environment, check=False).returncode:
+        # The wheel states the mode of each file, in which the user's umask must not show.
+        if subprocess.run(command, env=environment, umask=0o022, check=False).returncode:
             raise SystemExit("release: the wheel could not be built; see pip's message")
 
 

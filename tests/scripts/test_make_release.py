@@ -4,6 +4,7 @@
 import hashlib
 import importlib.util
 import json
+import os
 import re
 import sys
 import threading
@@ -150,9 +151,14 @@ def test_the_hashes_are_those_that_sha256sum_checks(release, tmp_path):
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="the wheel is built of tracked files")
 def test_a_repeated_build_of_the_wheel_gives_the_same_bytes(release, tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    for name in ("first", "second"):
-        (tmp_path / name).mkdir()
-        release.build_wheel(tmp_path / name)
+    before = os.umask(0o022)
+    try:
+        for name, umask in (("first", 0o022), ("second", 0o077)):
+            (tmp_path / name).mkdir()
+            os.umask(umask)
+            release.build_wheel(tmp_path / name)
+    finally:
+        os.umask(before)
     (first,) = (tmp_path / "first").iterdir()
     (second,) = (tmp_path / "second").iterdir()
     assert first.name == second.name
