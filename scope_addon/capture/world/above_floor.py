@@ -12,11 +12,11 @@ one does, and a foot at rest a few millimetres below it hardly moves. Where h st
 `UNDER_FLOOR_M`, nothing changes at all.
 
 Body and legs share the lift. The root rises by what the deeper foot needs, except as far as the
-other foot or a palm rests on the floor and would leave it; the legs bend by the rest. Trunk, head
-and thighs, on which somebody sits, kneels or lies, go up with the root alone, and hands by their
-arms. Feet that are not in the image are a guess, and so is the floor then: they do not move the
-body, and nothing else is raised. Where a foot rests on something clearly below the floor, as after
-a leap from a wall, the floor is another one and the motion stays.
+other foot or a palm rests on the floor and would leave it; the legs bend by the rest. Trunk, head,
+thighs and upper arms, on which somebody sits, kneels, lies or leans, go up with the root alone, and
+hands by their arms. Feet that are not in the image are a guess, and so is the floor then: they do
+not move the body, and nothing else is raised. Where a foot rests on something clearly below the
+floor, as after a leap from a wall, the floor is another one and the motion stays.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ ROUNDS = 4  # of smoothing without going below what is needed
 
 
 _HAND_WORDS = ("wrist", "hand", "thumb", "index", "middle", "ring", "pinky")
-_TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head", "left_hip", "right_hip")
+# Thighs and upper arms, whose skin reaches to knees and elbows, go up with the trunk.
+_TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
+_TRUNK += ("left_hip", "right_hip", "left_shoulder", "right_shoulder")
 
 
 def raise_body(

@@ -238,6 +238,33 @@ def test_somebody_who_lies_is_not_pushed_under_the_floor(step):
     np.testing.assert_allclose(found.root[still], (root - depth[:, None] * up)[still], atol=0.01)
 
 
+def test_elbows_under_the_floor_raise_the_body(step):
+    """Somebody whose elbows are lower than the knees, and the feet in the air, sinks by 6 cm."""
+    supported, omega, root, place, T_world_camera, times = step
+    up = T_world_camera[2, :3]
+    bent = omega.copy()
+    bent[:, 1:] = np.eye(3)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        turns = {
+            "hip": (-90.0, 0.0, 0.0),
+            "knee": (120.0, 0.0, 0.0),
+            "shoulder": (0.0, -sign * 90.0, 0.0),
+            "elbow": (0.0, -sign * 60.0, 0.0),
+        }
+        for name, degrees in turns.items():
+            part = supported.joint_names.index(f"{side}_{name}")
+            bent[:, part] = rotations.exp(np.radians(degrees))
+    bent[:, 0] = omega[0, 0] @ rotations.exp(np.radians([115.0, 0.0, 0.0]))
+    person = (supported, bent, root, place, T_world_camera, times)
+    root = root + supported.rest_joints()[0]
+    elbows = skin_of(person, ["left_shoulder", "right_shoulder"])
+    root = root - skin_heights(person, bent[:1], root[:1])[:, elbows].min() * up
+    depth = 0.06 * bump(times, 0.5, 2.5)
+    _, found = raised(person, bent, root - depth[:, None] * up)
+    heights = skin_heights(person, found.rotations, found.root)
+    assert heights[:, elbows].min() > -0.012
+
+
 def test_a_single_frame_is_raised(step):
     omega, root = on_the_floor(step)
     sunk = root[:1] - 0.1 * step[4][2, :3]
