@@ -81,12 +81,13 @@ def print_advisories() -> None:
     table = tomllib.loads(ADVISORIES.read_text("utf-8"))
     print(f"inside the packages, as of {table['as_of']}:")
     for library in table["library"]:
-        reach = "reachable" if library["reachable"] else "out of reach"
-        print(
-            f"  {library['project']} {library['found']} in {library['package']}: "
-            f"{', '.join(library['advisories'])} (fixed in {library['fixed_in']}); {reach}: "
-            f"{library['because']}"
-        )
+        what = f"{library['project']} {library['found']} in {library['package']}"
+        known = "no known vulnerability"
+        if library["advisories"]:
+            reach = "reachable" if library["reachable"] else "out of reach"
+            advisories = ", ".join(library["advisories"])
+            known = f"{advisories} (fixed in {library['fixed_in']}); {reach}"
+        print(f"  {what}: {known}: {library['because']}")
 
 
 def main(ask: Ask = ask) -> int:

@@ -37,6 +37,7 @@ SEEN = ("out", "tmp", "home")  # folders in which nothing may be left
 KEPT_FOLDERS = (
     *("scope-mocap", "cache", "captures", "jobs", "kernels", "1" * 32, "unfinished", "recordings"),
 )
+KEPT_FILE = f"{CACHE}/times.json"  # how long the stages of the last captures took
 # What a live capture that was killed leaves on purpose, until the user finishes it.
 RECORDED = re.compile(r".*\.recording(\.lock)?|.*\.unfinished( \d+)?\.mp4")
 
@@ -200,7 +201,8 @@ class Workplace:
             for path in found
             if path.is_file() or (not any(path.iterdir()) and not _may_be_empty(path))
         ]
-        return sorted({str(path.relative_to(self._folder)) for path in files} - set(self._whole))
+        names = {str(path.relative_to(self._folder)) for path in files}
+        return sorted(names - set(self._whole) - {KEPT_FILE})
 
 
 def _may_be_empty(path: Path) -> bool:
