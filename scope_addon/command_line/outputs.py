@@ -226,9 +226,11 @@ def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -
     from ..scene.rigs.rig_file import check_rig
     from .bounded_import import bounded_import
 
+    written = [*outputs, *filter(None, (getattr(args, "overlay", None),))]
     for rig in rigs:
         with bounded_import(rig.path):
-            check_rig(rig, fingers=fingers)
+            referred = check_rig(rig, fingers=fingers)
+        refuse_inputs(written, referred)
     return rigs
 
 

@@ -134,7 +134,13 @@ def unfinished_captures(root: Path) -> list[Path]:
 
 
 def _remove_old(own: Path) -> None:
-    """Remove what is old beside the folder of a capture, and if all is too much, the oldest."""
+    """Remove what is old beside the folder of a capture, and if all is too much, the oldest; and
+    the locks of captures that were killed when they had no folder.
+    """
+    for lock in own.parent.glob("*.lock"):
+        is_ours = _FOLDER_NAME.fullmatch(lock.stem) is not None
+        if is_ours and not lock.with_suffix("").exists() and is_abandoned(lock):
+            remove(lock)
     found = []
     for folder in own_entries(own.parent, _FOLDER_NAME):
         with suppress(OSError):

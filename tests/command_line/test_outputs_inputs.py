@@ -3,12 +3,48 @@
 
 import json
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from scope.scope_addon.cli import main
 from scope.scope_addon.command_line.outputs import FOOTAGE, OTHER_INPUTS, check_outputs
 from scope.scope_addon.errors import UsageError
 
+RIG_WITH_TEXTURE = """
+import sys, bpy
+from scope.tests.scene.made_rigs import build_rig
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+rig, _ = build_rig("mixamo")
+texture, target = sys.argv[1:]
+image = bpy.data.images.new("texture", 4, 4)
+image.filepath_raw = texture
+image.file_format = "PNG"
+image.save()
+material = bpy.data.materials.new("skin")
+material.use_nodes = True
+node = material.node_tree.nodes.new("ShaderNodeTexImage")
+node.image = image
+shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+mesh = bpy.data.meshes.new("skin")
+mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+mesh.uv_layers.new()
+mesh.materials.append(material)
+skin = bpy.data.objects.new("skin", mesh)
+bpy.context.scene.collection.objects.link(skin)
+skin.parent = rig
+skin.vertex_groups.new(name=rig.data.bones[0].name).add([0, 1, 2], 1.0, "REPLACE")
+skin.modifiers.new("Armature", "ARMATURE").object = rig
+if target.endswith(".blend"):
+    bpy.ops.wm.save_as_mainfile(filepath=target)
+else:
+    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    bpy.ops.export_scene.gltf(
+        filepath=target, export_format="GLTF_SEPARATE", export_keep_originals=True
+    )
+"""
 WRITTEN = {"outputs": ".npz", "overlay": ".mp4", "report": ".html"}
 NAMES = ("symbolic link", "hard link", "detour")
 
@@ -74,6 +110,25 @@ def test_the_file_of_one_of_several_people_is_no_input(tmp_path):
     body.write_text("body")
     with pytest.raises(UsageError, match="take.person2.npz is the input itself"):
         check("outputs", tmp_path / "take.npz", {"body": body})
+
+
+@pytest.mark.parametrize("suffix", [".blend", ".gltf"])
+def test_what_a_rigs_file_refers_to_is_no_output(tmp_path, monkeypatch, capsys, suffix):
+    """The texture of a rig is read whenever the rig is exported."""
+    clip = tmp_path / "walk.png"
+    clip.write_text("clip")
+    texture = tmp_path / "texture.png"
+    rig = tmp_path / f"rig{suffix}"
+    subprocess.run(
+        [sys.executable, "-c", RIG_WITH_TEXTURE, str(texture), str(rig)],
+        check=True,
+        cwd=Path(__file__).parents[2],
+    )
+    was = texture.read_bytes()
+    command = ["capture", str(clip), "--overlay", str(texture), "--retarget", str(rig)]
+    assert main([*command, "-o", str(tmp_path / "out.glb"), "--quiet"]) == 2
+    assert "texture.png is the input itself" in capsys.readouterr().err
+    assert texture.read_bytes() == was
 
 
 def test_the_command_line_refuses_before_it_begins(tmp_path, capsys):

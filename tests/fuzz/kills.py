@@ -37,7 +37,9 @@ SEEN = ("out", "tmp", "home")  # folders in which nothing may be left
 KEPT_FOLDERS = (
     *("scope-mocap", "cache", "captures", "jobs", "kernels", "1" * 32, "unfinished", "recordings"),
 )
-KEPT_FILE = f"{CACHE}/times.json"  # how long the stages of the last captures took
+# How long the stages of the last captures took, and the empty locks of killed captures, which the
+# next one removes, but not a command whose results are all there.
+KEPT_FILE = re.compile(f"{CACHE}/times.json|{UNFINISHED}[0-9a-f-]*.lock")
 # What a live capture that was killed leaves on purpose, until the user finishes it.
 RECORDED = re.compile(r".*\.recording(\.lock)?|.*\.unfinished( \d+)?\.mp4")
 
@@ -201,8 +203,8 @@ class Workplace:
             for path in found
             if path.is_file() or (not any(path.iterdir()) and not _may_be_empty(path))
         ]
-        names = {str(path.relative_to(self._folder)) for path in files}
-        return sorted(names - set(self._whole) - {KEPT_FILE})
+        names = {str(path.relative_to(self._folder)) for path in files} - set(self._whole)
+        return sorted(name for name in names if KEPT_FILE.fullmatch(name) is None)
 
 
 def _may_be_empty(path: Path) -> bool:

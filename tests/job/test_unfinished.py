@@ -14,6 +14,7 @@ from scope.scope_addon.errors import ChangedFootageError, NoPersonError
 from scope.scope_addon.job import unfinished
 from scope.scope_addon.job.cache import Cache
 from scope.scope_addon.job.unfinished import FOLDER, unfinished_capture
+from scope.scope_addon.temporary import hold, release
 
 
 def name_of(digit):
@@ -193,6 +194,25 @@ def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
     monkeypatch.setattr(unfinished, "_LARGEST", 2500)
     end(tmp_path, footage)
     assert [folder.exists() for folder in folders] == [True, True, False, False]
+
+
+def test_the_lock_of_a_killed_capture_without_a_folder_is_removed_by_the_next_one(
+    tmp_path, footage
+):
+    folder = tmp_path / "caches" / FOLDER
+    folder.mkdir(parents=True)
+    name = f"{'0' * 32}-{'1' * 32}"
+    (folder / f"{name}.lock").touch()
+    held = folder / f"{'2' * 32}-{'1' * 32}.lock"
+    assert hold(held)
+    others = [folder / "mine.lock", folder / f"{'3' * 32}-{'1' * 32}.lock"]
+    others[0].touch()
+    others[1].write_text("not empty, so no lock of ours")
+    with unfinished_capture(tmp_path / "caches", footage):
+        assert sorted(path for path in others if path.exists()) == sorted(others)
+        assert held.exists()
+        assert not (folder / f"{name}.lock").exists()
+    release(held)
 
 
 def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypatch):

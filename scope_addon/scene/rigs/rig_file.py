@@ -94,11 +94,12 @@ def with_meshes(
     return keep
 
 
-def check_rig(source: RigSource, *, fingers: bool = True) -> None:
+def check_rig(source: RigSource, *, fingers: bool = True) -> list[Path]:
     """Check, before a capture, that a motion can be retargeted to the rig.
 
     :param fingers: whether the motion will include fingers; otherwise, those of the rig are not
         checked.
+    :return: the existing files that the rig's file refers to, such as its textures.
     :raises InputError: when the rig cannot be loaded, or its bones cannot be mapped or rotated.
     :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
     """
@@ -112,6 +113,17 @@ def check_rig(source: RigSource, *, fingers: bool = True) -> None:
         }
         with at_rest(rig):
             probe(rig, moved)
+        return _files_referred_to()
+
+
+def _files_referred_to() -> list[Path]:
+    """Return the existing files of the session's images and libraries."""
+    files = []
+    for block in (*bpy.data.images, *bpy.data.libraries):
+        path = Path(bpy.path.abspath(block.filepath, library=block.library))
+        if path.is_file():
+            files.append(path)
+    return files
 
 
 def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:

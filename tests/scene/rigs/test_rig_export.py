@@ -219,6 +219,21 @@ def test_a_file_with_thousands_of_bones_is_refused_before_they_are_probed(tmp_pa
     assert not bpy.data.armatures
 
 
+def test_a_files_scripts_and_drivers_run_no_code(tmp_path, capfd):
+    marks = [tmp_path / "driver ran", tmp_path / "script ran"]
+    rig, _ = build_rig("mixamo")
+    bpy.data.texts.new("script").write(f"open({str(marks[1])!r}, 'w')")
+    rig["script"] = bpy.data.texts["script"]
+    bpy.data.texts["script"].use_module = True
+    driver = rig.pose.bones[0].driver_add("scale", 0).driver
+    driver.expression = f"open({str(marks[0])!r}, 'w') and 1.0"
+    formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    check_rig(rig_source(tmp_path / "rig.blend"))
+    assert not [mark for mark in marks if mark.exists()]
+    assert "restricted access disallows name 'open'" in capfd.readouterr().err
+
+
 def test_a_rig_with_blocked_bones_is_refused_before_the_capture(tmp_path):
     rig, bone_of = build_rig("mixamo")
     limit = rig.pose.bones[bone_of["left_knee"]].constraints.new("LIMIT_ROTATION")
