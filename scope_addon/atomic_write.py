@@ -127,6 +127,21 @@ def replace_durably(source: Path, target: Path) -> None:
     sync_folder(target.parent)
 
 
+def write_result(path: Path, content: str | bytes) -> None:
+    """Write a file as `atomic_path` does, text as UTF-8.
+
+    :raises OutputError: the file cannot be written.
+    """
+    try:
+        with atomic_path(path) as temporary:
+            if isinstance(content, str):
+                temporary.write_text(content, encoding="utf-8")
+            else:
+                temporary.write_bytes(content)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+
+
 def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool = False) -> None:
     """Write arrays as an ``.npz``, complete or not at all: the same bytes as numpy's ``savez``.
 

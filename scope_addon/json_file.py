@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..solver.errors import InputError
-from .atomic_write import atomic_path, reason
+from .atomic_write import write_result
 from .errors import OutputError
 from .untrusted.files import check_regular
 
@@ -80,13 +80,10 @@ def save_map(path: Path, what: str, **content: Any) -> None:
     text = json.dumps(
         {"format": f"scope {what}", "version": 1, **content}, indent=2, ensure_ascii=False
     )
-    try:
-        with atomic_path(path) as temporary:
-            # Half of a surrogate pair, which JSON's escapes can hold and UTF-8 cannot, is written
-            # as such an escape.
-            temporary.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    # Half of a surrogate pair, which JSON's escapes can hold and UTF-8 cannot, becomes such an
+    # escape.
+    writable_text = text.encode("utf-8", "backslashreplace").decode()
+    write_result(path, writable_text + "\n")
 
 
 def _is_map_or_empty(path: Path, what: str) -> bool:

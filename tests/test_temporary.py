@@ -6,10 +6,12 @@ A process may live in another namespace, on a machine of any name, with any cloc
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -337,3 +339,44 @@ def test_names_are_found_in_the_systems_own_folder(monkeypatch, tmp_path):
     monkeypatch.setenv("TEMP", str(tmp_path))
     monkeypatch.setenv("TMPDIR", str(tmp_path / "none"))
     assert temporary.system_folder() == tmp_path
+
+
+class StandInForMsvcrt(types.ModuleType):
+    """The part of Windows' module that is used, as its documentation describes it: bytes from the
+    position on are locked, also after the end of the file, until the file is closed; an open file
+    that has no lock is refused with EACCES.
+    """
+
+    LK_NBLCK = 2
+
+    def locking(self, handle, mode, nbytes):
+        assert (mode, nbytes) == (self.LK_NBLCK, 1)
+        import fcntl
+
+        assert os.lseek(handle, 0, os.SEEK_CUR) == 0  # so that all lock the same byte
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise PermissionError(errno.EACCES, "Permission denied") from error
+
+
+@posix
+def test_the_locks_of_windows_say_the_same(tmp_path, monkeypatch):
+    """They have never been tried on Windows itself."""
+    monkeypatch.setitem(sys.modules, "msvcrt", StandInForMsvcrt("msvcrt"))
+    monkeypatch.setattr(sys, "platform", "win32")
+    abandoned = f".scope-{'0' * 16}"
+    (tmp_path / f"{abandoned}-lock").touch()
+    (tmp_path / abandoned).touch()
+    path = claim(tmp_path)
+    path.touch()
+    assert not (tmp_path / abandoned).exists()
+    assert not is_abandoned(path.with_name(f"{path.name}-lock"))
+    other = claim(tmp_path)
+    assert path.exists()
+    discard(other)
+    discard(path)
+    assert list(tmp_path.iterdir()) == []
+    assert hold(tmp_path / "lock")
+    assert not hold(tmp_path / "lock")
+    release(tmp_path / "lock")

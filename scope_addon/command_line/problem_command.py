@@ -18,9 +18,8 @@ from typing import Any
 
 from ...solver.body_file import BUILT_IN
 from ...solver.errors import InputError
-from ..atomic_write import atomic_path, reason
+from ..atomic_write import write_result
 from ..capture_report import Report
-from ..errors import OutputError
 from ..footage import json_text
 from ..json_file import read_json_object
 from ..notices import PHRASES, SENTENCES
@@ -77,13 +76,7 @@ def run_problem_report(args: argparse.Namespace) -> dict[str, Any]:
     if args.report:
         refuse_inputs([args.output], [args.report] if args.report.is_file() else [])
         content["capture"] = figures_without_names(_read_report(args.report))
-    try:
-        with atomic_path(args.output) as temporary:
-            temporary.write_text(json_text(content, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(
-            f"cannot write {args.output} ({reason(error)}); choose another file with -o"
-        ) from error
+    write_result(args.output, json_text(content, indent=1) + "\n")
     print(
         f"wrote {args.output}, which names no file, folder, person or address; read it, then "
         "attach it to your problem report",

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ..atomic_write import atomic_path, reason
+from ..atomic_write import write_result
 from ..capture.media.video_range import FootageRange
 from ..capture_report import Report
 from ..counts import counted
-from ..errors import OutputError
 from ..footage import unicode_text
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
@@ -73,11 +72,7 @@ def write_capture_page(path: Path, clip: CapturedClip, progress: Progress | None
     rows = shown_rows(clip.motions)
     pictures = overlay_pictures(clip.video, clip.motions, clip.body, rows, clip.wanted, progress)
     content = unicode_text(capture_page(clip, rows, pictures)).encode()
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_bytes(content)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    write_result(path, content)
 
 
 def capture_page(

@@ -46,17 +46,13 @@ WRITES = {
     # a recording that grows
     "scope_addon/live/outputs/journal.py",
     # the content of temporary files
-    "scope_addon/capture/camera/calibration.py",
-    "scope_addon/scene/export/trc.py",
+    "scope_addon/atomic_write.py",
     "scope_addon/capture/media/file_names.py",
     "scope_addon/capture/overlay/overlay_video.py",
     "scope_addon/capture/overlay/video_writer.py",
     "scope_addon/job/clips/finished.py",
     "scope_addon/job/preview.py",
-    "scope_addon/command_line/problem_command.py",
-    "scope_addon/json_file.py",
     "scope_addon/motion.py",
-    "scope_addon/report/capture_page.py",
     "scope_addon/scene/character/corrections/uncorrected_keys.py",
     "scope_addon/scene/export/formats.py",
     "scope_addon/scene/export/glb_times.py",

@@ -36,8 +36,8 @@ import numpy as np
 from ....solver.errors import InputError
 from ....solver.rotations import exp, log
 from ...arrays import Float64Array
-from ...atomic_write import atomic_path, reason
-from ...errors import OutputError, UsageError
+from ...atomic_write import write_result
+from ...errors import UsageError
 from ...json_file import read_json_object
 from ...motion import Motion
 from ...untrusted.files import check_regular, in_one_line
@@ -238,11 +238,7 @@ def write_calibration(path: Path, motion: Motion) -> None:
         raise UsageError(
             "the footage was mirrored, so its cameras have no places; capture without --mirror"
         )
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_text(calibration_text(motion), encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    write_result(path, calibration_text(motion))
 
 
 def calibration_text(motion: Motion) -> str:

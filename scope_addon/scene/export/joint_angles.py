@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...atomic_write import atomic_path, reason
-from ...errors import OutputError
+from ...atomic_write import write_result
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
 from .one_rate import at_one_rate
@@ -54,11 +53,7 @@ def write_angles(path: Path, motion: Motion, body: Body) -> None:
             "inDegrees=yes",
             "endheader",
         ]
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    write_result(path, "\n".join(lines) + "\n")
 
 
 def joint_angles(motion: Motion, body: Body) -> dict[str, NDArray[np.float64]]:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...atomic_write import atomic_path, reason
-from ...errors import OutputError
+from ...atomic_write import write_result
 from ...kinematics.axes import R_OPENSIM_WORLD
 from ...motion import Motion
 from .one_rate import at_one_rate
@@ -43,11 +42,7 @@ def write_trc(path: Path, motion: Motion, body: Body) -> None:
     :param body: that the motion was fitted with.
     :raises OutputError: the file cannot be written.
     """
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_text(trc_text(path.name, motion, body), encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {reason(error)}") from error
+    write_result(path, trc_text(path.name, motion, body))
 
 
 def trc_text(name: str, motion: Motion, body: Body) -> str:
