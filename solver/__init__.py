@@ -29,6 +29,8 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .fitting.batch import fit_clips as fit_clips
     from .fitting.clip import carry as carry
     from .fitting.clip import fit_clip as fit_clip
+    from .fitting.derivatives import SolutionDerivatives as SolutionDerivatives
+    from .fitting.derivatives import solution_derivatives as solution_derivatives
     from .fitting.frame_solver import FrameSolver as FrameSolver
     from .fitting.frame_solver import fit as fit
     from .fitting.frame_solver import fit_tree as fit_tree
@@ -107,7 +109,10 @@ if not TYPE_CHECKING:
             return str(tomllib.loads(manifest.read_text("utf-8"))["version"])
         from importlib import metadata  # which takes long to load, as Blender starts
 
-        return metadata.version("scope-mocap")
+        try:
+            return metadata.version("scope-solver")
+        except metadata.PackageNotFoundError:
+            return metadata.version("scope-mocap")
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *_MODULE_OF, "__version__"})

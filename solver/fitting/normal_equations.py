@@ -127,6 +127,26 @@ def equations(
     return NormalEquations(float(cost), *_dense(tree, pose, blocks))
 
 
+def gradient(tree: Tree, terms: Terms, stage: Array, state: State, triggs: float = 0.0) -> Array:
+    """Return g (n,) of `equations` alone, in O(K) + O(N).
+
+    The force and moment about the pelvis on a joint are those on all parts below it.
+    """
+    pose = state.pose(tree)
+    blocks = make_blocks(tree)
+    scratch = make_workspace(tree).scratch
+    write_blocks(tree, terms, stage, float(triggs), pose, blocks, scratch)
+    raise_failure()
+    forces = blocks.A[:, :, GRADIENT].copy()
+    joints = np.empty((len(tree.parents) - 1, 3))
+    for i in range(len(tree.parents) - 1, 0, -1):
+        moment, force = forces[i, :3], forces[i, 3:]
+        lever = pose.t[i] - pose.t[0]
+        joints[i - 1] = blocks.H_u[i, :, GRADIENT] + moment - np.cross(lever, force)
+        forces[tree.parents[i]] += forces[i]
+    return np.concatenate([forces[0], joints.ravel(), blocks.c[: tree.shape]])
+
+
 def _dense(tree: Tree, pose: Pose, blocks: Blocks) -> tuple[Array, Array]:
     """Return the gradient (n,) and JᵀJ (n, n) of the blocks of all parts."""
     P = tree.shape

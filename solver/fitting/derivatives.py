@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a solution changes with what was measured and with the weights, by the implicit function
+theorem.
+
+At a minimum x(m) of the cost E(x, m) the gradient g(x, m) = dE/dx vanishes, so that
+    H dx/dm = -dg/dm,   H = dg/dx
+with the whole Hessian H: that of Gauss-Newton leaves out the curvature of residuals and robust
+kernels. g is exact; H, symmetric, and dg/dm are its central differences, in 2 (n + numbers)
+linearizations.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from ..gauss_newton.terms import make_terms
+from ..measurements import Measurements
+from ..options import Options, Priors, default_priors
+from ..part import Array
+from ..points import numbered
+from ..residuals.registry import SHAPE_PRIOR, column_of, registered
+from ..rotations import hat
+from ..state import State
+from ..tree import BodyArrays, Tree, make_tree
+from ..validation import check_list, check_type
+from .normal_equations import gradient, moved
+from .report import COLUMNS
+
+_STEP = 1e-5  # of the unknowns, radians, metres and shape
+_SHARE = 1e-6  # by which a measured number is changed, of a standard deviation its share
+_LEAST_CURVATURE = 1e-12  # smallest over largest eigenvalue of H: below, an unknown is not fixed
+_WEIGHTS = "weights"
+# the measurements' numbers that a solution depends on smoothly
+_MEASURED = {
+    "keypoints2d": ("pixels", "confidence", "sigma_px"),
+    "keypoints3d": ("points", "confidence", "sigma_m"),
+    "orientation_field": ("directions", "confidence"),
+    "pose_priors": ("t_camera_part", "weight_rotation", "weight_translation"),
+    "foot_contacts": ("points", "probability"),
+    "floor": ("offset", "contact"),
+}
+# those of which g is linear, like weights; a difference from 0 may not go below it
+_LINEAR = ("confidence", "weight_rotation", "weight_translation", "probability", "contact")
+
+
+@dataclass
+class SolutionDerivatives:
+    """Derivatives of a solution, each by the name that was asked for; the last axes are its own."""
+
+    # (n, ...) of the unknowns of `NormalEquations`: the root's turn and place, joints, shape
+    unknowns: dict[str, Array]
+    joints: dict[str, Array]  # (K+1, 3, ...) of the joints' positions, camera frame, metres
+
+
+def solution_derivatives(
+    body: BodyArrays,
+    measurements: Measurements,
+    state: State,
+    wrt: Sequence[str],
+    *,
+    priors: Priors | None = None,
+    options: Options = Options(),  # noqa: B008 - frozen
+) -> SolutionDerivatives:
+    """Return how the solution of a frame changes with its measurements and weights.
+
+    For a loss L of the joints, np.tensordot(dL, derivatives.joints[name], 2) is its gradient.
+
+    :param state: the solution: where the gradient of the cost vanishes. That of a fit whose
+        `Options` have a tolerance of 0 is exact.
+    :param wrt: names: of measured numbers, "keypoints2d.pixels" or "keypoints3d.sigma_m", as they
+        are given in `measurements`; of weights, "weights.keypoints3d" or "weights.shape", the
+        fields of `Weights`, or of a registered residual. A derivative has the shape of what it is
+        named after, before which stand the axes of `SolutionDerivatives`.
+    :param priors, options: those of the fit.
+    :raises ShapeError: an array does not fit the body.
+    :raises InvalidValueError: a value that no fit can use, a name of nothing that was given, or the
+        measurements and priors do not fix the solution.
+    """
+    check_type(measurements, Measurements, "measurements")
+    check_type(state, State, "state")
+    check_list(wrt, "wrt", "derivative")
+    problem = _Problem(body, numbered(body, measurements), state, priors, options)
+    H = problem.hessian()
+    curvatures = np.linalg.eigvalsh(H)
+    if not curvatures[0] > _LEAST_CURVATURE * curvatures[-1]:
+        raise InvalidValueError(
+            "The derivatives of a solution need a minimum, where the cost rises in every "
+            f"direction, but its Hessian has the eigenvalue {curvatures[0]:.3g}; fit with a "
+            "tolerance of 0, or give priors of what was not measured."
+        )
+    motion = _motion_of_joints(problem.tree, state)
+    unknowns = {}
+    for name in wrt:
+        mixed = problem.mixed(name)
+        change = -np.linalg.solve(H, mixed.reshape(len(H), -1))
+        unknowns[name] = change.reshape(mixed.shape)
+    joints = {name: np.tensordot(motion, change, 1) for name, change in unknowns.items()}
+    return SolutionDerivatives(unknowns, joints)
+
+
+class _Problem:
+    """The gradient of a frame's cost as a function of state, measurements and weights."""
+
+    def __init__(
+        self,
+        body: BodyArrays,
+        measurements: Measurements,
+        state: State,
+        priors: Priors | None,
+        options: Options,
+    ) -> None:
+        check_type(priors, (Priors, type(None)), "priors")
+        check_type(options, Options, "options")
+        self.tree = make_tree(body)
+        self.measurements = measurements
+        self.state = state
+        self.priors = default_priors(body) if priors is None else priors
+        self.triggs = options.triggs
+        self.stage = options.stage_table([options.schedule(cold=False)[-1]])[0][0]
+        self.terms = make_terms(self.tree, measurements, self.priors)
+
+    def hessian(self) -> Array:
+        """Return H (n, n)."""
+        columns = []
+        for step in _STEP * np.eye(3 + 3 * len(self.tree.parents) + self.tree.shape):
+            ahead = self._gradient_at(moved(self.tree, self.state, step))
+            behind = self._gradient_at(moved(self.tree, self.state, -step))
+            columns.append((ahead - behind) / (2.0 * _STEP))
+        H = np.array(columns)
+        return 0.5 * (H + H.T)
+
+    def mixed(self, name: str) -> Array:
+        """Return dg/dm (n, ...) of the numbers that a name stands for.
+
+        :raises InvalidValueError: it stands for nothing that was given.
+        """
+        kind, _, of = str(name).partition(".")
+        if kind == _WEIGHTS:
+            return self._of_weight(name, of)
+        given = getattr(self.measurements, kind, None) if kind in _MEASURED else None
+        value = getattr(given, of) if of in _MEASURED.get(kind, ()) and given is not None else None
+        if value is None:
+            known = [f"{one}.{each}" for one, fields in _MEASURED.items() for each in fields]
+            raise InvalidValueError(
+                f"There is no derivative with respect to {name!r}, which was not measured; choose "
+                f"of those that were among {', '.join(known)}, and weights, such as "
+                "'weights.keypoints3d'."
+            )
+        values = np.array(value, dtype=float)
+        at_state = self._gradient_at(self.state)
+        columns = np.empty((values.size, len(at_state)))
+        for k in range(values.size):
+            if of in _LINEAR:
+                columns[k] = self._gradient_of(kind, given, of, values, k, 1.0) - at_state
+                continue
+            step = _SHARE * abs(values.flat[k]) if of.startswith("sigma") else _SHARE
+            ahead = self._gradient_of(kind, given, of, values, k, step)
+            behind = self._gradient_of(kind, given, of, values, k, -step)
+            columns[k] = (ahead - behind) / (2.0 * step)
+        return columns.T.reshape(-1, *values.shape)
+
+    def _of_weight(self, name: str, kind: str) -> Array:
+        """Return dg/dw (n,): g is linear in each weight."""
+        if kind == "shape":
+            column = SHAPE_PRIOR
+        elif kind in COLUMNS:
+            column = COLUMNS[kind]
+        else:
+            registered(kind)
+            column = column_of(kind)
+        alone = np.zeros_like(self.stage)
+        alone[1] = self.stage[1]
+        alone[0, column] = 1.0
+        return gradient(self.tree, self.terms, alone, self.state, self.triggs)
+
+    def _gradient_at(self, state: State) -> Array:
+        return gradient(self.tree, self.terms, self.stage, state, self.triggs)
+
+    def _gradient_of(
+        self, kind: str, given: Any, of: str, values: Array, k: int, step: float
+    ) -> Array:
+        """Return g (n,) with number k of the values changed by a step."""
+        changed = values.copy()
+        changed.flat[k] += step
+        value = changed if changed.ndim else float(changed)
+        measurements = replace(self.measurements, **{kind: replace(given, **{of: value})})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what is unlikely was told of the measurements
+            terms = make_terms(self.tree, measurements, self.priors)
+        return gradient(self.tree, terms, self.stage, self.state, self.triggs)
+
+
+def _motion_of_joints(tree: Tree, state: State) -> Array:
+    """Return the derivatives (K+1, 3, n) of the joints' positions by the unknowns.
+
+    A joint moves with the twist (w, v) of its part about the pelvis, v + w x (t_i - t_0), and with
+    the shape by D_i. The twist is the root's, plus each joint's rotation on the way, which turns
+    about that joint.
+    """
+    pose = state.pose(tree)
+    parts = len(tree.parents)
+    first_shape = 3 + 3 * parts
+    motion = np.zeros((parts, 3, first_shape + tree.shape))
+    for i in range(parts):
+        motion[i, :, :3] = -hat(pose.t[i] - pose.t[0])
+        motion[i, :, 3:6] = np.eye(3)
+        motion[i, :, first_shape:] = pose.D[i, :, : tree.shape]
+        j = i
+        while j > 0:
+            motion[i, :, 3 + 3 * j : 6 + 3 * j] = -hat(pose.t[i] - pose.t[j])
+            j = tree.parents[j]
+    return motion
