@@ -145,6 +145,7 @@ def collect(notes: str, zips_at: str) -> None:
         listing = listing_of_zips(json.loads((DIST / "index.json").read_text("utf-8")), zips_at)
         (folder / "index.json").write_text(json.dumps(listing, indent=2) + "\n", "utf-8")
         build_wheel(folder)
+        run([sys.executable, str(ROOT / "scripts" / "solver_wheel.py"), str(folder)])
         (folder / NOTES).write_text(notes, "utf-8")
         readme = (ROOT / "README.md").read_text("utf-8")
         (folder / LISTING).write_text(listing_text(manifest(), readme, notes), "utf-8")

@@ -4,12 +4,14 @@
 import hashlib
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 
 from .code_keeper import CodeKeeper, use_keeper
+from .shipped_code import KernelCache
 
 # Reordering sums and fusing multiplications is allowed; assuming that no NaN or infinity occurs is
 # not, because the optimizer must recognise them. The GIL is released, so that frames can be solved
@@ -87,12 +89,12 @@ def announce_compilation(*kernels: Any) -> None:
 
 
 class NumbaCache:
-    """Numba's own cache, which besides a kernel's own file heeds all others of the solver."""
+    """Numba's own cache, which heeds all files of the solver, and code that came with a wheel."""
 
     def __init__(self) -> None:
         digest = hashlib.sha256()
         for path in sorted(Path(__file__).parent.rglob("*.py")):
-            digest.update(path.read_bytes())
+            digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
         self._sources = digest.hexdigest()
 
     def prepare(self, kernel: Any) -> None:
@@ -100,18 +102,12 @@ class NumbaCache:
 
     def keep(self, kernel: Any) -> None:
         """Switch the cache on, if there is a folder for it."""
-        try:
-            kernel.enable_caching()
-        except RuntimeError:  # no folder can be written to
-            return
-        # A kernel contains copies of kernels in other files, whose changes numba would not notice.
-        index = kernel._cache._cache_file
-        index._source_stamp = (index._source_stamp, self._sources)
+        with suppress(RuntimeError):  # no folder can be written to
+            kernel._cache = KernelCache(kernel.py_func, self._sources)
 
     def has_code(self, kernel: Any) -> bool:
         """Whether the cache has code of any signature."""
-        index = getattr(kernel._cache, "_cache_file", None)
-        return index is not None and bool(index._load_index())
+        return isinstance(kernel._cache, KernelCache) and kernel._cache.has_code()
 
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
@@ -120,6 +116,14 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         _prepared.append(compiled)
         _keeper.prepare(compiled)
     return compiled
+
+
+def ship_code(folder: Path) -> None:
+    """Write the code of all kernels that this process has compiled to a folder of shipped code."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for compiled in _kept:
+        for signature, result in compiled.overloads.items():
+            compiled._cache.ship(signature, result, folder)
 
 
 def _use(keeper: CodeKeeper) -> None:

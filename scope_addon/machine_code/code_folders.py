@@ -2,8 +2,8 @@
 """The folders in which machine code lies, named after everything that it depends on.
 
 Some code comes with the program (`SHIPPED`), compiled for a processor that nearly every computer's
-includes (`LEVELS`). What is missing there is compiled on first use, for the computer's own
-processor, and kept in a folder of the user.
+includes (`LEVELS` of solver/shipped_code.py). What is missing there is compiled on first use, for
+the computer's own processor, and kept in a folder of the user.
 
 Each version has a folder of its own, ``<area>-<environment>-<program>``: the area is the package
 whose sources count, the environment Python, system and processor, the program the sources' content
@@ -20,7 +20,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ import numba.core.config
 import numpy as np
 from numba.misc import appdirs
 
+from ...solver.shipped_code import can_run_shipped, host_features, machine, shipped_processor
 from ..temporary import own_entries, remove
 
 config: Any = numba.core.config  # these declare no types
@@ -42,15 +42,6 @@ SOLVER = ROOT / "solver"
 # the package that contains the solver
 PACKAGE = __name__.rpartition(".scope_addon.")[0]
 SHIPPED = ROOT / "assets" / "kernels"
-# By machine: LLVM's name of the processor that shipped code is compiled for, and the features that
-# it needs of another.
-LEVELS = {
-    "x86_64": (
-        "x86-64-v3",
-        ("avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2"),
-    ),
-    "arm64": ("apple-m1", ()),  # macOS, whose every ARM processor is this one or a later one
-}
 _chosen: list[Path] = []  # at most one
 _STALE_S = 14 * 24 * 3600.0  # unused for so long, another version's code is removed
 
@@ -115,7 +106,7 @@ class Area:
                     remove(other)
 
     def _folder_name(self, processor: str) -> str:
-        environment = sys.implementation.cache_tag, sys.platform, _machine(), processor
+        environment = sys.implementation.cache_tag, sys.platform, machine(), processor
         return f"{self._name}-{digest_of(environment)[:8]}-{self._program}"
 
 
@@ -145,46 +136,11 @@ def places() -> list[Path]:
     ]
 
 
-@cache
-def _machine() -> str:
-    machine = str(llvm.get_process_triple()).partition("-")[0]
-    return {"amd64": "x86_64", "aarch64": "arm64"}.get(machine, machine)
-
-
-def shipped_processor() -> str:
-    """Return LLVM's name of the processor that code is shipped for; empty where none is."""
-    return (
-        ""
-        if _machine() == "arm64" and sys.platform != "darwin"
-        else LEVELS.get(_machine(), ("", ()))[0]
-    )
-
-
-@cache
-def can_run_shipped() -> bool:
-    """Whether the processor has everything that shipped code needs, and numba is not configured to
-    use less.
-    """
-    if config.CPU_NAME not in (None, "", shipped_processor()) or not config.ENABLE_AVX:
-        return False
-    return bool(shipped_processor()) and all(
-        _host_features().get(feature) for feature in LEVELS[_machine()][1]
-    )
-
-
-@cache
-def _host_features() -> dict[str, bool]:
-    try:
-        return dict(llvm.get_host_cpu_features())
-    except RuntimeError:  # LLVM does not know this processor
-        return {}
-
-
 def _processor() -> str:
     """Describe the processor that numba compiles for: the one to ship for, or this computer's."""
     if config.CPU_NAME and config.CPU_NAME == shipped_processor():
         return shipped_processor()
-    features = config.CPU_FEATURES or sorted(name for name, has in _host_features().items() if has)
+    features = config.CPU_FEATURES or sorted(name for name, has in host_features().items() if has)
     return digest_of(config.CPU_NAME or llvm.get_host_cpu_name(), features, config.ENABLE_AVX)
 
 

@@ -25,6 +25,7 @@ import numba.core.environment
 import numba.core.typed_passes
 from numba.core import serialize
 
+from ...solver.shipped_code import ANNOTATION
 from .code_folders import PACKAGE
 
 # The versions whose internals this file was written for and tested with: from the first on, and
@@ -45,9 +46,6 @@ _passes: Any = numba.core.typed_passes
 _rebuild: Any = _compiler.CompileResult._rebuild
 _rebuild_environment: Any = numba.core.environment._rebuild_env
 _dumps: Callable[[Any], bytes] = serialize.dumps
-# Index of the annotated source in what numba reduces a result to: of no use, and with the paths of
-# the machine.
-_ANNOTATION = 6
 
 
 class _Library(_codegen.JITCodeLibrary):  # type: ignore[misc]
@@ -110,7 +108,7 @@ def payload_of(result: Any) -> bytes:
     and the name of the package, for `load_result`.
     """
     reduced = list(result._reduce())
-    reduced[_ANNOTATION] = ""
+    reduced[ANNOTATION] = ""
     module = result.library._get_module_for_linking()
     values = [*module.functions, *module.global_variables]
     names = {value.name for value in values if not value.is_declaration}

@@ -9,6 +9,7 @@ import scope
 FILES = (
     "solver/code_keeper.py",
     "solver/kernel.py",
+    "solver/shipped_code.py",
     "scope_addon/__init__.py",
     "scope_addon/atomic_write.py",
     "scope_addon/errors.py",

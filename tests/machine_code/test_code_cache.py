@@ -9,11 +9,8 @@ import shutil
 
 import pytest
 from scope.scope_addon.machine_code.code_files import SUFFIX, read_code, write_code
-from scope.scope_addon.machine_code.code_folders import (
-    can_run_shipped,
-    shipped_processor,
-)
 from scope.scope_addon.temporary import claim, discard
+from scope.solver.shipped_code import can_run_shipped, shipped_processor
 
 from .small_package import LONG_CALLEE, make_package
 

@@ -7,6 +7,7 @@ import os
 
 import pytest
 from scope.scope_addon.machine_code.kernel_count import kernel_count
+from scope.solver.shipped_code import can_run_shipped, shipped_processor
 
 from .small_package import make_package
 
@@ -65,6 +66,37 @@ def test_a_changed_callee_reaches_its_cached_caller(runs):
 def test_compiling_is_announced_once(runs):
     """The first session says why it waits; the next one finds the machine code and says nothing."""
     assert [said for _, said in runs] == [1, 0, 1, 0]
+
+
+SHIP = """
+import sys
+from pathlib import Path
+from package.solver import kernel, shipped_code
+from package.solver.outer import outer
+outer(0.0)
+kernel.ship_code(shipped_code.shipped_folder())
+"""
+
+
+@pytest.mark.skipif(not can_run_shipped(), reason="no code is shipped for this processor")
+def test_code_that_came_with_a_wheel_is_used_until_a_source_changes(run_code, tmp_path):
+    """It was compiled into another cache, for a processor that need not be this one."""
+    solver = make_package(tmp_path)
+    for name, text in SOURCE.items():
+        (solver / name).write_text(text.format(value=1))
+    variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "maker"))
+    chosen = {"NUMBA_CPU_NAME": shipped_processor(), "NUMBA_CPU_FEATURES": ""}
+    run_code(SHIP, tmp_path, variables | chosen)
+    shipped = sorted(path.suffix for path in (solver / "machine_code").rglob("*.nb*"))
+    assert shipped == [".nbc", ".nbc", ".nbi", ".nbi"]
+    variables["NUMBA_CACHE_DIR"] = str(tmp_path / "user")
+    used = run_code(RUN, tmp_path, variables)
+    assert used.stdout.split() == ["1.0", "1"]
+    assert used.stderr == ""
+    (solver / "inner.py").write_text(SOURCE["inner.py"].format(value=22))
+    stale = run_code(RUN, tmp_path, variables)
+    assert stale.stdout.split() == ["22.0", "0"]
+    assert stale.stderr.count("Compiling the solver") == 1
 
 
 LATE = """

@@ -61,7 +61,7 @@ def test_code_of_other_sources_is_not_shipped(shipped, staging, changed, capsys,
 
 
 def test_the_processors_are_those_that_the_solver_looks_for(shipped):
-    from scope.scope_addon.machine_code.code_folders import LEVELS
+    from scope.solver.shipped_code import LEVELS
 
     assert shipped.PROCESSORS == {
         "windows-x64": LEVELS["x86_64"][0],

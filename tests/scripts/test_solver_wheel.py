@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The wheel of the solver alone: what it contains, says and needs."""
+
+import base64
+import csv
+import hashlib
+import importlib.util
+import io
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CODE = "machine_code/linux-x86_64-cpython-311/kernel.nbc"
+# Loads what a fit needs besides machine code, which is not compiled here.
+LOAD = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from scope import solver
+assert solver.load_body("scope").K == 23 and solver.load_body("scope_child_h").P == 11
+assert "left_knee" in solver.load_joint_prior().names
+assert solver.__file__.startswith(sys.argv[1]), solver.__file__
+assert not any("scope_addon" in name for name in sys.modules)
+for name in solver.__all__:
+    getattr(solver, name)
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel, with a file in place of machine code."""
+    place = tmp_path_factory.mktemp("solver_wheel")
+    made = place / "code" / CODE.removeprefix("machine_code/")
+    made.parent.mkdir(parents=True)
+    made.write_bytes(b"code")
+    (made.parent / "made_from").write_text("sources")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "scripts"))
+        spec = importlib.util.spec_from_file_location(
+            "solver_wheel", ROOT / "scripts" / "solver_wheel.py"
+        )
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module.build_wheel(place, place / "code")
+
+
+def test_it_has_the_solver_its_data_and_machine_code_and_nothing_else(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+    sources = {
+        f"scope/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "solver").rglob("*.py")
+    }
+    data = {
+        "scope/__init__.py",
+        "scope/solver/py.typed",
+        f"scope/solver/{CODE}",
+        "scope/assets/body/LICENSE.md",
+        "scope/assets/body/growth.npz",
+        "scope/assets/body/scope.npz",
+        "scope/assets/body/scope_h.npz",
+        "scope/assets/prior/README.md",
+        "scope/assets/prior/joint_prior.npz",
+    }
+    assert names == sources | data
+
+
+def test_its_record_holds(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        contents = {name: archive.read(name) for name in archive.namelist()}
+    record = next(name for name in contents if name.endswith("/RECORD"))
+    rows = {row[0]: row[1:] for row in csv.reader(io.StringIO(contents[record].decode()))}
+    assert set(rows) == set(contents)
+    for name, (digest, size) in rows.items():
+        if name != record:
+            own = base64.urlsafe_b64encode(hashlib.sha256(contents[name]).digest())
+            assert digest == f"sha256={own.decode().rstrip('=')}"
+            assert int(size) == len(contents[name])
+
+
+def test_it_states_its_licences_and_needs_numpy_and_numba_alone(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        metadata = next(name for name in archive.namelist() if name.endswith("/METADATA"))
+        text = archive.read(metadata).decode()
+    lines = text.splitlines()
+    assert "License-Expression: Apache-2.0 AND GPL-3.0-or-later AND CC0-1.0" in lines
+    needed = [line.split()[1].split(">")[0] for line in lines if line.startswith("Requires-Dist")]
+    assert needed == ["numpy", "numba", "llvmlite"]
+    assert "joint prior (`assets/prior/joint_prior.npz`) is under GPL-3.0-or-later" in text
+    assert "](../" not in text
+
+
+def test_it_works_without_the_rest_of_scope(wheel, tmp_path):
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path)
+    command = [sys.executable, "-c", LOAD, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
