@@ -28,6 +28,9 @@ from .validation import (
     check_robust,
     check_rotations,
     check_type,
+    warn_of_deviations,
+    warn_of_distance,
+    warn_of_floor,
     warn_of_pixels,
     warn_of_points,
 )
@@ -39,6 +42,8 @@ LARGEST = 1e30
 # coordinates, a pixel at a focal length of 1000, and of 3D keypoints in metres.
 SIGMA_2D = 1e-3
 SIGMA_3D = 1e-2
+# in normalized image coordinates, of any detector or marker: a hundredth of a pixel
+_LEAST_SIGMA_2D = 1e-5
 
 
 @kernel
@@ -224,6 +229,8 @@ class Measurements:
         warn_of_pixels(K, pixels, out)
         if m.sigma_px is not None:
             sigma_px = _sigmas(m.sigma_px, n, "sigma_px of 2D keypoints")
+            least = _LEAST_SIGMA_2D * K[0, 0]
+            warn_of_deviations(sigma_px, least, np.inf, "sigma_px of 2D keypoints", "pixels")
             out[:, 2] *= SIGMA_2D**2 * K[0, 0] * K[1, 1] / sigma_px**2
         return indices, out
 
@@ -246,9 +253,9 @@ class Measurements:
             out, has_camera=self.intrinsics is not None, are_weights=m.sigma_m is not None
         )
         if m.sigma_m is not None:
-            out[:, 3] *= (
-                SIGMA_3D / _sigmas(m.sigma_m, len(indices), "sigma_m of 3D keypoints")
-            ) ** 2
+            sigma_m = _sigmas(m.sigma_m, len(indices), "sigma_m of 3D keypoints")
+            warn_of_deviations(sigma_m, 0.0, 1.0, "sigma_m of 3D keypoints", "metres")
+            out[:, 3] *= (SIGMA_3D / sigma_m) ** 2
         return indices, out
 
     def packed_directions(self, points: int) -> tuple[Array, Array, Array]:
@@ -290,6 +297,11 @@ class Measurements:
             tables["foot_contact"] = _foot_contact_rows(self.foot_contacts, points)
         if self.floor is not None:
             tables["floor"] = _floor_rows(self.floor, points)
+            if not _has_axis(self.floor.normal, 1):
+                seen = self.keypoints3d.points if self.keypoints3d is not None else np.zeros((0, 3))
+                normal = np.asarray(self.floor.normal, dtype=float)
+                offset = as_number(self.floor.offset, "Offset of the floor")
+                warn_of_floor(normal, offset, np.asarray(seen, dtype=float))
         return tables
 
 
@@ -351,6 +363,7 @@ def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     check_not_negative(w_R, "Rotation weights of pose priors")
     check_not_negative(w_t, "Translation weights of pose priors")
     check_rotations(R, "Rotations of pose priors", w_R)
+    warn_of_distance(t[w_t > 0.0], "Positions of pose priors lie")
     ints, floats = pose_prior.pack(parts, R, t, w_R, w_t)
     if not _all_weigh(w_R, w_t):
         weigh = (w_R > 0.0) | (w_t > 0.0)
@@ -363,6 +376,7 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     indices = as_indices(m.indices, points, "Indices of foot contacts")
     n = len(indices)
     stand = as_array(m.points, (n, 3), "Points of foot contacts")
+    warn_of_distance(stand, "Points of foot contacts lie")
     weight = as_array(m.probability, (n,), "Probability of foot contacts")
     check_not_negative(weight, "Probability of foot contacts")
     return _usable_rows(foot_contact.pack(indices, stand, weight))

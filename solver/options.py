@@ -28,6 +28,7 @@ from .validation import (
     check_switch,
     check_type,
     check_weight,
+    warn_of_weight,
 )
 
 
@@ -197,6 +198,9 @@ class Options:
         for k, stage in enumerate(self.stages or ()):
             check_type(stage, Stage, f"Options.stages[{k}]")
         check_type(self.weights, (Weights, type(None)), "Options.weights")
+        if self.weights is not None:
+            warn_of_weight(self.weights.keypoints2d, 10.0, "Options.weights.keypoints2d")
+            warn_of_weight(self.weights.keypoints3d, 0.05, "Options.weights.keypoints3d")
         if self.stages is not None and self.weights is not None:
             raise InvalidValueError(
                 "Options.weights are those of the default stages; with Options.stages, give each "

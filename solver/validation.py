@@ -33,6 +33,11 @@ _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 _FEWEST_POINTS = 4  # that are no coincidence
 _WIDEST = 4.0  # tangent of half a pinhole camera's field of view, 76 degrees
 _MOST_CONFIDENT = 10.0  # on average: confidences are shares of one, or a few times that
+_STEEPEST = 0.5  # y of a floor's normal, of at most 1: more only if the camera is upside down
+_BELOW_M = 0.3
+_SHORTEST_PX = 10.0  # of a focal length in pixels: shorter ones belong to normalized coordinates
+_FARTHEST = 300.0  # metres from the origin to what a person touches, or to a camera
+_FARTHEST_MM = 1000.0 * _FARTHEST
 
 
 def as_indices(value: ArrayLike, limit: int, name: str) -> Array:
@@ -248,6 +253,12 @@ def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
         )
     elif fault == 4:
         _warn(ScopeWarning, f"Confidence of 2D keypoints {_TOO_CONFIDENT}")
+    elif fault == 5:
+        _warn(
+            ScopeWarning,
+            "The principal point of the intrinsics is (0, 0), the image's corner; it is mostly "
+            "half of the image's size.",
+        )
 
 
 def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
@@ -268,6 +279,19 @@ def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
         )
     elif fault == 2 and not are_weights:
         _warn(ScopeWarning, f"Confidence of 3D keypoints {_TOO_CONFIDENT}")
+    elif fault == 3:
+        _warn(
+            ScopeWarning,
+            "Points of 3D keypoints are (0, 0, 0), as of keypoints that are missing; give these a "
+            "confidence of 0.",
+        )
+    elif fault == 4 and has_camera:
+        _warn(
+            ScopeWarning,
+            "Points of 3D keypoints lie partly behind the camera, as those that are relative to "
+            "the pelvis; add its position in the camera frame, or leave out intrinsics and 2D "
+            "keypoints.",
+        )
 
 
 _TOO_CONFIDENT = (
@@ -278,6 +302,62 @@ _TOO_CONFIDENT = (
 
 def _warn(kind: type[ScopeWarning], message: str) -> None:
     warnings.warn(message, kind, stacklevel=4)
+
+
+def warn_of_distance(points: Array, name: str) -> None:
+    """Warn of points (n, 3) that are too far away to be in metres, with `UnitsWarning`.
+
+    :param name: with a verb, as a message begins: "Points of foot contacts lie".
+    """
+    distances = np.abs(points).max(axis=-1, initial=0.0)
+    # beyond, they are no millimetres either
+    known = distances[distances < _FARTHEST_MM]
+    if len(known) and known.min() > _FARTHEST:
+        _warn(UnitsWarning, f"{name} more than {_FARTHEST:g} m away; {_UNITS}.")
+
+
+def warn_of_deviations(sigmas: Array, least: float, most: float, name: str, unit: str) -> None:
+    """Warn of standard deviations (n,) all of which are too small or large, with `UnitsWarning`."""
+    if len(sigmas) and (sigmas.max() < least or sigmas.min() > most):
+        _warn(
+            UnitsWarning,
+            f"{name} is {sigmas[0]:g} {unit}, which no measurement has; it must be in {unit}.",
+        )
+
+
+def warn_of_floor(normal: Array, offset: float, points: Array) -> None:
+    """Warn of a floor that is probably upside down, has the wrong sign, or is not in metres.
+
+    :param normal: (3,). :param points: (n, 3) 3D keypoints.
+    """
+    if normal[1] > _STEEPEST:
+        _warn(
+            ScopeWarning,
+            "The floor's normal points down, y > 0 in camera axes, but must point up; negate "
+            "normal and offset.",
+        )
+        return
+    warn_of_distance(np.array([[0.0, 0.0, offset]]), "The floor lies")
+    if len(points) >= _FEWEST_POINTS:
+        below = offset - points @ normal
+        if ((below > _BELOW_M) & (below < LARGEST_STEP)).all():
+            _warn(
+                ScopeWarning,
+                f"All 3D keypoints lie more than {_BELOW_M:g} m below the floor; its offset is "
+                "normal^T p of a point p of it, which is negative where the floor is below the "
+                "camera.",
+            )
+
+
+def warn_of_weight(weight: float, least: float, name: str) -> None:
+    """Warn of a weight that is probably a standard deviation, with `UnitsWarning`."""
+    if 0.0 < weight < least:
+        warnings.warn(
+            f"{name} is {weight:g}, but weights are 1/sigma^2, in squared metres or normalized "
+            "image coordinates; give deviations as sigma_px or sigma_m.",
+            UnitsWarning,
+            stacklevel=4,
+        )
 
 
 def warn_of_frame_numbers(times: Array) -> None:
@@ -413,9 +493,10 @@ def _fault_of_intrinsics(K: Array) -> int:
 @kernel
 def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
     """Return 0, or what is wrong: 1 pixels in 0..1, 2 missing at (0, 0), 3 focal length, 4
-    confidence.
+    confidence, 5 principal point.
     """
     count = 0
+    positive = 0
     small = 0
     zero = 0
     wide = 0
@@ -431,6 +512,8 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
             small += 1
         if x == 0.0 and y == 0.0:
             zero += 1
+        if x > 0.0 and y > 0.0:
+            positive += 1
         if abs(normalized[k, 0]) > _WIDEST or abs(normalized[k, 1]) > _WIDEST:
             wide += 1
     if count < _FEWEST_POINTS:
@@ -441,13 +524,19 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
         return 2
     if 2 * wide > count or K[0, 2] > _WIDEST * K[0, 0] or K[1, 2] > _WIDEST * K[1, 1]:
         return 3
-    return 4 if confidence > _MOST_CONFIDENT * count else 0
+    if confidence > _MOST_CONFIDENT * count:
+        return 4
+    in_image = K[0, 0] > _SHORTEST_PX and K[0, 2] == 0.0 and K[1, 2] == 0.0
+    return 5 if in_image and positive == count else 0
 
 
 @kernel
 def _fault_of_points(points: Array) -> int:
-    """Return 0, or what is wrong with (n, 4): 1 all behind the camera, 2 confidence."""
+    """Return 0, or what is wrong with (n, 4): 1 all behind the camera, 2 confidence, 3 missing at
+    the origin, where one point may be the pelvis, 4 some behind.
+    """
     count = 0
+    zero = 0
     behind = 0
     confidence = 0.0
     for k in range(points.shape[0]):
@@ -458,11 +547,17 @@ def _fault_of_points(points: Array) -> int:
         confidence += points[k, 3]
         if points[k, 2] < 0.0:
             behind += 1
+        if points[k, 0] == 0.0 and points[k, 1] == 0.0 and points[k, 2] == 0.0:
+            zero += 1
     if count < _FEWEST_POINTS:
         return 0
     if behind == count:
         return 1
-    return 2 if confidence > _MOST_CONFIDENT * count else 0
+    if 1 < zero < count:
+        return 3
+    if confidence > _MOST_CONFIDENT * count:
+        return 2
+    return 4 if 4 * behind > count else 0
 
 
 @kernel

@@ -3,10 +3,12 @@
 
 Rotation: the one that best turns the rest pose's points (3D keypoints) or bones (orientation field)
 onto the measured ones, the least-squares rotation of Kabsch. Without either, upright and facing the
-camera. Position: by 3D keypoints, the difference of centroids; by 2D keypoints, the linear least
-squares of
+camera, or where 2D keypoints do not say where a person faces, each of twelve headings. Position: by
+3D keypoints, the difference of centroids; by 2D keypoints, the linear least squares of
     (R v + t)_x - u (R v + t)_z = 0,   (R v + t)_y - v (R v + t)_z = 0.
 """
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ NEAREST = 0.3
 FARTHEST = 100.0
 FRONTAL = np.diag([1.0, -1.0, -1.0])  # upright and facing the camera
 DISTANCE = 3.0
+_HEADINGS = tuple(k * math.pi / 6.0 for k in range(12))  # radians from where the body faces first
 
 
 @kernel
@@ -109,18 +112,20 @@ def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
     return R
 
 
-def initial_state(
+def initial_states(
     tree: Tree,
     terms: Terms,
     joint_mean: NDArray[np.float64],
     beta: NDArray[np.float64],
-    heading: float = 0.0,
-) -> State:
-    """Return a first state in the camera frame, metres; finite whatever the measurements are.
+    *,
+    several: bool = False,
+) -> list[State]:
+    """Return first states in the camera frame, metres; finite whatever the measurements are.
 
     :param joint_mean: (K, 3, 3) states of joints 1..K.
     :param beta: (P,)
-    :param heading: by which the body is turned about its own vertical axis from there, radians.
+    :param several: whether to turn the body about its own vertical axis to all of `_HEADINGS`,
+        although more than the image says where it faces.
     """
     pose = make_pose(tree)
     pose.Omega[1:] = joint_mean
@@ -130,7 +135,6 @@ def initial_state(
     directed = np.zeros(16)
     _moments(tree, terms, pose, points, space, directed)
     R = None
-    t = None
     if space[0] > 0.0:
         products = space[7:].reshape(3, 3) - np.outer(space[4:7], space[1:4] / space[0])
         R = _rotation_onto(products)
@@ -138,15 +142,19 @@ def initial_state(
         R = _rotation_onto(directed[7:].reshape(3, 3))
     if R is None:
         R = FRONTAL
-    if heading != 0.0:
-        R = R @ exp([0.0, heading, 0.0])
-    if space[0] > 0.0:
-        t = (space[4:7] - R @ space[1:4]) / space[0]
-    else:
-        t = _position_in_image(terms, points, np.ascontiguousarray(R))
-    if t is None or not np.isfinite(t).all():
-        t = np.array([0.0, 0.0, DISTANCE])
-    return State(R.copy(), t, joint_mean.copy(), beta.copy())
+        several = several or bool((terms.flags & HAS_2D).any())
+    states = []
+    for heading in _HEADINGS if several else _HEADINGS[:1]:
+        turned = R @ exp([0.0, heading, 0.0]) if heading != 0.0 else R
+        t = None
+        if space[0] > 0.0:
+            t = (space[4:7] - turned @ space[1:4]) / space[0]
+        else:
+            t = _position_in_image(terms, points, np.ascontiguousarray(turned))
+        if t is None or not np.isfinite(t).all():
+            t = np.array([0.0, 0.0, DISTANCE])
+        states.append(State(turned.copy(), t, joint_mean.copy(), beta.copy()))
+    return states
 
 
 def _position_in_image(

@@ -21,7 +21,7 @@ from .views import View
 
 # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
 _MIN_CONDITION = 1e-4
-_LARGEST_ERROR = 0.02  # of cameras that agree, in normalized image coordinates
+_LARGEST_ERROR = 0.01  # of cameras that agree, in normalized image coordinates
 _LEAST_SHARE = 1 / 3  # of one camera's points that must be triangulated, or that camera says more
 
 

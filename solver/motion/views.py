@@ -26,7 +26,13 @@ from ..residuals.external import External
 from ..residuals.registry import RESIDUALS, empty_tables
 from ..rotations import nearest_rotation
 from ..tree import Tree
-from ..validation import check_finite, check_list, check_rotations, check_type
+from ..validation import (
+    check_finite,
+    check_list,
+    check_rotations,
+    check_type,
+    warn_of_distance,
+)
 
 
 @dataclass
@@ -162,11 +168,10 @@ def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
         check_type(view, View, f"{name}[{k}]")
         check_type(view.measurements, Measurements, f"measurements of {name}[{k}]")
         R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]")
-        t = view.t_camera_world
+        t = as_array(view.t_camera_world, (3,), f"t_camera_world of {name}[{k}]")
         check_rotations(R[None], f"R_camera_world of {name}[{k}]")
-        check_finite(
-            as_array(t, (3,), f"t_camera_world of {name}[{k}]"), f"t_camera_world of {name}[{k}]"
-        )
+        check_finite(t, f"t_camera_world of {name}[{k}]")
+        warn_of_distance(t[None], f"t_camera_world of {name}[{k}] lies")
     return frame
 
 

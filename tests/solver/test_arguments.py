@@ -196,7 +196,7 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
     poses = {"parts": [0], "R_camera_part": [TURN], "t_camera_part": [[0.0, 0.0, 4.0]]}
     poses |= {"weight_rotation": [1.0], "weight_translation": [1.0]}
     contacts = {"indices": [0], "points": [[0.0, 0.0, 4.0]], "probability": [1.0]}
-    floor = {"indices": [0], "normal": UP, "offset": 1.0, "contact": [1.0], "below": [1.0]}
+    floor = {"indices": [0], "normal": UP, "offset": -2.0, "contact": [1.0], "below": [1.0]}
     state = {
         "R_camera_root": TURN,
         "t_camera_root": np.ones(3),

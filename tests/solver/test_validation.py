@@ -532,7 +532,7 @@ ARGUMENTS_REFUSED = {
     ),
     "state": (
         lambda: fit(BODY, SEEN, init=untyped("rest")),
-        "init must be State or None, but is the text 'rest'",
+        "init, unless it is 'multi', must be State or None, but is the text 'rest'",
     ),
     "priors": (
         lambda: fit(BODY, SEEN, priors=untyped("weak")),

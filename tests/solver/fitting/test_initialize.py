@@ -6,7 +6,7 @@ not.
 import numpy as np
 import pytest
 from scope.solver import Keypoints2D, Keypoints3D, Measurements, OrientationField, Priors, make_tree
-from scope.solver.fitting.initialize import initial_state
+from scope.solver.fitting.initialize import initial_states
 from scope.solver.gauss_newton.terms import make_terms
 
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
@@ -22,7 +22,7 @@ CONFIDENCE = np.random.default_rng(3).uniform(0.2, 1.0, M)
 
 
 def guess(measurements):
-    return initial_state(TREE, make_terms(TREE, measurements, Priors()), OMEGA, BETA)
+    return initial_states(TREE, make_terms(TREE, measurements, Priors()), OMEGA, BETA)[0]
 
 
 def test_points_in_space_give_the_root_where_joints_and_shape_are_known():

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`python -m scope.benchmarks.solver.cold_starts [COUNT]`: how often fits that are given only
+measurements find the person, and whether the deviations that they state are right.
+
+Random people, 1,000 unless said otherwise: every joint drawn from the joint prior, the shape from
+the population, any heading, 2.5 to 5 m away. COCO's 17 keypoints are seen with 2 px at a focal
+length of 1,000 px, and where a network is meant to lift them, in space with 2 cm.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import solver
+from ...solver import Body, JointPrior, Keypoints2D, Keypoints3D, Measurements, State, rotations
+
+COUNT = 1000
+FOCAL = 1000.0
+CAMERA = np.array([[FOCAL, 0.0, 500.0], [0.0, FOCAL, 500.0], [0.0, 0.0, 1.0]])
+SIGMA_PX = 2.0
+SIGMA_M = 0.02
+FAR_M = 0.2  # a keypoint that is farther away from its true place is at a wrong limb
+COSTLY = 1.5  # times the cost of a fit that starts from the truth: another minimum
+JUDGED = ("left_knee", "right_elbow", "left_wrist", "right_ankle", "left_shoulder")
+Array = NDArray[np.float64]
+
+
+class Person(NamedTuple):
+    """A random person, and what was measured."""
+
+    state: State
+    joints: Array  # (K+1, 3) camera frame, metres
+    points: Array  # (17, 3) COCO's keypoints
+    seen: Measurements
+
+
+def coco_of(body: Body) -> list[int]:
+    """Return the numbers of COCO's 17 keypoints."""
+    return list(body.keypoint_set("coco").values())[:17]
+
+
+def random_person(body: Body, prior: JointPrior, seed: int) -> Person:
+    """Return a person, whose standard deviations the measurements state."""
+    rng = np.random.default_rng(seed)
+    turns = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    for i, name in enumerate(body.joint_names):
+        if i > 0 and name in prior.names:
+            turns[i] = prior.sample(name, 1, rng)[0]
+    beta = rng.standard_normal(body.P)
+    heading = rotations.exp([0.0, rng.uniform(-np.pi, np.pi), 0.0])
+    lean = rotations.exp(0.2 * rng.standard_normal(3))
+    turns[0] = np.diag([1.0, -1.0, -1.0]) @ heading @ lean
+    root = np.array([rng.uniform(-0.5, 0.5), rng.uniform(-0.3, 0.3), rng.uniform(2.5, 5.0)])
+    R, t = body.forward_kinematics(turns, root - body.rest_joints(beta)[0], beta)
+    index = coco_of(body)
+    points = body.keypoints(R, t, beta, index)
+    pixels = FOCAL * points[:, :2] / points[:, 2:] + 500.0
+    pixels += SIGMA_PX * rng.standard_normal((17, 2))
+    space = points + SIGMA_M * rng.standard_normal((17, 3))
+    seen = Measurements(
+        CAMERA,
+        Keypoints2D(index, pixels, sigma_px=SIGMA_PX),
+        Keypoints3D(index, space, sigma_m=SIGMA_M),
+    )
+    return Person(State(turns[0], t[0], turns[1:], beta), t, points, seen)
+
+
+def without_deviations(seen: Measurements) -> Measurements:
+    """Return measurements that state none, so that the default weights hold."""
+    assert seen.keypoints2d is not None
+    assert seen.keypoints3d is not None
+    return replace(
+        seen,
+        keypoints2d=replace(seen.keypoints2d, sigma_px=None),
+        keypoints3d=replace(seen.keypoints3d, sigma_m=None),
+    )
+
+
+def farthest(body: Body, people: list[Person], seen: list[Measurements]) -> Array:
+    """Return the largest distance (n,) of a fitted keypoint from its true place, metres."""
+    index = coco_of(body)
+    found = []
+    for person, fit in zip(people, solver.fit_batch(body, seen), strict=True):
+        points = body.keypoints(fit.R_camera_part, fit.t_camera_part, fit.state.beta, index)
+        found.append(np.linalg.norm(points - person.points, axis=1).max())
+    return np.array(found)
+
+
+def excess(body: Body, people: list[Person]) -> Array:
+    """Return the cost (n,) of fits to 2D keypoints alone over that of fits from the truth."""
+    seen = [replace(without_deviations(person.seen), keypoints3d=None) for person in people]
+    from_truth = solver.fit_batch(body, seen, init=[person.state for person in people])
+    found = solver.fit_batch(body, seen)
+    return np.array([a.cost / b.cost for a, b in zip(found, from_truth, strict=True)])
+
+
+def calibration(body: Body, people: list[Person]) -> float:
+    """Return the mean square of errors of joints over their covariance, 1 if that is right."""
+    squares = []
+    for person in people:
+        found = solver.fit_motion(body, [person.seen], [0.0], init=[person.state], covariance=True)
+        assert found.joint_covariance is not None
+        for joint in JUDGED:
+            i = body.joint_names.index(joint)
+            off = found.t_world_part[0, i] - person.joints[i]
+            squares.append(off @ np.linalg.solve(found.joint_covariance[0, i], off) / 3.0)
+    return float(np.mean(squares))
+
+
+def main() -> int:
+    """Measure, and print the figures."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else COUNT
+    body = solver.load_body("scope")
+    prior = solver.load_joint_prior()
+    people = [random_person(body, prior, seed) for seed in range(count)]
+    default = farthest(body, people, [without_deviations(person.seen) for person in people])
+    stated = farthest(body, people, [person.seen for person in people])
+    rows = [
+        ["wrong limbs, 2D and 3D, default weights", f"{100 * (default > FAR_M).mean():.1f} %"],
+        ["wrong limbs, 2D and 3D, deviations given", f"{100 * (stated > FAR_M).mean():.1f} %"],
+        ["another minimum, 2D alone", f"{100 * (excess(body, people) > COSTLY).mean():.1f} %"],
+        ["errors over their covariance", f"{calibration(body, people):.2f}"],
+    ]
+    print(f"{count} people")
+    for name, value in rows:
+        print(f"{name}: {value}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
