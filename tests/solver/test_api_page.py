@@ -92,6 +92,23 @@ def with_own_body(found, seen):
     assert off_mm(found["fit"].t_camera_part, seen["joints"]) < 100.0
 
 
+def with_own_tree(found, seen):
+    turn = np.linalg.norm(rotations.log(found["fit"].state.Omega[0]))
+    assert turn == pytest.approx(np.pi / 2, abs=1e-4)
+
+
+def of_the_solution(found, seen):
+    """The loss of a fit with a slightly larger weight says the same."""
+    heavier = replace(found["solver"].Weights(), shape=1.05)
+    stages = [found["solver"].Stage(heavier, 0.0, 200)]
+    options = found["solver"].Options(stages=stages)
+    fit = found["fit"]
+    again = found["solver"].fit(found["body"], found["seen"], init=fit.state, options=options)
+    before, after = (((each.t_camera_part - seen["joints"]) ** 2).sum() for each in (fit, again))
+    by_weight = (found["loss"] * found["found"].joints["weights.shape"]).sum()
+    assert float(by_weight) == pytest.approx((after - before) / 0.05, rel=0.1)
+
+
 def of_the_step(found, seen):
     equations = found["equations"]
     step = found["step"]
@@ -107,7 +124,9 @@ CHECKS = [
     from_cameras,
     with_own_residual,
     with_own_body,
+    with_own_tree,
     of_the_step,
+    of_the_solution,
 ]
 
 
