@@ -192,7 +192,15 @@ LOWEST = float((POINTS @ UP).min())
 
 def on_floor(normal, offset):
     floor = Floor([0], normal, offset, [1.0])
-    return fitted(Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS), floor=floor))
+    seen = Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS), floor=floor)
+    short = Options(stages=[Stage(max_iterations=1)])
+    return lambda: solver.fit(BODY, seen, priors=Priors(), options=short)
+
+
+def joints_as_keypoints():
+    body, _, everyone = people()
+    seen = Keypoints3D(np.arange(body.K + 1), everyone[0].joints)
+    solver.fit(body, Measurements(keypoints3d=seen))
 
 
 def with_pose(t):
@@ -213,7 +221,7 @@ MISTAKES = {
         ScopeWarning,
         "add its position",
     ),
-    "numbers of other points": (space(POINTS[::-1].copy()), ScopeWarning, "joint i is M "),
+    "joints numbered as keypoints": (joints_as_keypoints, ScopeWarning, "joint i is M "),
     "a floor's normal down": (on_floor(-UP, -LOWEST), ScopeWarning, "must point up"),
     "a floor's offset": (on_floor(UP, LOWEST + 5.0), ScopeWarning, "below the floor"),
     "a floor in millimetres": (on_floor(UP, 1e3 * LOWEST - 400.0), UnitsWarning, "floor lies more"),
