@@ -4,8 +4,8 @@
 The measurements are those that the capture passes to the solver: its networks process the clips
 next to the checkout once, and the measurements are kept in build/bench. Weights, stages and robust
 scales are the capture's; the shape is unknown in every frame. Cold: without an earlier estimate,
-from `initial_state` through all stages. Warm: from the previous frame. Converged: cost within 0.1 %
-and joints within 1 mm of the result of the same start at a relative decrease of 1e-12.
+from `initial_states` through all stages. Warm: from the previous frame. Converged: cost within
+0.1 % and joints within 1 mm of the result of the same start at a relative decrease of 1e-12.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..scope_addon.atomic_write import atomic_path
 from ..scope_addon.capture.camera.intrinsics import choose_camera
 from ..scope_addon.capture.fitting import weights as fit_weights
-from ..scope_addon.capture.fitting.prepared_track import prepare_track
+from ..scope_addon.capture.fitting.prepared_track import PreparedTrack, prepare_track
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.media.video_range import VideoRange
 from ..scope_addon.capture.tracking.left_right import repair_left_right
@@ -78,12 +78,15 @@ def load_clips(names: Sequence[str]) -> list[Clip]:
     return clips
 
 
-def _record(video: Path, body: Body, path: Path) -> None:
-    """Find the person in a clip and keep what the first pass over it hands to the solver."""
+def prepare(video: Path, body: Body, end_s: float = float("inf")) -> PreparedTrack:
+    """Find the person in a clip: what the first pass over it hands to the solver.
+
+    :raises NoPersonError: nobody was found.
+    """
     tracker = PeopleTracker("best", os.cpu_count() or 1, None)
     times = list[float]()
     tracklets: defaultdict[int, Tracklet] = defaultdict(Tracklet)
-    with open_video(video, VideoRange()) as footage:
+    with open_video(video, VideoRange(end_s=end_s)) as footage:
         camera = choose_camera(footage.width, footage.height, metadata_focal_mm=footage.focal_35mm)
         for frame in footage:
             for number, observation in tracker.step(frame.image_rgb, time_s=frame.timestamp_s):
@@ -94,7 +97,12 @@ def _record(video: Path, body: Body, path: Path) -> None:
         raise NoPersonError(
             f"no person was found in {video}: the benchmark needs the clips of ../shared"
         )
-    prepared = prepare_track(body, repair_left_right(tracks[0], camera), camera)
+    return prepare_track(body, repair_left_right(tracks[0], camera), camera)
+
+
+def _record(video: Path, body: Body, path: Path) -> None:
+    """Keep what the first pass over a clip hands to the solver."""
+    prepared = prepare(video, body)
     calls = [
         (prepared.measure(int(k)), prepared.priors) for k in np.flatnonzero(prepared.track.seen)
     ]

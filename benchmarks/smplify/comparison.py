@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,22 @@ from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.overlay.overlay_video import body_colors, camera_vertices, draw_overlay
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
-from ...solver import Body, load_body
+from ...solver import (
+    Body,
+    Measurements,
+    Options,
+    Priors,
+    State,
+    fit,
+    load_body,
+    load_joint_prior,
+)
 from ...solver.body_file import ASSETS
+from ...solver.rotations import log
 from ...tools.readme_pictures.__main__ import write_jpeg
 from ...tools.render_sample.truth import LIMBS, project
 from ..evaluation.metrics import mpjpe, pa_mpjpe, relative_to
-from ..frames import CACHE, DATA
+from ..frames import CACHE, DATA, REPORTED, capture_options, prepare
 from ..page.shots import frames_of
 from ..perception.accuracy import CAMERAS
 from ..perception.render_shots import fitted_motions
@@ -34,6 +45,11 @@ from .objective import Frame, Objective, PosePrior
 EVERY = 10
 QUICK = 40
 PRIOR_EVERY = 10  # of the recordings' frames
+PEOPLE = ("labval_walk_ts.mp4", "opencap_squat_cam0.mov")
+PEOPLE_END_S = 4.0  # of each
+PEOPLE_EVERY = 20
+PEOPLE_QUICK = 60
+DRAWN = 5000
 SHOWN_PX = 220
 SIDES = {"L": "left", "R": "right"}
 Points = NDArray[np.float64]
@@ -59,7 +75,96 @@ def smplify(quick: bool) -> dict[str, Any]:
         figures[clip] = _clip(body, prior, video, truth, QUICK if quick else EVERY)
         rows = [[name, *row.values()] for name, row in figures[clip].items()]
         print(table((clip, "MPJPE-root mm", "PA-MPJPE mm", MS), rows), end="\n\n", flush=True)
+    figures["people"] = people(body, PEOPLE_QUICK if quick else PEOPLE_EVERY)
+    rows = [[name, *row.values()] for name, row in figures["people"].items()]
+    headings = ("people", "MPJPE-root mm", "PA-MPJPE mm", "ms of the processor per frame")
+    print(table(headings, rows), end="\n\n", flush=True)
     return figures
+
+
+def people(body: Body, every: int) -> dict[str, dict[str, float]]:
+    """Compare optimizers and starts on real people, each frame alone; the means of the clips.
+
+    The 3D keypoints are the lifting network's. The dense objective's prior is of poses drawn from
+    Scope's own prior, so that all know the same. A body fitted to the 3D keypoints alone stands in
+    for a regression network's estimate; Scope refines it with all that it sees of the frame.
+    """
+    rows: dict[str, list[dict[str, float]]] = {}
+    prior = PosePrior.of(drawn_poses(body))
+    cold = capture_options(True, REPORTED)
+    warm = capture_options(False, REPORTED)
+    for name in PEOPLE:
+        prepared = prepare(DATA / "people" / "inputs" / name, body, PEOPLE_END_S)
+        priors = prepared.priors
+        with np.load(DATA / "people" / "truth" / f"{Path(name).stem}.npz") as data:
+            true = data["joints"].astype(float)
+            names = [str(joint) for joint in data["names"]]
+            index = data["frame_index"]
+        seen = np.flatnonzero(
+            prepared.track.seen & np.isin(np.arange(len(prepared.track.seen)), index)
+        )
+        found: dict[str, list[Points]] = {}
+        took: dict[str, float] = {}
+        for k in seen[::every]:
+            m = prepared.measure(int(k))
+            alone = Measurements(keypoints3d=m.keypoints3d)
+            start = fit(body, alone, priors=priors).state
+            ways = {
+                "SMPLify's objective": partial(_dense, body, prior, m, with_points=False),
+                "the same with 3D keypoints": partial(_dense, body, prior, m, with_points=True),
+                "3D keypoints alone, as of a regression": partial(_sparse, body, alone, priors),
+                "the same, refined by Scope": partial(_sparse, body, m, priors, start, warm),
+                "Scope": partial(_sparse, body, m, priors, None, cold),
+            }
+            for way, solve in ways.items():
+                since = time.process_time()
+                found.setdefault(way, []).append(solve())
+                took[way] = took.get(way, 0.0) + 1e3 * (time.process_time() - since)
+        wanted = true[np.searchsorted(index, seen[::every])]
+        for way, joints in found.items():
+            figures = errors(body, np.array(joints), wanted, names)
+            rows.setdefault(way, []).append(figures | {"ms": took[way] / len(joints)})
+    return {
+        way: {key: float(np.mean([each[key] for each in clips])) for key in clips[0]}
+        for way, clips in rows.items()
+    }
+
+
+def drawn_poses(body: Body) -> Points:
+    """Return poses (n, 3K), rotation vectors, every joint drawn from the joint prior."""
+    prior = load_joint_prior()
+    rng = np.random.default_rng(0)
+    vectors = np.zeros((DRAWN, body.K, 3))
+    for k, name in enumerate(body.joint_names[1:]):
+        if name in prior.names:
+            vectors[:, k] = log(prior.sample(name, DRAWN, rng))
+    return vectors.reshape(DRAWN, -1)
+
+
+def _sparse(
+    body: Body,
+    m: Measurements,
+    priors: Priors,
+    start: State | None = None,
+    options: Options = Options(),  # noqa: B008 - frozen
+) -> Points:
+    """Return the joints (K+1, 3) of Scope's fit."""
+    return fit(body, m, init=start, priors=priors, options=options).t_camera_part
+
+
+def _dense(body: Body, prior: PosePrior, m: Measurements, *, with_points: bool) -> Points:
+    """Return the joints (K+1, 3) of SMPLify's objective."""
+    assert m.keypoints2d is not None
+    numbers = {number: name for name, number in body.keypoint_set("blazepose").items()}
+    frame = Frame(
+        tuple(numbers[int(k)] for k in np.asarray(m.keypoints2d.indices)),
+        np.asarray(m.keypoints2d.pixels, dtype=float),
+        np.clip(np.asarray(m.keypoints2d.confidence, dtype=float), 0.0, 1.0),
+        np.asarray(m.intrinsics, dtype=float),
+        m.keypoints3d if with_points else None,
+    )
+    objective = Objective(body, prior, frame)
+    return objective.joints(objective.fit().x)
 
 
 def _clip(

@@ -5,6 +5,8 @@ r"""SMPLify's objective for one frame, with what this body and these keypoints h
 with the Geman-McClure ρ(e) = σ² ‖e‖² / (σ² + ‖e‖²), σ = 100 px, of keypoints p_i with confidence
 w_i. The pose prior is one Gaussian instead of a mixture of eight, over the rotation vectors of all
 recordings in ../shared; interpenetration is left out. The weights fall in four stages, as there.
+Where 3D keypoints q_i are given, as Fan et al. (ICCV 2021) gave it some, it also has
+    λ_3 Σ_i c_i ‖(x_i − x̄) − (q_i − q̄)‖², relative to the means of all.
 Source: Bogo et al., Keep it SMPL, ECCV 2016; the weights are those of its published code.
 """
 
@@ -16,7 +18,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body
+from ...solver import Body, Keypoints3D
 from ...solver.rotations import exp
 from ...tools.render_sample.truth import project
 from .dense import Minimum, minimize
@@ -24,6 +26,8 @@ from .dense import Minimum, minimize
 SIGMA_PX = 100.0
 STAGES = ((404.0, 100.0), (404.0, 50.0), (57.4, 10.0), (4.78, 5.0))  # λ_θ, λ_β
 BEND = 15.0  # λ_a
+# λ_3: 8 cm count as much as 100 px at this kernel's width do
+LAMBDA_3D = (SIGMA_PX / 0.08) ** 2
 LIMIT = 60
 TOLERANCE = 1e-4
 START_LIMIT = 30
@@ -55,6 +59,7 @@ class Frame:
     pixels: Vector  # (J, 2)
     confidence: Vector  # (J,)
     intrinsics: Vector  # (3, 3)
+    points: Keypoints3D | None = None  # numbered as on the body, for `LAMBDA_3D`
 
 
 class Objective:
@@ -126,22 +131,38 @@ class Objective:
         )
         prior = np.sqrt(pose_weight) * (theta - self.prior.mean) @ self.prior.whitening.T
         bends = BEND * np.exp(np.clip(self.signs * x[:, self.bends], -10, 3))
-        return np.concatenate(
-            [robust.reshape(len(x), -1), prior, np.sqrt(shape_weight) * betas, bends], axis=1
-        )
+        parts = [robust.reshape(len(x), -1), prior, np.sqrt(shape_weight) * betas, bends]
+        if self.frame.points is not None:
+            parts.append(self._offsets_in_space(x, self.frame.points))
+        return np.concatenate(parts, axis=1)
+
+    def _offsets_in_space(self, x: Vector, seen: Keypoints3D) -> Vector:
+        """Return weighted differences (B, 3 J) from the 3D keypoints, without the means of both."""
+        numbers = np.asarray(seen.indices)
+        measured = np.asarray(seen.points, dtype=float)
+        weight = np.asarray(seen.confidence, dtype=float)[:, None]
+        off = self._points(x, numbers) - measured
+        off = off - (weight * off).sum(axis=-2, keepdims=True) / weight.sum()
+        return (np.sqrt(LAMBDA_3D * weight) * off).reshape(len(x), -1)
 
     def _offsets(self, x: Vector) -> Vector:
         """Return projected minus seen keypoints (B, J, 2), pixels."""
+        points = self._points(x, self.at)
+        points[..., 2] = np.maximum(points[..., 2], 0.1)
+        return project(points, self.frame.intrinsics) - self.frame.pixels
+
+    def _points(self, x: Vector, numbers: NDArray[np.intp]) -> Vector:
+        """Return keypoints and joints (B, J, 3) of these numbers, in the camera frame."""
         states, trans, betas = self.pose(x)
-        points = np.empty((len(x), len(self.at), 3))
+        points = np.empty((len(x), len(numbers), 3))
         # most points of a Jacobian share theirs
         shapes, of = np.unique(betas, axis=0, return_inverse=True)
         for k, shape in enumerate(shapes):
             rows = of.reshape(-1) == k
             R, t = self.body.forward_kinematics(states[rows], trans[rows], shape)
-            points[rows] = self.body.keypoints(R, t, shape)[:, self.at]
-        points[..., 2] = np.maximum(points[..., 2], 0.1)
-        return project(points, self.frame.intrinsics) - self.frame.pixels
+            everything = np.concatenate([self.body.keypoints(R, t, shape), t], axis=1)
+            points[rows] = everything[:, numbers]
+        return points
 
     def _place(self, heading: float) -> Minimum:
         """Return root rotation and translation that fit the trunk, with the prior's mean pose, from

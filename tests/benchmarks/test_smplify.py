@@ -8,11 +8,22 @@ The dense optimizer on problems whose minima are known.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.benchmarks.smplify.comparison import errors
 from scope.benchmarks.smplify.dense import minimize
-from scope.benchmarks.smplify.objective import ROOT, SIGMA_PX, UPRIGHT, Frame, Objective, PosePrior
+from scope.benchmarks.smplify.objective import (
+    LAMBDA_3D,
+    ROOT,
+    SIGMA_PX,
+    UPRIGHT,
+    Frame,
+    Objective,
+    PosePrior,
+)
+from scope.solver import Keypoints3D
 from scope.solver.rotations import exp
 
 K = np.array([[900.0, 0, 480], [0, 900, 270], [0, 0, 1]])
@@ -74,6 +85,22 @@ def test_the_robust_term_is_geman_mcclures(body, prior, truth):
     frame.pixels[0] += [300.0, 400.0]
     squared = (Objective(body, prior, frame).residuals(truth[None], 0.0, 0.0)[0, :2] ** 2).sum()
     assert squared == pytest.approx(SIGMA_PX**2 * 500.0**2 / (SIGMA_PX**2 + 500.0**2))
+
+
+def test_3d_keypoints_count_by_where_they_are_to_each_other(body, prior, truth):
+    """Wherever the whole body is, and more the farther one of two is from its place."""
+    objective = Objective(body, prior, frame_at(body, truth))
+    joints = objective.joints(truth)[[4, 5]]
+    numbers = len(body.keypoint_names) + np.array([4, 5])
+    elsewhere = replace(objective.frame, points=Keypoints3D(numbers, joints + 0.5, np.ones(2)))
+    apart = [[0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]]
+    farther = replace(objective.frame, points=Keypoints3D(numbers, joints + apart, np.ones(2)))
+    exact, off = (
+        Objective(body, prior, frame).residuals(truth[None], 0.0, 0.0)[0, -6:]
+        for frame in (elsewhere, farther)
+    )
+    assert np.abs(exact).max() < 1e-9
+    assert (off**2).sum() == pytest.approx(LAMBDA_3D * 2 * 0.04**2)
 
 
 COMPARED_NAMES = [
