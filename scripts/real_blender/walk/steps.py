@@ -190,6 +190,7 @@ class Steps(FileSteps):
                     "interpolate_span",
                     "exchange_sides",
                     "foot_stands",
+                    "this_rests",
                     "flip_limb",
                     "turn_around",
                 ),

@@ -39,7 +39,7 @@ from shared.session import (
 
 # On a screen of 1600 x 1000, of which a laptop of 1366 x 768 shows the first 768 pixels, with two
 # captures in the list.
-FBX_BUTTON = (1090, 453)
+FBX_BUTTON = (1078, 453)
 RAW_BUTTON = (1085, 622)
 FOLD = 768
 FOLDER_BUTTON = (1231, 128)  # beside the footage, before that which adds a camera

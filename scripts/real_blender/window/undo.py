@@ -161,6 +161,7 @@ def edits() -> dict[str, Callable[[], object]]:
         "floor here": lambda: use(scope.floor_here),
         "flip limb": lambda: use(scope.flip_limb, start=10, end=20, limb="left_leg"),
         "turn around": lambda: use(scope.turn_around, start=10, end=20),
+        "this rests": lambda: use(scope.this_rests, start=10, end=12, part="left_knee"),
         "push to NLA": lambda: use(scope.push_to_nla),  # last, because it leaves no action to edit
     }
 
