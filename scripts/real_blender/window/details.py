@@ -185,7 +185,6 @@ def searched() -> Iterator[float]:
         before = popup()
         key("F3")
         yield from until(lambda empty=before: popup() != empty, 20, "the search")
-        yield 1.0  # until it takes keys, on a busy machine
         before = popup()
         subprocess.Popen(["xdotool", "type", "--delay", "60", words])
         yield from until(lambda empty=before: popup() != empty, 20, "what is found")
