@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A user's camera calibration: a JSON file with OpenCV's camera matrix and distortion, for footage
-of any size; or a TOML file with a table for each camera, as Pose2Sim and Caliscope write them.
+of any size; or a file with a table for each camera, as other programs write them (see
+`calibration_tables`).
 
     {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], "dist": [k1, k2, p1, p2, k3],
      "size": [width, height]}
@@ -25,7 +26,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +40,7 @@ from ...atomic_write import write_result
 from ...errors import UsageError
 from ...json_file import read_json_object
 from ...motion import Motion
-from ...untrusted.files import check_regular, in_one_line
+from .calibration_tables import SUFFIXES, Tables, camera_tables, has_tables
 
 _FORMAT = (
     'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], '
@@ -69,7 +69,6 @@ _LARGEST_TANGENTIAL = 0.5
 _LARGEST_MAGNIFICATION = 3.0  # by distortion, at half the shorter side
 _LARGEST_SKEW = 1e-3  # of the focal length; less than a pixel at the picture's edge
 _LARGEST_SIDE = 1e6
-_LARGEST_TOML = 1 << 20  # bytes
 _SIZE_TOLERANCE_PX = 1.0  # for sizes that were rounded
 
 
@@ -140,15 +139,15 @@ class Calibration:
 
 
 def read_calibration(path: Path) -> Calibration:
-    """Read a calibration from a JSON or TOML file.
+    """Read a calibration from a file.
 
-    :param path: of TOML, the camera's name may follow after a #.
+    :param path: of one with tables, the camera's name may follow after a #.
     :raises InputError: the file cannot be read, or holds an unknown key or an impossible value; or
         it has several cameras, and none or another one is named.
     """
     file, camera = calibration_file(path)
-    if file.suffix.lower() == ".toml":
-        content = _toml_camera(file, camera)
+    if has_tables(file):
+        content = _lens_of(file, camera)
     else:
         content = read_json_object(path, InputError, "calibration", _FORMAT)
     return calibration_of(path, content)
@@ -170,25 +169,25 @@ def calibration_of(path: Path, content: dict[str, Any]) -> Calibration:
 
 def calibration_file(path: Path) -> tuple[Path, str]:
     """Return the file of a calibration, and the name of the camera in it, which may be empty."""
-    file, _, camera = str(path).partition(".toml#")
-    return (Path(f"{file}.toml"), camera) if camera else (path, "")
+    file, _, camera = str(path).rpartition("#")
+    return (Path(file), camera) if camera and file.endswith(SUFFIXES) else (path, "")
 
 
 def placed_cameras(path: Path, stems: Sequence[str]) -> list[tuple[Path, Float64Array | None]]:
     """Return, for each video of a take, its calibration and its camera's (4, 4) world to camera,
     metres; None where the file does not say it.
 
-    A TOML file's cameras belong to the videos of the same names, whatever their case and signs
-    between words are, and otherwise to the videos in their order. Any other calibration is that of
-    all cameras, whose places are unknown.
+    The cameras of a file with tables belong to the videos of the same names, whatever their case
+    and signs between words are, and otherwise to the videos in their order. Any other calibration
+    is that of all cameras, whose places are unknown.
 
     :param stems: names of the videos without suffix.
     :raises InputError: the file cannot be read, or its cameras are not those of the videos.
     """
     file, camera = calibration_file(path)
-    if file.suffix.lower() != ".toml" or camera:
+    if not has_tables(file) or camera:
         return [(path, None)] * len(stems)
-    cameras = _toml_cameras(file)
+    cameras = _cameras(file)
     if len(cameras) == 1:
         return [(path, None)] * len(stems)
     by_name: dict[str, str] = {}
@@ -212,7 +211,7 @@ def _letters(name: str) -> str:
 
 
 def _world_to_camera(path: Path, name: str, table: dict[str, Any]) -> Float64Array | None:
-    """Return the place (4, 4) of a camera of a TOML file; None where it does not say it."""
+    """Return the place (4, 4) of one of a file's cameras; None where it does not say it."""
     if table.get("rotation") is None or table.get("translation") is None:
         return None
     rotation = _numbers(table["rotation"])
@@ -277,31 +276,20 @@ def calibration_text(motion: Motion) -> str:
     return "\n".join(lines)
 
 
-def _toml_cameras(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the tables of cameras of a TOML file, by name.
+def _cameras(path: Path) -> Tables:
+    """Return the tables of a file's cameras, by name.
 
     :raises InputError: the file cannot be read.
     """
-    check_regular(path, InputError, "calibration", _LARGEST_TOML)
-    try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{path} does not exist; check the path") from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not a TOML file ({in_one_line(error)})") from error
-    return {
-        name: table
-        for name, table in tables.items()
-        if isinstance(table, dict) and any(key in table for key in _NAMES["intrinsics"])
-    }
+    return camera_tables(path, _NAMES["intrinsics"])
 
 
-def _toml_camera(path: Path, camera: str) -> dict[str, Any]:
-    """Return the lens of a camera of a TOML file; what concerns its place is left out.
+def _lens_of(path: Path, camera: str) -> dict[str, Any]:
+    """Return the lens of one of a file's cameras; what concerns its place is left out.
 
     :raises InputError: the file cannot be read, or does not say which camera it is.
     """
-    cameras = _toml_cameras(path)
+    cameras = _cameras(path)
     names = ", ".join(cameras) or "none"
     if camera and camera not in cameras:
         raise InputError(f"{path} has no camera {camera!r}; its cameras are {names}")

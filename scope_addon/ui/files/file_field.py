@@ -24,7 +24,7 @@ FOOTAGE = ";".join(f"*{suffix}" for suffix in FOOTAGE_SUFFIXES)
 _FILTERS = {  # by the name of the setting
     "file": _VIDEOS,
     "body_file": "*.npz;*.pkl;*.pickle",
-    "calibration_file": "*.json;*.toml",
+    "calibration_file": "*.json;*.toml;*.yml;*.yaml;*.pickle;*.pkl",
     "detector_file": "*.onnx",
     "keypoints_file": "*.onnx",
 }

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Calibrations that FreeMoCap, EasyMocap and OpenCap have written: files by hand, after their
+published formats.
+"""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
+from scope.solver.errors import InputError
+
+# A quarter turn about x: the camera looks along the world's y, its y down is the world's −z.
+QUARTER = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+FREEMOCAP = """
+[cam_0]
+name = "recording_camera_0"
+size = [ 720, 1280,]
+matrix = [ [ 880.0, 0.0, 359.5,], [ 0.0, 880.0, 639.5,], [ 0.0, 0.0, 1.0,],]
+distortions = [ 0.05, 0.0, 0.0, 0.0, 0.0,]
+rotation = [ 0.0, 0.0, 0.0,]
+translation = [ 0.0, 0.0, 0.0,]
+
+[cam_1]
+name = "recording_camera_1"
+size = [ 720, 1280,]
+matrix = [ [ 900.0, 0.0, 359.5,], [ 0.0, 900.0, 639.5,], [ 0.0, 0.0, 1.0,],]
+distortions = [ 0.0, 0.0, 0.0, 0.0, 0.0,]
+rotation = [ 0.0, 1.5707963267948966, 0.0,]
+translation = [ -2500.0, 12.0, 2400.0,]
+
+[metadata]
+adjusted = false
+error = 0.0
+charuco_square_size = 58.0
+path_to_recorded_videos = "somewhere"
+"""
+INTRI = """%YAML:1.0
+---
+names:
+   - "01"
+   - "02"
+K_01: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [1.2e+03, 0., 960., 0., 1201., 540., 0., 0., 1.]
+H_01: 1080
+W_01: 1920
+dist_01: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [0.1, -0.02, 0., 0., 0.003]
+K_02: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [1300., 0., 960.,
+      0., 1301., 540., 0., 0., 1.]
+"""
+EXTRI = """%YAML:1.0
+---
+names:
+   - "01"
+   - "02"
+R_01: !!opencv-matrix
+   rows: 3
+   cols: 1
+   dt: d
+   data: [1.5707963267948966, 0., 0.]
+Rot_01: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [1., 0., 0., 0., 0., -1., 0., 1., 0.]
+T_01: !!opencv-matrix
+   rows: 3
+   cols: 1
+   dt: d
+   data: [0.1, 1.2, 4.]
+Rot_02: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [1., 0., 0., 0., 0., -1., 0., 1., 0.]
+T_02: !!opencv-matrix
+   rows: 3
+   cols: 1
+   dt: d
+   data: [-0.1, 1.2, 4.]
+"""
+
+
+def test_freemocap_is_in_millimetres(tmp_path):
+    path = tmp_path / "camera_calibration.toml"
+    path.write_text(FREEMOCAP)
+    (first, T_first), (second, T_second) = placed_cameras(path, ["a", "b"])
+    np.testing.assert_allclose(T_first, np.eye(4))
+    np.testing.assert_allclose(T_second[:3, 3], [-2.5, 0.012, 2.4])
+    np.testing.assert_allclose(T_second[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=1e-12)
+    assert read_calibration(first).intrinsics[0, 0] == 880
+    assert read_calibration(second).size == (720, 1280)
+
+
+@pytest.mark.parametrize("given", ["intri.yml", "extri.yml"])
+def test_easymocap(tmp_path, given):
+    (tmp_path / "intri.yml").write_text(INTRI)
+    (tmp_path / "extri.yml").write_text(EXTRI)
+    (second, T_second), (first, T_first) = placed_cameras(tmp_path / given, ["02", "01"])
+    for T, x in ((T_first, 0.1), (T_second, -0.1)):
+        np.testing.assert_allclose(T[:3, :3], QUARTER, atol=1e-9)
+        np.testing.assert_allclose(T[:3, 3], [x, 1.2, 4.0])
+    lens = read_calibration(first)
+    np.testing.assert_allclose(lens.intrinsics, [[1200, 0, 960], [0, 1201, 540], [0, 0, 1]])
+    np.testing.assert_allclose(lens.dist, [0.1, -0.02, 0, 0, 0.003])
+    assert lens.size == (1920, 1080)
+    assert read_calibration(second).intrinsics[1, 1] == 1301
+
+
+def test_easymocap_without_places(tmp_path):
+    path = tmp_path / "intri.yml"
+    path.write_text(INTRI)
+    assert [T for _, T in placed_cameras(path, ["01", "02"])] == [None, None]
+    path.write_text(INTRI.replace("1.2e+03, 0., 960.", "1.2e+03, .nan, 960."))
+    with pytest.raises(InputError, match="K_01 is not a list of numbers"):
+        placed_cameras(path, ["01", "02"])
+    path.write_text(INTRI.replace("   rows: 3", "   rows: 4"))
+    with pytest.raises(InputError, match="K_01 has 9 numbers, but 4 rows of 3"):
+        placed_cameras(path, ["01", "02"])
+    path.write_text("%YAML:1.0\n---\n")
+    with pytest.raises(InputError, match="has no cameras"):
+        placed_cameras(path, ["01", "02"])
+    path.rename(tmp_path / "extri.yml")
+    with pytest.raises(InputError, match=r"intri\.yml does not exist"):
+        placed_cameras(tmp_path / "extri.yml", ["01", "02"])
+
+
+def opencap(folder, number, **more):
+    """Write what OpenCap keeps of one camera; return the file."""
+    path = folder / f"Cam{number}" / "cameraIntrinsicsExtrinsics.pickle"
+    path.parent.mkdir()
+    content = {
+        "intrinsicMat": np.array([[1500.0 + number, 0, 360], [0, 1500, 640], [0, 0, 1]]),
+        "distortion": np.array([[0.2, -0.1, 0.0, 0.0, 0.0]]),
+        "imageSize": np.array([[1280], [720]]),
+        "rotation": QUARTER,
+        "translation": np.array([[100.0 * number], [900.0], [3500.0]]),
+        "rotation_EulerAngles": np.zeros(3),
+        **more,
+    }
+    path.write_bytes(pickle.dumps(content))
+    return path
+
+
+def test_opencap(tmp_path):
+    files = [opencap(tmp_path, number) for number in (10, 2, 0)]
+    found = placed_cameras(files[1], ["left", "middle", "right"])
+    assert [str(file).rpartition("#")[2] for file, _ in found] == ["Cam0", "Cam2", "Cam10"]
+    for (file, T), number in zip(found, (0, 2, 10), strict=True):
+        np.testing.assert_allclose(T[:3, :3], QUARTER, atol=1e-9)
+        np.testing.assert_allclose(T[:3, 3], [0.1 * number, 0.9, 3.5])
+        lens = read_calibration(file)
+        assert lens.intrinsics[0, 0] == 1500 + number
+        assert lens.size == (720, 1280)
+
+
+class _Runs:
+    """A pickle of it writes a file when it is read as usual."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (self.path,)
+
+
+def test_a_pickle_runs_nothing(tmp_path):
+    file = opencap(tmp_path, 0, intrinsicMat=_Runs(tmp_path / "ran"))
+    with pytest.raises(InputError, match="cameraIntrinsicsExtrinsics"):
+        read_calibration(file)
+    assert not (tmp_path / "ran").exists()
+    crooked = opencap(tmp_path, 1, rotation=np.ones((3, 3)))
+    file.unlink()
+    opencap(tmp_path, 2)
+    with pytest.raises(InputError, match="the rotation of Cam1 is no rotation matrix"):
+        placed_cameras(crooked, ["left", "right"])
