@@ -71,6 +71,8 @@ SENTENCES = {
     "weak_place": "{footage}: the angle between this camera and the first one is known to "
     "{degrees:.0f} degrees only; walk around, so that you fill more of both images",
     "not_in_view": "{footage} does not show {person:who}, or was not recognized",
+    "unseen_in_view": "{footage} does not show {person:who} {times:times}, or shows somebody else, "
+    "so that the other cameras alone tell the motion there",
     "view_contradicts": "{footage} contradicts the other cameras about {person:who} {times:times}, "
     "and was left out there",
     "calibration_contradicts": "{calibration} does not fit {footage}: {person:who} is not where "

@@ -107,7 +107,7 @@ def upright(
     return image if rotation is None else cast(Uint8Array, cv2.rotate(image, rotation))
 
 
-def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
+def open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]:
     """Open a file with PyAV, which is imported here because not every installation has it.
 
     :return: the base of PyAV's exceptions, and the container; None if PyAV cannot open the file.
@@ -132,7 +132,7 @@ def _open_with_pyav(path: Path) -> tuple[type[Exception], InputContainer | None]
     return av.error.FFmpegError, container
 
 
-def _film(path: Path, container: InputContainer) -> av.VideoStream:
+def film_of(path: Path, container: InputContainer) -> av.VideoStream:
     """Return the stream of moving images: of several, the largest one, for the others are previews.
 
     The picture of a cover, as files of music have, is none of them.
@@ -206,7 +206,7 @@ def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[
     """
     pictures: dict[int, Uint8Array] = {}
     pixels_left = max_pixels
-    failure, container = _open_with_pyav(path)
+    failure, container = open_with_pyav(path)
     if container is None:
         return pictures
     with container:
@@ -249,11 +249,11 @@ class PyavReader:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._failure, container = _open_with_pyav(path)
+        self._failure, container = open_with_pyav(path)
         if container is None:
             raise _undecodable(path)
         try:
-            self._stream = _film(path, container)
+            self._stream = film_of(path, container)
         except VideoError:
             container.close()
             raise
@@ -390,12 +390,12 @@ def count_frames(path: Path) -> int:
 
     :raises VideoError: PyAV is not installed.
     """
-    failure, container = _open_with_pyav(path)
+    failure, container = open_with_pyav(path)
     if container is None:
         return 0
     try:
         with container:
-            stream = _film(path, container)
+            stream = film_of(path, container)
             return sum(1 for packet in container.demux(stream) if packet.size)
     except (failure, VideoError):
         return 0
@@ -437,12 +437,12 @@ def usual_fps(path: Path) -> Fraction | None:
 
     :raises VideoError: PyAV is not installed, or there is no video in the file.
     """
-    failure, container = _open_with_pyav(path)
+    failure, container = open_with_pyav(path)
     if container is None:
         return None
     times_s: list[float] = []
     with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
-        for packet in container.demux(_film(path, container)):
+        for packet in container.demux(film_of(path, container)):
             if packet.pts is not None and packet.time_base:
                 times_s.append(float(packet.pts * packet.time_base))
             if len(times_s) == _TIMED_PACKETS:

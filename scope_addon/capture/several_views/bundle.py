@@ -3,20 +3,20 @@
 
     minimize  sum over k, n of c rho(|r_kn|^2 / sigma^2) + priors
               + sum over frames, bones of rho(log(|X_a - X_b| / L_ab)^2 (M_ab / sigma_L)^2),
-    r_kn = s_k pi(R_k X_n + t_k) - x_kn(t_n + tau_k)
+    r_kn = s_k pi(R_k X_n + t_k) - x_kn(t_n + tau_k + d_k (t_n - t_mean))
 
 over the keypoints X_n in the first camera's axes, the lengths L of bones, which are the same in all
 frames and on both sides (M: the mean body's), and of each camera k its pose R_k, t_k
-(R_camera_first), the scale s_k of its focal length and the offset tau_k of its clock. x_kn are rays
-between frames, by linear interpolation, c is the confidence, rho(s) = log(1 + s). The first camera
-has R = 1, t = 0, tau = 0.
+(R_camera_first), the scale s_k of its focal length, and the offset tau_k and the drift d_k of its
+clock. x_kn are rays between frames, by linear interpolation, c is the confidence, rho(s) = log(1 +
+s). The first camera has R = 1, t = 0, tau = 0, d = 0.
 
 A person who fills a small part of two images hardly shows perspective there, and two such images do
 not tell the angle between their cameras (Koenderink and van Doorn 1991). Lengths that do not change
 while the body moves do. Their prior, an adult's bones, gives the whole its size.
 
 The points of a frame depend on no other frame's, so they are eliminated from the normal equations
-(Schur complement), and a dense system of 8 unknowns a camera and one a bone is left.
+(Schur complement), and a dense system of 9 unknowns a camera and one a bone is left.
 
 Sources: Triggs et al. 2000, Bundle adjustment - a modern synthesis; Albl et al. 2017 for the
 offsets of unsynchronized cameras, whose points move linearly between frames.
@@ -48,10 +48,12 @@ BONE_PRIOR = 0.07  # relative deviation of a length from the mean body's
 # counts against priors. With 0.1, focal lengths of two phones that are known to 3 and 20 % end 2
 # and 8 % off, with all of them 13 and 11 %; with 0.01, offsets get worse.
 _INDEPENDENT = 0.03
-_UNKNOWNS = 8  # of a camera: rotation 3, position 3, logarithm of the focal scale, offset
+_UNKNOWNS = 9  # of a camera: rotation 3, position 3, logarithm of the focal scale, offset, drift
 _FOCAL = 6
 _CLOCK = 7
+_DRIFT = 8
 _CLOCK_SIGMA_S = 0.1  # of the offset that the bundle starts from
+DRIFT_SIGMA = 1e-4  # of clocks: those of phones differ by up to 0.1 s in twenty minutes
 _MOST_TRIALS = 60
 NEAREST_M = 0.2  # the least distance of a keypoint from a camera
 
@@ -63,7 +65,8 @@ class CameraPlace:
     R_camera_first: Float64Array  # (3, 3)
     t_camera_first: Float64Array  # (3,) metres
     log_focal: float = 0.0  # of the true focal length over the assumed one
-    offset_s: float = 0.0  # its clock less the first camera's
+    offset_s: float = 0.0  # its clock less the first camera's, when that shows 0
+    drift: float = 0.0  # by how many seconds a second its clock is faster than the first one's
     # Standard deviations of the two, and of the pose: rotation in radians, position in metres.
     focal_sigma: float = 0.0
     offset_sigma_s: float = 0.0
@@ -80,6 +83,16 @@ class CameraPlace:
         moved: Float64Array = points @ self.R_camera_first.T + self.t_camera_first
         return moved
 
+    def own_times(self, times: Float64Array) -> Float64Array:
+        """Return times of the first camera's clock as this camera's clock shows them, seconds."""
+        own: Float64Array = times + self.offset_s + self.drift * times
+        return own
+
+    def first_times(self, times: Float64Array) -> Float64Array:
+        """Return times of this camera's clock as the first camera's clock shows them, seconds."""
+        first: Float64Array = (times - self.offset_s) / (1.0 + self.drift)
+        return first
+
     @property
     def center(self) -> Float64Array:
         """The camera in the first camera's axes, metres."""
@@ -95,6 +108,14 @@ class Given:
     offset_s: float | None = None  # of its clock; None: unknown
     # (4, 4) from the first camera's axes to its own, metres; None: unknown
     T_camera_first: Float64Array | None = None
+    drift: float = 0.0  # of its clock
+    # Standard deviation of the clock, as sound tells it, seconds; 0: it stays as it is.
+    offset_sigma_s: float = 0.0
+
+    @property
+    def without_clock(self) -> Given:
+        """The same, with nothing known of the clock."""
+        return replace(self, offset_s=None, drift=0.0, offset_sigma_s=0.0)
 
 
 @dataclass(frozen=True)
@@ -114,12 +135,18 @@ class _Unknowns:
     lengths: Float64Array
     points: Float64Array
 
-    def moved(self, step: Float64Array, points: Float64Array) -> _Unknowns:
-        """Return them after a step of cameras and lengths, and one of the points."""
+    def moved(self, step: Float64Array, points: Float64Array, mean_s: float) -> _Unknowns:
+        """Return them after a step of cameras and lengths, and one of the points.
+
+        :param mean_s: the time for which the steps of offsets are.
+        """
         count = len(self.cameras)
         of_cameras = step[: count * _UNKNOWNS].reshape(count, _UNKNOWNS)
         return _Unknowns(
-            [_moved(place, own) for place, own in zip(self.cameras, of_cameras, strict=True)],
+            [
+                _moved(place, own, mean_s)
+                for place, own in zip(self.cameras, of_cameras, strict=True)
+            ],
             self.lengths * np.exp(step[count * _UNKNOWNS :]),
             self.points + points,
         )
@@ -172,14 +199,15 @@ def triangulate(
     return points
 
 
-def _moved(place: CameraPlace, step: Float64Array) -> CameraPlace:
+def _moved(place: CameraPlace, step: Float64Array, mean_s: float) -> CameraPlace:
     turn = exp(step[:3])
     return replace(
         place,
         R_camera_first=turn @ place.R_camera_first,
         t_camera_first=turn @ place.t_camera_first + step[3:6],
         log_focal=place.log_focal + float(step[_FOCAL]),
-        offset_s=place.offset_s + float(step[_CLOCK]),
+        offset_s=place.offset_s + float(step[_CLOCK] - step[_DRIFT] * mean_s),
+        drift=place.drift + float(step[_DRIFT]),
     )
 
 
@@ -247,16 +275,18 @@ class _Problem:
     ) -> None:
         self.people = people
         self.times = times
+        self.mean_s = float(times.mean()) if len(times) else 0.0
         self.start = start
         self.focal_sigma = [each.focal_sigma for each in given]
+        self.clock_sigma_s = [each.offset_sigma_s or _CLOCK_SIGMA_S for each in given]
         self.mean_lengths = mean_lengths
         of_cameras = np.ones((len(people), _UNKNOWNS), bool)
         for free, each in zip(of_cameras, given, strict=True):
             free[:_FOCAL] = each.T_camera_first is None
             free[_FOCAL] = each.focal_sigma > 0
-            free[_CLOCK] = each.offset_s is None
+            free[_CLOCK:] = each.offset_s is None or each.offset_sigma_s > 0
         of_cameras[0, :_FOCAL] = False
-        of_cameras[0, _CLOCK] = False
+        of_cameras[0, _CLOCK:] = False
         self.is_free = np.append(of_cameras.ravel(), np.ones(len(mean_lengths), bool))
 
     def observed(self, places: Sequence[CameraPlace]) -> tuple[Float64Array, Float64Array]:
@@ -264,7 +294,7 @@ class _Problem:
         keypoint that fewer than two cameras see has none.
         """
         at = [
-            person.at(self.times + place.offset_s)
+            person.at(place.own_times(self.times))
             for person, place in zip(self.people, places, strict=True)
         ]
         rays = np.array([each.rays for each in at])
@@ -290,16 +320,22 @@ class _Problem:
     def _prior_cost(self, now: _Unknowns) -> float:
         lengths = np.log(now.lengths / self.mean_lengths) / BONE_PRIOR
         total = float(np.square(lengths).sum())
-        for place, start, sigma in zip(now.cameras, self.start, self.focal_sigma, strict=True):
-            total += ((place.offset_s - start.offset_s) / _CLOCK_SIGMA_S) ** 2
-            if sigma > 0:
-                total += (place.log_focal / sigma) ** 2
+        for v, (place, start) in enumerate(zip(now.cameras, self.start, strict=True)):
+            later_s, faster = self._clock_change(place, start)
+            total += (later_s / self.clock_sigma_s[v]) ** 2 + (faster / DRIFT_SIGMA) ** 2
+            if self.focal_sigma[v] > 0:
+                total += (place.log_focal / self.focal_sigma[v]) ** 2
         return total / _INDEPENDENT
+
+    def _clock_change(self, place: CameraPlace, start: CameraPlace) -> tuple[float, float]:
+        """Return by how much a clock is ahead of where it started, at the mean time, and faster."""
+        faster = place.drift - start.drift
+        return place.offset_s - start.offset_s + faster * self.mean_s, faster
 
     def step_from(self, now: _Unknowns) -> Callable[[float], _Unknowns]:
         """Return a function that gives the unknowns after a step with some damping."""
         system = self.linearize(now)
-        return lambda damping: now.moved(*system.solve(damping))
+        return lambda damping: now.moved(*system.solve(damping), self.mean_s)
 
     def linearize(self, now: _Unknowns) -> _System:
         """Return the normal equations, by iterated weights."""
@@ -321,7 +357,8 @@ class _Problem:
             weight = (
                 confidence[v].ravel() * (depth > NEAREST_M) / (1.0 + square) / KEYPOINT_SIGMA**2
             )
-            J_point, J_camera = _derivatives(place, flat, speed)
+            since_mean_s = np.repeat(self.times - self.mean_s, n)
+            J_point, J_camera = _derivatives(place, flat, speed, since_mean_s)
             weighted_camera = J_camera * weight[:, None, None]
             weighted_point = J_point * weight[:, None, None]
             H_global[own, own] += np.einsum("mri,mrj->ij", weighted_camera, J_camera)
@@ -402,8 +439,9 @@ class _Problem:
         pull = np.zeros(len(g_global))
         for v, (place, start) in enumerate(zip(now.cameras, self.start, strict=True)):
             clock = v * _UNKNOWNS + _CLOCK
-            diagonal[clock] = 1.0 / _CLOCK_SIGMA_S**2
-            pull[clock] = place.offset_s - start.offset_s
+            diagonal[clock] = 1.0 / self.clock_sigma_s[v] ** 2
+            diagonal[clock + 1] = 1.0 / DRIFT_SIGMA**2
+            pull[clock], pull[clock + 1] = self._clock_change(place, start)
             if self.focal_sigma[v] > 0:
                 focal = v * _UNKNOWNS + _FOCAL
                 diagonal[focal] = 1.0 / self.focal_sigma[v] ** 2
@@ -417,7 +455,7 @@ class _Problem:
     def _speed(self, v: int, place: CameraPlace) -> Float64Array:
         """Return how fast rays (N, n, 2) move, 1/s."""
         half = 1.0 / 120.0
-        times = self.times + place.offset_s
+        times = place.own_times(self.times)
         later = self.people[v].at(times + half)
         earlier = self.people[v].at(times - half)
         both = (later.seen & earlier.seen)[:, None, None]
@@ -454,9 +492,9 @@ def image_residual(
 
 
 def _derivatives(
-    place: CameraPlace, points: Float64Array, speed: Float64Array
+    place: CameraPlace, points: Float64Array, speed: Float64Array, since_mean_s: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Return the derivatives of the residuals by the points (M, 2, 3) and by the camera (M, 2, 8).
+    """Return the derivatives of the residuals by the points (M, 2, 3) and by the camera (M, 2, 9).
 
     A step w of the rotation moves a point y in the camera's axes to exp(w) y, so it adds w x y.
     """
@@ -468,4 +506,5 @@ def _derivatives(
     J_camera[:, :, 3:6] = J_seen
     J_camera[:, :, _FOCAL] = scale * projected(seen)
     J_camera[:, :, _CLOCK] = -speed
+    J_camera[:, :, _DRIFT] = -speed * since_mean_s[:, None]
     return J_seen @ place.R_camera_first, J_camera

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -19,12 +20,19 @@ from ...kinematics.runs import runs
 from ..fitting.track_fit import spread
 from .bundle import KEYPOINT_SIGMA, CameraPlace, Given, adjust, image_residual, triangulate
 from .first_places import first_place
-from .seen_person import SeenPerson
-from .synchronize import Offset, offset_between
+from .seen_person import BONE_ENDS, BONE_STARTS, SeenPerson
+from .synchronize import APART_S, MOST_LIKELY, likely_offsets
 
-LONGEST_OFFSET_S = 60.0
+# With another offset, keypoints have to fit this much worse; otherwise the offset is uncertain.
+_MARGIN = 0.1
+# So much worse than with an offset by motion, and the sound is not that of the pictures.
+_DUBBED = 2.0
 _PAIR_FRAMES = 80  # of a clip that two cameras are adjusted to
 _ALL_FRAMES = 150
+# Guesses are tried with so many frames first, and those kept that do not cost so much more.
+_ROUGH_FRAMES = 25
+_ROUGHLY = 2.0
+_MOST_GUESSES = 4
 # Lifted bodies lean and turn by up to 15 degrees too far, and two cameras that start from such a
 # rotation can end in another minimum. So they start from several ones, turned about the person.
 _TURNS = np.radians([0.0, -20.0, 20.0])
@@ -35,6 +43,19 @@ MOST_TURNED = np.radians(60.0)
 MOST_APART = 3.0
 CONTRADICTS = 6.0
 CONTRADICTS_S = 0.5
+# Logarithm of bones' lengths, by the points of two cameras, over their usual ones: up to 0.1 in
+# four pairs of real cameras, 0.2 where one of two drawn ones is mirrored.
+MOST_STRETCHED = 0.15
+_LEAST_KNOWN = 6  # keypoints or bones of a moment
+UNSEEN_S = 1.0  # for which a person is unseen by a camera before the report says so
+
+
+class Clock(StrEnum):
+    """What tells a camera's clock."""
+
+    GIVEN = "given"
+    SOUND = "sound"
+    MOTION = "motion"
 
 
 @dataclass(frozen=True)
@@ -45,6 +66,7 @@ class Calibration:
     # (V,) the number of the first camera's most prominent person in each camera
     main: list[int | None]
     is_offset_certain: list[bool]  # (V,)
+    clocks: list[Clock]  # (V,)
 
 
 def calibrate(
@@ -62,30 +84,36 @@ def calibrate(
     places: list[CameraPlace | None] = [CameraPlace.first()]
     main: list[int | None] = [0]
     certain = [True]
+    clocks = [Clock.GIVEN]
     for v in range(1, len(people)):
-        known = (given[0], given[v])
-        found = [
-            (pair, number)
-            for number, person in enumerate(people[v])
-            if (pair := _pair(first, person, known, mean_lengths)) is not None
-        ]
-        best, number = min(found, key=lambda each: each[0].cost, default=(None, None))
+        best = _best_pair(first, people[v], (given[0], given[v]), mean_lengths)
         places.append(best.place if best is not None else None)
-        main.append(number)
+        main.append(best.number if best is not None else None)
         certain.append(best.is_offset_certain if best is not None else False)
+        clocks.append(best.clock if best is not None else Clock.MOTION)
     used = [v for v, place in enumerate(places) if place is not None]
     if len(used) < 2:
-        return Calibration(places, main, certain)
+        return Calibration(places, main, certain, clocks)
     bundle = adjust(
         [people[v][main[v] or 0] for v in used],
         [place for place in places if place is not None],
         _times(first, _ALL_FRAMES),
-        [given[v] for v in used],
+        [given[v].without_clock if clocks[v] == Clock.MOTION else given[v] for v in used],
         mean_lengths,
     )
     for v, place in zip(used, bundle.cameras, strict=True):
         places[v] = place
-    return Calibration(places, main, certain)
+    return Calibration(places, main, certain, clocks)
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """Who in another camera may be the first one's person, and what may be its clock."""
+
+    number: int  # of the person
+    given: tuple[Given, Given]  # of both cameras
+    offset_s: float
+    clock: Clock
 
 
 @dataclass(frozen=True)
@@ -93,53 +121,119 @@ class _Pair:
     """Another camera's place from one person, and the cost per keypoint that was seen."""
 
     place: CameraPlace
-    is_offset_certain: bool
     cost: float
+    number: int  # of the person
+    clock: Clock
+    is_offset_certain: bool = True
 
 
-def _pair(
+def _guesses(
+    first: SeenPerson, people: Sequence[SeenPerson], given: tuple[Given, Given]
+) -> list[_Guess]:
+    """Return who another camera's people may be, and when."""
+    offset_s = given[1].offset_s
+    unknown = (given[0], given[1].without_clock)
+    guesses = []
+    for number, person in enumerate(people):
+        if offset_s is not None:
+            clock = Clock.SOUND if given[1].offset_sigma_s > 0 else Clock.GIVEN
+            guesses.append(_Guess(number, given, offset_s, clock))
+            if clock == Clock.GIVEN:
+                continue
+        guesses += [
+            _Guess(number, unknown, likely_s, Clock.MOTION)
+            for likely_s in likely_offsets(first, person)
+        ]
+    return guesses
+
+
+def _best_pair(
     first: SeenPerson,
-    second: SeenPerson,
+    people: Sequence[SeenPerson],
     given: tuple[Given, Given],
     mean_lengths: Float64Array,
 ) -> _Pair | None:
-    """Return the second camera's place, if both may have seen the same person."""
-    offset_s = given[1].offset_s
-    if offset_s is not None:
-        offset = Offset(offset_s, is_certain=True)
-    elif (found := offset_between(first, second, LONGEST_OFFSET_S)) is not None:
-        offset = found
-    else:
-        return None
-    shared = _shared_times(first, second, offset.seconds)
-    starts = _starts(first, second, shared, offset.seconds, given[1].T_camera_first)
+    """Return another camera's place by the one of its people who is the first camera's person; None
+    if nobody may be them.
+    """
+    guesses = everything = _guesses(first, people, given)
+
+    def tried(guess: _Guess, frames: int, turns: Float64Array) -> _Pair | None:
+        return _adjusted_pair(first, people[guess.number], guess, frames, turns, mean_lengths)
+
+    if len(guesses) > 1:
+        roughly = [(tried(guess, _ROUGH_FRAMES, _TURNS[:1]), guess) for guess in guesses]
+        costs = [pair.cost if pair is not None else np.inf for pair, _ in roughly]
+        order = np.argsort(costs)[:_MOST_GUESSES]
+        guesses = [guesses[k] for k in order if costs[k] < _ROUGHLY * min(costs)]
+    pairs = [pair for guess in guesses if (pair := tried(guess, _PAIR_FRAMES, _TURNS)) is not None]
+
+    def dearness(pair: _Pair) -> float:
+        return pair.cost * (_DUBBED if pair.clock == Clock.MOTION else 1.0)
+
+    best = min(pairs, key=dearness, default=None)
+    if best is None or best.clock != Clock.MOTION:
+        return best
+    others = [
+        pair
+        for pair in pairs
+        if pair.number == best.number and abs(pair.place.offset_s - best.place.offset_s) > APART_S
+    ]
+    # Where a person hardly moves, everything fits.
+    likely = sum(guess.number == best.number for guess in everything)
+    is_certain = likely < MOST_LIKELY and all(
+        other.cost > best.cost * (1.0 + _MARGIN) for other in others
+    )
+    return replace(best, is_offset_certain=is_certain)
+
+
+def _adjusted_pair(
+    first: SeenPerson,
+    second: SeenPerson,
+    guess: _Guess,
+    frames: int,
+    turns: Float64Array,
+    mean_lengths: Float64Array,
+) -> _Pair | None:
+    """Return the second camera's place if a guess is right; None if both hardly see the person at
+    once then.
+
+    :param frames: how many both cameras are adjusted to.
+    :param turns: of the places that adjustments start from, radians.
+    """
+    drift = guess.given[1].drift
+    clock = CameraPlace(np.eye(3), np.zeros(3), offset_s=guess.offset_s, drift=drift)
+    shared = _shared_times(first, second, clock, frames)
+    starts = _starts(first, second, shared, clock, guess.given[1].T_camera_first, turns)
     if not len(shared) or not starts:
         return None
     adjusted = [
-        adjust([first, second], [CameraPlace.first(), start], shared, given, mean_lengths)
+        adjust([first, second], [CameraPlace.first(), start], shared, guess.given, mean_lengths)
         for start in starts
     ]
     best = min(adjusted, key=lambda bundle: bundle.cost)
-    return _Pair(best.cameras[1], offset.is_certain, best.cost / max(best.known, 1))
+    return _Pair(best.cameras[1], best.cost / max(best.known, 1), guess.number, guess.clock)
 
 
 def _starts(
     first: SeenPerson,
     second: SeenPerson,
     times: Float64Array,
-    offset_s: float,
+    clock: CameraPlace,
     T_camera_first: Float64Array | None,
+    turns: Float64Array,
 ) -> list[CameraPlace]:
-    """Return places from which to adjust the second camera; none if both hardly see the person at
-    once.
+    """Return places from which to adjust the second camera, with the clock of one; none if both
+    hardly see the person at once.
     """
     if T_camera_first is not None:
-        return [CameraPlace(T_camera_first[:3, :3], T_camera_first[:3, 3], offset_s=offset_s)]
-    start = first_place(first, second, times, offset_s)
+        R, t = T_camera_first[:3, :3], T_camera_first[:3, 3]
+        return [replace(clock, R_camera_first=R, t_camera_first=t)]
+    start = first_place(first, second, times, clock)
     if start is None:
         return []
     middle = np.median(first.root[first.seen], axis=0)
-    return [_turned(start, middle, turn) for turn in _TURNS]
+    return [_turned(start, middle, turn) for turn in turns]
 
 
 def _turned(place: CameraPlace, point: Float64Array, angle: float) -> CameraPlace:
@@ -154,10 +248,12 @@ def _times(person: SeenPerson, most: int) -> Float64Array:
     return times
 
 
-def _shared_times(first: SeenPerson, second: SeenPerson, offset_s: float) -> Float64Array:
+def _shared_times(
+    first: SeenPerson, second: SeenPerson, clock: CameraPlace, most: int = _PAIR_FRAMES
+) -> Float64Array:
     """Return times of the first camera at which both see the person."""
-    both = first.seen & second.at(first.times + offset_s).seen
-    return _times(replace(first, seen=both), _PAIR_FRAMES)
+    both = first.seen & second.at(clock.own_times(first.times)).seen
+    return _times(replace(first, seen=both), most)
 
 
 def same_people(
@@ -206,7 +302,7 @@ def contradicts(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> bool:
 
     Cameras of equal height that were exchanged have rays that meet, in a wrong place.
     """
-    turned = first_place(one, other, _shared_times(one, other, place.offset_s), place.offset_s)
+    turned = first_place(one, other, _shared_times(one, other, place), place)
     if turned is None:
         return False
     angle = float(np.linalg.norm(log(turned.R_camera_first @ place.R_camera_first.T)))
@@ -230,8 +326,8 @@ def _common_points(
     """Return a person at times at which the first and another camera see them, as both do, and the
     keypoints (N, n, 3) by the rays of both, first camera's axes.
     """
-    times = _shared_times(one, other, place.offset_s)
-    at = one.at(times), other.at(times + place.offset_s)
+    times = _shared_times(one, other, place)
+    at = one.at(times), other.at(place.own_times(times))
     confidence = np.array([each.confidence for each in at])
     rays = np.array([each.rays for each in at])
     return at, triangulate(rays, confidence, [CameraPlace.first(), place])
@@ -261,7 +357,7 @@ def contradicting_spans(
     if len(used) < 2 or first is None:
         return spans
     times = first.times
-    at = [people[v].at(times + places[v].offset_s) for v in used]  # type: ignore[union-attr]
+    at = [people[v].at(places[v].own_times(times)) for v in used]  # type: ignore[union-attr]
     cameras = [places[v] for v in used]
     error = np.array([_error_without(at, cameras, k) for k in range(len(used))])
     if len(used) == 2:
@@ -270,17 +366,34 @@ def contradicting_spans(
         worst = error.argmax(axis=0)
         wrong = (np.arange(len(used))[:, None] == worst) & (error > CONTRADICTS)
     for k, v in enumerate(used):
-        spans[v] = _long_spans(wrong[k], times)
+        spans[v] = _long_spans(wrong[k], times, CONTRADICTS_S)
     return spans
+
+
+def unseen_spans(
+    first: SeenPerson, other: SeenPerson, place: CameraPlace
+) -> list[tuple[float, float]]:
+    """Return when the first camera shows a person, and another one films without showing them: for
+    at least `UNSEEN_S`, by the first camera's clock, seconds.
+    """
+    own_times = place.own_times(first.times)
+    films = (own_times >= other.times[0]) & (own_times <= other.times[-1])
+    missed = films & first.seen & ~other.at(own_times).seen
+    return _long_spans(missed, first.times, UNSEEN_S)
 
 
 def _error_without(
     at: Sequence[SeenPerson], cameras: Sequence[CameraPlace | None], k: int
 ) -> Float64Array:
-    """Return the median distance (N,) of camera k's keypoints from those of the others; with two
-    cameras, of both from their common points. Zero where too little is seen.
+    """Return the median distance (N,) of camera k's keypoints from those of the others, in standard
+    deviations. Zero where too little is seen.
+
+    Two cameras have the common points alone, of which each is half as far from either. These fit
+    to both also where one shows somebody else beside the person, at the same height, but then bones
+    have other lengths than otherwise.
     """
-    others = [v for v in range(len(at)) if v != k] if len(at) > 2 else list(range(len(at)))
+    is_pair = len(at) == 2
+    others = list(range(len(at))) if is_pair else [v for v in range(len(at)) if v != k]
     confidence = np.array([at[v].confidence for v in others])
     rays = np.array([at[v].rays for v in others])
     places = [cameras[v] for v in others]
@@ -288,18 +401,40 @@ def _error_without(
     known = ((confidence > 0).sum(axis=0) >= 2) & (at[k].confidence > 0)
     distance = _distance(at[k], cameras[k], points)  # type: ignore[arg-type]
     error = np.zeros(len(distance))
-    for row in np.flatnonzero(known.sum(axis=1) >= 6):
+    for row in np.flatnonzero(known.sum(axis=1) >= _LEAST_KNOWN):
         error[row] = np.median(distance[row, known[row]])
-    return error
+    if not is_pair:
+        return error
+    return np.maximum(2.0 * error, CONTRADICTS * _stretch(points, known) / MOST_STRETCHED)
 
 
-def _long_spans(wrong: BoolArray, times: Float64Array) -> list[tuple[float, float]]:
-    """Return the spans of at least `CONTRADICTS_S`, with short pauses closed."""
+def _stretch(points: Float64Array, known: BoolArray) -> Float64Array:
+    """Return by how much bones are too long or too short (N,), as the median of logarithms, by
+    points (N, n, 3). Zero where fewer than `_LEAST_KNOWN` are known.
+    """
+    length = np.linalg.norm(points[:, BONE_ENDS] - points[:, BONE_STARTS], axis=-1)
+    both = known[:, BONE_ENDS] & known[:, BONE_STARTS]
+    logarithm = np.log(np.maximum(length, 1e-3))
+    usual = np.array(
+        [
+            np.median(logarithm[both[:, row], row]) if both[:, row].any() else 0.0
+            for row in range(len(BONE_STARTS))
+        ]
+    )
+    change = np.abs(logarithm - usual)
+    stretch = np.zeros(len(points))
+    for row in np.flatnonzero(both.sum(axis=1) >= _LEAST_KNOWN):
+        stretch[row] = np.median(change[row, both[row]])
+    return stretch
+
+
+def _long_spans(wrong: BoolArray, times: Float64Array, least_s: float) -> list[tuple[float, float]]:
+    """Return the spans of at least so many seconds, with short pauses closed."""
     spans: list[list[float]] = []
     for first, end in runs(wrong):
         start, stop = float(times[first]), float(times[end - 1])
-        if spans and start - spans[-1][1] < CONTRADICTS_S:
+        if spans and start - spans[-1][1] < least_s:
             spans[-1][1] = stop
         else:
             spans.append([start, stop])
-    return [(start, stop) for start, stop in spans if stop - start >= CONTRADICTS_S]
+    return [(start, stop) for start, stop in spans if stop - start >= least_s]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ...arrays import Float64Array
+from ...arrays import Float32Array, Float64Array
 from ...errors import UsageError
 from ...footage import display_text
 from ...notices import Notice, notice
@@ -22,6 +22,7 @@ from ..camera.calibration import placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
 from ..fitting.keypoint_offsets import with_keypoint_offsets
 from ..fitting.prepared_track import prepare_track
+from ..media.sound import loudness
 from ..media.video import Video, open_video
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
@@ -40,9 +41,11 @@ from .calibrate import (
     contradicts,
     relative_distance,
     same_people,
+    unseen_spans,
 )
 from .person_in_views import PersonInViews, with_focal_scale
 from .seen_person import KEYPOINTS, SeenPerson, bone_lengths, seen_person
+from .sound_offset import offset_by_sound
 
 MOST_VIEWS = 8
 # Of the standard deviation of a camera's rotation, from which on the report warns.
@@ -104,7 +107,7 @@ def capture_views(
     ]
     with clock.stage("solver"):
         progress(PLACING, 0, 0)
-        given = _given([view.camera for view in views], options, [T for _, T in files])
+        given = _given(views, options, [T for _, T in files])
         calibration = calibrate(
             [view.people for view in views], given, bone_lengths(_rest_keypoints(body, options))
         )
@@ -199,21 +202,44 @@ def _calibration_files(
 
 
 def _given(
-    cameras: Sequence[Camera],
+    views: Sequence[_View],
     options: CaptureOptions,
     T_camera_world: Sequence[Float64Array | None],
 ) -> list[Given]:
-    """Return what options say about each camera."""
-    offsets_s = [0.0, *(options.offsets_s or [None] * (len(cameras) - 1))]
-    first = T_camera_world[0]
-    return [
-        Given(
-            camera.focal_deviation,
-            offset_s,
-            T @ np.linalg.inv(first) if T is not None and first is not None else None,
-        )
-        for camera, offset_s, T in zip(cameras, offsets_s, T_camera_world, strict=True)
-    ]
+    """Return what options and sound say about each camera."""
+    given = []
+    for v, view in enumerate(views):
+        T, T_first = T_camera_world[v], T_camera_world[0]
+        known = Given(view.camera.focal_deviation)
+        if T is not None and T_first is not None:
+            known = replace(known, T_camera_first=T @ np.linalg.inv(T_first))
+        if v == 0:
+            known = replace(known, offset_s=0.0)
+        elif options.offsets_s:
+            known = replace(known, offset_s=options.offsets_s[v - 1])
+        given.append(known)
+    unknown = [v for v, known in enumerate(given) if known.offset_s is None]
+    first_sound = _sound_of(views[0]) if unknown else None
+    for v in unknown:
+        own_sound = _sound_of(views[v])
+        if first_sound is None or own_sound is None:
+            continue
+        heard = offset_by_sound(first_sound, own_sound)
+        if heard is not None:
+            given[v] = replace(
+                given[v],
+                offset_s=heard.seconds,
+                drift=heard.drift,
+                offset_sigma_s=heard.sigma_s,
+            )
+    return given
+
+
+def _sound_of(view: _View) -> Float32Array | None:
+    """Return how loud a video is; None without sound, and of slow motion, whose sound is stretched
+    in several ways.
+    """
+    return loudness(view.video.path) if view.video.recorded_speed == 1.0 else None
 
 
 def _doubts_about_file(
@@ -297,7 +323,10 @@ def _observe_view(
             "or capture this video alone"
         )
     with clock.stage("solver"):
-        tracks = repaired(shot_of(video, body, options, footage), tracks)
+        shot = shot_of(video, body, options, footage)
+        # People move on while a picture cuts, so that its times have no gap there.
+        times_s = footage.timestamps / shot.speed
+        tracks = [replace(track, times=times_s) for track in repaired(shot, tracks)]
         people = [
             seen_person(prepare_track(body, track, footage.camera, None, False), footage.camera)
             for track in tracks
@@ -347,6 +376,16 @@ def _people_in_views(
                 if place is not None:
                     notices.append(notice("not_in_view", footage=views[v].name, person=person))
                 continue
+            missed_s = unseen_spans(views[0].people[k], views[v].people[number], place)
+            if missed_s:
+                notices.append(
+                    notice(
+                        "unseen_in_view",
+                        footage=views[v].name,
+                        person=person,
+                        times=[start for start, _ in missed_s],
+                    )
+                )
             if spans[v]:
                 notices.append(
                     notice(
@@ -356,19 +395,19 @@ def _people_in_views(
                         times=[start for start, _ in spans[v]],
                     )
                 )
-            track = _without(views[v].tracks[number], spans[v], place.offset_s)
+            track = _without(views[v].tracks[number], spans[v], place)
             others.append((track, with_focal_scale(views[v].camera, place), place))
-        track = _without(views[0].tracks[k], spans[0], 0.0)
+        track = _without(views[0].tracks[k], spans[0], CameraPlace.first())
         own_progress = progress_of_person(progress, k, len(everyone))
         people.append(PersonInViews(shot, track, others, heights[k], own_progress))
     return people, notices
 
 
-def _without(track: Track, spans: Sequence[tuple[float, float]], offset_s: float) -> Track:
+def _without(track: Track, spans: Sequence[tuple[float, float]], place: CameraPlace) -> Track:
     """Return a track that does not see the person in spans of the first camera's clock."""
     if not spans:
         return track
-    times = np.asarray(track.times, float) - offset_s
+    times = place.first_times(np.asarray(track.times, float))
     wrong = np.zeros(len(times), bool)
     for start, end in spans:
         wrong |= (times >= start) & (times <= end)
@@ -382,6 +421,8 @@ def _about_cameras(views: Sequence[_View], calibration: Calibration) -> list[Not
     for v in range(1, len(views)):
         place = calibration.places[v]
         name = views[v].name
+        if views[v].footage.cuts_s:
+            warnings.append(notice("cuts", footage=name, times=views[v].footage.cuts_s))
         if place is None:
             warnings.append(notice("view_without_place", footage=name))
             continue
@@ -401,8 +442,10 @@ def _about_view(view: _View, number: int, calibration: Calibration) -> dict[str,
         return about | {"is_used": False}
     about |= {
         "is_used": True,
+        "clock": str(calibration.clocks[number]),
         "offset_s": round(place.offset_s, 4),
         "offset_sigma_s": round(place.offset_sigma_s, 4),
+        "clock_drift": round(place.drift, 7),
         "focal_px": round(float(with_focal_scale(view.camera, place).intrinsics[0, 0]), 1),
         "focal_deviation": round(place.focal_sigma, 3),
         "R_camera_first": np.round(place.R_camera_first, 6).tolist(),

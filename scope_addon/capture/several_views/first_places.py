@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ....solver.rotations import nearest_rotation
@@ -15,7 +17,7 @@ _FAR_M = 0.15  # from which on a lifted keypoint weighs less
 
 
 def first_place(
-    first: SeenPerson, second: SeenPerson, times: Float64Array, offset_s: float
+    first: SeenPerson, second: SeenPerson, times: Float64Array, clock: CameraPlace
 ) -> CameraPlace | None:
     """Return the second camera's place in the first one's axes; None if both hardly see the person
     at once.
@@ -24,9 +26,10 @@ def first_place(
     second one, and the translation joins their hips, both by weights that fall with the distance.
 
     :param times: (N,) of the first camera's clock, seconds.
+    :param clock: a place with the second camera's clock.
     """
     a = first.at(times)
-    b = second.at(times + offset_s)
+    b = second.at(clock.own_times(times))
     both = a.seen & b.seen
     if both.sum() < 3:
         return None
@@ -40,4 +43,4 @@ def first_place(
         error = np.linalg.norm(end - start @ R.T, axis=-1)
         weight = confidence / (1.0 + np.square(error / _FAR_M))
     moves = b.root[both] - a.root[both] @ R.T
-    return CameraPlace(R, np.median(moves, axis=0), offset_s=offset_s)
+    return replace(clock, R_camera_first=R, t_camera_first=np.median(moves, axis=0))

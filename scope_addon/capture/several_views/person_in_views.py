@@ -73,7 +73,7 @@ def other_view(
     :param camera: with its true focal length.
     """
     times = np.asarray(prepared.track.times, float)
-    at = track_at(track, times + place.offset_s)
+    at = track_at(track, place.own_times(times))
     measurer = Measurer(prepared.body, camera.intrinsics)
     pixels = camera.undistort(at.keypoints_px)
     lifted = lift(measurer, at, pixels)

@@ -6,27 +6,28 @@ such signals s of both cameras, standardized, the offset of the second clock is
 
     tau = argmin over tau of mean over t, i of rho(s_i(t) - s'_i(t + tau)).
 
-A person who hardly moves, or moves periodically, has several minima of nearly the same depth, and
-the offset is then unknown. Nearby minima are told apart and refined by `bundle`.
+A person who hardly moves, or moves periodically, has several minima of nearly the same depth. One
+who turns while walking also looks to both cameras alike a while apart, with the same errors of the
+lifted body. So the best minima are returned, and `calibrate` takes the one to which all keypoints
+fit best.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array
 from .seen_person import NAMES, SeenPerson
 
+LONGEST_OFFSET_S = 60.0
 STEP_S = 1.0 / 60.0
 MIN_OVERLAP_S = 1.0
 # Parts of the shorter clip that both cameras have to show.
 MIN_OVERLAP = 0.3
 # Between minima that count as different ones.
-_APART_S = 0.2
-# The next best minimum has to be this much worse; otherwise the offset is ambiguous.
-_MARGIN = 0.1
+APART_S = 0.2
+MOST_LIKELY = 4  # minima that are returned
+_WORSE = 1.25  # than the best one, as which others are not returned
 _ROBUST = 1.0  # of the difference of standardized signals
 _TO_OWN_SIDE = ("wrist", "shoulder"), ("wrist", "hip"), ("elbow", "hip"), ("ankle", "hip")
 _TO_OTHER_SIDE = ("wrist", "wrist"), ("elbow", "elbow"), ("knee", "knee"), ("ankle", "ankle")
@@ -45,20 +46,9 @@ _HIPS = [NAMES.index(f"{side}_hip") for side in ("left", "right")]
 _LEAST_DEVIATION = 0.05  # of a signal, in lengths of the trunk, so that noise is not standardized
 
 
-@dataclass(frozen=True)
-class Offset:
-    """The time in a camera's file less the time in the first camera's, of one and the same
-    moment.
-    """
-
-    seconds: float
-    is_certain: bool  # no other offset explains the motion nearly as well
-
-
-def offset_between(first: SeenPerson, second: SeenPerson, longest_s: float) -> Offset | None:
-    """Return the offset of the second camera's clock; None where no overlap is long enough.
-
-    :param longest_s: the largest offset that is looked for, either way, seconds.
+def likely_offsets(first: SeenPerson, second: SeenPerson) -> list[float]:
+    """Return the time in the second camera's file less that in the first one's, of one and the same
+    moment, seconds: what fits best first. None where no overlap is long enough.
     """
     clock = np.arange(first.times[0], first.times[-1], STEP_S)
     second_clock = np.arange(second.times[0], second.times[-1], STEP_S)
@@ -71,7 +61,7 @@ def offset_between(first: SeenPerson, second: SeenPerson, longest_s: float) -> O
     # Sample i of the second camera's signals is compared with sample i + lag of the first one's.
     for lag in range(-len(second_clock) + 1, len(clock)):
         offset_s = second.times[0] - first.times[0] - lag * STEP_S
-        if abs(offset_s) > longest_s:
+        if abs(offset_s) > LONGEST_OFFSET_S:
             continue
         begin = max(0, lag)
         end = min(len(clock), len(second_clock) + lag)
@@ -82,14 +72,17 @@ def offset_between(first: SeenPerson, second: SeenPerson, longest_s: float) -> O
         square = np.square(difference / _ROBUST)
         costs.append(float(np.mean(square / (1.0 + square))))
         offsets.append(offset_s)
-    if not offsets:
-        return None
     cost = np.array(costs)
     offset = np.array(offsets)
-    best = int(np.argmin(cost))
-    others = np.abs(offset - offset[best]) > _APART_S
-    is_certain = not others.any() or bool(cost[others].min() > cost[best] * (1.0 + _MARGIN))
-    return Offset(_vertex(offset, cost, best), is_certain)
+    likely: list[float] = []
+    is_left = np.ones(len(cost), bool)
+    while is_left.any() and len(likely) < MOST_LIKELY:
+        best = int(np.argmin(np.where(is_left, cost, np.inf)))
+        if cost[best] > _WORSE * cost.min():
+            break
+        likely.append(_vertex(offset, cost, best))
+        is_left &= np.abs(offset - offset[best]) > APART_S
+    return likely
 
 
 def _vertex(shift: Float64Array, cost: Float64Array, best: int) -> float:
