@@ -34,6 +34,7 @@ ELSEWHERE = {  # imported where they are wanted: some need packages that others 
     "blender": (".blender", "blender"),
     "cluster": (".cluster", "cluster"),
     "two_people": (".two_people.accuracy", "two_people"),
+    "travelling": (".drawn.travelling", "travelling"),
     "views": (".drawn.views", "views"),
     "climbs": (".climbs.accuracy", "climbs"),
     "live": (".live.live", "live"),

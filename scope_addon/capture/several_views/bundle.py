@@ -84,12 +84,12 @@ class CameraPlace:
         return moved
 
     def own_times(self, times: Float64Array) -> Float64Array:
-        """Return times of the first camera's clock as this camera's clock shows them, seconds."""
+        """Return times (...) of the first camera's clock as this one's shows them, seconds."""
         own: Float64Array = times + self.offset_s + self.drift * times
         return own
 
     def first_times(self, times: Float64Array) -> Float64Array:
-        """Return times of this camera's clock as the first camera's clock shows them, seconds."""
+        """Return times (...) of this camera's clock as the first one's shows them, seconds."""
         first: Float64Array = (times - self.offset_s) / (1.0 + self.drift)
         return first
 

@@ -50,7 +50,7 @@ class SoundOffset:
 def offset_by_sound(first: Float32Array, second: Float32Array) -> SoundOffset | None:
     """Return the offset of the second camera's clock; None where the sounds do not tell it.
 
-    :param first, second: (T, bands) as `loudness` returns them.
+    :param first: (T, B) as `loudness` returns it. :param second: (T', B) likewise.
     """
     a = _onsets(first)
     b = _onsets(second)

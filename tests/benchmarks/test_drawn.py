@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drawn walkers: feet that stand do not move, and pictures show the body where the truth says."""
+
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.benchmarks.drawn.footage import HEIGHT, WIDTH, Camera, intrinsics_of
+from scope.benchmarks.drawn.surroundings import Surroundings
+from scope.benchmarks.drawn.view_scenes import FIRST, SECOND
+from scope.benchmarks.drawn.views import _score_camera
+from scope.benchmarks.drawn.walk import RUNS, Walk, Walker
+
+
+@pytest.mark.parametrize("walk", [Walk(1.3), Walk(3.0, 0.72, style=RUNS), Walk(1.0, turn=0.3)])
+def test_feet_that_stand_stay_where_they_are(body, walk):
+    walker = Walker(body, walk)
+    times = np.arange(60) / 30.0
+    poses = [walker.pose(time_s) for time_s in times]
+    lowest = np.array([walker.vertices(pose)[:, 2].min() for pose in poses if pose.stands.any()])
+    assert np.abs(lowest).max() < 0.03
+    ankles = [body.joint_names.index(f"{side}_ankle") for side in ("left", "right")]
+    joints = np.array([walker.joints(pose)[ankles] for pose in poses])
+    stands = np.array([pose.stands for pose in poses])
+    moved = np.linalg.norm(np.diff(joints[..., :2], axis=0), axis=-1)
+    both = stands[:-1] & stands[1:]
+    # An ankle turns about heel and toes.
+    assert moved[both].max() < 0.04
+    assert moved[~both].max() > walk.speed_m_s / 30.0
+    travelled = np.linalg.norm(joints[-1].mean(axis=0)[:2] - joints[0].mean(axis=0)[:2])
+    assert travelled == pytest.approx(walk.speed_m_s * 59 / 30, rel=0.2)
+
+
+def test_a_box_is_drawn_where_it_is():
+    walls = np.zeros((4, 8, 8, 3), np.float32)
+    walls[1] = 200.0
+    shell = np.array([[-5.0, -5.0, 0.0], [5.0, 5.0, 300.0]])
+    box = np.array([[[-0.5, 1.0, 0.0], [0.5, 2.0, 2.0]]])
+    scene = Surroundings(shell, box, np.array([1]), (walls,) * 7, is_plain=False)
+    camera = Camera(lambda _: np.array([0.0, -4.0, 1.0]), lambda _: np.array([0.0, 0.0, 1.0]))
+    R, centers = camera.path(np.zeros(1))
+    focal_px = 400.0
+    image = scene.draw(R[0], centers[0], intrinsics_of(focal_px), WIDTH, HEIGHT)
+    rows, columns = np.nonzero(image[..., 0])
+    half = focal_px * 0.5 / 5.0  # of the near side, five metres away
+    assert columns.min() == pytest.approx(WIDTH / 2 - half, abs=1.5)
+    assert columns.max() == pytest.approx(WIDTH / 2 + half, abs=1.5)
+    assert rows.min() == pytest.approx(HEIGHT / 2 - focal_px * 1.0 / 5.0, abs=1.5)
+
+
+def test_a_camera_has_the_frames_of_its_own_clock():
+    camera = Camera(lambda _: np.zeros(3), lambda _: np.ones(3), Fraction(60), start_s=-0.5)
+    np.testing.assert_allclose(camera.times(1.0)[[0, 1, -1]], [-0.5, -0.5 + 1 / 60, 0.5 - 1 / 60])
+
+
+def test_score_of_a_camera():
+    truths = []
+    for camera, start_s in ((FIRST, 0.0), (SECOND, 0.5)):
+        R, centers = camera.path(np.zeros(1))
+        truths.append({"R_world_camera": R, "centers": centers, "start_s": np.array(start_s)})
+    R_first, R_second = (truth["R_world_camera"][0] for truth in truths)
+    center = R_first.T @ (truths[1]["centers"][0] - truths[0]["centers"][0])
+    R = R_second.T @ R_first
+    about = {"offset_s": -0.49, "R_camera_first": R, "t_camera_first_m": -1.1 * R @ center}
+    found = SimpleNamespace(**_score_camera(about, *truths))
+    assert found.offset_ms == pytest.approx(10.0)
+    assert found.rotation_deg == pytest.approx(0.0, abs=1e-6)
+    assert found.baseline_deg == pytest.approx(0.0, abs=1e-4)
+    assert found.scale == pytest.approx(1.1)
