@@ -46,8 +46,10 @@ ROUNDS = 4  # of smoothing without going below what is needed
 
 _HAND_WORDS = ("wrist", "hand", "thumb", "index", "middle", "ring", "pinky")
 # Thighs and upper arms, whose skin reaches to knees and elbows, go up with the trunk.
-_TRUNK = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
-_TRUNK += ("left_hip", "right_hip", "left_shoulder", "right_shoulder")
+_TRUNK = (
+    *("pelvis", "spine1", "spine2", "spine3", "neck", "head"),
+    *("left_hip", "right_hip", "left_shoulder", "right_shoulder"),
+)
 
 
 def raise_body(
