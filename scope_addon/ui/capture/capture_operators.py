@@ -32,7 +32,10 @@ MOST_FURTHER_VIEWS = 7
 DRAWN_EVERY_S = 0.3  # between two drawings of a stage's progress; previews come as often
 ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
 # States of a clip of the queue.
-WAITING, DONE, FAILED = "WAITING", "DONE", "FAILED"
+WAITING = "WAITING"
+CAPTURING = "CAPTURING"
+DONE = "DONE"
+FAILED = "FAILED"
 
 
 class _State:
@@ -86,8 +89,9 @@ class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
         settings = context.scene.scope
         settings.footage = stored_path(context, str(paths[0]))
         settings.queue.clear()
-        for path in paths[1:] and paths:
-            settings.queue.add().footage = stored_path(context, str(path))
+        if len(paths) > 1:
+            for path in paths:
+                settings.queue.add().footage = stored_path(context, str(path))
         show_tab(context)
         return {"FINISHED"}
 
@@ -309,7 +313,6 @@ class SCOPE_OT_capture_queue(CapturingOperator):
     bl_idname = "scope.capture_queue"
     bl_label = "Capture All"
 
-    _row = -1  # of the clip that is being captured
     _finished = 0  # clips so far
 
     @classmethod
@@ -321,17 +324,16 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         if settings.views:
             cls.poll_message_set(tip_("Remove the other cameras' videos first"))
             return False
-        if not any(clip.status == WAITING for clip in settings.queue):
+        if not any(_waits(clip) for clip in settings.queue):
             cls.poll_message_set(tip_("All clips of the list have been captured; choose others"))
             return False
         return True
 
     def begin(self, scene: bpy.types.Scene) -> bool:
         """Start the first clip that waits and can be started; return whether there is one."""
-        queue = scene.scope.queue
-        for row, clip in enumerate(queue):
-            if clip.status == WAITING:
-                self._row = row
+        for clip in scene.scope.queue:
+            if _waits(clip):
+                clip.status = CAPTURING
                 scene.scope.footage = clip.footage
                 if super().begin(scene):
                     return True
@@ -339,10 +341,10 @@ class SCOPE_OT_capture_queue(CapturingOperator):
 
     def fail(self, error: Exception | str) -> bool:
         """Note why the clip cannot be captured, and go on; return False."""
-        queue = self._queue()
-        if 0 <= self._row < len(queue):
-            queue[self._row].status = FAILED
-            queue[self._row].message = sentence(error)
+        clip = _clip_of_job()
+        if clip is not None:
+            clip.status = FAILED
+            clip.message = sentence(error)
         stop_job()
         self.report({"WARNING"}, sentence(error))
         return False
@@ -355,9 +357,9 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         scene = _scene_of_job()
         if "FINISHED" in outcome:
             self._finished += 1
-            queue = self._queue()
-            if 0 <= self._row < len(queue):
-                queue[self._row].status = DONE
+            clip = _clip_of_job()
+            if clip is not None:
+                clip.status = DONE
             stop_job()
             if not bpy.app.background:  # so that each capture can be undone alone
                 bpy.ops.ed.undo_push(message="Capture")
@@ -371,9 +373,19 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         redraw_sidebars()
         return outcome
 
-    def _queue(self) -> Any:
-        scene = _scene_of_job()
-        return scene.scope.queue if scene is not None else ()
+    def say_cancelled(self) -> None:
+        """Say what the scene keeps."""
+        if not self._finished:
+            super().say_cancelled()
+            return
+        self.report({"INFO"}, "Capture cancelled; the clips captured before stay in the scene")
+
+    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        """Let a cancelled clip wait again, and end as a single capture does."""
+        clip = _clip_of_job()
+        if clip is not None:
+            clip.status = WAITING
+        return super().end(context, outcome)
 
 
 class SCOPE_OT_remove_clip(bpy.types.Operator):
@@ -392,6 +404,21 @@ class SCOPE_OT_remove_clip(bpy.types.Operator):
             return {"CANCELLED"}
         queue.remove(self.index)
         return {"FINISHED"}
+
+
+def _waits(clip: Any) -> bool:
+    """Whether a clip of the list is still to be captured; a file that was saved while it was being
+    captured holds it as such.
+    """
+    return clip.status in (WAITING, CAPTURING)
+
+
+def _clip_of_job() -> Any | None:
+    """Return the clip of the list that is being captured; None if it was removed from the list."""
+    scene = _scene_of_job()
+    if scene is None:
+        return None
+    return next((clip for clip in scene.scope.queue if clip.status == CAPTURING), None)
 
 
 def _scene_of_job() -> bpy.types.Scene | None:

@@ -20,7 +20,7 @@ from ..reporting import iface_, warning_text
 from ..translations import CONTEXT
 from ..view.comparison import camera_of, cameras_of, is_looking_through, side_area
 from . import preview_picture
-from .capture_operators import DONE, FAILED, WAITING, state
+from .capture_operators import CAPTURING, DONE, FAILED, WAITING, state
 from .captures import draw_captures, people_of, people_text, shown_capture, unit_text
 from .frame_rate_operators import differs, keyed_for
 from .stored_warnings import stored_warning
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ...job.progress.job_progress import JobProgress
 
 _PIXELS_PER_CHARACTER = 7.0
-_STATUS_ICONS = {WAITING: "TIME", DONE: "CHECKMARK", FAILED: "ERROR"}
+_STATUS_ICONS = {WAITING: "TIME", CAPTURING: "PLAY", DONE: "CHECKMARK", FAILED: "ERROR"}
 
 
 class Tab:

@@ -233,6 +233,37 @@ def test_clips_of_a_queue_are_captured_one_after_the_other_and_a_bad_one_stops_n
     assert queued() == [("a.png", "DONE"), ("c.png", "DONE")]
 
 
+def test_a_clip_that_is_removed_while_it_is_captured_marks_no_other_as_done(fake_worker, footage):
+    paths = [footage.with_name(f"{name}.png") for name in ("a", "b")]
+    for path in paths:
+        shutil.copy(footage, path)
+    choose_several(paths)
+    fake_worker("finish()")
+    settings = bpy.context.scene.scope
+    began = CaptureJob.step
+
+    def removed_meanwhile(job):
+        if Path(settings.footage).name == "a.png" and len(settings.queue) == 2:
+            settings.queue.remove(0)
+        return began(job)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(CaptureJob, "step", removed_meanwhile)
+        assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert queued() == [("b.png", "DONE")]
+    assert sorted(each.name for each in captures_of(bpy.context.scene)) == ["a", "b"]
+
+
+def test_a_clip_saved_while_it_was_captured_waits(fake_worker, footage):
+    other = footage.with_name("other.png")
+    shutil.copy(footage, other)
+    choose_several([footage, other])
+    bpy.context.scene.scope.queue[0].status = "CAPTURING"
+    fake_worker("finish()")
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert [status for _, status in queued()] == ["DONE", "DONE"]
+
+
 def test_one_chosen_clip_is_no_queue(footage):
     assert choose_several([footage]) == {"FINISHED"}
     settings = bpy.context.scene.scope
