@@ -83,7 +83,9 @@ stands = solver.StandingPoints([coco[15]], np.ones((6, 1)))
 solver.fit_motion(body, views, np.arange(6) / 30.0, stands=stands, covariance=True)
 solver.fit_motion(body, [everything] * 6, np.arange(6) / 30.0, window=0.1, overlap=0.05)
 solver.fit_motion(body, [everything] * 6, np.arange(6) / 30.0, focal=True)
-ship_code(Path(sys.argv[1]) / shipped_folder().name)
+folder = Path(sys.argv[1]) / shipped_folder().name
+folder.mkdir(parents=True, exist_ok=True)
+ship_code(folder)
 print(shipped_folder().name)
 """
 

@@ -119,8 +119,9 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
 
 
 def ship_code(folder: Path) -> None:
-    """Write the code of all kernels that this process has compiled to a folder of shipped code."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write the code of all kernels that this process has compiled to a folder of shipped code,
+    which exists.
+    """
     for compiled in _kept:
         for signature, result in compiled.overloads.items():
             compiled._cache.ship(signature, result, folder)

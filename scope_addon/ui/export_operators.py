@@ -205,7 +205,10 @@ class SCOPE_OT_export(ReportingOperator):
         if self.format in _OF_MOTION:
             people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
             if not people:
-                raise UsageError("the captured person was deleted; undo that or capture again")
+                raise UsageError(
+                    f"cannot write {path.name}: the capture's armature was removed; undo that or "
+                    "capture again"
+                )
             motions = [motion_of(obj) for obj in people]
             bodies = [body_of(obj) for obj in people]
             written = write_without_scene(check_output(path), motions, bodies)

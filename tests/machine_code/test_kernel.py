@@ -74,7 +74,9 @@ from pathlib import Path
 from package.solver import kernel, shipped_code
 from package.solver.outer import outer
 outer(0.0)
-kernel.ship_code(shipped_code.shipped_folder())
+folder = shipped_code.shipped_folder()
+folder.mkdir(parents=True)
+kernel.ship_code(folder)
 """
 
 

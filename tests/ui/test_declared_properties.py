@@ -44,6 +44,7 @@ _NOT_OPTIONS = (
     "rna_type",
     "name",
     "views",
+    "queue",
     "capture",
     "capture_index",
     "no_result",
