@@ -72,6 +72,7 @@ def writer(folder, *before):
 def end(process):
     with process:
         process.kill()
+        process.wait()  # before its input ends, at which the process of a namespace would finish
 
 
 def age(folder, time_s):
