@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import MotionFileError, OutputError
-from .animation_data import actions
 
 if TYPE_CHECKING:
     import bpy
@@ -64,6 +63,8 @@ def check_samples(scene: bpy.types.Scene, rigs: Sequence[bpy.types.Object]) -> N
 
     :raises OutputError: it does.
     """
+    from .animation_data import actions  # Loads bpy, which on loading may print to stdout.
+
     frames = scene.frame_end - scene.frame_start + 1
     bones = sum(len(rig.data.bones) for rig in rigs)
     needed_bytes = frames * bones * _BYTES_PER_BONE
