@@ -73,10 +73,10 @@ def draw_corrections(layout: bpy.types.UILayout, feet: bpy.types.UILayout) -> No
     """
     for text, foot in (("Left Foot Stands", "left"), ("Right Foot Stands", "right")):
         feet.operator("scope.foot_stands", text=text).foot = foot
-    layout.operator("scope.this_rests", icon="SNAP_FACE")
     layout.operator("scope.exchange_sides", icon="MOD_MIRROR")
     layout.operator("scope.upright_line", icon="EMPTY_SINGLE_ARROW")
     layout.operator("scope.floor_here", icon="GRID")
+    layout.operator("scope.this_rests", icon="SNAP_FACE")
     layout.operator("scope.flip_limb", icon="ARROW_LEFTRIGHT")
     layout.operator("scope.turn_around", icon="FILE_REFRESH")
 
