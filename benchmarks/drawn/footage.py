@@ -83,6 +83,7 @@ def draw_clip(
     focal_px = np.array([camera.focal_px(t) for t in times])
     stands_still = np.ptp(centers, axis=0).max() == 0 and np.ptp(R_world_camera, axis=0).max() == 0
     background = None
+    skins = [_skin(walker, TINT + number) for number, walker in enumerate(walkers)]
     joints = []
     stands = []
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -98,10 +99,9 @@ def draw_clip(
             joints.append([w.joints(pose) for w, pose in zip(walkers, poses, strict=True)])
             stands.append([pose.stands for pose in poses])
             canvas = Canvas.blank(WIDTH, HEIGHT)
-            for number, (walker, pose) in enumerate(zip(walkers, poses, strict=True)):
+            for skin, walker, pose in zip(skins, walkers, poses, strict=True):
                 vertices = (walker.vertices(pose) - center) @ R
-                triangles, colors = _skin(walker, TINT + number)
-                rasterize(canvas, vertices, triangles, colors, K)
+                rasterize(canvas, vertices, *skin, K)
             writer.write(change(time_s, blended(background, canvas)))
     truth: dict[str, Any] = {
         "joints": np.swapaxes(np.array(joints), 0, 1),  # (people, T, K+1, 3) in the world, metres

@@ -28,7 +28,7 @@ R_WORLD_LEVELCAMERA = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.
 # OpenSim's y points up: (x, y, z) -> (y, z, x), as Pose2Sim converts a world with z up.
 R_OPENSIM_WORLD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
-# The axes of a person who stands in the rest pose, in OpenSim's: forward, up, and to the right.
+# In the rest pose, OpenSim's x points forward, y up, and z to the person's right.
 R_OPENSIM_MODEL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 

@@ -25,9 +25,9 @@ from ..points import numbered
 from ..residuals.registry import SHAPE_PRIOR, column_of, registered
 from ..rotations import hat
 from ..state import State
-from ..tree import BodyArrays, Tree, make_tree
+from ..tree import BodyArrays, Tree
 from ..validation import check_list, check_type
-from .normal_equations import gradient, moved
+from .normal_equations import gradient, moved, problem_of
 from .report import COLUMNS
 
 _STEP = 1e-5  # of the unknowns, radians, metres and shape
@@ -113,15 +113,11 @@ class _Problem:
         priors: Priors | None,
         options: Options,
     ) -> None:
-        check_type(priors, (Priors, type(None)), "priors")
-        check_type(options, Options, "options")
-        self.tree = make_tree(body)
         self.measurements = measurements
         self.state = state
         self.priors = default_priors(body) if priors is None else priors
+        self.tree, self.terms, self.stage = problem_of(body, measurements, self.priors, options)
         self.triggs = options.triggs
-        self.stage = options.stage_table([options.schedule(cold=False)[-1]])[0][0]
-        self.terms = make_terms(self.tree, measurements, self.priors)
 
     def hessian(self) -> Array:
         """Return H (n, n)."""

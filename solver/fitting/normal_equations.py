@@ -62,7 +62,7 @@ def linearize(
     :raises ShapeError: an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use.
     """
-    tree, terms, stage = _problem(body, measurements, priors, options)
+    tree, terms, stage = problem_of(body, measurements, priors, options)
     return equations(tree, terms, stage, state, options.triggs)
 
 
@@ -85,7 +85,7 @@ def gauss_newton_step(
     :raises InvalidValueError: a value that no fit can use.
     """
     check_weight(damping, "damping")
-    tree, terms, stage = _problem(body, measurements, priors, options)
+    tree, terms, stage = problem_of(body, measurements, priors, options)
     work = make_workspace(tree)
     pose = state.pose(tree)
     blocks = make_blocks(tree)
@@ -98,10 +98,14 @@ def gauss_newton_step(
     return GaussNewtonStep(direction, float(decrease), moved(tree, state, direction))
 
 
-def _problem(
+def problem_of(
     body: BodyArrays, measurements: Measurements, priors: Priors | None, options: Options
 ) -> tuple[Tree, Terms, Array]:
-    """Return tree, terms, and the row (2, weights) of weights and 1/sigma."""
+    """Return tree, terms, and the row (2, weights) of weights and 1/sigma.
+
+    :raises ShapeError: an array does not fit the body.
+    :raises InvalidValueError: a value that no fit can use.
+    """
     check_type(measurements, Measurements, "measurements")
     check_type(priors, (Priors, type(None)), "priors")
     check_type(options, Options, "options")

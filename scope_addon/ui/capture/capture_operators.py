@@ -5,16 +5,15 @@ running job.
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.props import CollectionProperty, IntProperty, StringProperty
+from bpy.props import IntProperty
 
 from .. import warm_up
-from ..files.file_field import FootageBrowser, stored_path
+from ..files.file_field import SeveralFootageBrowser, chosen_files, stored_path
 from ..libraries import restore_libraries
 from ..live.live_state import state as live_state
 from ..reporting import iface_, rpt_, sentence, tip_
@@ -57,17 +56,12 @@ def end_capture() -> None:
     state.message = ""
 
 
-class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
+class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
     """Choose a video or image of a person, or several that are captured one after the other"""
 
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
-
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
-    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Use a dropped file, or ask for one."""
@@ -77,36 +71,25 @@ class SCOPE_OT_choose_footage(FootageBrowser, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file, and queue the files if there are several."""
-        names = [each.name for each in self.files if each.name]
-        chosen = [os.path.join(self.directory, name) for name in names] or [self.filepath]
-        paths = [Path(bpy.path.abspath(path)) for path in chosen]
-        for path in paths:
-            if not os.path.isfile(path):  # Path.is_file raises where a name is too long
-                self.report(
-                    {"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path)
-                )
-                return {"CANCELLED"}
+        paths = chosen_files(self)
+        if not paths:
+            return {"CANCELLED"}
         settings = context.scene.scope
-        settings.footage = stored_path(context, str(paths[0]))
+        settings.footage = stored_path(context, paths[0])
         settings.queue.clear()
         if len(paths) > 1:
             for path in paths:
-                settings.queue.add().footage = stored_path(context, str(path))
+                settings.queue.add().footage = stored_path(context, path)
         show_tab(context)
         return {"FINISHED"}
 
 
-class SCOPE_OT_add_view(FootageBrowser, bpy.types.Operator):
+class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
     """Add a video of the same moment by another camera. All cameras must stand still"""
 
     bl_idname = "scope.add_view"
     bl_label = "Add View"
     bl_options = {"UNDO"}
-
-    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
-    files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
-    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -127,13 +110,8 @@ class SCOPE_OT_add_view(FootageBrowser, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add the chosen files."""
         settings = context.scene.scope
-        names = [each.name for each in self.files if each.name]
-        paths = [os.path.join(self.directory, name) for name in names] or [self.filepath]
-        paths = [bpy.path.abspath(path) for path in paths]
-        if missing := next((path for path in paths if not os.path.isfile(path)), ""):
-            self.report(
-                {"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=missing)
-            )
+        paths = chosen_files(self)
+        if not paths:
             return {"CANCELLED"}
         if len(settings.views) + len(paths) > MOST_FURTHER_VIEWS:
             self.report({"ERROR"}, rpt_("There are at most eight cameras"))

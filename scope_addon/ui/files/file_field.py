@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
 from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, display_text
+from ..reporting import rpt_
 
 _ASSETS = Path(__file__).resolve().parents[3] / "assets"
 _TEXT = "_text"  # ends the name of the text of a path
@@ -46,6 +47,30 @@ class FootageBrowser:
         self.filepath = present(context.scene.scope.footage)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
+
+
+class SeveralFootageBrowser(FootageBrowser):
+    """Properties of an operator that asks for one or several files of footage."""
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: CollectionProperty(
+        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
+    )
+
+
+def chosen_files(operator: Any) -> list[str]:
+    """Return the paths of the files that are chosen in the browser of an operator, a
+    `SeveralFootageBrowser`; none, and an error of the operator, if one does not exist.
+    """
+    names = [each.name for each in operator.files if each.name]
+    chosen = [os.path.join(operator.directory, name) for name in names] or [operator.filepath]
+    paths = [str(Path(bpy.path.abspath(path))) for path in chosen]
+    for path in paths:
+        if not os.path.isfile(path):  # Path.is_file raises where a name is too long
+            said = rpt_("{path} is not a file; choose a video or image", path=path)
+            operator.report({"ERROR"}, said)
+            return []
+    return paths
 
 
 def present(path: str) -> str:
