@@ -68,8 +68,8 @@ from .errors import (
 )
 from .footage import display_text, is_url, json_text
 from .installed import CAPTURE, check_installed
-from .job.clips.finished import FINISHED_FILE, write_finished
-from .job.clips.task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
+from .job.clip_task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
+from .job.finished_clip import FINISHED_FILE, write_finished
 from .options.capture import OFF
 from .parent import end_with_parent
 from .private_folder import lasting_folder

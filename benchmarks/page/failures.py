@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from ...scope_addon.motion import Motion
 from ...scope_addon.report import page
-from ...scope_addon.report.footage_pictures import small_picture
-from ...scope_addon.report.page import Markup
+from ...scope_addon.report.page import Markup, small_picture
 from ...solver.body import Body
 from ...tools.readme_pictures.clips import error_mm
 from ...tools.readme_pictures.panel import OURS, TRUTH, Panel, next_to_each_other

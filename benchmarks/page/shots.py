@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.overlay.overlay_video import body_colors, draw_overlay, painted_frames
 from ...scope_addon.motion import Motion
-from ...scope_addon.report.footage_pictures import Picture, small_picture, spread_rows
-from ...scope_addon.report.page import Markup
+from ...scope_addon.report.page import Markup, Picture, small_picture, spread_rows
 from ...solver.body import Body
 from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera

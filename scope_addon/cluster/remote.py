@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Footage and results in a store of files that is addressed by URLs (``s3://``, ``gs://``,
-``sftp://``), by `fsspec`.
+"""Where the results of attempts are collected and published: a folder that all workers see, or a
+store of files that is addressed by URLs (``s3://``, ``gs://``, ``sftp://``), by `fsspec`.
+
+Only checked results get their final names, and only this machine renames them: a worker that was
+thought lost and still runs cannot publish anything, because an attempt that was given up has no
+folder any more. The folder of the attempts is a temporary one, and is removed by another batch if
+this one is killed.
 
 A store moves a file to its final name by copying (S3, Google Cloud) or renaming (SFTP); either way
 a reader finds the earlier file or the complete new one.
@@ -8,8 +13,10 @@ a reader finds the earlier file or the complete new one.
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
@@ -18,14 +25,16 @@ from typing import Any
 import fsspec
 
 from ...solver.errors import InputError, ScopeError
+from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError, UsageError
 from ..footage import is_url
 from ..job.batch import REPORT_NAME
+from ..job.finished_clip import file_hash
 from ..private_folder import lasting_folder
-from ..temporary import hold, is_abandoned, release
-from .staging import TOKEN
+from ..temporary import claim, discard, hold, is_abandoned, release, remove
 
 ATTEMPTS = ".scope-attempts"  # folder of all batches in a store of results
+TOKEN = "token"  # file by which a worker shows that it sees the same folder
 
 
 @contextmanager
@@ -276,3 +285,78 @@ def _remove(url: str) -> None:
         file_system.invalidate_cache()
         if file_system.exists(path):
             file_system.rm(path, recursive=True)
+
+
+class Staging:
+    """The folders of one batch.
+
+    :param out: output folder.
+    :raises OutputError: the folder cannot be created.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self.token = secrets.token_hex(16)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            self.folder = claim(out, ".attempts-")
+            self.folder.mkdir()  # for whoever the workers run as
+            (self.folder / TOKEN).write_text(self.token)
+        except OSError as error:
+            raise OutputError(f"cannot write to {out}: {reason(error)}") from error
+
+    def attempt(self, number: int) -> str:
+        """Return the path of an attempt's folder, which the worker makes."""
+        return str(self.folder / str(number))
+
+    def windows(self, number: int) -> Path | None:
+        """Return the path of a folder for the windows of a clip; None where clips are not
+        divided.
+        """
+        return self.folder / f"windows{number}"
+
+    def publish(
+        self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None
+    ) -> bool:
+        """Give the results of an attempt their final names, and return True; False if one is not
+        what was captured.
+
+        :param folder: to which they go, if not to the output folder.
+        :param outputs: the results, relative to the attempt's folder and to that one.
+        :param content: their ``sha256`` and ``bytes``, as the worker has computed them.
+        :raises OSError: a result cannot be renamed.
+        :raises OutputError: a final name is that of a folder or device.
+        """
+        try:
+            if not all(
+                file_hash(Path(attempt, name)) == content[name]["sha256"] for name in outputs
+            ):
+                return False
+        except (OSError, KeyError):
+            return False
+        for name in outputs:
+            _rename(Path(attempt, name), (folder or self._out) / name)
+        return True
+
+    def write_report(self, file: Path) -> None:
+        """Do nothing: the report is written to the output folder itself."""
+
+    def remove(self, attempt: str) -> None:
+        """Remove the folder of an attempt, after which its results cannot be published."""
+        remove(Path(attempt))
+
+    def close(self) -> None:
+        """Remove the folders of all attempts."""
+        discard(self.folder)
+
+
+def _rename(staged: Path, final: Path) -> None:
+    final.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        # The worker, which wrote the file, has synced its content.
+        replace_durably(staged, resolve_link(final))
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        with atomic_path(final) as temporary:  # a folder of the results is a link to another disk
+            shutil.copyfile(staged, temporary)

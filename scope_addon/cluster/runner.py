@@ -4,16 +4,19 @@ publish the results.
 
 Which worker captures what is decided here and not by the scheduler, because workers have to be
 checked before they get a clip, also those that join later, and because a capture uses all threads
-of a worker, not one.
+of a worker, not one. A long clip is divided: several workers observe it, window by window, before
+one joins the windows and captures the clip.
 """
 
 from __future__ import annotations
 
+import math
 import queue
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,17 +26,18 @@ from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
 from ..footage import display_address, is_url
 from ..job.batch import ROOT
-from ..job.clips.task import COUNT, DIVIDED, ClipTask, Entry, failure
+from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
+from ..temporary import remove
 from . import worker as worker_side
-from .division import Divisions, described, is_part
-from .remote import RemoteStaging
-from .staging import Staging
+from .remote import RemoteStaging, Staging
 from .workers import Workers
 
 _POLLING_INTERVAL_S = 1.0  # for the list of workers
 _RESULT_TIMEOUT_S = 30.0  # for fetching an outcome that a worker holds
 ATTEMPTS = 3  # of a clip whose workers are lost
+MAX_WINDOWS = 5  # in a task: what a lost worker costs
+TASKS_PER_WORKER = 2  # at least, so that a faster worker gets more of them
 
 
 class _Attempt(NamedTuple):
@@ -409,3 +413,87 @@ class DaskRunner:
             # the scheduler is lost, and forgets them by itself
             with suppress(OSError, TimeoutError):
                 self._client.cancel(futures, force=True)
+
+
+@dataclass
+class _Division:
+    task: ClipTask  # the clip's
+    key: str
+    windows: int
+    folder: Path
+    left: set[str]  # ranges of windows
+    frames: int = 0
+    seconds: float = 0.0
+    workers: set[str] = field(default_factory=set)
+
+
+class Divisions:
+    """The clips of a batch that are divided at present."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, _Division] = {}
+
+    def begin(self, task: ClipTask, entry: Entry, folder: Path, workers: int) -> list[ClipTask]:
+        """Divide a clip, and return the tasks of its windows.
+
+        :param entry: with the clip's key and the number of its windows.
+        :param folder: in which the files of the windows are collected; it is created.
+        :param workers: how many tasks can run at a time.
+        :raises OSError: the folder cannot be created.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        ranges = window_ranges(int(entry["windows"]), workers)
+        self._open[task.name] = _Division(
+            task, entry["key"], int(entry["windows"]), folder, set(ranges)
+        )
+        return [task._replace(windows=each, key=entry["key"]) for each in ranges]
+
+    def folder(self, task: ClipTask) -> Path:
+        """Return the folder in which the windows of a task's clip are collected."""
+        return self._open[task.name].folder
+
+    def ended(self, task: ClipTask, worker: str, entry: Entry | None) -> list[ClipTask]:
+        """Note that some windows were observed, or were given up; they are then left to the task
+        that joins all.
+
+        :param entry: of the windows; None: they were given up.
+        :return: the task that joins the windows, when no others are left.
+        """
+        division = self._open[task.name]
+        division.left.discard(task.windows)
+        if entry is not None:
+            division.frames += int(entry["report"].get("frames", 0))
+            division.seconds += entry.get("seconds", 0.0)
+            division.workers.add(worker)
+        if division.left:
+            return []
+        return [division.task._replace(key=division.key, windows_folder=str(division.folder))]
+
+    def close(self, task: ClipTask) -> tuple[int, dict[str, Any]]:
+        """Forget a clip, and remove its windows.
+
+        :return: how many of its frames were observed in windows, and what its entry in the report
+            has besides.
+        """
+        division = self._open.pop(task.name, None)
+        if division is None:
+            return 0, {}
+        remove(division.folder)
+        about = {"windows": division.windows, "window_seconds": round(division.seconds, 2)}
+        return division.frames, about | {"window_workers": sorted(division.workers)}
+
+
+def window_ranges(windows: int, workers: int) -> list[str]:
+    """Return ranges ``FIRST:END`` of successive windows, each of which becomes a task."""
+    size = max(1, min(MAX_WINDOWS, math.ceil(windows / (TASKS_PER_WORKER * max(workers, 1)))))
+    return [f"{first}:{min(first + size, windows)}" for first in range(0, windows, size)]
+
+
+def is_part(task: ClipTask) -> bool:
+    """Return whether a task is some windows of a clip."""
+    return task.windows not in ("", COUNT)
+
+
+def described(task: ClipTask) -> str:
+    """Return what a task captures, for the log."""
+    return f"{task.file} (windows {task.windows})" if is_part(task) else task.file

@@ -22,19 +22,12 @@ from ..errors import OutputError
 from ..footage import is_url
 from ..installed import CAPTURE, check_installed
 from ..job.batch import ROOT
-from ..job.clips.processes import ClipProcesses
-from ..job.clips.task import (
-    CaptureSettings,
-    ClipTask,
-    Entry,
-    Extras,
-    capture_clip,
-    failure,
-)
+from ..job.clip_runner import ClipProcesses
+from ..job.clip_task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, failure
 from ..job.request import program_version
 from ..temporary import remove_abandoned, system_folder, temporary_folder
 from . import remote
-from .staging import TOKEN
+from .remote import TOKEN
 
 PROGRAM = (sys.executable, "-m", __name__.rpartition(".cluster")[0])
 # statuses of an attempt, in addition to those of a clip

@@ -28,8 +28,8 @@ def dask_runner(args: argparse.Namespace, program: Sequence[str] | None) -> Dask
     :raises ScopeError: the package is missing, or the scheduler cannot be reached.
     """
     check_cluster()
-    from ..cluster.connection import connect
     from ..cluster.runner import DaskRunner
+    from ..cluster.workers import connect
 
     # As given, not resolved: a link may lead elsewhere on other machines.
     folder, out = (

@@ -187,7 +187,7 @@ def _list_formats(source: str, *, quiet: bool) -> dict[str, Any]:
 
     :raises ScopeError: it is not a camera, or does not answer.
     """
-    from ..job.live.formats import ask_for_formats
+    from ..job.live_cameras import ask_for_formats
 
     camera = ask_for_formats(source)
     if not quiet:

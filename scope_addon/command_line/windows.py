@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..capture_report import warnings_as_json
 from ..errors import UsageError
-from ..job.clips.task import COUNT, WINDOWS, WINDOWS_FOLDER
+from ..job.clip_task import COUNT, WINDOWS, WINDOWS_FOLDER
 from .arguments import path_argument
 
 if TYPE_CHECKING:

@@ -23,10 +23,19 @@ from ..atomic_write import atomic_path, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
 from ..temporary import remove
-from .clips.find import OVERLAY, find_clips
-from .clips.finished import finished_file, has_content
-from .clips.runner import LocalRunner, Runner
-from .clips.task import FINISHED, NO_EXTRAS, REPORT, CaptureSettings, ClipTask, Entry, Extras
+from .clip_runner import LocalRunner, Runner
+from .clip_task import (
+    FINISHED,
+    NO_EXTRAS,
+    OVERLAY,
+    REPORT,
+    CaptureSettings,
+    ClipTask,
+    Entry,
+    Extras,
+    find_clips,
+)
+from .finished_clip import finished_file, has_content
 from .request import program_version
 
 REPORT_NAME = "scope-batch.json"

@@ -14,8 +14,7 @@ from typing import Any
 
 from ..errors import SetupError
 from ..temporary import discard, remove
-from .live.formats_request import FormatsRequest
-from .live.request import LiveRequest
+from .live_request import FormatsRequest, LiveRequest
 from .messages import (
     CAPTURE_FIELDS,
     LONGEST_LINE,

@@ -20,9 +20,7 @@ from ..footage import json_text
 from ..parent import end_with_parent
 from ..temporary import discard, remove
 from .cache import cache_of
-from .live.commands import Commands
-from .live.formats_request import FormatsRequest
-from .live.request import LiveRequest
+from .live_request import Commands, FormatsRequest, LiveRequest
 from .request import WARM_UP, JobRequest
 from .unfinished import unfinished_capture
 from .watched_footage import WatchedFootage
@@ -80,11 +78,11 @@ def run(
 
             reporter.send("result", compiled=warm_up(reporter.progress))
         elif isinstance(request, LiveRequest):
-            from .live.capture import capture_live
+            from .live_capture import capture_live
 
             capture_live(request, job_folder, reporter.send, commands or Commands())
         elif isinstance(request, FormatsRequest):
-            from .live.cameras import camera_with_formats
+            from .live_cameras import camera_with_formats
 
             camera = camera_with_formats(request.source)
             reporter.send("result", name=camera.name, formats=camera.formats)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The parts of a self-contained HTML page: document, sections, tables, the stage with overlay and
-3D view.
+3D view, and a few frames of the overlay as small pictures of bounded size.
 
 Every text that is passed in is escaped here. Content that is markup already has the type `Markup`.
 The page's policy forbids every request to a network, so that it cannot come to need one.
@@ -8,13 +8,23 @@ The page's policy forbids every request to a network, so that it cannot come to 
 
 from __future__ import annotations
 
+import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any, NewType
 
-from .footage_pictures import Picture
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ..capture.media.video_range import FootageRange
+from ..capture.overlay.overlay_video import painted_frames
+from ..errors import OutputError
+from ..motion import Motion
 
 Markup = NewType("Markup", str)
 
@@ -22,6 +32,12 @@ PEOPLE_COLORS = 5  # as many as the overlay's tints
 _FILES = Path(__file__).with_name("static")
 _SCRIPTS = ("motion.js", "webgl.js", "viewer.js", "page.js")  # in this order
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+PICTURES = 40
+LONGEST_SIDE = 800
+MAX_BYTES = 5_000_000  # of all pictures of a page
+_QUALITY = 74  # of WebP
+
+Progress = Callable[[int, int], None]
 
 
 def person_color(person: int) -> str:
@@ -214,3 +230,84 @@ def stage(count: int, image_size: Sequence[int]) -> Markup:
 
 def _file(name: str) -> str:
     return (_FILES / name).read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of one of the rows that the page shows: a WebP file."""
+
+    row: int
+    content: bytes
+    width: int
+    height: int
+
+    @property
+    def url(self) -> str:
+        """Its content as a data URL."""
+        return f"data:image/webp;base64,{base64.b64encode(self.content).decode('ascii')}"
+
+
+def overlay_pictures(
+    video: Path,
+    motions: Sequence[Motion],
+    body: Body,
+    rows: NDArray[np.int64],
+    wanted: FootageRange | None = None,
+    progress: Progress | None = None,
+) -> list[Picture]:
+    """Return at most `PICTURES` frames of the overlay, in chronological order, of at most
+    `MAX_BYTES` together.
+
+    :param rows: (n,) rows of the motions that the page shows.
+    :param wanted: the range of the footage that was captured.
+    :param progress: called with (pictures done, pictures expected).
+    :raises VideoError: the footage cannot be read.
+    :raises ShapeError: a motion does not have the joints of the body.
+    :raises OutputError: OpenCV cannot write WebP.
+    """
+    chosen = spread_rows(len(rows), PICTURES)
+    row_of = dict(zip(motions[0].frames[rows[chosen]].tolist(), chosen.tolist(), strict=True))
+    pictures = []
+    for index, image in painted_frames(video, motions, body, list(row_of), wanted=wanted):
+        pictures.append(small_picture(row_of[index], image))
+        if progress is not None:
+            progress(len(pictures), len(chosen))
+    return bounded(pictures, MAX_BYTES)
+
+
+def spread_rows(count: int, most: int) -> NDArray[np.int64]:
+    """Return at most ``most`` of the rows from 0 to ``count`` − 1, (n,), spread evenly, the first
+    and last included.
+    """
+    rows: NDArray[np.int64] = np.unique(
+        np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64)
+    )
+    return rows
+
+
+def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGEST_SIDE) -> Picture:
+    """Return an RGB image, (H, W, 3) uint8, as a WebP picture of at most ``longest_side`` pixels.
+
+    :raises OutputError: OpenCV cannot write WebP.
+    """
+    height, width = image.shape[:2]
+    scale = min(1.0, longest_side / max(height, width))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
+    ok, data = cv2.imencode(
+        ".webp", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, _QUALITY]
+    )
+    if not ok:
+        raise OutputError(
+            "cannot make the report's images: this OpenCV cannot write WebP; install another"
+        )
+    return Picture(row, data.tobytes(), *size)
+
+
+def bounded(pictures: list[Picture], most_bytes: int) -> list[Picture]:
+    """Return the pictures, or every second, fourth, ... of them, so that all together are at most
+    ``most_bytes``.
+    """
+    while len(pictures) > 1 and sum(len(picture.content) for picture in pictures) > most_bytes:
+        pictures = pictures[::2]
+    return pictures

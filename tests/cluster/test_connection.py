@@ -17,9 +17,9 @@ def connection():
     file.
     """
     package("distributed")
-    from scope.scope_addon.cluster import connection
+    from scope.scope_addon.cluster import workers
 
-    return connection
+    return workers
 
 
 @pytest.mark.parametrize(

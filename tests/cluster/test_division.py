@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scope.scope_addon.cli import PROGRAM, SAMPLE, main
-from scope.scope_addon.cluster.division import MAX_WINDOWS, Divisions, window_ranges
-from scope.scope_addon.job.clips.task import CaptureSettings, ClipTask
+from scope.scope_addon.cluster.runner import MAX_WINDOWS, Divisions, window_ranges
+from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask
 
 from ..job.processes import runs, wait_for
 from .test_runner import calls, files, run, started

@@ -309,7 +309,7 @@ def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(
             self._timeout = 2.0
             await super()._reconnect()
 
-    monkeypatch.setattr("scope.scope_addon.cluster.connection.Client", Impatient)
+    monkeypatch.setattr("scope.scope_addon.cluster.workers.Client", Impatient)
     for name in ("a", "b"):
         (folder / f"{name}.mp4").write_text("hangs" if name == "b" else name)
     file = tmp_path / "scheduler.json"

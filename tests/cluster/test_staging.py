@@ -8,7 +8,7 @@ import os
 
 import pytest
 from scope.scope_addon import temporary
-from scope.scope_addon.cluster.staging import TOKEN, Staging
+from scope.scope_addon.cluster.remote import TOKEN, Staging
 from scope.scope_addon.errors import OutputError
 
 

@@ -25,7 +25,7 @@ LARGEST_ARRAYS = 1 << 24
 
 
 def read_request(path: Path) -> None:
-    from scope.scope_addon.job.live.request import LiveRequest
+    from scope.scope_addon.job.live_request import LiveRequest
     from scope.scope_addon.job.request import JobRequest
 
     text = path.read_bytes().decode("utf-8", "replace")
@@ -33,8 +33,8 @@ def read_request(path: Path) -> None:
 
 
 def read_reply(path: Path) -> None:
+    from scope.scope_addon.job.job_progress import JobProgress
     from scope.scope_addon.job.messages import parse_message
-    from scope.scope_addon.job.progress.job_progress import JobProgress
 
     progress = JobProgress()
     for line in path.read_bytes().splitlines(keepends=True):
@@ -60,12 +60,12 @@ def read_recording(path: Path) -> None:
 
 
 def read_live_reply(path: Path) -> None:
-    from scope.scope_addon.job.live import process
+    from scope.scope_addon.job import live_process
     from scope.scope_addon.job.messages import parse_message
 
     for line in path.read_bytes().splitlines(keepends=True):
-        parse_message(line, process._FIELDS)
-        pose = process.parse_pose(line, JOINTS, COEFFICIENTS)
+        parse_message(line, live_process._FIELDS)
+        pose = live_process.parse_pose(line, JOINTS, COEFFICIENTS)
         assert pose is None or (np.isfinite(pose.rotations).all() and np.isfinite(pose.betas).all())
 
 
@@ -148,8 +148,8 @@ def load_times(path: Path) -> None:
     """Load the times of earlier captures, show a capture's remaining time by them, and keep those
     of this one.
     """
-    from scope.scope_addon.job.progress.job_progress import STAGES, JobProgress
-    from scope.scope_addon.job.progress.stage_times import load_stage_times, save_stage_times
+    from scope.scope_addon.job.job_progress import STAGES, JobProgress
+    from scope.scope_addon.job.stage_times import load_stage_times, save_stage_times
 
     folder = path.with_name("times")
     folder.mkdir(exist_ok=True)
@@ -178,7 +178,7 @@ def read_batch_report(path: Path) -> None:
 
 
 def requests(_: Path) -> list[bytes]:
-    from scope.scope_addon.job.live.request import LiveRequest
+    from scope.scope_addon.job.live_request import LiveRequest
     from scope.scope_addon.options import Place, options_at
 
     values = {option.name: option.default for option in options_at(Place.WORKER)}
@@ -308,7 +308,7 @@ def cached_reports(folder: Path) -> list[bytes]:
 
 
 def times(folder: Path) -> list[bytes]:
-    from scope.scope_addon.job.progress.stage_times import save_stage_times
+    from scope.scope_addon.job.stage_times import save_stage_times
 
     for kind in ("other", KEY):
         save_stage_times(

@@ -100,7 +100,7 @@ def _register() -> None:
     """
     import bpy
     import scope
-    from scope.scope_addon.job.live.process import LiveProcess
+    from scope.scope_addon.job.live_process import LiveProcess
     from scope.scope_addon.job.process import WorkerProcess
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

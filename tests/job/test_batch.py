@@ -18,7 +18,7 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import signals
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
-from scope.scope_addon.job.clips.runner import LocalRunner
+from scope.scope_addon.job.clip_runner import LocalRunner
 from scope.scope_addon.motion import Motion
 from scope.solver.body_file import BUILT_IN
 from scope.solver.errors import InputError

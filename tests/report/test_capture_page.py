@@ -26,7 +26,7 @@ from scope.scope_addon.report.capture_page import (
     warning_list,
     write_capture_page,
 )
-from scope.scope_addon.report.footage_pictures import small_picture
+from scope.scope_addon.report.page import small_picture
 
 from ..made_motion import made_face, made_motion
 

@@ -15,8 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from scope.scope_addon.report import machine
-from scope.scope_addon.report.footage_pictures import Picture, bounded, small_picture, spread_rows
-from scope.scope_addon.report.motion_figures import height_text, highest_speed, motion_figures
+from scope.scope_addon.report.capture_page import height_text, highest_speed, motion_figures
+from scope.scope_addon.report.page import Picture, bounded, small_picture, spread_rows
 
 from ..made_motion import made_motion
 

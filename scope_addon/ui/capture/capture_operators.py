@@ -455,7 +455,7 @@ class SCOPE_PT_stop_capture(bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw both answers; Return gives the one that was asked for."""
-        from ...job.progress.job_progress import duration
+        from ...job.job_progress import duration
 
         column = self.layout.column()
         column.operator_context = "EXEC_DEFAULT"  # or it would ask again

@@ -26,7 +26,7 @@ from .frame_rate_operators import differs, keyed_for
 from .stored_warnings import stored_warning
 
 if TYPE_CHECKING:
-    from ...job.progress.job_progress import JobProgress
+    from ...job.job_progress import JobProgress
 
 _PIXELS_PER_CHARACTER = 7.0
 _STATUS_ICONS = {WAITING: "TIME", CAPTURING: "PLAY", DONE: "CHECKMARK", FAILED: "ERROR"}
@@ -313,7 +313,7 @@ def _draw_figures(
         "{count} frame" if result.frames == 1 else "{count} frames", count=result.frames
     )
     if seconds:
-        from ...job.progress.job_progress import duration
+        from ...job.job_progress import duration
 
         frames = iface_("{frames}, captured in {time}", frames=frames, time=duration(seconds))
     draw_text(context, column, frames, "TIME")

@@ -40,8 +40,7 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
         # Imported here: it loads numpy, which would slow down the start of Blender.
         from ....solver.errors import ScopeError
         from ...errors import UsageError
-        from ...job.live.cameras import camera_source
-        from ...job.live.formats import FormatsProcess
+        from ...job.live_cameras import FormatsProcess, camera_source
 
         typed = context.scene.scope_live.camera
         state.message = ""
@@ -96,7 +95,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     if state.asking is not None:
         draw_text(context, layout, iface_("Querying the camera"))
     elif state.cameras:
-        from ...job.live.cameras import camera_number, camera_source
+        from ...job.live_cameras import camera_number, camera_source
 
         source = camera_source(context.scene.scope_live.camera)
         camera = state.cameras.get(camera_number(source)) if source is not None else None

@@ -22,9 +22,9 @@ from ....solver.errors import ScopeError
 from ...capture_report import Report
 from ...errors import OfflineError, UsageError, VideoError
 from ...footage import display_text
-from ...job.live.cameras import camera_source
-from ...job.live.process import PRESENCES, LiveProcess, ShownPose
-from ...job.live.request import LiveRequest
+from ...job.live_cameras import camera_source
+from ...job.live_process import PRESENCES, LiveProcess, ShownPose
+from ...job.live_request import LiveRequest
 from ...job.process import START_SCRIPT
 from ...live.outputs.journal import read_about
 from ...live.outputs.unfinished import remove_recording, unfinished_video

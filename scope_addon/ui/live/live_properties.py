@@ -26,7 +26,7 @@ def _cameras(
     """Return the cameras whose number or name contains what was typed, with formats where these are
     known.
     """
-    from ...job.live.cameras import list_cameras
+    from ...job.live_cameras import list_cameras
 
     told = {
         (camera.number, camera.name): camera for camera in state.cameras.values() if camera.formats

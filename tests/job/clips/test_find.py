@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.job.clips.find import find_clips, videos_of_take
+from scope.scope_addon.job.clip_task import find_clips, videos_of_take
 
 
 def found_in(

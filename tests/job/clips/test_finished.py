@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.job.batch import REPORT_NAME, Batch
-from scope.scope_addon.job.clips.finished import (
+from scope.scope_addon.job.finished_clip import (
     finished_file,
     read_finished,
     remove_finished,

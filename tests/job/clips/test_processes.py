@@ -7,8 +7,8 @@ import sys
 import threading
 
 import pytest
-from scope.scope_addon.job.clips import processes as module
-from scope.scope_addon.job.clips.processes import STOPPED, ClipProcesses
+from scope.scope_addon.job import clip_runner as module
+from scope.scope_addon.job.clip_runner import STOPPED, ClipProcesses
 
 from ..processes import wait_for
 

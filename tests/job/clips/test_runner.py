@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from scope.scope_addon.job.clips.runner import LocalRunner
+from scope.scope_addon.job.clip_runner import LocalRunner
 
 from ..processes import wait_for
 

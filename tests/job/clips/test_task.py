@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scope.scope_addon.job.clips.task import CaptureSettings
+from scope.scope_addon.job.clip_task import CaptureSettings
 
 
 def basis(**options: str | None) -> str:

@@ -6,7 +6,7 @@ import struct
 import sys
 
 import pytest
-from scope.scope_addon.job.live.cameras import LONGEST_NAME, camera_source, list_cameras
+from scope.scope_addon.job.live_cameras import LONGEST_NAME, camera_source, list_cameras
 
 SIZES = {b"MJPG": [(640, 480), (1920, 1080)], b"YUYV": [(640, 480)]}
 

@@ -10,10 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.job.live.capture import MOTION, _Recorder, capture_live
-from scope.scope_addon.job.live.commands import RECORD, Commands
-from scope.scope_addon.job.live.process import LiveProcess, parse_pose
-from scope.scope_addon.job.live.request import LiveRequest
+from scope.scope_addon.job.live_capture import MOTION, _Recorder, capture_live
+from scope.scope_addon.job.live_process import LiveProcess, parse_pose
+from scope.scope_addon.job.live_request import RECORD, Commands, LiveRequest
 from scope.scope_addon.job.messages import WorkerFailedError
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion

@@ -6,8 +6,7 @@ The request of a live capture as one line, told from that of other footage.
 
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.job.live.commands import RECORD, STOP, Commands
-from scope.scope_addon.job.live.request import LiveRequest
+from scope.scope_addon.job.live_request import RECORD, STOP, Commands, LiveRequest
 from scope.scope_addon.job.request import WARM_UP, JobRequest
 
 

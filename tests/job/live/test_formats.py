@@ -9,10 +9,9 @@ import textwrap
 
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.job.live import formats
-from scope.scope_addon.job.live.cameras import Camera, list_cameras
-from scope.scope_addon.job.live.formats import FormatsProcess, ask_for_formats
-from scope.scope_addon.job.live.formats_request import FormatsRequest
+from scope.scope_addon.job import live_cameras
+from scope.scope_addon.job.live_cameras import Camera, FormatsProcess, ask_for_formats, list_cameras
+from scope.scope_addon.job.live_request import FormatsRequest
 from scope.scope_addon.job.messages import WorkerFailedError
 
 from ..processes import runs, wait_for
@@ -23,7 +22,7 @@ ANSWER = {"event": "result", "name": "USB Camera", "formats": ["mjpeg 1280×720"
 @pytest.fixture(autouse=True)
 def nobody_is_given_up(monkeypatch):
     """On a computer that has other work, a process may take minutes to start."""
-    monkeypatch.setattr(formats, "ANSWER_S", 900.0)
+    monkeypatch.setattr(live_cameras, "ANSWER_S", 900.0)
 
 
 @pytest.fixture
@@ -57,7 +56,7 @@ def test_the_answer_is_a_camera(asking):
 def test_a_camera_that_does_not_answer_is_given_up(asking, monkeypatch):
     process = asking("time.sleep(600)")
     assert process.answer() is None
-    monkeypatch.setattr(formats, "ANSWER_S", 0.0)
+    monkeypatch.setattr(live_cameras, "ANSWER_S", 0.0)
     with pytest.raises(
         WorkerFailedError,
         match="camera 2 has not reported its formats within 0 s; if the system asks",

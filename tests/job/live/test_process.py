@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.scope_addon.job.live import process as live_process
-from scope.scope_addon.job.live.process import LiveProcess, parse_pose
-from scope.scope_addon.job.live.request import LiveRequest
+from scope.scope_addon.job import live_process
+from scope.scope_addon.job.live_process import LiveProcess, parse_pose
+from scope.scope_addon.job.live_request import LiveRequest
 from scope.scope_addon.job.messages import WorkerFailedError
 
 from ..processes import wait_for

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.job.progress.job_progress import BUILDING, STAGES, JobProgress
+from scope.scope_addon.job.job_progress import BUILDING, STAGES, JobProgress
 
 MEASURED = json.loads((Path(__file__).parent / "measured_progress.json").read_text("utf-8"))
 OF_SEVERAL = 0.04  # of a capture of several people, by which the estimate may be off besides

@@ -12,7 +12,7 @@ import av
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.job.live.cameras import camera_source, camera_with_formats, list_cameras
+from scope.scope_addon.job.live_cameras import camera_source, camera_with_formats, list_cameras
 from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.sources import open_source, system_cameras
 

@@ -12,8 +12,8 @@ from functools import partial
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.job.job_progress import JobProgress
 from scope.scope_addon.job.messages import WorkerFailedError
-from scope.scope_addon.job.progress.job_progress import JobProgress
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.packed_motion import stored_motion

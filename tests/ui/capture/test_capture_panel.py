@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.job.progress.job_progress import JobProgress, duration
+from scope.scope_addon.job.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.animation_data.frame_spans import parse_spans
 from scope.scope_addon.scene.footage_strip import start_of, strips_of

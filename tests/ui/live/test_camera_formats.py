@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from scope.scope_addon.job.live import cameras, formats
-from scope.scope_addon.job.live.cameras import Camera
+from scope.scope_addon.job import live_cameras
+from scope.scope_addon.job.live_cameras import Camera
 from scope.scope_addon.ui.live import camera_formats, live_properties
 from scope.scope_addon.ui.live.live_operators import end_live
 from scope.scope_addon.ui.live.live_state import state
@@ -20,7 +20,7 @@ ANSWER = {"event": "result", "name": "USB Camera", "formats": ["mjpeg 1280×720"
 @pytest.fixture(autouse=True)
 def nobody_is_given_up(monkeypatch):
     """On a computer that has other work, a process may take minutes to start."""
-    monkeypatch.setattr(formats, "ANSWER_S", 900.0)
+    monkeypatch.setattr(live_cameras, "ANSWER_S", 900.0)
 
 
 @pytest.fixture
@@ -33,8 +33,10 @@ def answering(tmp_path, monkeypatch):
             "import json, sys, time\nasked = json.loads(sys.stdin.readline())\n"
             + textwrap.dedent(code)
         )
-        real = formats.FormatsProcess
-        monkeypatch.setattr(formats, "FormatsProcess", lambda *arguments: real(*arguments, script))
+        real = live_cameras.FormatsProcess
+        monkeypatch.setattr(
+            live_cameras, "FormatsProcess", lambda *arguments: real(*arguments, script)
+        )
 
     yield answer
     end_live()
@@ -64,7 +66,7 @@ def drawn():
 def test_the_answer_is_shown_and_completes_the_list(answering, monkeypatch):
     answering(f"assert asked == {{'formats_of': '1'}}; print(json.dumps({ANSWER!r}))")
     listed = [Camera(0, "Front"), Camera(1, "USB Camera")]
-    monkeypatch.setattr(cameras, "list_cameras", lambda: listed)
+    monkeypatch.setattr(live_cameras, "list_cameras", lambda: listed)
     assert live_properties._cameras(None, None, "usb") == ["1: USB Camera"]
     ask()
     assert live_properties._cameras(None, None, "usb") == ["1: USB Camera (mjpeg 1280×720)"]

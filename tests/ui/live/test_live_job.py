@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
-from scope.scope_addon.job.live.process import LiveProcess
+from scope.scope_addon.job.live_process import LiveProcess
 from scope.scope_addon.job.messages import WorkerFailedError
 from scope.scope_addon.scene.animation_data.actions import fcurves
 from scope.scope_addon.ui.live import live_job

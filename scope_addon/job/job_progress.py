@@ -7,7 +7,7 @@ import time
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 
-from ...capture.stages.clock import COMPILING, FINDING
+from ..capture.stages.clock import COMPILING, FINDING
 
 # Share of the total time that each stage of a capture takes, in order; measured on clips of 5 to 10
 # seconds.

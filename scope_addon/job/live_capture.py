@@ -9,24 +9,23 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ....solver.errors import ScopeError
-from ...capture_report import warnings_as_json
-from ...errors import system_error_message
-from ...live.outputs.footage import Footage
-from ...live.outputs.people_recording import Keep, PeopleRecording, unfinished_recording
-from ...live.outputs.pose_values import values
-from ...live.outputs.unfinished import SUFFIX, is_recording
-from ...live.run import Listeners, LiveOptions, LiveProgress, run_live
-from ...live.sources import Picture, Source, open_source
-from ...notices import OTHER, Notice, notice
-from ..cache import recordings_of
-from .commands import Commands
-from .request import LiveRequest
+from ...solver.errors import ScopeError
+from ..capture_report import warnings_as_json
+from ..errors import system_error_message
+from ..live.outputs.footage import Footage
+from ..live.outputs.people_recording import Keep, PeopleRecording, unfinished_recording
+from ..live.outputs.pose_values import values
+from ..live.outputs.unfinished import SUFFIX, is_recording
+from ..live.run import Listeners, LiveOptions, LiveProgress, run_live
+from ..live.sources import Picture, Source, open_source
+from ..notices import OTHER, Notice, notice
+from .cache import recordings_of
+from .live_request import Commands, LiveRequest
 
 if TYPE_CHECKING:
-    from ....solver import Body
-    from ...live.people import LivePeople
-    from ...live.pose import LivePose
+    from ...solver import Body
+    from ..live.people import LivePeople
+    from ..live.pose import LivePose
 
 Send = Callable[..., None]  # an event and its values
 MOTION = "person{}.npz"  # from 1 on
@@ -39,8 +38,8 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the
         recording.
     """
-    from ...live.clock import Clock
-    from ...untrusted.body_file import load_body
+    from ..live.clock import Clock
+    from ..untrusted.body_file import load_body
 
     chosen = request.values
     if is_recording(request.source):

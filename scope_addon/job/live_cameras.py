@@ -4,7 +4,8 @@
 On Linux from sysfs and Video4Linux, elsewhere as FFmpeg lists them, by DirectShow or AVFoundation,
 where a camera's number is its place in this list. Reading them does not switch a camera on.
 Elsewhere than on Linux, the list has no formats: for these, FFmpeg has to open a camera, which is
-done for one camera, in a process of its own (`formats`).
+done for one camera, in a process of its own that ends with the answer, or when it takes too long.
+FFmpeg loads the camera's driver for it, whose defects then end that process and nothing else.
 """
 
 from __future__ import annotations
@@ -13,15 +14,20 @@ import os
 import re
 import struct
 import sys
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...errors import VideoError
-from ...live.sources.camera_modes import described
-from ...live.sources.system_cameras import camera_names, camera_with_modes
+from ..errors import UsageError, VideoError
+from ..live.sources.camera_modes import described
+from ..live.sources.system_cameras import camera_names, camera_with_modes
+from ..temporary import temporary_folder
+from .live_request import FormatsRequest
+from .messages import WARM_UP_FIELDS, Fields, WorkerFailedError
+from .process import START_SCRIPT, WorkerProcess
 
 NAMES = Path("/sys/class/video4linux")
 DEVICES = Path("/dev")
@@ -41,6 +47,9 @@ _CAPTURE = 1  # V4L2_CAP_VIDEO_CAPTURE and V4L2_BUF_TYPE_VIDEO_CAPTURE
 _DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
 
 Ioctl = Callable[[int, int, bytearray], Any]
+ANSWER_S = 20.0  # for an answer, and for the user's to the system's question
+_MAX_ANSWERED_FORMATS = 64  # formats
+_INTERVAL_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -184,3 +193,84 @@ def _shown(name: str) -> str:
     """
     text = "".join(c for c in name if c.isprintable())
     return text.strip()[:LONGEST_NAME] or "camera"
+
+
+def _is_shown(value: object) -> bool:
+    return isinstance(value, str) and 0 < len(value) <= LONGEST_NAME and value.isprintable()
+
+
+def _are_formats(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) <= _MAX_ANSWERED_FORMATS
+        and all(_is_shown(text) for text in value)
+    )
+
+
+_FIELDS: Fields = {
+    "progress": WARM_UP_FIELDS["progress"],
+    "result": {"name": _is_shown, "formats": _are_formats},
+}
+
+
+class FormatsProcess(WorkerProcess):
+    """The question to one camera. Call ``answer`` regularly; ``close`` ends the process at once."""
+
+    def __init__(
+        self, source: str, job_folder: Path, python: Sequence[str], script: Path = START_SCRIPT
+    ) -> None:
+        """Start the process; see `WorkerProcess`.
+
+        :param source: as `camera_source` gives it.
+        :raises SetupError: the process cannot be started.
+        """
+        self.source = source
+        self._began_s = time.monotonic()
+        super().__init__(FormatsRequest(source), job_folder, None, python, script)
+        self._fields = _FIELDS
+
+    def answer(self) -> Camera | None:
+        """Return the camera with its formats; None as long as there is no answer.
+
+        :raises WorkerFailedError: there will be none.
+        """
+        for message in self.poll():
+            if message["event"] == "result":
+                return Camera(
+                    camera_number(self.source), message["name"], tuple(message["formats"])
+                )
+        if time.monotonic() - self._began_s > ANSWER_S:
+            raise WorkerFailedError(
+                f"camera {self.source} has not reported its formats within {ANSWER_S:.0f} s; if "
+                "the system asks "
+                "for permission to use it, answer, and try again"
+            )
+        return None
+
+    def _cause_of_end(self) -> str:
+        return (
+            f"camera {self.source} cannot be asked for its formats; check that it is plugged in, "
+            "and that this program"
+            " may use cameras"
+        )
+
+
+def ask_for_formats(text: str) -> Camera:
+    """Return a camera with its formats, waiting for the answer.
+
+    :param text: number or device.
+    :raises UsageError: it is not a camera.
+    :raises ScopeError: there is no answer.
+    """
+    source = camera_source(text)
+    if source is None:
+        said = "a stream" if "://" in text else text
+        raise UsageError(f"{said} is not a camera; give its number, 0 for the first")
+    with temporary_folder("formats") as folder:
+        process = FormatsProcess(source, folder, [sys.executable])
+        try:
+            while (camera := process.answer()) is None:
+                time.sleep(_INTERVAL_S)
+        finally:
+            process.close()
+    return camera

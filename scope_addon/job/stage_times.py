@@ -47,8 +47,8 @@ def save_stage_times(folder: Path, kind: str, seconds: Mapping[str, float], fram
 
     :param seconds: of each stage, of all frames.
     """
-    from ....solver.errors import ScopeError
-    from ...json_file import save_map
+    from ...solver.errors import ScopeError
+    from ..json_file import save_map
 
     if frames < 1:
         return
@@ -61,8 +61,8 @@ def save_stage_times(folder: Path, kind: str, seconds: Mapping[str, float], fram
 
 
 def _read(folder: Path) -> dict[str, Any]:
-    from ....solver.errors import ScopeError
-    from ...json_file import load_map
+    from ...solver.errors import ScopeError
+    from ..json_file import load_map
 
     with suppress(ScopeError, OSError):
         kinds = load_map(folder / _FILE, _WHAT).get("kinds")

@@ -17,10 +17,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...atomic_write import complete_file
-from ...errors import OutputError
-from ...footage import json_text
-from ...temporary import remove
+from ..atomic_write import complete_file
+from ..errors import OutputError
+from ..footage import json_text
+from ..temporary import remove
 
 FINISHED_FILE = "--finished-file"  # option that only a batch passes to its processes
 _KEY = 16  # characters of a clip's key in the name

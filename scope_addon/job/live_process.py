@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...options.live import MAX_PEOPLE
-from ..messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
-from ..process import START_SCRIPT, WorkerProcess
-from .commands import RECORD, STOP
-from .request import LiveRequest
+from ..options.live import MAX_PEOPLE
+from .live_request import RECORD, STOP, LiveRequest
+from .messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
+from .process import START_SCRIPT, WorkerProcess
 
 PRESENCES = ("seen", "held", "lost")
 _POSE = re.compile(rb'\{"event": "pose", "person": (\d),')
