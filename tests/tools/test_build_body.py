@@ -8,15 +8,12 @@ import zipfile
 import numpy as np
 import pytest
 from scope.solver.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
-from scope.tools.build_body.anthropometry import ADULTS, draw_adults, draw_children
 from scope.tools.build_body.build import rig_body
 from scope.tools.build_body.geometry import growth
 from scope.tools.build_body.geometry.expressions import build_expressions
 from scope.tools.build_body.geometry.materials import mirror_faces
 from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
-from scope.tools.build_body.landmarks import DENSITY, Landmarks
-from scope.tools.build_body.population import draw_population
 from scope.tools.build_body.source import fetch_wheel
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
@@ -134,95 +131,6 @@ def test_files_are_small_and_carry_their_licence(body):
 
 # People
 # --------------------------------------------------------------------------------------------------
-
-# published means and deviations of all 6,068 soldiers of ANSUR II together, millimetres and
-# kilograms
-BOTH_SEXES = {
-    "stature": (1714.41, 90.02), "sitting": (898.11, 45.30), "acromion": (1406.16, 79.09),
-    "epicondyle": (483.24, 29.36),
-    "biacromial": (399.20, 30.24), "hip_breadth": (348.39, 25.30), "waist": (914.50, 114.27),
-    "weight": (79.71, 15.65),
-    "upper_arm": (327.37, 20.72), "forearm": (259.19, 19.78), "foot": (263.03, 17.39),
-    "tragion": (129.62, 6.66),
-    "head_breadth": (152.18, 6.24),
-}  # fmt: skip
-MEN = 4082
-WOMEN = 1986
-
-
-@pytest.mark.parametrize("name", ADULTS)
-def test_the_survey_of_both_sexes_follows_from_the_tables(name):
-    """The mixture of two distributions: its variance has a part between their means."""
-    (man, man_sd), (woman, woman_sd) = ADULTS[name]
-    men = MEN / (MEN + WOMEN)
-    women = WOMEN / (MEN + WOMEN)
-    deviation = np.sqrt(men * man_sd**2 + women * woman_sd**2 + men * women * (man - woman) ** 2)
-    unit = 1.0 if name == "weight" else 1000.0
-    mean, published = BOTH_SEXES[name]
-    assert unit * (men * man + women * woman) == pytest.approx(mean, rel=1e-3)
-    assert unit * deviation == pytest.approx(published, rel=0.015)
-
-
-def test_drawn_adults_have_the_proportions_of_measured_ones():
-    """Sitting height over stature: 0.52 to 0.53, with a deviation of 0.013 to 0.015; heavy people
-    are there.
-    """
-    adults = draw_adults(np.random.default_rng(0), np.arange(20_000) % 2 == 0)
-    share = adults["sitting"] / adults["stature"]
-    assert 0.52 < share.mean() < 0.53
-    assert 0.013 < share.std() < 0.015
-    assert np.corrcoef(adults["weight"], adults["waist"])[0, 1] > 0.8
-    assert np.quantile(adults["weight"], [0.01, 0.99]) == pytest.approx([46, 133], abs=6)
-
-
-def test_drawn_children_grow():
-    children, years = draw_children(np.random.default_rng(0), np.arange(4000) % 2 == 0)
-    small = years < 8
-    tall = years > 14
-    assert children["stature"][small].mean() == pytest.approx(1.215, abs=0.02)
-    assert children["stature"][tall].mean() == pytest.approx(1.65, abs=0.03)
-    assert (children["sitting"] / children["stature"])[small].mean() > 0.535
-
-
-def test_weight_and_its_gradient_are_those_of_a_closed_skin():
-    """A tetrahedron of 1/6 m³; the derivative by central differences."""
-    corners = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]]) + 0.3
-    skin = Landmarks(np.zeros((0, 4)), {}, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))
-    weight, gradient = skin.weight(corners)
-    assert weight[0] == pytest.approx(DENSITY / 6)
-    for v, x in np.ndindex(4, 3):
-        step = np.zeros_like(corners)
-        step[0, v, x] = 1e-4
-        assert gradient[0, v, x] == pytest.approx(
-            (skin.weight(corners + step)[0] - skin.weight(corners - step)[0])[0] / 2e-4, abs=1e-3
-        )
-
-
-@pytest.mark.usefixtures("one_solver")
-def test_people_measure_what_the_surveys_say(shaped, targets):
-    source = shaped.source
-    people = draw_population(source, targets, 9, 3)
-    off = {key: np.abs(people.measured[key] - people.wanted[key]) for key in people.wanted}
-    for key in ("stature", "hip", "shoulder", "knee", "upper_arm", "forearm", "foot"):
-        assert np.nanmedian(off[key]) < 0.008, key
-    assert np.nanmedian(off["waist"]) < 0.05
-    assert np.nanmedian(off["weight"]) < 3.0
-    vertices = people.base + np.tensordot(people.coefficients, people.moves, axes=1)
-    np.testing.assert_allclose(vertices[:, source.cubes["pelvis"]].mean(axis=1), 0.0, atol=1e-9)
-    skin = np.unique(source.faces[source.face_group == "body"])
-    np.testing.assert_allclose(
-        np.ptp(vertices[:, skin, 1], axis=1), people.measured["stature"], atol=0.01
-    )
-
-
-@pytest.mark.usefixtures("one_solver")
-@pytest.mark.parametrize("count", [1, 10])
-def test_few_people_are_all_adults(shaped, targets, count):
-    source = shaped.source
-    people = draw_population(source, targets, count, 3)
-    assert len(people.coefficients) == len(people.measured["stature"]) == count
-    assert people.age.min() >= 18.0
-    np.testing.assert_allclose(people.measured["stature"], people.wanted["stature"], atol=0.02)
 
 
 # The mesh
@@ -343,21 +251,6 @@ def test_trunks_and_legs_vary_against_each_other_as_in_surveys(body):
     stature = betas @ (body.shapedirs[top, 1] - body.shapedirs[bottom, 1])
     assert ratio.std() == pytest.approx(0.046, abs=0.006)
     assert -0.5 < np.corrcoef(ratio, stature)[0, 1] < -0.1
-
-
-def test_bones_have_human_lengths(body):
-    at = {name: body.J_template[i] for i, name in enumerate(body.joint_names)}
-    for first, second, shortest, longest in (
-        ("left_hip", "left_knee", 0.36, 0.46),
-        ("left_knee", "left_ankle", 0.36, 0.46),
-        ("left_shoulder", "left_elbow", 0.22, 0.32),
-        ("left_elbow", "left_wrist", 0.20, 0.29),
-        ("left_hip", "right_hip", 0.13, 0.24),
-        ("left_shoulder", "right_shoulder", 0.28, 0.42),
-        ("pelvis", "neck", 0.45, 0.60),
-        ("neck", "head", 0.05, 0.16),
-    ):
-        assert shortest < np.linalg.norm(at[first] - at[second]) < longest, (first, second)
 
 
 def test_the_rest_pose_is_a_t(body):

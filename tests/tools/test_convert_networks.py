@@ -99,25 +99,6 @@ def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
     assert_same_as_tflite(network, np.array(crops))
 
 
-@pytest.mark.parametrize("network", [n for n in NETWORKS if n.blocked], ids=lambda n: n.name)
-def test_operators_of_the_blocked_layout_compute_the_same(network: Network) -> None:
-    model = read_model(model_bytes(network), network.member)
-    size = network.input_shape[1]
-    images = np.random.default_rng(4).random((2, 3, size, size), np.float32)
-    results = []
-    for blocked in (False, True):
-        converted = convert_model(model, network.input_shape, network.outputs, blocked=blocked)
-        kinds = {node.op_type for node in converted.graph.node}
-        assert ("PRelu" in kinds) != blocked
-        assert ("Pad" in kinds) != blocked
-        session = onnxruntime.InferenceSession(
-            converted.SerializeToString(), providers=["CPUExecutionProvider"]
-        )
-        results.append(session.run(None, {"input": images}))
-    for found, expected in zip(*results, strict=True):
-        assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
-
-
 def test_mask_is_an_output_on_request() -> None:
     network = next(n for n in NETWORKS if n.name == "pose_landmark_lite")
     images = np.random.default_rng(4).random((1, 3, 256, 256), np.float32)

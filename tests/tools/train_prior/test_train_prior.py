@@ -10,7 +10,6 @@ import pytest
 from scope.solver import load_body, rotations
 from scope.solver.learned_prior import BUILT_IN, load_joint_prior
 from scope.solver.residuals import joint_flow as jf
-from scope.tools.train_prior import baselines
 from scope.tools.train_prior.data import (
     ALWAYS,
     FOLDS,
@@ -86,21 +85,6 @@ def test_performers_do_not_straddle_the_split():
     assert group_of("reactidle", "reactidle_012") in ALWAYS
     groups = [*TEST, *RESERVED, *ALWAYS, *(g for fold in FOLDS for g in fold)]
     assert len(set(groups)) == len(groups)
-
-
-@pytest.mark.parametrize(
-    "s", [(0.0, 0.0, 0.0), (3.0, 1.0, -0.5), (8.0, 5.0, 2.0), (12.0, 3.0, -2.5)]
-)
-def test_fisher_constant_is_the_integral_over_rotations(s):
-    R = uniform_rotations(np.random.default_rng(1), 400_000)
-    values = np.exp(R[:, 0, 0] * s[0] + R[:, 1, 1] * s[1] + R[:, 2, 2] * s[2])
-    tolerance = 4.0 * values.std() / values.mean() / np.sqrt(len(values))
-    constant, gradient = baselines.log_fisher_constant(np.array(s))
-    assert constant == pytest.approx(np.log(values.mean()), abs=max(tolerance, 1e-9))
-    moments = (np.diagonal(R, axis1=1, axis2=2) * values[:, None]).mean(0) / values.mean()
-    np.testing.assert_allclose(
-        gradient, moments, atol=5.0 * (tolerance + 1.0 / np.sqrt(len(values)))
-    )
 
 
 def test_built_in_prior_covers_the_default_body(prior):
