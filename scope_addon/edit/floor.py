@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Aligning the feet with the floor: height, level, and removing penetration."""
+"""Aligning the feet with the floor: height, level, removing penetration, and the height of the
+floor under a foot of which the user says that it rests there.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,18 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import shortest_turn
+from ..errors import UsageError
 from ..kinematics.axes import UP
+from ..kinematics.foot_skin import FootSkin
 from ..kinematics.smoothing import gaussian_smooth
 from ..kinematics.standing import standing_probability
-from .clip import Clip
+from .clip import Clip, sample
 
 _MAX_TILT = np.radians(20.0)  # A steeper plane through the soles is not the floor.
 _MIN_SPREAD_M = 0.3  # Soles closer together do not show the slope of the floor.
 _LIFT_CUTOFF_HZ = 3.0
+LOWER = "lower"
+_PARTS = {LOWER: slice(0, 4), "left": slice(0, 2), "right": slice(2, 4)}
 
 
 def refloor(
@@ -83,3 +89,22 @@ def _levelling(
     if np.arccos(np.clip(normal @ UP, -1.0, 1.0)) > _MAX_TILT:
         return np.eye(3), middle
     return shortest_turn(normal, UP), middle
+
+
+def foot_height(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: float, foot: str
+) -> float:
+    """Return the height in metres of the lowest skin of a foot at a time.
+
+    :param betas: (P,) shape coefficients.
+    :param time: seconds, on the clip's clock.
+    :param foot: "left", "right" or "lower", which is the lower one of the two.
+    :raises UsageError: the foot is none of these.
+    """
+    if foot not in _PARTS:
+        raise UsageError(f"the foot must be left, right or lower, not {foot!r}")
+    betas = np.asarray(betas, float)
+    at = sample(clip, np.array([time]))
+    poses = body.forward_kinematics(at.rotations, at.root - body.rest_joints(betas)[0], betas)
+    heights = FootSkin(body, betas).heights(*poses, UP)[0]
+    return float(heights[_PARTS[foot]].min())

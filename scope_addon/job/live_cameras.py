@@ -22,8 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError, VideoError
-from ..live.sources.camera_modes import described
-from ..live.sources.system_cameras import camera_names, camera_with_modes
+from ..live.sources.system_cameras import camera_names, camera_with_modes, described
 from ..temporary import temporary_folder
 from .live_request import FormatsRequest
 from .messages import WARM_UP_FIELDS, Fields, WorkerFailedError

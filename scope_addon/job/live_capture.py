@@ -14,8 +14,8 @@ from ..capture_report import warnings_as_json
 from ..errors import system_error_message
 from ..live.outputs.footage import Footage
 from ..live.outputs.people_recording import Keep, PeopleRecording, unfinished_recording
-from ..live.outputs.pose_values import values
 from ..live.outputs.unfinished import SUFFIX, is_recording
+from ..live.pose import values
 from ..live.run import Listeners, LiveOptions, LiveProgress, run_live
 from ..live.sources import Picture, Source, open_source
 from ..notices import OTHER, Notice, notice

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from .added_keypoints import with_keypoints
-from .contact_points import PALMS
+from .contact_points import PALMS, with_keypoints
 from .frame_blocks import by_blocks
 
 SPACING_M = 0.05  # Distance between the sampled vertices.

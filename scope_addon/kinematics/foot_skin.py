@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp
 from ..motion import Motion
-from .added_keypoints import with_points_on_parts
 from .axes import UP
-from .contact_points import FOOT_PARTS
+from .contact_points import FOOT_PARTS, with_points_on_parts
 from .frame_blocks import by_blocks
 from .runs import runs
 from .standing import LEVEL_M

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Processing long clips a few thousand frames at a time.
+"""Saving memory with long clips: a few thousand frames are processed at a time, and results are
+stored in single precision.
 
-The rotation matrices of an hour's 108,000 frames take 190 MB, and numpy's intermediate results
-several times that.
+An hour at 30 frames per second has 108,000 frames: the rotation matrices of one person take 190 MB
+in double precision, and numpy's intermediate results several times that. Frames are computed in
+double precision and stored in single precision, which moves a joint 10 m away by a micrometre.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 BLOCK_FRAMES = 4096
+Record = TypeVar("Record", bound=Any)
 
 
 def by_blocks(
@@ -40,3 +44,21 @@ def by_blocks(
         for whole, result in zip(out, results, strict=True):
             whole[block] = result
     return tuple(out)
+
+
+def to_single_precision(record: Record) -> Record:
+    """Convert the float64 arrays (T, ...) of a dataclass with more than three values per frame to
+    float32.
+
+    :return: a copy of the dataclass; itself if there is nothing to convert.
+    """
+    large = {}
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if (
+            isinstance(value, np.ndarray)
+            and value.dtype == np.float64
+            and value.size > 3 * len(value)
+        ):
+            large[field.name] = value.astype(np.float32)
+    return replace(record, **large) if large else record

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The body fitted to one observation after another, each from the state of the one before.
+"""The body fitted to one observation after another, each from the state of the one before, and from
+what the body is known to stand on.
 
 The lifting network's window ends with the newest frame, which stands for the samples after it: at
 the end of a clip, it is the same (see `lifter`). A frame whose fit contradicts the lifter is fitted
 again with the stages of a cold start, and keeps the fit of lower cost, as in `frame_sequence`;
 earlier frames stay as they were given.
+
+The size of a body in the picture does not tell a squat from a step back, but feet at rest do: a
+`Support` is the floor, and the places where points rest.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...solver import Body, Fit, FrameSolver, Measurements, Options, State
+from ...solver import Body, Fit, Floor, FootContacts, FrameSolver, Measurements, Options, State
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_measurements import Measurer
 from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
@@ -27,7 +31,44 @@ from ..capture.perception.lifter import KEYPOINT_COUNT, OFFSETS_S, default_lifte
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import single_frame_track
 from ..kinematics.contact_points import CONTACT_POINTS, with_contact_points
-from .feet.support import Support
+
+# of the floor's weight; three times as much tilts bodies whose distance begins too far
+AFTER_A_PAUSE = 0.01
+
+
+@dataclass(frozen=True)
+class Support:
+    """Places in the camera frame, metres, and the plane of the floor, normal . p = offset."""
+
+    places: NDArray[np.floating[Any]]  # (6, 3) where points rest
+    rests: NDArray[np.floating[Any]]  # (6,) probability that each of them rests there
+    on_floor: NDArray[np.floating[Any]]  # (6,) probability that it rests on the floor
+    not_below: NDArray[np.floating[Any]]  # (6,) probability that it is not below the floor
+    stands: float  # probability that the lowest sole was on the floor
+    floor_normal: NDArray[np.floating[Any]]  # (3,) unit, upwards
+    floor_offset: float
+
+    def added_to(self, measurements: Measurements, points: NDArray[np.intp]) -> Measurements:
+        """Return the measurements of a frame with this support.
+
+        :param points: (6,) numbers of the contact points.
+        """
+        return replace(
+            measurements,
+            foot_contacts=FootContacts(points, self.places, self.rests),
+            floor=Floor(
+                points, self.floor_normal, self.floor_offset, self.on_floor, below=self.not_below
+            ),
+        )
+
+    def after_a_pause(self) -> Support:
+        """Return what is left of it when points may have moved since: who stood on the floor is not
+        below it now.
+        """
+        nothing = np.zeros_like(self.rests)
+        not_below = np.full_like(nothing, AFTER_A_PAUSE * self.stands)
+        return replace(self, rests=nothing, on_floor=nothing, not_below=not_below)
+
 
 _SOLE_KEYPOINTS = [
     KEYPOINT_NAMES.index(f"{side}_{name}")

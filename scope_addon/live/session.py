@@ -19,9 +19,8 @@ from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import track_of
 from .calibration import Calibration, Calibrator, GradualCalibration
-from .causal_fit import CausalFit, FittedFrame
-from .feet.hold import FootHold
-from .feet.support import Support
+from .causal_fit import CausalFit, FittedFrame, Support
+from .feet import FootHold
 from .left_right import CausalLeftRight
 from .pose import LivePose, Presence
 from .smoothing import PoseFilter

@@ -1,19 +1,119 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Causal smoothing of a pose: its rotations, and the direction and distance of its pelvis."""
+"""Causal smoothing of a pose: its rotations, and the direction and distance of its pelvis.
+
+The filters are causal low-pass filters that make up for most of their own delay: n first-order
+filters in a row, x̂ += a (x − x̂) with a = 1 / (1 + 1 / (2π f dt)) and the time step dt, suppress
+noise with the n-th power of its frequency, and delay steady motion by n / (2π f), whatever the
+frame rate. The result is moved on by its own velocity times a lead, which takes that much of the
+delay away. Rotations take the fraction a of the rotation from R̂ to R.
+
+On fits of four clips at 60 frames/s and one at 30, compared with the offline motion, the delay
+decides: six filters of 5.5 Hz with a delay of 60 ms have two thirds of the jitter of six of 7 Hz
+with 33 ms, and deviate as much. The best response of any form and of the same delay (fitted to
+three of the clips) has an eighth less jitter on the fourth. Cutoff frequencies that fall with speed
+add jitter of their own, and deviate more. A Kalman filter of constant velocity or acceleration with
+the same delay jitters twice as much, because every innovation is a jump in its derivatives.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .low_pass import Response, RotationFilter, VectorFilter
+from ...solver import rotations
 
 DELAY_S = 0.06  # of every pose, whatever the frame rate: later frames separate noise from motion
+LONGEST_STEP_S = 0.5  # after a longer pause, a filter starts again
+# after the start, until when the velocity is not yet known; the lead grows during this time
+LEAD_FROM_S = 0.4
+
+
+@dataclass(frozen=True)
+class Response:
+    """How a filter responds: n, f and the lead of the module's equations."""
+
+    stages: int
+    cutoff_hz: float
+    lead_s: float = 0.0
+
+    @classmethod
+    def delayed(cls, stages: int, cutoff_hz: float, delay_s: float) -> Response:
+        """Return the response that delays steady motion by a time."""
+        return cls(stages, cutoff_hz, stages / (2 * np.pi * cutoff_hz) - delay_s)
+
+    def lead(self, age_s: float) -> float:
+        """Return the lead at a time after the start."""
+        share = min(age_s / LEAD_FROM_S, 1.0)
+        return self.lead_s * share * share * (3 - 2 * share)
+
+    def share(self, step_s: float) -> float:
+        """Return a for a time step."""
+        return float(1.0 / (1.0 + 1.0 / (2 * np.pi * self.cutoff_hz * step_s)))
+
+
 MOTION = Response.delayed(stages=6, cutoff_hz=5.5, delay_s=DELAY_S)
 # its logarithm: noisier than the direction
 DISTANCE = Response.delayed(stages=5, cutoff_hz=3.5, delay_s=DELAY_S)
+
+
+class VectorFilter:
+    """Filters vectors (n,)."""
+
+    def __init__(self, response: Response) -> None:
+        self._response = response
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again with the next value."""
+        self._values: list[NDArray[np.float64]] = []
+
+    def __call__(self, value: NDArray[np.floating[Any]], step_s: float) -> NDArray[np.float64]:
+        """Return the filtered value (...).
+
+        :param value: (...), of the kind that the filter is for.
+        :param step_s: seconds since the value before.
+        """
+        x: NDArray[np.float64] = np.array(value, float)
+        if not self._values or not 0.0 < step_s <= LONGEST_STEP_S:
+            self._values = [x] * self._response.stages
+            self._age_s = 0.0
+            return x
+        self._age_s += step_s
+        share = self._response.share(step_s)
+        before = self._values[-1]
+        for k, state in enumerate(self._values):
+            self._values[k] = x = self._between(state, x, share)
+        return self._beyond(before, x, self._response.lead(self._age_s) / step_s)
+
+    def _between(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], share: float
+    ) -> NDArray[np.float64]:
+        """Return what lies between a and b, at a share of the way."""
+        return a + share * (b - a)
+
+    def _beyond(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float
+    ) -> NDArray[np.float64]:
+        """Return what lies beyond b, by a multiple of the way from a."""
+        return b + lead * (b - a)
+
+
+class RotationFilter(VectorFilter):
+    """Filters rotations (J, 3, 3), each for itself."""
+
+    def _between(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], share: float
+    ) -> NDArray[np.float64]:
+        between = a @ rotations.exp(share * rotations.log(np.swapaxes(a, 1, 2) @ b))
+        return rotations.nearest_rotation(between)  # without what rounding has added up
+
+    def _beyond(
+        self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float
+    ) -> NDArray[np.float64]:
+        return b @ rotations.exp(lead * rotations.log(np.swapaxes(a, 1, 2) @ b))
 
 
 class PoseFilter:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from .bone_map import FINGERS, PHALANGES, SPINE, BoneMap
 from .bone_names import CENTRE, LIMBS, BoneName, parse_names
 from .fingers import find_fingers
-from .rest_check import faces_backwards, rest_faults
-from .rest_pose import RestPose
+from .rest_pose import RestPose, faces_backwards, rest_faults
 
 _LEG = ("hip", "knee", "ankle", "foot")
 _ARM = ("collar", "shoulder", "elbow", "wrist")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..errors import MotionFileError, UsageError
 from ..footage import display_text
-from ..kinematics.face.expressions import body_with_mouth, expressions_of
+from ..kinematics.face import body_with_mouth, expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from ..notices import Notice, notice

@@ -261,7 +261,7 @@ def expression_maps(folder: Path) -> list[bytes]:
 
 
 def built_in_maps() -> Path:
-    from scope.scope_addon.retarget.face.face_controls import FOLDER
+    from scope.scope_addon.retarget.face_controls import FOLDER
 
     return FOLDER
 

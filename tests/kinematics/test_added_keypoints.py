@@ -2,7 +2,7 @@
 """Keypoints that are added to a body, against vertices and joints of the same body."""
 
 import numpy as np
-from scope.scope_addon.kinematics.added_keypoints import with_keypoints, with_points_on_parts
+from scope.scope_addon.kinematics.contact_points import with_keypoints, with_points_on_parts
 from scope.solver import load_body
 from scope.solver.rotations import exp
 

@@ -10,7 +10,7 @@ import numpy as np
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.placement import place_track
-from scope.scope_addon.kinematics.single_precision import to_single_precision
+from scope.scope_addon.kinematics.frame_blocks import to_single_precision
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 

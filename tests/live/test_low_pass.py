@@ -7,8 +7,13 @@ is less.
 
 import numpy as np
 import pytest
-from scope.scope_addon.live.low_pass import Response, RotationFilter, VectorFilter
-from scope.scope_addon.live.smoothing import DELAY_S, PoseFilter
+from scope.scope_addon.live.smoothing import (
+    DELAY_S,
+    PoseFilter,
+    Response,
+    RotationFilter,
+    VectorFilter,
+)
 from scope.solver import rotations
 from scope.solver.rotations import exp, log
 

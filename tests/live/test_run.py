@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.live.outputs.people_recording import PeopleRecording
 from scope.scope_addon.live.pose import Presence
-from scope.scope_addon.live.run import Listeners, LiveOptions, run_live
-from scope.scope_addon.live.statistics import Statistics
+from scope.scope_addon.live.run import Listeners, LiveOptions, Statistics, run_live
 
 from .fake_source import FakeClock, FakeSource
 

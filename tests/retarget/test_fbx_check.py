@@ -8,8 +8,8 @@ import struct
 import tracemalloc
 
 import pytest
-from scope.scope_addon.retarget import fbx_check
-from scope.scope_addon.retarget.fbx_check import check_fbx
+from scope.scope_addon.retarget import rig_source
+from scope.scope_addon.retarget.rig_source import check_fbx
 from scope.solver.errors import InputError
 
 from .made_files import array, fbx, node
@@ -45,12 +45,12 @@ def test_a_file_that_contradicts_itself_is_refused(tmp_path, properties, says):
 def test_nodes_without_end_are_refused(tmp_path, monkeypatch):
     """They would be read for hours, or until nothing is left of the stack."""
     path = fbx(tmp_path / "rig.fbx")  # two nodes, and the end of each list of them
-    monkeypatch.setattr(fbx_check, "_MAX_NODES", 4)
+    monkeypatch.setattr(rig_source, "_MAX_NODES", 4)
     check_fbx(path)
-    monkeypatch.setattr(fbx_check, "_MAX_NODES", 3)
+    monkeypatch.setattr(rig_source, "_MAX_NODES", 3)
     with pytest.raises(InputError, match="it has too many nodes"):
         check_fbx(path)
-    monkeypatch.setattr(fbx_check, "_DEEPEST", 0)
+    monkeypatch.setattr(rig_source, "_DEEPEST", 0)
     with pytest.raises(InputError, match="nested too deeply"):
         check_fbx(path)
 

@@ -9,7 +9,7 @@ import os
 import random
 
 import pytest
-from scope.scope_addon.retarget.gltf_check import check_gltf
+from scope.scope_addon.retarget.rig_source import check_gltf
 from scope.solver.errors import InputError
 
 from .made_files import glb

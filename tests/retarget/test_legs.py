@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.retarget.feet import pelvis_drop
-from scope.scope_addon.retarget.legs import solve_leg
+from scope.scope_addon.retarget.foot_placement import pelvis_drop, solve_leg
 from scope.solver.rotations import exp
 
 FRAMES = 200

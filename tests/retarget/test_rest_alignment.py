@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
-from scope.scope_addon.retarget.rest_alignment import heading_alignment, rest_alignment
 from scope.scope_addon.retarget.skeleton import Skeleton
+from scope.scope_addon.retarget.transfer import heading_alignment, rest_alignment
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 

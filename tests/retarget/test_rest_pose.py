@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.retarget.rest_check import faces_backwards, rest_faults
-from scope.scope_addon.retarget.rest_pose import RestPose
+from scope.scope_addon.retarget.rest_pose import RestPose, faces_backwards, rest_faults
 
 # An elbow, and a hand with a thumb and two fingers, along +x.
 NAMES = ["forearm", "hand", "thumb", "index", "middle"]

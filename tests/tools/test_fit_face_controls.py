@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scope.scope_addon.retarget.face.face_controls import built_in
+from scope.scope_addon.retarget.face_controls import built_in
 from scope.tools.build_body.source import fetch_wheel
 from scope.tools.fit_face_controls.amounts import (
     share_shown,

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from ...scope_addon.errors import exit_status
-from ...scope_addon.retarget.face.face_controls import FOLDER
+from ...scope_addon.retarget.face_controls import FOLDER
 from ...solver.errors import ScopeError
 from ..build_body.source import fetch_wheel
 from ..pinned_wheel import DOWNLOADS

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ...scope_addon.expression_names import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, TURNED
-from ...scope_addon.retarget.face.face_frame import RestBone, measure_face
+from ...scope_addon.retarget.face_controls import RestBone, measure_face
 from ...solver.rotations import exp
 from .amounts import Amounts, Problem, eye_amounts, free_of, jacobian, share_shown
 from .shapes import FaceShapes

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from ...scope_addon.errors import SetupError
 from ...scope_addon.expression_names import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, ExpressionMap
-from ...scope_addon.retarget.face.face_controls import control_motions
-from ...scope_addon.retarget.face.face_frame import FaceFrame, RestBone, measure_face
+from ...scope_addon.retarget.face_controls import FaceFrame, RestBone, control_motions, measure_face
 from .amounts import Amounts, Problem, eye_amounts, free_of, jacobian, share_shown
 from .shapes import FaceShapes
 

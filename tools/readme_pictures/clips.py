@@ -14,7 +14,7 @@ import numpy as np
 
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
-from ...scope_addon.kinematics.face.expressions import body_with_mouth
+from ...scope_addon.kinematics.face import body_with_mouth
 from ...scope_addon.motion import Motion
 from ...solver import Body, load_body
 from ...solver.body_file import ASSETS

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.kinematics.face.expressions import expressions_of
+from ...scope_addon.kinematics.face import expressions_of
 from ...solver.body import Body
 
 SKINS = ((0.58, 0.36, 0.27), (0.5, 0.29, 0.2), (0.3, 0.16, 0.1), (0.12, 0.06, 0.04))  # linear

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize, vertex_normals
-from ...scope_addon.kinematics.face.expressions import mouth_faces_of
+from ...scope_addon.kinematics.face import mouth_faces_of
 from ...solver.body import Body
 from .looks import Look
 from .truth import SIZE, head_faces

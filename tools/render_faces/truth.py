@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.kinematics.face.expressions import expressions_of
+from ...scope_addon.kinematics.face import expressions_of
 from ...solver.body import Body
 from .sequences import FaceClip
 

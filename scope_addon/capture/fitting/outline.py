@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ....solver import Body, ClipFit, Fit, fit_clip
 from ....solver.residuals.outline import FLOATS, INTS, pack
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
-from ...kinematics.added_keypoints import with_keypoints
 from ...kinematics.body_surface import one_per_cell
+from ...kinematics.contact_points import with_keypoints
 from ..camera.intrinsics import Camera
 from ..overlay.rasterizer import fill_silhouette, vertex_normals
 from ..perception.observation import PersonMask

@@ -14,7 +14,7 @@ import numpy as np
 
 from ....solver import Body, MotionFit, MotionPrior, State, fit_motion
 from ...arrays import Float64Array, IndexArray
-from ...kinematics.single_precision import to_single_precision
+from ...kinematics.frame_blocks import to_single_precision
 from ..camera.intrinsics import Camera
 from ..fitting.frame_measurements import Measurer
 from ..fitting.frame_sequence import FittedTrack

@@ -13,7 +13,7 @@ import numpy as np
 
 from ....solver.body_file import CHILD_BELOW_M
 from ...arrays import BoolArray, Float64Array
-from ...kinematics.single_precision import to_single_precision
+from ...kinematics.frame_blocks import to_single_precision
 from ...motion import Motion
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import PreparedTrack, prepare_track

@@ -18,8 +18,7 @@ from ...kinematics.contact_points import (
     contact_point_positions,
     with_contact_points,
 )
-from ...kinematics.frame_blocks import by_blocks
-from ...kinematics.single_precision import to_single_precision
+from ...kinematics.frame_blocks import by_blocks, to_single_precision
 from ...kinematics.smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from ...kinematics.standing import resting_probability
 from ..fitting.frame_sequence import FittedTrack

@@ -2,6 +2,9 @@
 """A motion with corrections: which can be changed and removed again, and outlive another smoothing.
 
 The motion keeps what was corrected, and of the frames that this changed how they were before.
+
+What a fit could not meet is measured afterwards: how far pins put feet under the floor, and how far
+from it parts stay that shall rest there. The fit keeps feet above it unless a pin asks for more.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from ....solver.body import Body
 from ....solver.names import BODY_JOINTS
 from ....solver.rotations import exp, log
 from ...errors import MotionFileError
+from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ...kinematics.smoothing import smooth_rotations
 from ...motion import Motion
 from ...untrusted.files import in_one_line
@@ -36,12 +40,13 @@ from .corrections import (
 from .depth_flips import flipped
 from .edits import edited
 from .moved import moved_clip, moved_motion
-from .rays import pixel_of
-from .solve_pins import Shot, resolve
+from .pose_refit import pixel_of
+from .solve_pins import Shot, lowest_skin, resolve, resting_joints
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
 # Smoothing has mixed left and right within this time of a span's end.
 _MIXED_S = 0.12
+_NOTICED_M = 0.002
 
 
 def corrections_of(motion: Motion) -> tuple[Correction, ...]:
@@ -235,3 +240,40 @@ def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating
     poses = before.copy()
     poses[new] = log(clip.rotations[new]).reshape(poses[new].shape)
     return poses
+
+
+def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
+    """Return how far a foot is under the floor because of what was measured, metres, and in how
+    many frames.
+
+    :param body: the motion's body.
+    :return: the largest depth and the number of frames, of feet that are more than
+        `UNDER_FLOOR_M` under the floor and lower than without pins; 0 and 0 if there are none,
+        and on uneven ground.
+    :raises MotionFileError: the motion's corrections are damaged.
+    """
+    if motion.uneven_ground:
+        return 0.0, 0
+    free = with_corrections(
+        motion, body, tuple(c for c in corrections_of(motion) if not isinstance(c, Contact | Pin))
+    )
+    lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
+    under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
+    return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)
+
+
+def distance_from_floor(motion: Motion, body: Body, contact: Contact) -> float:
+    """Return how far from the floor a part stays at most that rests there, metres; 0 on uneven
+    ground, whose height is unknown.
+
+    :param body: the motion's body.
+    :param contact: of a part other than a foot.
+    """
+    rows = np.flatnonzero((motion.frames >= contact.first) & (motion.frames <= contact.last))
+    if motion.uneven_ground or not len(rows):
+        return 0.0
+    clip = clip_from_motion(body, motion, raw=False).rows(rows)
+    heights = [
+        lowest_skin(clip, body, motion.betas, joint) for joint in resting_joints(contact.part)
+    ]
+    return float(np.abs(heights).max())

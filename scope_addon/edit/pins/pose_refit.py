@@ -7,11 +7,22 @@
 where r_p are the corrected points, in the image or in space, and held points: other hands, feet and
 the head, which should stay where they were. The joints of the corrected limb are free to turn, all
 others are stiff. The skin of the feet has a one-sided residual, which keeps it above the floor.
+
+A pin can only be followed as far as the limb reaches. One that is farther away than the limb is
+long would otherwise be met by moving the whole body. So the pin is moved towards the limb's first
+joint, on the straight line, until the stretched limb and a small slack reach it. The slack is what
+shoulder girdle, trunk and pelvis may add. Pins of the pelvis and the hips are not limited: they
+move the body.
+
+A pin of the pelvis in the image keeps the person at their depth. Were the depth free, the body
+could meet a pin below the pelvis by moving away from a camera that is lower than it, rather than by
+bending the knees.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,7 +50,6 @@ from ....solver.tree import with_fixed_shape
 from ...errors import UsageError
 from ...kinematics.contact_points import SOLES, with_contact_points
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
-from .rays import Camera, point_at_depth
 
 # Inverse variances: per radian² of joints, per metre² of points and of the pelvis, per squared
 # image coordinate.
@@ -63,6 +73,11 @@ _LIMBS = {
     "leg": ("hip", "knee", "ankle", "foot"),
 }
 _ENDS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "head")
+# A camera: world_from_camera (4, 4), metres, and intrinsics (3, 3).
+Camera = tuple[NDArray[np.float64], NDArray[np.float64]]
+_STEEP = np.radians(45.0)  # A steep camera looks farther up or down from the horizon.
+SLACK_M = 0.03
+_MOVES_BODY = ("pelvis", "left_hip", "right_hip")
 
 
 @dataclass
@@ -292,3 +307,103 @@ class PoseRefit:
         limbs = {limb_of(name) for name in joints} | _bent_by(joints)
         keep = np.array([limb_of(self.names[k]) in limbs for k in ints[:, 0]], bool)
         return ints[keep], floats[keep]
+
+
+def pixel_of(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Project a point (3,), world, to a pixel (2,)."""
+    T, K = camera
+    p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
+    pixel: NDArray[np.float64] = p[:2] / p[2]
+    return pixel
+
+
+def nearest_on_ray(
+    camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the point (3,) nearest to another one of those in front of the camera that project to
+    a pixel (2,).
+    """
+    T, K = camera
+    ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
+    ray /= np.linalg.norm(ray)
+    nearest: NDArray[np.float64] = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
+    return nearest
+
+
+def point_at_depth(
+    camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the point (3,) that projects to a pixel (2,) and is as far away as another one, (3,).
+
+    It is in the upright plane through the other point that faces the camera, so that somebody who
+    crouches does so in place. A camera that looks steeply down or up moves it in a plane that is
+    parallel to the image.
+    """
+    T, K = camera
+    normal = T[:3, 2] * [1.0, 1.0, 0.0]
+    if np.linalg.norm(normal) < np.cos(_STEEP):
+        normal = T[:3, 2]
+    ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
+    along = float(ray @ normal)
+    # The ray meets the plane beside or behind the camera, or nowhere.
+    if along < 1e-3 * float(np.linalg.norm(ray) * np.linalg.norm(normal)):
+        return nearest_on_ray(camera, pixel, point)
+    place: NDArray[np.float64] = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
+    return place
+
+
+def within_reach(
+    refit: PoseRefit,
+    joint: str,
+    target: NDArray[np.float64],
+    places: tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]]],
+    camera: Camera | None,
+    slack: float = SLACK_M,
+) -> NDArray[np.float64]:
+    """Return where a pin can be met: the pin itself, or a place on the way to it.
+
+    :param target: (3,) metres in the world, or (2,) pixels.
+    :param places: the joints before the correction (K+1, 3), world, and other joints that are
+        pinned in space, (3,).
+    :param camera: world_from_camera (4, 4) and intrinsics (3, 3), for a target in pixels.
+    :param slack: metres that may be added to the limb's length.
+    :return: the place in the form of ``target``; for the pelvis always (3,).
+    """
+    at, pinned = places
+    if joint == "pelvis" and len(target) == 2 and camera is not None:
+        return point_at_depth(camera, target, at[refit.joint(joint)])
+    if joint in _MOVES_BODY:
+        return target
+    first, reach = _first_joint(refit, joint, pinned)
+    origin = pinned.get(first, at[refit.joint(first)])
+    nearest = (
+        target if len(target) == 3 or camera is None else nearest_on_ray(camera, target, origin)
+    )
+    distance = float(np.linalg.norm(nearest - origin))
+    if distance <= reach + slack:
+        return target
+    place: NDArray[np.float64] = origin + (nearest - origin) * ((reach + slack) / distance)
+    return place if len(target) == 3 or camera is None else pixel_of(camera, place)
+
+
+def _first_joint(
+    refit: PoseRefit, joint: str, pinned: Mapping[str, NDArray[np.float64]]
+) -> tuple[str, float]:
+    """Return the joint that a limb turns about, or a pinned one nearer to its end, and the limb's
+    length from there.
+    """
+    rest = refit.body.rest_joints(refit.betas)
+    parents = refit.body.parents
+    side = joint.partition("_")[0]
+    ends = {f"{side}_arm": f"{side}_shoulder", f"{side}_leg": f"{side}_hip"}
+    root = (
+        "pelvis" if joint.endswith(("shoulder", "collar")) else ends.get(limb_of(joint), "pelvis")
+    )
+    part = refit.joint(joint)
+    length = 0.0
+    while True:
+        parent = int(parents[part])
+        length += float(np.linalg.norm(rest[part] - rest[parent]))
+        part = parent
+        if part == 0 or refit.names[part] == root or refit.names[part] in pinned:
+            return refit.names[part], length

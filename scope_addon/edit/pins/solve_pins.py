@@ -8,7 +8,7 @@ them. (3) Every key of that span is fitted again with the interpolated pose as t
 corrected joint where that pose has it, and feet that stand, other hands and the head where they
 were. Keys outside of the span are not touched. The joints of a limb, and limbs whose spans overlap,
 are treated in turns until all pins are met. A pin that its limb cannot reach is approached, see
-``reach.py``.
+``pose_refit.py``.
 
 On captured walks whose arm was turned away from the known truth over half a second to a second,
 pins of elbow and wrist reduce the wrist's mean error over the span from 83 pixels to 27, 15 and 10
@@ -33,9 +33,19 @@ from ...kinematics.standing import standing_probability
 from ..clip import Clip, sample
 from .corrections import FEET, Contact, Pin
 from .fade import faded
-from .pose_refit import FLOOR_M, HELD, PINNED, PINNED_2D, STANDING, Points, PoseRefit, limb_of
-from .rays import pixel_of
-from .reach import SLACK_M, within_reach
+from .pose_refit import (
+    FLOOR_M,
+    HELD,
+    PINNED,
+    PINNED_2D,
+    SLACK_M,
+    STANDING,
+    Points,
+    PoseRefit,
+    limb_of,
+    pixel_of,
+    within_reach,
+)
 
 _CONTACT_REACH_S = 0.25
 _FLOOR_M = 0.12  # A foot that stands within this height of z = 0 is put on it.

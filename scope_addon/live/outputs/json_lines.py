@@ -18,8 +18,7 @@ from typing import Any
 
 from ....solver import Body
 from ...errors import OutputError
-from ..pose import LivePose
-from .pose_values import values
+from ..pose import LivePose, values
 
 VERSION = 1
 MAX_CLIENTS = 16

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from ...errors import OfflineError, VideoError
 from .camera import CAMERA_SIZE, CameraSource
-from .file import FileSource
-from .source import Picture, Source
+from .source import FileSource, Picture, Source
 from .stream import SCHEMES, StreamSource
 
 __all__ = ["CAMERA_SIZE", "Picture", "Source", "is_stream", "open_source"]

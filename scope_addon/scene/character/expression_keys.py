@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ...expression_names import EXPRESSIONS
 from ...kinematics.axes import R_WORLD_MODEL
-from ...kinematics.face.expressions import expressions_of, mouth_faces_of
+from ...kinematics.face import expressions_of, mouth_faces_of
 from ...motion import Motion
 from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
 from ..animation_data.timing import whole_frames_of

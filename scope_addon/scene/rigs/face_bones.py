@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from ...errors import UsageError
 from ...retarget.expression_map import ExpressionMap, guess_expression_map
-from ...retarget.face.face_controls import (
+from ...retarget.face_controls import (
     ControlMotion,
+    RestBone,
     control_motions,
     guess_control_map,
     has_face_controls,
 )
-from ...retarget.face.face_frame import RestBone
 from ..animation_data.actions import Channels, bone_path
 from ..animation_data.transaction import all_or_nothing
 from .face_retarget import CapturedExpressions, key_names

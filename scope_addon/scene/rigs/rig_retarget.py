@@ -20,7 +20,7 @@ from ...notices import PHRASES, Notice, notice
 from ...retarget.bone_map import SPINE, BoneMap
 from ...retarget.expression_map import ExpressionMap
 from ...retarget.guess import SHAPED, guess
-from ...retarget.rest_check import rest_faults
+from ...retarget.rest_pose import rest_faults
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
 from ...retarget.transfer import Transfer, leg_ratio

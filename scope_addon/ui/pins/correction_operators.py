@@ -51,7 +51,7 @@ def floor_warning(armature: bpy.types.Object, body: Body) -> str:
     """Return the message about feet that corrections have put under the floor; empty if there are
     none.
     """
-    from ...edit.pins.under_floor import feet_under_floor
+    from ...edit.pins.corrected_motion import feet_under_floor
 
     motion = motion_of(armature)
     depth, count = feet_under_floor(motion, body)
@@ -233,9 +233,8 @@ class SCOPE_OT_this_rests(CorrectSpanOperator):
 
     def _off_floor(self, armature: bpy.types.Object, body: Body) -> str:
         """Return the message about a part that stays away from the floor; empty if it rests."""
-        from ...edit.pins.corrected_motion import corrections_of
+        from ...edit.pins.corrected_motion import corrections_of, distance_from_floor
         from ...edit.pins.corrections import Contact
-        from ...edit.pins.under_floor import distance_from_floor
 
         motion = motion_of(armature)
         own = [c for c in corrections_of(motion) if isinstance(c, Contact) and c.part == self.part]

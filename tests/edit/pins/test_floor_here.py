@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
+from scope.scope_addon.edit.floor import LOWER, foot_height
 from scope.scope_addon.edit.pins.corrected_motion import (
     corrections_of,
     distance_from_pin,
     with_corrections,
 )
 from scope.scope_addon.edit.pins.corrections import Contact, Floor, Pin, Upright, added, world_of
-from scope.scope_addon.edit.pins.floor_here import LOWER, foot_height
 from scope.scope_addon.edit.pins.moved import moved_clip, moved_motion
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.errors import UsageError

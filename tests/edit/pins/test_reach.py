@@ -11,9 +11,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.edit.pins.fade import faded
-from scope.scope_addon.edit.pins.pose_refit import PoseRefit
-from scope.scope_addon.edit.pins.rays import nearest_on_ray, pixel_of, point_at_depth
-from scope.scope_addon.edit.pins.reach import SLACK_M, within_reach
+from scope.scope_addon.edit.pins.pose_refit import (
+    SLACK_M,
+    PoseRefit,
+    nearest_on_ray,
+    pixel_of,
+    point_at_depth,
+    within_reach,
+)
 
 from ...made_motion import level_camera
 from ..walking import BETAS, BODY, NAMES, walk

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.face import expressions, mouth
-from scope.scope_addon.kinematics.face.expressions import expressions_of, mouth_faces_of
-from scope.scope_addon.kinematics.face.mouth import with_teeth_and_tongue
+from scope.scope_addon.kinematics import face
+from scope.scope_addon.kinematics.face import expressions_of, mouth_faces_of, with_teeth_and_tongue
 from scope.solver.errors import ModelFileError
 
 M = 914  # vertices of teeth and tongue
@@ -59,17 +58,19 @@ OF_EXPRESSIONS = OF_BOTH | {
 }
 
 
-def damaged(module, tmp_path, monkeypatch, change):
-    with np.load(module.FILE) as file:
+def damaged(constant, tmp_path, monkeypatch, change):
+    """Have the constant of the module name a changed copy of the file."""
+    path = getattr(face, constant)
+    with np.load(path) as file:
         data = dict(file)
-    np.savez(tmp_path / module.FILE.name, **data | change(data))
-    monkeypatch.setattr(module, "FILE", tmp_path / module.FILE.name)
+    np.savez(tmp_path / path.name, **data | change(data))
+    monkeypatch.setattr(face, constant, tmp_path / path.name)
 
 
 @pytest.fixture(autouse=True)
 def _read_again():
     def forget():
-        for read in (mouth.read_mouth, expressions._read, expressions._with_mouth):
+        for read in (face.read_mouth, face._read, face._with_mouth):
             read.cache_clear()
 
     forget()
@@ -79,26 +80,26 @@ def _read_again():
 
 @pytest.mark.parametrize("name", OF_MOUTH)
 def test_damaged_teeth_and_tongue_are_refused(name, body, tmp_path, monkeypatch):
-    damaged(mouth, tmp_path, monkeypatch, OF_MOUTH[name])
+    damaged("MOUTH_FILE", tmp_path, monkeypatch, OF_MOUTH[name])
     with pytest.raises(ModelFileError, match=rf"mouth\.npz.*{name.split()[0]}"):
         with_teeth_and_tongue(body)
 
 
 @pytest.mark.parametrize("name", OF_EXPRESSIONS)
 def test_damaged_expressions_are_refused(name, body, tmp_path, monkeypatch):
-    damaged(expressions, tmp_path, monkeypatch, OF_EXPRESSIONS[name])
+    damaged("FILE", tmp_path, monkeypatch, OF_EXPRESSIONS[name])
     with pytest.raises(ModelFileError, match=rf"expressions\.npz.*{name.split()[0]}"):
         mouth_faces_of(body)
 
 
 def test_a_file_that_lacks_an_array_is_refused(body, tmp_path, monkeypatch):
-    for module, use in ((mouth, with_teeth_and_tongue), (expressions, expressions_of)):
-        with np.load(module.FILE) as file:
+    for constant, use in (("MOUTH_FILE", with_teeth_and_tongue), ("FILE", expressions_of)):
+        path = getattr(face, constant)
+        with np.load(path) as file:
             data = dict(file)
         np.savez(
-            tmp_path / module.FILE.name,
-            **{key: value for key, value in data.items() if key != "moves"},
+            tmp_path / path.name, **{key: value for key, value in data.items() if key != "moves"}
         )
-        monkeypatch.setattr(module, "FILE", tmp_path / module.FILE.name)
+        monkeypatch.setattr(face, constant, tmp_path / path.name)
         with pytest.raises(ModelFileError, match="lacks moves"):
             use(body)

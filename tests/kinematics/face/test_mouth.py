@@ -9,11 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.face.expressions import (
-    body_with_mouth,
-    expressions_of,
-    mouth_faces_of,
-)
+from scope.scope_addon.kinematics.face import body_with_mouth, expressions_of, mouth_faces_of
 from scope.solver.body_file import load_body
 
 from .test_expressions import by_name

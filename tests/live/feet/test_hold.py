@@ -13,10 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.standing import line_of_sight
-from scope.scope_addon.live.causal_fit import FittedFrame
-from scope.scope_addon.live.feet.hold import FootHold
-from scope.scope_addon.live.feet.support import AFTER_A_PAUSE, Support
-from scope.scope_addon.live.feet.transition import Transition
+from scope.scope_addon.live.causal_fit import AFTER_A_PAUSE, FittedFrame, Support
+from scope.scope_addon.live.feet import FootHold, Transition
 from scope.solver import Floor, FootContacts, Measurements
 from scope.solver.rotations import exp
 

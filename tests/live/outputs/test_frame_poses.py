@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.kinematics.axes import world_from_level_camera
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
-from scope.scope_addon.live.outputs.frame_poses import at_frames, in_last_shape
+from scope.scope_addon.live.outputs.recording import at_frames, in_last_shape
 from scope.scope_addon.live.pose import LivePose, Presence
 from scope.solver import rotations
 

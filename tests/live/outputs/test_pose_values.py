@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.live.outputs.pose_values import values
+from scope.scope_addon.live.pose import values
 
 from .test_vmc import pose_of
 

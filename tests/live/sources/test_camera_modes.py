@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import pytest
-from scope.scope_addon.live.sources.camera_modes import (
+from scope.scope_addon.live.sources.system_cameras import (
     LONGEST_LOG,
     MAX_MODES,
     Mode,

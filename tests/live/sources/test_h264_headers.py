@@ -10,7 +10,7 @@ from fractions import Fraction
 import av
 import numpy as np
 import pytest
-from scope.scope_addon.live.sources.h264_headers import FrameNumbers
+from scope.scope_addon.live.sources.damage import FrameNumbers
 
 WAYS = {
     "baseline": ("mpegts", {"profile": "baseline"}, "yuv420p"),

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.live.sources.pace import IN_TIME_S, SLOWEST_S, Pace
+from scope.scope_addon.live.sources.newest_frame import IN_TIME_S, SLOWEST_S, Pace
 
 
 def processed(rate, seconds, took_s, pace=None):

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
-from scope.scope_addon.retarget.face.face_controls import (
+from scope.scope_addon.retarget.face_controls import (
+    RestBone,
     built_in,
     control_motions,
     guess_control_map,
+    measure_face,
 )
-from scope.scope_addon.retarget.face.face_frame import RestBone, measure_face
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.retarget.face.face_frame import RestBone, measure_face, pivot
+from scope.scope_addon.retarget.face_controls import RestBone, measure_face, pivot
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp
 

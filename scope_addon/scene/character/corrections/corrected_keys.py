@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .....solver.body import Body
 from ....edit.clip import Clip, sample
+from ....edit.floor import foot_height
 from ....edit.pins.corrected_motion import (
     corrections_of,
     floor_of,
@@ -25,7 +26,6 @@ from ....edit.pins.corrected_motion import (
     uncorrected,
 )
 from ....edit.pins.corrections import Correction, FeetOnFloor, Pin, feet_on_floor, world_of
-from ....edit.pins.floor_here import foot_height
 from ....edit.pins.moved import moved_clip
 from ....edit.pins.solve_pins import missed, resolve
 from ....edit.smooth import smoothed

@@ -9,7 +9,7 @@ swings past it: meanwhile, it is let go only after `PASSED_S`, or when it rises.
 fitted to these places and to the floor (`Support`), from which the distance of the body follows.
 The legs then bridge what smoothing has left between held feet and their places: they bend, and the
 rest of the body stays. Where a hold begins or ends, what it would change abruptly dies away
-(`transition`).
+(`Transition`).
 
 A place can be wrong from the beginning, as after a cut of the footage, or where frames are rare and
 smoothing has not yet followed. The fits then stay at that place, too, and bend the body. So a foot
@@ -18,6 +18,12 @@ that the image shows elsewhere for `DISPLACED_S` is let go, and not held for a w
 The places drift towards where the fits have the points, because an error in where a hold began
 would otherwise tilt the body for as long as it lasts: fast while size and floor are being
 estimated, slowly afterwards.
+
+Where a hold begins or ends, the remainder r of an offset is what the change would add: it is taken
+over, and dies away. It follows r''' = −3ω r'' − 3ω² r' − ω³ r. At a change, the difference of the
+old and the new offset and that of their velocities are added to r and r', so that position,
+velocity and acceleration continue; with c₀ = r, c₁ = r' + ω r and c₂ = (r'' + 2ω r' + ω² r) / 2, a
+time t later r = (c₀ + c₁ t + c₂ t²) exp(−ω t).
 """
 
 from __future__ import annotations
@@ -29,21 +35,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver import Body
-from ...capture.world.placement import VISIBLE_CONFIDENCE
-from ...capture.world.stance import floor_probability
-from ...kinematics.contact_points import (
+from ...solver import Body
+from ..capture.world.placement import VISIBLE_CONFIDENCE
+from ..capture.world.stance import floor_probability
+from ..kinematics.contact_points import (
     CONTACT_POINTS,
     FOOT_PARTS,
     SOLES,
     contact_point_positions,
     with_contact_points,
 )
-from ...kinematics.leg_reach import move_feet
-from ...kinematics.standing import CONTACT_SPEED_M_S, logistic, resting_probability, speed_across
-from ..causal_fit import SAME_SHAPE, FittedFrame
-from .support import Support
-from .transition import Transition
+from ..kinematics.leg_reach import move_feet
+from ..kinematics.standing import CONTACT_SPEED_M_S, logistic, resting_probability, speed_across
+from .causal_fit import SAME_SHAPE, FittedFrame, Support
 
 WINDOW_S = 0.6
 SPEED_FRAMES = 3  # at least in the window, from which speeds can be computed
@@ -279,3 +283,56 @@ def _rise(lowest: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """
     rise = SOFT_M * np.logaddexp(0.0, -lowest / SOFT_M)
     return np.asarray(rise * floor_probability(np.minimum(lowest, 0.0)))
+
+
+class Transition:
+    """The remainders of some offsets (n, 3).
+
+    :param hz: ω / 2π.
+    """
+
+    def __init__(self, n: int, hz: float) -> None:
+        self._omega = 2 * np.pi * hz
+        self._r: NDArray[np.float64] = np.zeros((n, 3))
+        self._v = np.zeros((n, 3))
+        self._a = np.zeros((n, 3))
+
+    @property
+    def remainder(self) -> NDArray[np.float64]:
+        """What is to be added to the present offsets (n, 3)."""
+        return self._r
+
+    def advance(self, step_s: float) -> None:
+        """Let time pass."""
+        w = self._omega
+        t = step_s
+        c0 = self._r
+        c1 = self._v + w * self._r
+        c2 = (self._a + 2 * w * self._v + w * w * self._r) / 2
+        value = c0 + (c1 + c2 * t) * t
+        slope = c1 + 2 * c2 * t
+        decay = np.exp(-w * t)
+        self._r = value * decay
+        self._v = (slope - w * value) * decay
+        self._a = (2 * c2 - 2 * w * slope + w * w * value) * decay
+
+    def change(
+        self,
+        where: NDArray[np.bool_],
+        old: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
+        new: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
+        step_s: float,
+    ) -> None:
+        """Take over the difference of two courses of the offsets as of the frame before; `advance`
+        comes after it.
+
+        A long step then leaves time for the difference to die away.
+
+        :param where: (n,) which offsets change from one to the other.
+        :param old: (n, 3) as they were in the frame before, and would be now.
+        :param new: (n, 3) as they would have been in the frame before, and are now.
+        :param step_s: seconds between the two frames.
+        """
+        self._r = self._r + where[:, None] * (old[0] - new[0])
+        if step_s > 0:
+            self._v = self._v + where[:, None] * ((old[1] - old[0]) - (new[1] - new[0])) / step_s
