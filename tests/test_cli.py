@@ -231,7 +231,6 @@ def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch)
     monkeypatch.chdir(tmp_path)
     before = state()
     for argv in (
-        ["capture", *BRIEF],
         ["capture", SAMPLE, *BRIEF, "--overlay", "check.mp4"],
         ["batch", SAMPLE.parent, "--out", "motions", "--formats", "npz", *BRIEF],
     ):

@@ -128,7 +128,7 @@ def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatc
     n = 0
     failed = 0
     while True:
-        n += 1
+        n = later(n)
         for name in names:
             (out / name).write_bytes(OLD)
         capfd.readouterr()

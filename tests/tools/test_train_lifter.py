@@ -13,26 +13,26 @@ from scope.scope_addon.capture.perception.lifter import (
 
 from ..required import missing, package
 
-try:
-    import torch
-except ImportError:
-    missing(
-        "torch is not installed, which trains the lifting network: pip install torch",
-        "SCOPE_WITHOUT_TRAINING",
-    )
 
-from scope.tools.train_lifter import network_input
-from scope.tools.train_lifter.network import LiftingNetwork
-
-
-@pytest.fixture(autouse=True)
-def _seed():
-    torch.set_num_threads(1)  # with more, small batches wait for other processes' threads
+@pytest.fixture
+def torch():
+    """PyTorch, which takes seconds to load: not while tests are collected."""
+    try:
+        import torch
+    except ImportError:
+        missing(
+            "torch is not installed, which trains the lifting network: pip install torch",
+            "SCOPE_WITHOUT_TRAINING",
+        )
+    torch.set_num_threads(1)  # With more, small batches wait for other processes' threads.
     torch.manual_seed(0)
+    return torch
 
 
-def test_the_input_is_that_of_captures():
+def test_the_input_is_that_of_captures(torch):
     """`network_input` of the product is the second implementation."""
+    from scope.tools.train_lifter import network_input
+
     rng = np.random.default_rng(0)
     rays = rng.normal(0, 0.3, (6, 33, 2))
     world = rng.normal(0, 0.4, (6, 33, 3))
@@ -46,9 +46,10 @@ def test_the_input_is_that_of_captures():
     assert np.allclose(R_ours[0], R, atol=1e-9)
 
 
-def test_the_exported_network_is_the_trained_one(tmp_path):
+def test_the_exported_network_is_the_trained_one(torch, tmp_path):
     package("onnx")
     from scope.tools.train_lifter.export import export, read_exported
+    from scope.tools.train_lifter.network import LiftingNetwork
 
     network = LiftingNetwork(width=32, blocks=2)
     for p in network.parameters():

@@ -45,6 +45,7 @@ def registered(tmp_path, monkeypatch):
     """Register the extension in a fresh Blender. Each test has its own cache; all share the
     compiled solver.
     """
+    from scope.scope_addon.machine_code import code_folders
     from scope.scope_addon.ui import preferences
     from scope.scope_addon.ui.capture import capture_job
 
@@ -52,6 +53,8 @@ def registered(tmp_path, monkeypatch):
     scope.register()
     monkeypatch.setattr(body_file, "load_body", load_body_once)
     monkeypatch.setattr(preferences, "user_folder", lambda: tmp_path / "user")
+    # What this process compiles later would lie in a test's folder, where nobody finds it again.
+    monkeypatch.setattr(code_folders, "keep_in", lambda folder: None)
     monkeypatch.setattr(
         capture_job,
         "WorkerProcess",

@@ -54,9 +54,7 @@ def all_kept(
     ("people", "frame", "goes_on_at_s"),
     [
         ("largest", 40, 0.0),
-        ("largest", 75, 1.0),
         (2, 75, 1.0),
-        (2, 130, 3.0),
         ("largest", 210, 3.0),
     ],
 )
@@ -94,18 +92,16 @@ def flipped(whole: bytes) -> bytes:
     return whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
 
 
-@pytest.mark.parametrize("damage", [lambda whole: whole[:-100], flipped])
 def test_from_a_damaged_window_on_a_stopped_clip_is_observed_again(
     windows_of: Callable[..., list[Track]],
     undisturbed: Callable[..., list[Track]],
     observed_times: list[float],
     all_kept: Path,
-    damage: Callable[[bytes], bytes],
 ) -> None:
     (third,) = all_kept.glob("windows-*/window00002.npz")
     third.unlink()  # as of a clip that was stopped in its last window
     (second,) = all_kept.glob("windows-*/window00001.npz")
-    second.write_bytes(damage(second.read_bytes()))
+    second.write_bytes(flipped(second.read_bytes()))
     whole = undisturbed()
     observed_times.clear()
     tracks = windows_of(options(), None, all_kept)

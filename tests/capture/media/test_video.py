@@ -473,11 +473,8 @@ def test_seeking_in_containers_with_unreliable_frame_counts(
 # Real clips: sizes, rates and counts of ../shared/data/README.md
 
 CLIPS = [
-    ("clips/walk_side_static.mp4", 1768, 994, 30, 230),
     ("clips/squats_5fps.mp4", 720, 1280, 5, 65),
-    ("clips/gesture_square.mp4", 576, 576, 30, 120),
     ("clips/two_people_portrait.mp4", 1080, 1920, 12, 40),
-    ("clips/hand_closeup.mp4", 620, 1080, 25, 325),
     ("pose2sim/cam1.mp4", 1080, 1920, 60, 100),
 ]
 

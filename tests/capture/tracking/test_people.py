@@ -603,7 +603,7 @@ def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: 
 @pytest.mark.usefixtures("networks")
 @pytest.mark.parametrize(
     ("cameras", "crossing"),
-    [(("cam2", "cam3"), True), (("cam4", "cam1"), True), (("cam1", "cam3"), False)],
+    [(("cam2", "cam3"), True), (("cam1", "cam3"), False)],
 )
 def test_identities_of_real_people_are_never_switched(
     shared: Path, cameras: tuple[str, str], crossing: bool

@@ -553,22 +553,6 @@ def test_an_empty_schedule_is_refused_and_none_is_the_default(warm):
     assert costs[0] == costs[1]
 
 
-def test_wrong_states_priors_and_trees_are_refused():
-    body, state = scene(11)
-    m = measured(body, state)
-    with pytest.raises(
-        ShapeError,
-        match=r"Omega must have shape \(23, 3, 3\), but got shape \(22, "
-        r"3, 3\)",
-    ):
-        fit(body, m, init=State(state[0], state[1], state[2][1:], state[3]))
-    with pytest.raises(ShapeError, match="shape prior"):
-        fit(body, m, priors=Priors(shape_mean=np.zeros(3)))
-    body.parents = np.array([-1, 2, 1, *range(2, 23)])
-    with pytest.raises(ShapeError, match="before their children"):
-        fit(body, m)
-
-
 def test_one_solver_fits_cold_and_warm_by_turns_as_a_new_one_for_each_does():
     body, state = scene(3)
     m = measured(body, state, noise=1.0)
