@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from .disks import new_disk, problem_with
-from .kills import COMMANDS, check_command, chosen
+from .kills import COMMANDS, check_command
 from .system_calls import AVAILABLE, CUT, FULL, KILL, NO_MEMORY, traced
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Linux on x86-64")
@@ -70,18 +70,6 @@ def test_a_file_that_is_not_synced_is_lost_by_a_power_cut() -> None:
         assert path.read_text() == "whole"
         disk.cut()
         assert path.read_text() != "whole"
-
-
-def test_several_commands_and_faults_can_be_named() -> None:
-    """Names of two commands chose neither, and nothing was run."""
-    assert [(c.name, a) for c, a in chosen(["live", "cache", KILL])] == [
-        ("live", KILL),
-        ("cache", KILL),
-    ]
-    assert [(c.name, a) for c, a in chosen(["compile"])] == [("compile", KILL), ("compile", FULL)]
-    assert len(chosen([])) == sum(len(command.actions) for command in COMMANDS)
-    with pytest.raises(SystemExit, match="no command or fault lives; there are batch, "):
-        chosen(["lives"])
 
 
 PROGRAM = """

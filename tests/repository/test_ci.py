@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -19,8 +18,6 @@ from ..required import package
 ROOT = Path(__file__).resolve().parents[2]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 RELEASE = ROOT / ".github" / "workflows" / "release.yml"
-# what takes minutes otherwise, so that the build has begun
-AFTER_THE_BUILD = {"fuzz", "matrix", "browser"}
 PREPARES = {"./scripts/setup", "./scripts/debian"}  # which the others call where they need it
 
 
@@ -34,52 +31,6 @@ def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
     assert local - PREPARES == scripts(
         (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
     )
-
-
-def run_locally(folder: Path, *failing: str) -> subprocess.CompletedProcess[str]:
-    """Run `.ci/run` where every script only says its name and arguments, and some of them fail."""
-    for name in scripts((ROOT / ".ci" / "run").read_text("utf-8")):
-        (folder / "scripts").mkdir(exist_ok=True)
-        script = folder / name
-        status = 3 if script.name in failing else 0
-        waits = (
-            "until test -s build/build.log; do sleep 0.05; done; "
-            if script.name in AFTER_THE_BUILD
-            else ""
-        )
-        script.write_text(f'#!/bin/sh\n{waits}echo "$0 $*," && exit {status}\n')
-        script.chmod(0o755)
-    (folder / ".ci").mkdir()
-    shutil.copy2(ROOT / ".ci" / "run", folder / ".ci" / "run")
-    return subprocess.run(
-        [folder / ".ci" / "run"], capture_output=True, text=True, check=False, timeout=60
-    )
-
-
-@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
-@pytest.mark.parametrize("failing", ["debian", "build", "fuzz", "blender"])
-def test_a_failure_fails_the_local_run_and_is_shown_also_in_the_background(
-    tmp_path: Path, failing: str
-) -> None:
-    done = run_locally(tmp_path, failing)
-    assert done.returncode == 3
-    assert f"./scripts/{failing} " in done.stdout
-
-
-@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
-def test_a_failure_in_the_background_is_shown_beside_another(tmp_path: Path) -> None:
-    done = run_locally(tmp_path, "build", "browser")
-    assert done.returncode == 3
-    assert "./scripts/browser " in done.stdout
-    assert "./scripts/build " in done.stdout
-
-
-@pytest.mark.skipif(os.name == "nt", reason="the first bash there may be that of another Linux")
-def test_the_local_run_builds_every_zip_before_the_extension_is_tested(tmp_path: Path) -> None:
-    done = run_locally(tmp_path)
-    assert done.returncode == 0, done.stderr
-    # no platform: all of them
-    assert done.stdout.endswith("./scripts/build ,\n./scripts/blender ,\n")
 
 
 def test_all_that_is_run_exists() -> None:

@@ -146,15 +146,6 @@ def defined(header: set[str]) -> Counter:
     )
 
 
-def test_the_tables_of_a_page_are_found(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text(
-        "| key | b |\n|---|---|\n| `x` | 1 |\n\n```text\n| key |\n```\n\n| other | b "
-        "|\n|---|---|\n| y | 2 |\n"
-    )
-    assert tables(page) == [("key", [["`x`", "1"]]), ("other", [["y", "2"]])]
-
-
 def test_every_option_is_defined_once_in_the_command_line_page():
     known = set().union(*options().values())
     assert {"-o", "--output", "VIDEO", "--jobs"} <= known
@@ -265,20 +256,6 @@ def anchors(page: Path) -> set[str]:
     return {
         re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", h).lower()).replace(" ", "-") for h in headings
     }
-
-
-def test_folders_of_others_are_not_searched_for_pages(tmp_path):
-    for name in (
-        "a.md",
-        "docs/b.md",
-        "build/c.md",
-        "build/root/docs/d.md",
-        ".venv/e.md",
-        "docs/f.txt",
-    ):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).touch()
-    assert pages_under(tmp_path) == [tmp_path / "a.md", tmp_path / "docs" / "b.md"]
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())

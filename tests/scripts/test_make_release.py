@@ -102,30 +102,6 @@ def test_sources_that_are_committed_dated_and_not_tagged_elsewhere_may_be_releas
     assert capsys.readouterr().err.count("this is a dry run, otherwise") == 2
 
 
-def test_addresses_of_zips_elsewhere_keep_their_names(release):
-    def listing():
-        return {"data": [{"archive_url": "./scope-1.zip"}, {"archive_url": "./scope-2.zip"}]}
-
-    assert release.listing_of_zips(listing(), "") == listing()
-    elsewhere = release.listing_of_zips(listing(), "https://example.com/download/v1/")
-    assert [each["archive_url"] for each in elsewhere["data"]] == [
-        "https://example.com/download/v1/scope-1.zip",
-        "https://example.com/download/v1/scope-2.zip",
-    ]
-
-
-def test_the_listing_has_every_text_that_the_platform_asks_for(release):
-    manifest = release.manifest()
-    text = release.listing_text(manifest, (ROOT / "README.md").read_text("utf-8"), "- Notes.\n")
-    assert manifest["tagline"] in text
-    for name, why in manifest["permissions"].items():
-        assert f"- {name}: {why}" in text
-    for section in release.SECTIONS:
-        assert f"### {section}\n" in text
-    assert "- Notes." in text
-    assert "](" not in re.sub(r"\]\(https?://", "", text)
-
-
 def test_pictures_have_the_size_of_the_platform(release, tmp_path):
     import cv2
 
