@@ -37,8 +37,7 @@ from .character import (
 )
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
-from .datablock_names import short_name
-from .local_scene import check_local
+from .datablocks import check_local, short_name
 
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
 # Custom property of a capture's collection: the names of its markers on the timeline, by lines.

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 import bpy
 
-from .animation_data.removal import remove_blocks
 from .build import MARKERS
 from .character.bone_display import remove_if_unused
 from .character.root_object import ROOT_TAG
+from .datablocks import remove_blocks
 from .packed_motion import motion_texts
 
 

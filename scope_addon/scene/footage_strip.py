@@ -11,7 +11,7 @@ import bpy
 
 from ..errors import VideoError
 from ..footage import PICTURE_SUFFIXES
-from .local_scene import check_local
+from .datablocks import check_local
 
 _OURS = "scope_footage"  # custom property of the strips that are added here
 

@@ -20,16 +20,15 @@ from ..motion import Motion
 from ..notices import Notice
 from .animation_data import timing
 from .animation_data.actions import fcurves, frame_range
-from .animation_data.frame_spans import FrameSpan, parse_spans
-from .animation_data.retime import Retiming, action_strips, retime_keys, retime_strip
-from .animation_data.stored_values import start_frame
+from .animation_data.stored_values import FrameSpan, parse_spans, start_frame
+from .animation_data.timing import Retiming, action_strips, retime_keys, retime_strip
 from .camera import same_camera, show_footage_again, view_number
 from .character.confidence_curves import MARKER_NAMES
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
-from .datablock_names import holds
+from .datablocks import holds
 from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")

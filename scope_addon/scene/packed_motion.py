@@ -20,7 +20,7 @@ from ..motion import Motion
 # property of the armature: the text, or the path of a motion file in older .blend files
 MOTION = "scope_motion"
 _CONTENT = "motion"  # property of the text: bytes of the motion file
-# property of the text: bytes of ``character/corrections/uncorrected_keys.py``
+# property of the text: bytes of ``character/uncorrected_keys.py``
 _KEYS = "uncorrected_keys"
 _LARGEST_BYTES = 1 << 30  # packed; an hour at 60 frames per second takes a tenth
 _NOTE = """\

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..scene.datablock_names import holds
+from ..scene.datablocks import holds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -142,7 +142,7 @@ def set_motion_of(armature: bpy.types.Object, motion: Motion, keys: bytes = b"")
     duplicates keep it.
 
     :param keys: the keys from before the motion's corrections, see
-        ``scene/character/corrections/uncorrected_keys.py``.
+        ``scene/character/uncorrected_keys.py``.
     """
     from ..scene.packed_motion import pack_motion
 

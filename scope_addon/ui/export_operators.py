@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..options import Place
-from ..scene.datablock_names import holds
+from ..scene.datablocks import holds
 from .capture.captures import captures_of, people_of, shown_capture
 from .captured_person import PERSON, body_of, motion_of
 from .declared_properties import with_options

@@ -52,9 +52,8 @@ WRITES = {
     "scope_addon/job/finished_clip.py",
     "scope_addon/job/preview.py",
     "scope_addon/motion.py",
-    "scope_addon/scene/character/corrections/uncorrected_keys.py",
+    "scope_addon/scene/character/uncorrected_keys.py",
     "scope_addon/scene/export/formats.py",
-    "scope_addon/scene/export/glb_times.py",
 }
 
 

@@ -127,4 +127,4 @@ def test_no_operator_of_the_panel_opens_a_rigs_file():
         for path in sources("scope_addon")
         if any(name in path.read_text("utf-8") for name in importers)
     ]
-    assert readers == ["completeness", "rig_file"]  # the first reads what Scope has just written
+    assert readers == ["formats", "rig_file"]  # the first reads what Scope has just written

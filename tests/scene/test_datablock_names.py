@@ -4,7 +4,7 @@
 import bpy
 import pytest
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.datablock_names import SUFFIX_BYTES, holds, is_in_layer, short_name
+from scope.scope_addon.scene.datablocks import SUFFIX_BYTES, holds, is_in_layer, short_name
 
 
 @pytest.mark.parametrize("letter", ["x", "é", "歩", "🏃"])

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
-from scope.scope_addon.scene.animation_data.frame_spans import parse_spans, spans_text
+from scope.scope_addon.scene.animation_data.stored_values import parse_spans, spans_text
 from scope.scope_addon.scene.animation_data.timing import keyed_rate
 from scope.scope_addon.scene.camera import set_resolution
 from scope.scope_addon.scene.character.correction_list import listed_corrections

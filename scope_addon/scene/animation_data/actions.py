@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and writing keyframes in bulk. Only this module depends on how Blender stores them.
+"""Reading and writing keyframes and the modifiers of curves in bulk. Only this module depends on
+how Blender stores them.
 
 Since 4.4 an action holds layers -> strips -> one channelbag per slot, and each animated datablock
 picks a slot. Before, an action held F-curves directly and served one type of datablock; 5.0 removed
@@ -19,7 +20,6 @@ from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
 from ...errors import UsageError
-from .fcurve_modifiers import read_modifiers, write_modifiers
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
@@ -35,6 +35,7 @@ _KEY = (
     ),
     *((f"select_{part}", 1, np.bool_) for part in ("control_point", "left_handle", "right_handle")),
 )
+_ENVELOPE_POINTS = "control_points"  # of an envelope
 
 
 def has_slots() -> bool:
@@ -463,3 +464,44 @@ def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | Non
     if not spans:
         return None
     return min(s[0] for s in spans), max(s[1] for s in spans)
+
+
+def read_modifiers(curve: bpy.types.FCurve) -> list[dict[str, Any]]:
+    """Return the type and the settings of each modifier of a curve."""
+    return [{"type": modifier.type, **_settings(modifier)} for modifier in curve.modifiers]
+
+
+def write_modifiers(curve: bpy.types.FCurve, wanted: list[dict[str, Any]]) -> None:
+    """Replace the modifiers of a curve.
+
+    :param wanted: from ``read_modifiers``. Cycles must come first, if at all.
+    """
+    for modifier in list(curve.modifiers):
+        curve.modifiers.remove(modifier)
+    for values in wanted:
+        modifier = curve.modifiers.new(values["type"])
+        points = values.get(_ENVELOPE_POINTS, ())
+        for frame, _, _ in points:
+            modifier.control_points.add(frame)
+        # Blender 5.2 can crash when one point's value is assigned; foreach_set calls no update
+        if points:
+            modifier.control_points.foreach_set("min", [low for _, low, _ in points])
+            modifier.control_points.foreach_set("max", [high for _, _, high in points])
+        for _ in range(2):  # some settings are limited by others
+            for name, value in values.items():
+                if name not in ("type", "active", _ENVELOPE_POINTS):
+                    setattr(modifier, name, value)
+    for modifier, values in zip(curve.modifiers, wanted, strict=True):
+        if values.get("active"):  # a new modifier takes this from the others
+            modifier.active = True
+
+
+def _settings(modifier: bpy.types.FModifier) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for prop in modifier.bl_rna.properties:
+        value = getattr(modifier, prop.identifier)
+        if prop.identifier == _ENVELOPE_POINTS:
+            found[_ENVELOPE_POINTS] = [(point.frame, point.min, point.max) for point in value]
+        elif not prop.is_readonly:
+            found[prop.identifier] = tuple(value) if getattr(prop, "is_array", False) else value
+    return found

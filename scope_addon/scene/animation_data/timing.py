@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frame rates, and the position of each key on Blender's timeline.
+"""Frame rates, the position of each key on Blender's timeline, and moving keys and NLA strips for a
+scene that gets another rate.
 
 Blender stores a rate as the integer ``fps`` over the float ``fps_base``; 29.97 is 30 / 1.001 there,
 never 29 or 30. A pose seen at ``timestamp`` seconds is keyed at ``start_frame + timestamp · rate``,
@@ -10,14 +11,16 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import MotionFileError, UsageError
-from .retime import Retiming
+from .actions import fcurves_of
 from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24
@@ -28,6 +31,7 @@ POLICIES = ("keep", "set")
 RATE_POLICIES = (*POLICIES, "resample")
 # custom property of an armature: the frame range of the cycle, and that of the scene before it
 _CYCLE = "scope_cycle"
+_WHOLE = 1e-3  # keys this close to a whole frame are put on it
 
 
 def blender_rate(frames_per_second: float) -> tuple[int, float]:
@@ -179,3 +183,65 @@ def _stored_ranges(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[i
     ):
         return (), ()
     return frames[:2], frames[2:]
+
+
+@dataclass(frozen=True)
+class Retiming:
+    """Moves scene frames: ``origin`` stays, and the distance from it is multiplied by
+    ``factor``.
+    """
+
+    origin: float
+    factor: float
+
+    def frame(self, frame: float) -> float:
+        """Return where a frame is moved to."""
+        return self.origin + self.factor * (frame - self.origin)
+
+    def frames(self, frames: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return where keys (T,) are moved to; those within their precision of a whole frame are
+        put on it.
+        """
+        moved = self.origin + self.factor * (frames.astype(float) - self.origin)
+        whole = np.round(moved)
+        near = np.abs(moved - whole) < np.maximum(
+            _WHOLE, 4 * self.factor * np.spacing(np.abs(frames))
+        )
+        return np.where(near, whole, moved)
+
+    def span(self, first: int, last: int) -> tuple[int, int]:
+        """Return the whole frames that contain a span of frames after it is moved."""
+        return math.floor(self.frame(first) + _WHOLE), math.ceil(self.frame(last) - _WHOLE)
+
+
+def retime_keys(action: bpy.types.Action, retiming: Retiming) -> None:
+    """Move every key of an action, with its handles."""
+    for curve in fcurves_of(action):
+        keys = curve.keyframe_points
+        for name in ("co", "handle_left", "handle_right"):
+            values = np.empty(2 * len(keys), np.float32)
+            keys.foreach_get(name, values)
+            values[::2] = retiming.frames(values[::2])
+            keys.foreach_set(name, values)
+        curve.update()
+
+
+def action_strips(animation: bpy.types.AnimData) -> list[bpy.types.NlaStrip]:
+    """Return the NLA strips of a datablock that play an action."""
+    return [
+        s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action
+    ]
+
+
+def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
+    """Move an NLA strip, with the part of its action that it plays; the action's keys are not
+    moved.
+    """
+    ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
+    start, end, first, last = (retiming.frame(frame) for frame in ends)
+    # Blender keeps the end after the start
+    strip.action_frame_end = max(last, strip.action_frame_start + 1.0)
+    strip.action_frame_start = first
+    strip.action_frame_end = last
+    strip.frame_start_raw = start
+    strip.frame_end_raw = end

@@ -19,7 +19,7 @@ from ...motion import Motion
 from ...notices import REASONS
 from ...review_spans import find_review_spans
 from ..animation_data.actions import Channels, bone_property_path
-from ..animation_data.frame_spans import in_scene
+from ..animation_data.stored_values import in_scene
 
 CONFIDENCE = "confidence"
 CONTACT = "contact"

@@ -93,7 +93,7 @@ def _entry(
         Pin,
         Upright,
     )
-    from .corrections.corrected_keys import frames_that_show, scene_frame
+    from .corrected_keys import frames_that_show, scene_frame
 
     whole = int(motion.frames[0]), int(motion.frames[-1])
     if isinstance(correction, Pin):

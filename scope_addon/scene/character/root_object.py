@@ -19,9 +19,9 @@ from ...edit.pins.moved import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
 from ..animation_data.actions import Channels, check_not_in_nla, fcurves, read_keys
-from ..animation_data.removal import remove_blocks
-from ..animation_data.retime import Retiming
 from ..animation_data.stored_values import stored_numbers
+from ..animation_data.timing import Retiming
+from ..datablocks import remove_blocks
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty

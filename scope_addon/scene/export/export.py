@@ -3,7 +3,9 @@
 captured motion alone are written by ``without_scene``.
 
 Captures are linked to a temporary scene, so that nothing else of the user's file is exported and
-the result does not depend on selection or visibility. Files are written atomically.
+the result does not depend on selection or visibility. Files are written atomically. The bones can
+have the names of other skeletons, for programs that know these: only the names change, the rest
+pose is the body's T-pose, the bones those of the body.
 """
 
 from __future__ import annotations
@@ -11,8 +13,8 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -44,10 +46,28 @@ from .export_states import (
     unit_of_captures,
 )
 from .output_paths import WITHOUT_SCENE, check_output, person_paths
-from .skeleton_names import OWN, SKELETONS, renamed_bones
 from .without_scene import write_without_scene
 
 SHAPES = ("auto", "keys", "baked")
+OWN = "scope"  # the names of the body's own joints
+SKELETONS = (OWN, "mixamo", "ue5", "vrm", "unity")
+_CENTRE = ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
+_SIDED = ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+# Names of the centre, and of the sides without what tells them apart.
+_MIXAMO = (
+    ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head"),
+    ("UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand"),
+)
+_UE5 = (
+    ("pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head"),
+    ("thigh", "calf", "foot", "ball", "clavicle", "upperarm", "lowerarm", "hand"),
+)
+_UNITY = (
+    ("Hips", "Spine", "Chest", "UpperChest", "Neck", "Head"),
+    ("UpperLeg", "LowerLeg", "Foot", "Toes", "Shoulder", "UpperArm", "LowerArm", "Hand"),
+)
+_PHALANGES = ("Proximal", "Intermediate", "Distal")
 
 
 @dataclass(frozen=True)
@@ -285,3 +305,64 @@ def _reason(error: RuntimeError | OSError) -> str:
         f"{cause}; "
         f"{'free some space or choose another folder' if is_systems else 'try another format'}"
     )
+
+
+def bone_names(skeleton: str) -> dict[str, str]:
+    """Return the names of a skeleton's bones by the body's joints.
+
+    :param skeleton: one of ``SKELETONS``, except the body's own.
+    """
+    centre, sided = {"mixamo": _MIXAMO, "ue5": _UE5}.get(skeleton, _UNITY)
+    names = {part: _spelled(skeleton, "", name) for part, name in zip(_CENTRE, centre, strict=True)}
+    for side in ("left", "right"):
+        for part, name in zip(_SIDED, sided, strict=True):
+            names[f"{side}_{part}"] = _spelled(skeleton, side, name)
+        for finger in _FINGERS:
+            for k in (1, 2, 3):
+                names[f"{side}_{finger}{k}"] = _phalanx(skeleton, side, finger, k)
+        # The middle of the hand, in bodies without fingers.
+        names[f"{side}_hand"] = names[f"{side}_middle1"]
+    return names
+
+
+def _spelled(skeleton: str, side: str, name: str) -> str:
+    """Return a bone's name with its side."""
+    if skeleton == "mixamo":
+        return f"mixamorig:{side.title()}{name}"
+    if skeleton == "ue5":
+        return f"{name}_{side[0]}" if side else name
+    whole = side.title() + name
+    return whole if skeleton == "unity" else whole[0].lower() + whole[1:]
+
+
+def _phalanx(skeleton: str, side: str, finger: str, k: int) -> str:
+    """Return the name of a finger's k-th bone from the knuckle on, of a thumb from the palm on."""
+    if skeleton == "mixamo":
+        return _spelled(skeleton, side, f"Hand{finger.title()}{k}")
+    if skeleton == "ue5":
+        return _spelled(skeleton, side, f"{finger}_{k:02d}")
+    phalanges = _PHALANGES
+    if finger == "thumb" and skeleton == "vrm":
+        phalanges = ("Metacarpal", "Proximal", "Distal")
+    whole = "Little" if finger == "pinky" else finger.title()
+    return _spelled(skeleton, side, whole + phalanges[k - 1])
+
+
+@contextmanager
+def renamed_bones(rigs: Sequence[bpy.types.Object], skeleton: str) -> Iterator[None]:
+    """Give the bones of captured people the names of a skeleton inside the block; vertex groups and
+    keys follow.
+    """
+    names = {} if skeleton == OWN else bone_names(skeleton)
+    renamed: list[tuple[bpy.types.Bone, str]] = []
+    try:
+        for armature in {rig.data for rig in rigs}:
+            # A body without fingers has the middle of the hand, one with fingers has the knuckle.
+            for joint in [joint for joint in names if joint in armature.bones]:
+                bone = armature.bones[joint]
+                renamed.append((bone, joint))
+                bone.name = names[joint]
+        yield
+    finally:
+        for bone, joint in reversed(renamed):
+            bone.name = joint

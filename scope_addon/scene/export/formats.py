@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One writer per file format, with the settings that other tools need."""
+"""One writer per file format, with the settings that other tools need, and checks that Blender has
+written a file to its end: some of its writers do not report that a write failed.
+
+Of a binary glTF at frame rates such as 29.97, the key times are corrected. Blender's exporter
+computes the rate as ``fps`` times ``fps_base`` instead of fps / fps_base: 29.97 becomes 30.03, and
+the motion drifts from the footage's sound. Therefore a scene is written at its integer ``fps``, and
+the times in the file are scaled afterwards. (Blender's importer has the same error as its
+exporter.)
+"""
 
 from __future__ import annotations
 
 import ctypes
 import errno
 import io
+import json
 import os
 import re
+import struct
 import sys
 from collections.abc import Iterator
 from contextlib import (
@@ -29,9 +39,18 @@ from numpy.typing import NDArray
 from ...errors import OutputError
 from ..animation_data import timing
 from . import bvh
-from .completeness import is_whole_blend, is_whole_crate
 from .fbx_file import correct_fbx
-from .glb_times import corrected_key_times
+
+_CRATE = b"PXR-USDC"
+_SECTION = struct.Struct("<16sqq")  # name, start, size
+_ZSTANDARD = b"\x28\xb5\x2f\xfd"
+# magic numbers around the table of a seekable Zstandard file
+_TABLE = 0x184D2A5E
+_TABLE_END = 0x8F92EAB1
+_HAS_CHECKSUMS = 0x80
+# bytes: magic, version, length of the file; length, type of a chunk
+_HEADER = 12
+_CHUNK_HEADER = 8
 
 
 def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None:
@@ -310,3 +329,112 @@ def call_operator(operator: Any, **settings: Any) -> None:
         if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):
             raise KeyboardInterrupt from None
         raise
+
+
+def is_whole_crate(path: Path) -> bool:
+    """Return whether a USD crate file has its table of contents, and more than the root of the
+    scene.
+
+    The table is written last and located by the header. The exporter writes the file first without
+    and then with the scene.
+
+    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table
+    (8); the table is a count (8) of sections of 32 bytes each; the section of paths begins with
+    their count (8).
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(24)
+        if len(head) < 24 or head[:8] != _CRATE:
+            return False
+        (table,) = struct.unpack("<q", head[16:])
+        if not 24 <= table <= size - 8:
+            return False
+        file.seek(table)
+        (count,) = struct.unpack("<q", file.read(8))
+        if not 0 < count <= (size - table - 8) // _SECTION.size:
+            return False
+        sections = [_SECTION.unpack(file.read(_SECTION.size)) for _ in range(count)]
+        starts = [start for name, start, _ in sections if name.rstrip(b"\0") == b"PATHS"]
+        if not starts or not 0 <= starts[0] <= size - 8:
+            return False
+        file.seek(starts[0])
+        (paths,) = struct.unpack("<q", file.read(8))
+    return bool(paths > 1)
+
+
+def is_whole_blend(path: Path) -> bool:
+    """Return whether a .blend file is as long as its own table says, and Blender finds its end."""
+    if not _has_all_frames(path):
+        return False
+    try:
+        with bpy.data.libraries.load(str(path)):
+            return True
+    except OSError:
+        return False
+
+
+def _has_all_frames(path: Path) -> bool:
+    """Return whether the compressed parts of a .blend fill the file; True if it is not compressed.
+
+    Source: Zstandard, contrib/seekable_format: the file ends with a frame that lists the compressed
+    and the full size of every other one, their number, a byte of flags and a magic number.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if file.read(4) != _ZSTANDARD:
+            return True  # whether it is a .blend at all, Blender says
+        if size < 17:
+            return False
+        file.seek(size - 9)
+        count, flags, magic = struct.unpack("<IBI", file.read(9))
+        entry = 12 if flags & _HAS_CHECKSUMS else 8
+        start = size - 17 - count * entry
+        if magic != _TABLE_END or start < 0:
+            return False
+        file.seek(start)
+        if struct.unpack("<I", file.read(4))[0] != _TABLE:
+            return False
+        file.seek(4, 1)
+        table = file.read(count * entry)
+    return bool(sum(struct.unpack_from("<I", table, k * entry)[0] for k in range(count)) == start)
+
+
+@contextmanager
+def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+    """Correct the key times of the .glb that the block writes to ``path``."""
+    base = scene.render.fps_base
+    scene.render.fps_base = 1.0
+    try:
+        yield
+    finally:
+        scene.render.fps_base = base
+    if base != 1.0 and path.is_file():
+        _scale_times(path, base)
+
+
+def _scale_times(path: Path, factor: float) -> None:
+    """Multiply the times of all keys in the file."""
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, _HEADER)
+    begin = _HEADER + _CHUNK_HEADER
+    gltf = json.loads(data[begin : begin + length])
+    binary = bytearray(data[begin + length :])
+    for index in {
+        sampler["input"]
+        for animation in gltf.get("animations", ())
+        for sampler in animation["samplers"]
+    }:
+        accessor = gltf["accessors"][index]
+        start = gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0) + accessor.get(
+            "byteOffset", 0
+        )
+        times = np.frombuffer(binary, "<f4", accessor["count"], _CHUNK_HEADER + start)
+        times *= np.float32(factor)
+        accessor["min"] = [float(times.min())]
+        accessor["max"] = [float(times.max())]
+    text = json.dumps(gltf, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    total = begin + len(text) + len(binary)
+    head = data[:8] + struct.pack("<II", total, len(text)) + data[16:begin]
+    path.write_bytes(head + text + binary)

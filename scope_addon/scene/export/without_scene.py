@@ -1,5 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing the files that follow from motions alone. Free of bpy."""
+"""Writing the files that follow from motions alone. Free of bpy.
+
+Track row column files (.trc) of Motion Analysis, which OpenSim and Pose2Sim read, hold markers over
+time, in metres, with OpenSim's axes. Markers are joint centres of the body, and points on its
+surface, under the names that Pose2Sim has for them.
+
+Motion files (.mot) of OpenSim, and tables (.csv), hold joint angles over time, under the names of
+the coordinates of OpenSim's full-body model (Rajagopal 2015). Each segment has axes that, where a
+person stands with arms hanging and palms at the thighs, are x forward, y up, z to the right. With
+the segments' rotations R_1 and R_2 in the world, the angles of the joint between them are those of
+
+    R_1ᵀ R_2 = R_z(a) R_x(b) R_y(c),
+
+so that a is flexion, b is adduction, and c is rotation.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +21,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...atomic_write import write_result
+from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
-from .joint_angles import write_angles
 from .output_paths import person_paths
-from .trc import write_trc
 
 if TYPE_CHECKING:
     from ....solver.body import Body
+
+# Pose2Sim's names of joints, without their side, and ours.
+_JOINTS = {
+    "Hip": "hip",
+    "Knee": "knee",
+    "Ankle": "ankle",
+    "Shoulder": "shoulder",
+    "Elbow": "elbow",
+    "Wrist": "wrist",
+}
+# Likewise of keypoints on the surface.
+_KEYPOINTS = {"BigToe": "foot_index", "Heel": "heel", "Eye": "eye", "Ear": "ear"}
+_SIDES = {"R": "right", "L": "left"}
+_SIDE_OF = {"r": "right", "l": "left"}
+_PALM_AT_THIGH_DEG = 90.0  # of pronation, of which a palm that faces forward has none
 
 
 def write_without_scene(
@@ -35,3 +67,209 @@ def write_without_scene(
         else:
             motion.save(target)
     return targets
+
+
+def at_one_rate(
+    motion: Motion, columns: Sequence[NDArray[np.float64]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return times (S,) at the motion's rate, seconds, and the columns' values there, (S, N).
+
+    Values of a motion with a variable rate are interpolated linearly.
+
+    :param columns: N values (T,) over the motion's frames.
+    """
+    rate = motion.mocap_framerate
+    start_s = float(motion.timestamps[0])
+    count = 1 + round(float(motion.timestamps[-1] - start_s) * rate)
+    times_s = start_s + np.arange(count) / rate
+    rows = np.array([np.interp(times_s, motion.timestamps, column) for column in columns]).T
+    return times_s, rows
+
+
+def write_trc(path: Path, motion: Motion, body: Body) -> None:
+    """Write the markers of a motion.
+
+    :param body: that the motion was fitted with.
+    :raises OutputError: the file cannot be written.
+    """
+    write_result(path, trc_text(path.name, motion, body))
+
+
+def trc_text(name: str, motion: Motion, body: Body) -> str:
+    """Return the content of the file.
+
+    :param name: of the file, which stands in it.
+    """
+    names, markers = world_markers(motion, body)
+    rate = motion.mocap_framerate
+    columns = (markers @ R_OPENSIM_WORLD.T).reshape(len(motion), -1).T
+    times_s, rows = at_one_rate(motion, list(columns))
+    count = len(times_s)
+    numbers = range(1, len(names) + 1)
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\t"
+        "OrigNumFrames",
+        f"{rate:g}\t{rate:g}\t{count}\t{len(names)}\tm\t{rate:g}\t1\t{count}",
+        "Frame#\tTime\t" + "".join(f"{each}\t\t\t" for each in names).rstrip("\t"),
+        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in numbers),
+        "",
+    ]
+    for number, (time_s, row) in enumerate(zip(times_s, rows.tolist(), strict=True), 1):
+        lines.append(f"{number}\t{time_s:.6f}\t" + "\t".join(f"{value:.6f}" for value in row))
+    return "\n".join(lines) + "\n"
+
+
+def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.float64]]:
+    """Return the names of the M markers, and where they are (T, M, 3), world, metres."""
+    from ....solver import rotations  # Loads numba, and the command line starts without it.
+
+    betas = np.asarray(motion.betas, float)
+    R = rotations.exp(np.asarray(motion.poses, float).reshape(len(motion), -1, 3))
+    R_parts, joints = body.forward_kinematics(R, np.asarray(motion.trans, float), betas)
+    keypoints = body.keypoint_set("blazepose")
+    of_joints = {
+        f"{short}{ours}": f"{side}_{name}"
+        for short, side in _SIDES.items()
+        for ours, name in _JOINTS.items()
+    }
+    of_keypoints = {
+        f"{short}{ours}": f"{side}_{name}"
+        for short, side in _SIDES.items()
+        for ours, name in _KEYPOINTS.items()
+    }
+    of_keypoints["Nose"] = "nose"
+    at = [body.joint_names.index(name) for name in of_joints.values()]
+    which = [keypoints[name] for name in of_keypoints.values()]
+    on_surface = body.keypoints(R_parts, joints, betas, which)
+    hips = [body.joint_names.index(f"{side}_hip") for side in _SIDES.values()]
+    between = joints[:, hips].mean(axis=1, keepdims=True)
+    neck = joints[:, [body.joint_names.index("neck")]]
+    names = ["Hip", "Neck", *of_joints, *of_keypoints]
+    markers: NDArray[np.float64] = np.concatenate(
+        [between, neck, joints[:, at], on_surface], axis=1
+    )
+    return names, markers
+
+
+def write_angles(path: Path, motion: Motion, body: Body) -> None:
+    """Write the joint angles of a motion, as a .csv file or, with another suffix, as a .mot file.
+
+    :param body: that the motion was fitted with.
+    :raises OutputError: the file cannot be written.
+    """
+    angles = joint_angles(motion, body)
+    times_s, rows = at_one_rate(motion, list(angles.values()))
+    names = ["time", *angles]
+    separator = "," if path.suffix.lower() == ".csv" else "\t"
+    lines = [separator.join(names)]
+    for time_s, row in zip(times_s, rows.tolist(), strict=True):
+        lines.append(separator.join([f"{time_s:.6f}", *(f"{value:.6f}" for value in row)]))
+    if separator == "\t":
+        lines[:0] = [
+            path.stem,
+            "version=1",
+            f"nRows={len(times_s)}",
+            f"nColumns={len(names)}",
+            "inDegrees=yes",
+            "endheader",
+        ]
+    write_result(path, "\n".join(lines) + "\n")
+
+
+def joint_angles(motion: Motion, body: Body) -> dict[str, NDArray[np.float64]]:
+    """Return the angles (T,) of each joint, degrees without jumps by whole turns, and the place of
+    the pelvis, metres, by OpenSim's names.
+    """
+    from ....solver import rotations  # Loads numba, and the command line starts without it.
+
+    R_local = rotations.exp(np.asarray(motion.poses, float).reshape(len(motion), -1, 3))
+    betas = np.asarray(motion.betas, float)
+    R_world_part, joints = body.forward_kinematics(R_local, np.asarray(motion.trans, float), betas)
+    R_opensim_part = R_OPENSIM_WORLD @ R_world_part @ R_OPENSIM_MODEL.T
+    segments = {name: R_opensim_part[:, k] for k, name in enumerate(body.joint_names)}
+    pelvis = segments["pelvis"]
+    trunk = segments["spine3"]
+    tilt, listing, heading = _angles(pelvis)
+    place = joints[:, 0] @ R_OPENSIM_WORLD.T
+    found = {"pelvis_tilt": tilt, "pelvis_list": listing, "pelvis_rotation": heading}
+    found |= {f"pelvis_t{axis}": place[:, k] for k, axis in enumerate("xyz")}
+    for short in _SIDE_OF:
+        found |= _leg_angles(segments, short)
+    extension, bending, turn = _between(pelvis, trunk)
+    found |= {"lumbar_extension": extension, "lumbar_bending": bending, "lumbar_rotation": turn}
+    for short in _SIDE_OF:
+        found |= _arm_angles(segments, short)
+    return found
+
+
+def _leg_angles(
+    segments: dict[str, NDArray[np.float64]], short: str
+) -> dict[str, NDArray[np.float64]]:
+    """Return the angles of a leg; adduction, inversion and inward rotation are positive."""
+    side = _SIDE_OF[short]
+    inwards = 1.0 if short == "r" else -1.0
+    thigh, shin, foot, toes = (
+        segments[f"{side}_{part}"] for part in ("hip", "knee", "ankle", "foot")
+    )
+    flexion, adduction, rotation = _between(segments["pelvis"], thigh)
+    dorsiflexion, inversion, _ = _between(shin, foot)
+    return {
+        f"hip_flexion_{short}": flexion,
+        f"hip_adduction_{short}": inwards * adduction,
+        f"hip_rotation_{short}": inwards * rotation,
+        f"knee_angle_{short}": -_between(thigh, shin)[0],
+        f"ankle_angle_{short}": dorsiflexion,
+        f"subtalar_angle_{short}": inwards * inversion,
+        f"mtp_angle_{short}": _between(foot, toes)[0],
+    }
+
+
+def _arm_angles(
+    segments: dict[str, NDArray[np.float64]], short: str
+) -> dict[str, NDArray[np.float64]]:
+    """Return the angles of an arm; adduction, inward rotation, pronation, flexion of the wrist and
+    its deviation to the little finger are positive.
+    """
+    side = _SIDE_OF[short]
+    inwards = 1.0 if short == "r" else -1.0
+    # From the rest pose, in which arms are spread, to arms that hang.
+    R_hanging_spread = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -inwards], [0.0, inwards, 0.0]])
+    upper, forearm, hand = (
+        segments[f"{side}_{part}"] @ R_hanging_spread.T for part in ("shoulder", "elbow", "wrist")
+    )
+    flexion, adduction, rotation = _between(segments["spine3"], upper)
+    elbow, _, twist = _between(upper, forearm)
+    backwards, wrist_flexion, twist_of_wrist = _between(forearm, hand)
+    return {
+        f"arm_flex_{short}": flexion,
+        f"arm_add_{short}": inwards * adduction,
+        f"arm_rot_{short}": inwards * rotation,
+        f"elbow_flex_{short}": elbow,
+        f"pro_sup_{short}": _PALM_AT_THIGH_DEG + inwards * (twist + twist_of_wrist),
+        f"wrist_flex_{short}": inwards * wrist_flexion,
+        f"wrist_dev_{short}": -backwards,
+    }
+
+
+def _between(
+    R_first: NDArray[np.float64], R_second: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the angles of the joint between two segments, see `_angles`."""
+    return _angles(np.swapaxes(R_first, -1, -2) @ R_second)
+
+
+def _angles(
+    R: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return a, b and c of R = R_z(a) R_x(b) R_y(c), (T, 3, 3), in degrees without jumps by whole
+    turns.
+    """
+    about_z = np.arctan2(-R[:, 0, 1], R[:, 1, 1])
+    about_x = np.arcsin(np.clip(R[:, 2, 1], -1.0, 1.0))
+    about_y = np.arctan2(-R[:, 2, 0], R[:, 2, 2])
+    return (
+        np.degrees(np.unwrap(about_z)),
+        np.degrees(about_x),
+        np.degrees(np.unwrap(about_y)),
+    )

@@ -18,7 +18,7 @@ from ...errors import UsageError
 from ...retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ...retarget.guess import from_humanoid
 from ...retarget.rig_source import RigSource
-from ..animation_data.removal import NewDatablocks
+from ..datablocks import NewDatablocks
 from ..export import formats
 from ..export.export_states import temporary_scene
 from .rig_probe import at_rest, probe

@@ -45,8 +45,7 @@ from .rig_action import (
     root_locations,
     write_action,
 )
-from .rig_probe import at_rest, blocked_bones, probe
-from .rig_rest import rest_pose
+from .rig_probe import at_rest, blocked_bones, probe, rest_pose
 from .rigify_ik import ik_keys
 
 # Whose motion is missed where a rig has no bones for them.

@@ -30,7 +30,7 @@ from ...options import Place
 from ...options.body_choice import chosen_body
 from ...options.capture import AUTO
 from ...scene.build import BuildOptions, BuildResult, build_scene
-from ...scene.local_scene import check_local
+from ...scene.datablocks import check_local
 from ...scene.packed_motion import pack_motion
 from ...untrusted.body_file import load_body
 from ..declared_properties import option_values

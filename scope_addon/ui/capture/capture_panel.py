@@ -10,7 +10,7 @@ import bpy
 
 from ...footage import display_text
 from ...options import Section
-from ...scene.animation_data.frame_spans import parse_spans
+from ...scene.animation_data.stored_values import parse_spans
 from .. import warm_up
 from ..declared_properties import draw_section
 from ..export_operators import FORMATS, is_available

@@ -37,7 +37,7 @@ class SCOPE_PG_warning(bpy.types.PropertyGroup):
 
     text: StringProperty()  # in English
     record: StringProperty()  # JSON of the notice, from which it is shown in other languages
-    spans: StringProperty()  # scene frames; see `frame_spans`
+    spans: StringProperty()  # scene frames; see `stored_values`
 
 
 class SCOPE_PG_result(bpy.types.PropertyGroup):

@@ -14,7 +14,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ...notices import notice
-from ...scene.datablock_names import is_in_layer
+from ...scene.datablocks import is_in_layer
 from ..captured_person import captured_armature
 from ..reporting import iface_, sentence, tip_
 

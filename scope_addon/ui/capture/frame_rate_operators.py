@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...notices import Notice, notice
-from ...scene.animation_data.frame_spans import parse_spans, spans_text
-from ...scene.animation_data.stored_values import stored_rate
+from ...scene.animation_data.stored_values import parse_spans, spans_text, stored_rate
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from ..reporting import ReportingOperator, rpt_, tip_
 from .captures import people_of, shown_capture
@@ -161,7 +160,7 @@ def _update_results(
     warnings: list[Notice],
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate"""
-    from ...scene.datablock_names import holds
+    from ...scene.datablocks import holds
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:

@@ -9,7 +9,7 @@ from contextlib import suppress
 import bpy
 
 from ...notices import Notice, notice_from
-from ...scene.animation_data.frame_spans import FrameSpan, spans_text
+from ...scene.animation_data.stored_values import FrameSpan, spans_text
 from ..reporting import warning_text
 
 

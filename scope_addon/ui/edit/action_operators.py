@@ -128,7 +128,7 @@ class SCOPE_OT_rename_take(CaptureOperator):
         :raises UsageError: the name is empty.
         """
         from ...errors import UsageError
-        from ...scene.datablock_names import short_name
+        from ...scene.datablocks import short_name
 
         if not self.name.strip():
             raise UsageError("the take has no name; enter one")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
-from ...scene.datablock_names import holds
+from ...scene.datablocks import holds
 from ..capture.captures import captures_of, people_of
 from ..captured_person import library_of, motion_of, set_motion_of
 from ..preferences import keep_machine_code
@@ -69,10 +69,10 @@ class SCOPE_OT_smooth(EditOperator):
             restore_scene_range,
             store_rate,
         )
-        from ...scene.character.corrections.uncorrected_keys import write_both
         from ...scene.character.keys import bake_whole_frames, write_clip
         from ...scene.character.other_curves import restore_whole_motion
         from ...scene.character.root_object import remove_root_object
+        from ...scene.character.uncorrected_keys import write_both
 
         motion = motion_of(armature)
         if motion.corrections:  # which are solved again

@@ -31,14 +31,11 @@ from ...live.outputs.unfinished import remove_recording, unfinished_video
 from ...notices import OTHER, Notice, notice
 from ...options import Place, options_at
 from ...options.body_choice import chosen_body
-from ...scene.datablock_names import is_in_layer
-from ...scene.live.datablocks import scene_of
-from ...scene.live.live_body import LiveBody
-from ...scene.live.live_rig import LiveRig
-from ...scene.live.scene_before import SceneBefore, select_only
-from ...scene.local_scene import check_local
+from ...scene.datablocks import check_local, is_in_layer, scene_of
+from ...scene.live_body import LiveBody
+from ...scene.live_rig import LiveRig
 from ...scene.rigs.rig_retarget import usable_guess
-from ...scene.visibility import hide
+from ...scene.visibility import SceneBefore, hide, select_only
 from ...temporary import remove
 from ...untrusted.body_file import load_body
 from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows

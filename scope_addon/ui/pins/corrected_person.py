@@ -51,7 +51,7 @@ def change_corrections(
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
     from ...edit.pins.corrected_motion import corrections_of, with_corrections
-    from ...scene.character.corrections.corrected_keys import pinned_places, rewrite_changed_keys
+    from ...scene.character.corrected_keys import pinned_places, rewrite_changed_keys
     from ...scene.packed_motion import stored_keys
 
     keep_machine_code()
@@ -125,7 +125,7 @@ def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Moti
     :raises UsageError: the motion has none there.
     """
     from ...scene.animation_data.timing import scene_rate
-    from ...scene.character.corrections.corrected_keys import source_frame
+    from ...scene.character.corrected_keys import source_frame
 
     return source_frame(
         armature, motion, scene.frame_current + scene.frame_subframe, scene_rate(scene)
@@ -150,7 +150,7 @@ def pin_at(
 
     from ...edit.pins.corrected_motion import corrections_of, shot_of
     from ...edit.pins.corrections import Pin, world_of
-    from ...scene.character.corrections.corrected_keys import captured_points
+    from ...scene.character.corrected_keys import captured_points
 
     scene = context.scene
     (location, in_image, reach) = place

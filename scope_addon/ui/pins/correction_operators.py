@@ -159,7 +159,7 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
     ) -> str:
         """Add the correction and change the keys."""
         from ...edit.pins.corrections import added
-        from ...scene.character.corrections.corrected_keys import source_frame, whole_span
+        from ...scene.character.corrected_keys import source_frame, whole_span
 
         motion = motion_of(armature)
         begins, ends = whole_span(armature, motion, rate)

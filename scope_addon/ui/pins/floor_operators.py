@@ -45,7 +45,7 @@ class SCOPE_OT_floor_here(CorrectionOperator):
     ) -> str:
         """Move everybody of the capture, and the camera."""
         from ...edit.pins.corrections import Floor, added
-        from ...scene.character.corrections.corrected_keys import heights_of_foot
+        from ...scene.character.corrected_keys import heights_of_foot
 
         scene = context.scene
         motion = motion_of(armature)

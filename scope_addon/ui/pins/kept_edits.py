@@ -106,7 +106,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
     ) -> str:
         """Edit all keys, and keep that with the motion."""
         from ...edit.pins.corrections import FeetOnFloor, added
-        from ...scene.character.corrections.edited_keys import floored
+        from ...scene.character.edited_keys import floored
 
         feet = FeetOnFloor(self.level, self.lift)
         if not _has_motion(armature):

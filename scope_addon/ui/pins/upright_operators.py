@@ -90,7 +90,7 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
 
         from ...edit.pins.corrections import Upright, added
         from ...edit.pins.upright import upright_transform_in_view
-        from ...scene.character.corrections.corrected_keys import captured_points
+        from ...scene.character.corrected_keys import captured_points
 
         scene = context.scene
         motion = motion_of(armature)
@@ -257,7 +257,7 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
 
     from ...edit.pins.corrected_motion import shot_of
     from ...errors import UsageError
-    from ...scene.character.corrections.corrected_keys import captured_points
+    from ...scene.character.corrected_keys import captured_points
 
     armature = captured_armature(context)
     scene = context.scene

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ...scene.datablock_names import is_in_layer
+from ...scene.datablocks import is_in_layer
 from ..reporting import ReportingOperator, rpt_, tip_
 
 

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
-from ...scene.datablock_names import holds
+from ...scene.datablocks import holds
 from ..capture.captures import captures_of
 from ..captured_person import captured_armature
 from .frame_fit import fit_frame, unfit_frame

@@ -51,7 +51,7 @@ def show_new_capture(context: bpy.types.Context) -> None:
     """Show the capture that was just added: the viewports leave the comparison of an earlier
     one.
     """
-    from ...scene.datablock_names import holds
+    from ...scene.datablocks import holds
     from ...scene.visibility import hide_again
 
     hide_startup_cube(context)
@@ -98,7 +98,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
         from ...scene.camera import set_resolution
-        from ...scene.datablock_names import holds
+        from ...scene.datablocks import holds
         from ...scene.visibility import hide_again
 
         scene = context.scene

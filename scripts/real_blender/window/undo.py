@@ -210,7 +210,7 @@ def failing() -> Iterator[float]:
     not crash.
     """
     package = addon().__name__.removesuffix(".ui.capture.capture_operators")
-    names = "scene.character.corrections.corrected_keys", "errors"
+    names = "scene.character.corrected_keys", "errors"
     keys, errors = (import_module(f"{package}.{name}") for name in names)
 
     def fail(*_: object) -> None:

@@ -6,10 +6,10 @@ scene.
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data.removal import remove_blocks
 from scope.scope_addon.scene.animation_data.transaction import all_or_nothing
 from scope.scope_addon.scene.character.root_object import parent_to_root_object, remove_root_object
-from scope.scope_addon.scene.live.live_body import LiveBody
+from scope.scope_addon.scene.datablocks import remove_blocks
+from scope.scope_addon.scene.live_body import LiveBody
 
 
 def in_graph(scene):

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.animation_data.actions import fcurves
-from scope.scope_addon.scene.animation_data.retime import (
+from scope.scope_addon.scene.animation_data.timing import (
     Retiming,
     action_strips,
     retime_keys,

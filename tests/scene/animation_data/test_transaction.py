@@ -7,7 +7,6 @@ An action that was changed is restored from a copy made before, and stays the sa
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data.action_content import restore_content
 from scope.scope_addon.scene.animation_data.actions import (
     Channels,
     add_cycles,
@@ -16,7 +15,7 @@ from scope.scope_addon.scene.animation_data.actions import (
     read_keys,
     rewrite_keys,
 )
-from scope.scope_addon.scene.animation_data.transaction import all_or_nothing
+from scope.scope_addon.scene.animation_data.transaction import all_or_nothing, restore_content
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 
 

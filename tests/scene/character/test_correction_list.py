@@ -19,13 +19,13 @@ from scope.scope_addon.edit.pins.corrections import (
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.character.correction_list import listed_corrections
-from scope.scope_addon.scene.character.corrections.corrected_keys import (
+from scope.scope_addon.scene.character.corrected_keys import (
     frames_that_show,
     scene_frame,
     source_frame,
     whole_span,
 )
+from scope.scope_addon.scene.character.correction_list import listed_corrections
 
 from ...edit.walking import BODY, motion_of, walk
 

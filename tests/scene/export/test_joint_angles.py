@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.axes import R_OPENSIM_WORLD, R_WORLD_MODEL
-from scope.scope_addon.scene.export.joint_angles import joint_angles, write_angles
+from scope.scope_addon.scene.export.without_scene import joint_angles, write_angles
 from scope.solver.rotations import exp, log
 
 # By joint: a rotation about an axis of the rest pose (x to the left, y up, z forward), degrees, and

@@ -11,8 +11,8 @@ import sys
 import bpy
 import pytest
 from scope.scope_addon.errors import OutputError, UsageError
-from scope.scope_addon.scene.export.completeness import is_whole_blend, is_whole_crate
 from scope.scope_addon.scene.export.export import export_motions
+from scope.scope_addon.scene.export.formats import is_whole_blend, is_whole_crate
 from scope.scope_addon.scene.export.output_paths import check_output, person_paths
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.scene.export.trc import trc_text
+from scope.scope_addon.scene.export.without_scene import trc_text
 
 
 def read(text):

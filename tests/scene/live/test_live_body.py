@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.live.live_body import LiveBody
+from scope.scope_addon.scene.live_body import LiveBody
 from scope.solver.rotations import exp, quaternion_from_matrix
 
 KINDS = ("objects", "meshes", "armatures", "collections", "materials", "shape_keys", "actions")

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 from scope.scope_addon.capture_report import Report
 from scope.scope_addon.notices import OTHER, notice
-from scope.scope_addon.scene.animation_data.frame_spans import FrameSpan
+from scope.scope_addon.scene.animation_data.stored_values import FrameSpan
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.ui.capture import capture_panel
 from scope.scope_addon.ui.capture.result import review_spans, show_result

@@ -20,13 +20,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.body import Body
-from ....solver.rotations import matrix_from_quaternion
-from ...kinematics.axes import R_WORLD_MODEL
-from ..animation_data.removal import NewDatablocks
-from ..character import armature, body_mesh, bone_display, shape_keys
-from ..character.animation import quaternion_from_matrix, quaternion_product
-from .datablocks import KINDS, found, remove, scene_of
+from ...solver.body import Body
+from ...solver.rotations import matrix_from_quaternion
+from ..kinematics.axes import R_WORLD_MODEL
+from .character import armature, body_mesh, bone_display, shape_keys
+from .character.animation import quaternion_from_matrix, quaternion_product
+from .datablocks import KINDS, NewDatablocks, found, remove, scene_of
 
 _Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)
 _MIN_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre

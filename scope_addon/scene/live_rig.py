@@ -16,17 +16,17 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ....solver.body import Body
-from ....solver.rotations import matrix_from_quaternion, quaternion_from_matrix
-from ...edit.clip import Clip
-from ...retarget.bone_map import BoneMap
-from ...retarget.skeleton import basis
-from ...retarget.transfer import Transfer
-from ..character.root_object import parent_transform, topmost
-from ..rigs.rig_action import root_locations
-from ..rigs.rig_probe import SWITCHES, at_rest, probe
-from ..rigs.rig_retarget import RetargetOptions, usable_map
+from ...solver.body import Body
+from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ..edit.clip import Clip
+from ..retarget.bone_map import BoneMap
+from ..retarget.skeleton import basis
+from ..retarget.transfer import Transfer
+from .character.root_object import parent_transform, topmost
 from .datablocks import found
+from .rigs.rig_action import root_locations
+from .rigs.rig_probe import SWITCHES, at_rest, probe
+from .rigs.rig_retarget import RetargetOptions, usable_map
 
 # The proportions are compared again for such a change of a shape coefficient, but not at every pose
 # while these settle.

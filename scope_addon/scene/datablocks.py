@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Datablocks of Blender: their names, which are no longer than Blender allows, and not unique where
+some are linked from another file; finding them again, since undo may have removed or replaced them;
+and removing them.
+
+A scene that is linked from another file cannot be changed: Blender refuses, or does not save it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+
+from ..errors import UsageError
+
+_LONGEST = 63 if bpy.app.version < (5, 0) else 255  # bytes
+SUFFIX_BYTES = 24  # room for what is appended to a capture's name, such as ``_person12_body.001``
+KINDS = ("objects", "meshes", "armatures", "collections", "materials")
+
+
+def short_name(name: str) -> str:
+    """Return the beginning of a capture's name to which Blender can append a suffix without
+    truncating it.
+
+    Blender cuts off the end, so that the names of armature, body and camera would be the same but
+    for a number.
+    """
+    return name.encode("utf-8", "replace")[: _LONGEST - SUFFIX_BYTES].decode("utf-8", "ignore")
+
+
+def holds(collection: bpy.types.Collection, obj: bpy.types.Object) -> bool:
+    """Return whether an object is in a collection or in one below it.
+
+    Looking it up by its name alone would also find an object of that name which is linked from
+    another file.
+    """
+    return _contains(collection.all_objects, obj)
+
+
+def is_in_layer(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object) -> bool:
+    """Return whether an object is in a view layer, found as in `holds`."""
+    return _contains(view_layer.objects, obj)
+
+
+def _contains(objects: bpy.types.bpy_prop_collection, obj: bpy.types.Object) -> bool:
+    # the panel asks at every redraw, and only a namesake needs the whole scene
+    named = objects.get(obj.name)
+    return named == obj or (named is not None and any(each == obj for each in objects))
+
+
+def check_local(scene: bpy.types.Scene) -> None:
+    """Check that a scene is stored in this file.
+
+    :raises UsageError: it is linked from another one.
+    """
+    if scene.library is not None:
+        raise UsageError(
+            f"the scene is linked from {scene.library.filepath}, so nothing can be added to it; "
+            "use a scene of this "
+            "file"
+        )
+
+
+class NewDatablocks:
+    """The datablocks of some kinds that are new since a moment.
+
+    :param kinds: names of collections of ``bpy.data``.
+    """
+
+    def __init__(self, kinds: Sequence[str]) -> None:
+        self._before = {
+            kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in kinds
+        }
+
+    def all(self) -> list[tuple[str, bpy.types.ID]]:
+        """Return each with its kind, in the order of the kinds."""
+        blocks = ((kind, block) for kind in self._before for block in getattr(bpy.data, kind))
+        return [
+            (kind, block) for kind, block in blocks if block.session_uid not in self._before[kind]
+        ]
+
+    def remove(self) -> None:
+        """Remove them."""
+        bpy.data.batch_remove([block for _, block in self.all()])
+
+
+def remove_blocks(blocks: Sequence[bpy.types.ID]) -> None:
+    """Remove datablocks, and update the scenes that had the objects among them.
+
+    Blender updates only the scenes that a window shows. The dependency graph of a scene that was
+    shown before goes on pointing to removed objects, and Blender 4.3 crashes when it reads them
+    there to free unused drawing data.
+    """
+    scenes = {
+        scene
+        for block in blocks
+        if isinstance(block, bpy.types.Object)
+        for scene in block.users_scene
+    }
+    bpy.data.batch_remove(blocks)
+    for scene in scenes:
+        for layer in scene.view_layers:
+            layer.update()
+
+
+def found(kind: str, name: str, uid: int) -> bpy.types.ID | None:
+    """Return the datablock with a session's identifier; None if it was removed.
+
+    :param kind: the collection of ``bpy.data``.
+    :param name: which it had last.
+    """
+    blocks = getattr(bpy.data, kind)
+    block = blocks.get(name)
+    if block is not None and block.session_uid == uid:
+        return block
+    return next((block for block in blocks if block.session_uid == uid), None)
+
+
+def scene_of(uid: int) -> bpy.types.Scene:
+    """Return the scene with a session's identifier.
+
+    :raises UsageError: it was removed.
+    """
+    scene = found("scenes", "", uid)
+    if scene is None:
+        raise UsageError("the scene was removed during the live capture; start in another scene")
+    return scene
+
+
+def remove(blocks: set[tuple[str, int]]) -> None:
+    """Remove those of the datablocks that still exist."""
+    if not blocks:
+        return
+    remove_blocks([block for kind, uid in blocks if (block := found(kind, "", uid)) is not None])
+    bpy.context.view_layer.update()  # it would still list removed objects
