@@ -14,15 +14,28 @@ from contextlib import ExitStack
 import bpy
 
 from . import (
+    action_operators,
     after_append,
+    camera_formats,
     command,
+    edit_operators,
+    edit_panel,
     export_operators,
+    file_field,
     import_operators,
     keymap,
+    live_operators,
+    live_panel,
+    live_properties,
     menus,
     preferences,
     presets,
+    retarget_operators,
+    retarget_panel,
+    retarget_properties,
     translations,
+    view_after_undo,
+    view_operators,
     warm_up,
 )
 from .capture import (
@@ -33,71 +46,38 @@ from .capture import (
     frame_rate_operators,
     video_import,
 )
-from .edit import action_operators, asset_operators, edit_operators, edit_panel, key_operators
-from .files import drop, file_field
-from .live import camera_formats, live_operators, live_panel, live_properties
-from .pins import (
-    correction_operators,
-    correction_panel,
-    floor_operators,
+from .pins import correction_operators, correction_panel, kept_edits, pin_tool, upright_operators
+
+# Panels come last: they are drawn in this order, and those within another after it.
+_MODULES = (
+    capture_properties,
+    preferences,
+    capture_operators,
+    export_operators,
+    import_operators,
+    view_operators,
+    file_field,
+    video_import,
+    presets,
+    menus,
+    action_operators,
+    frame_rate_operators,
+    edit_operators,
     kept_edits,
+    correction_operators,
     pin_tool,
     upright_operators,
-)
-from .retarget import (
-    face_operators,
-    face_panel,
-    retarget_operators,
-    retarget_panel,
     retarget_properties,
-)
-from .view import view_after_undo, view_operators
-
-_MODULES = (
-    *(
-        capture_properties,
-        preferences,
-        capture_operators,
-        export_operators,
-        import_operators,
-        view_operators,
-        drop,
-    ),
-    *(
-        file_field,
-        video_import,
-        presets,
-        menus,
-        action_operators,
-        asset_operators,
-        frame_rate_operators,
-    ),
-    *(
-        edit_operators,
-        key_operators,
-        kept_edits,
-        correction_operators,
-        pin_tool,
-        upright_operators,
-        floor_operators,
-    ),
-    *(
-        retarget_properties,
-        retarget_operators,
-        face_operators,
-        live_properties,
-        live_operators,
-        camera_formats,
-    ),
-    *(
-        captures,
-        capture_panel,
-        live_panel,
-        edit_panel,
-        correction_panel,
-        retarget_panel,
-        face_panel,
-    ),
+    retarget_operators,
+    live_properties,
+    live_operators,
+    camera_formats,
+    captures,
+    capture_panel,
+    live_panel,
+    edit_panel,
+    correction_panel,
+    retarget_panel,
 )
 
 

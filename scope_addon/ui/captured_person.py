@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ..errors import UsageError
+from ..scene.animation_data.stored_values import stored_numbers, stored_text
 from ..scene.datablocks import holds
 
 if TYPE_CHECKING:
@@ -97,8 +99,6 @@ def body_of(armature: bpy.types.Object) -> Body:
     :raises ModelFileError: the body's file no longer exists or cannot be read.
     :raises UsageError: the armature does not store which body it is.
     """
-    from ..errors import UsageError
-    from ..scene.animation_data.stored_values import stored_text
     from ..untrusted.body_file import load_body
 
     which = stored_text(armature, "scope_body_file") or stored_text(armature, "scope_body")
@@ -116,9 +116,6 @@ def betas_of(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     :raises UsageError: the armature does not store them.
     """
     import numpy as np
-
-    from ..errors import UsageError
-    from ..scene.animation_data.stored_values import stored_numbers
 
     betas = np.array(stored_numbers(armature, "scope_betas"))
     if betas.shape != (body.P,):

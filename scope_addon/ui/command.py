@@ -7,6 +7,8 @@ import os
 
 import bpy
 
+from .preferences import cache
+
 _handle: object | None = None
 
 
@@ -14,8 +16,6 @@ def run(argv: list[str]) -> int:
     """Run the command line with the arguments after ``scope``; return the exit status. Blender
     calls this.
     """
-    from .preferences import cache
-
     os.environ.setdefault("NUMBA_CACHE_DIR", str(cache().kernels))
     from ..cli import main
 

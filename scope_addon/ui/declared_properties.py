@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..options import Choice, Option, Place, Section, options_at
-from .files.file_field import path_text, text_name
+from .file_field import path_text, text_name
 from .translations import CONTEXT
 
 _NOT_ANIMATABLE: set[str] = set()  # the options of a property without ANIMATABLE

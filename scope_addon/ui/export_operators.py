@@ -10,13 +10,15 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from ..errors import UsageError
 from ..options import Place
 from ..scene.datablocks import holds
 from .capture.captures import captures_of, people_of, shown_capture
 from .captured_person import PERSON, body_of, motion_of
+from .comparison import cameras_of
 from .declared_properties import with_options
+from .file_field import output_file
 from .reporting import ReportingOperator, rpt_, tip_
-from .view.comparison import cameras_of
 
 FORMATS = (
     (
@@ -166,12 +168,10 @@ class SCOPE_OT_export(ReportingOperator):
         :raises UsageError: the file has no name or folder, or there is nothing of what is to be
             written.
         """
-        from ..errors import UsageError
         from ..scene.export.export import ExportOptions, captures, export
         from ..scene.export.output_paths import check_output
         from ..scene.export.without_scene import write_without_scene
         from ..scene.rigs.rig_export import export_rig
-        from .files.output_file import output_file
 
         path = output_file(self.filepath, _SUFFIX[self.format])
         if not is_available(self.format):
@@ -251,9 +251,7 @@ class SCOPE_OT_save_calibration(ReportingOperator):
         :raises UsageError: the file has no name or folder, or the captured person was deleted.
         """
         from ..capture.camera.calibration import write_calibration
-        from ..errors import UsageError
         from ..scene.export.output_paths import check_output
-        from .files.output_file import output_file
 
         path = check_output(output_file(self.filepath, ".toml"), (".toml",))
         people = people_of(shown_capture(context.scene))

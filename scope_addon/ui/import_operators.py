@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
+from ..errors import UsageError
 from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
 from .capture.captures import captures_of, hide_others
+from .capture.frame_rate_operators import rate_warnings
 from .declared_properties import blender_property
 from .preferences import preferences
 from .reporting import ReportingOperator, iface_, rpt_, sentence
-from .view.view_operators import show_new_capture
+from .view_operators import show_new_capture
 
 if TYPE_CHECKING:
     from ..scene.build import BuildOptions
@@ -90,8 +92,6 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
         :raises UsageError: there are none.
         """
-        from ..errors import UsageError
-
         folder = Path(bpy.path.abspath(self.directory)) if self.directory else None
         names = [each.name for each in self.files if each.name]
         if folder and names:
@@ -106,8 +106,6 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
         :raises UsageError: no file is chosen for the body.
         """
-        from ..errors import UsageError
-
         if self.body != "FILE":
             return str(self.body).lower()
         chosen = preferences()
@@ -132,7 +130,6 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     from ..capture_report import Report
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
-    from .capture.frame_rate_operators import rate_warnings
     from .capture.result import show_result
 
     motion = imported.motion

@@ -14,7 +14,7 @@ from bpy.props import IntProperty, StringProperty
 from ..options import Place
 from . import keymap
 from .declared_properties import with_options
-from .files.file_field import draw_file, path_text
+from .file_field import draw_file, path_text
 from .reporting import iface_, rpt_
 
 if TYPE_CHECKING:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
+from ...solver.errors import ScopeError
 from ..footage import display_text
 from ..notices import Notice, Translate
+from .libraries import restore_libraries
 from .translations import CONTEXT
 
 
@@ -64,9 +66,6 @@ class ReportingOperator(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Run ``work`` and report."""
-        from ...solver.errors import ScopeError
-        from .libraries import restore_libraries
-
         try:
             restore_libraries()
             message = self.work(context)

@@ -46,7 +46,7 @@ def panel_live(video: str, result: str) -> int:
 
     import bpy
     from scope.scope_addon.scene.packed_motion import stored_motion
-    from scope.scope_addon.ui.live.live_job import LiveJob
+    from scope.scope_addon.ui.live_job import LiveJob
 
     _register()
     scene = bpy.context.scene
@@ -105,8 +105,8 @@ def _register() -> None:
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scope.register()
+    from scope.scope_addon.ui import live_job
     from scope.scope_addon.ui.capture import capture_job
-    from scope.scope_addon.ui.live import live_job
 
     def compiled(kind: Any, request: Any, folder: Path, _: object, *rest: Any) -> Any:
         return kind(request, folder, None, *rest)

@@ -228,7 +228,7 @@ def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_
     assert {
         "scope_addon/live/run.py",
         "scope_addon/job/live_capture.py",
-        "scope_addon/ui/live/live_job.py",
+        "scope_addon/ui/live_job.py",
     } <= set(names)
 
     def refused(file, match, **made_for):

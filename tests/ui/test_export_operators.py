@@ -14,7 +14,7 @@ from scope.scope_addon.scene.build import BuildOptions
 from scope.scope_addon.scene.visibility import hide
 from scope.scope_addon.ui.capture.capture_job import build_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
-from scope.scope_addon.ui.live.live_job import live_rig
+from scope.scope_addon.ui.live_job import live_rig
 from scope.solver.body_file import load_body
 
 from ..edit.walking import motion_of, walk

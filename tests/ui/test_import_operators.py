@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui.captured_person import captured_armature
-from scope.scope_addon.ui.view.comparison import cameras_of
+from scope.scope_addon.ui.comparison import cameras_of
 
 from ..edit.walking import motion_of, walk
 from ..made_motion import made_views

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import bpy
 from bpy.props import IntProperty
 
+from ....solver.errors import ScopeError
 from .. import warm_up
-from ..files.file_field import SeveralFootageBrowser, chosen_files, stored_path
+from ..file_field import SeveralFootageBrowser, chosen_files, stored_path
 from ..libraries import restore_libraries
-from ..live.live_state import state as live_state
+from ..live_properties import state as live_state
 from ..reporting import iface_, rpt_, sentence, tip_
-from ..view.sidebar import redraw_sidebars, show_tab
-from ..view.view_operators import show_new_capture
+from ..sidebar import redraw_sidebars, show_tab
+from ..view_operators import show_new_capture
 from . import preview_picture
 from .captures import unit_text
 from .job_operator import JobOperator, clear_status_bar
@@ -193,7 +194,6 @@ class CapturingOperator(JobOperator):
         state.message = ""
         state.scene_uid = scene.session_uid
         state.started = time.monotonic()
-        from ....solver.errors import ScopeError
 
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
@@ -239,8 +239,6 @@ class CapturingOperator(JobOperator):
 
     def _advance(self) -> set[str] | None:
         """Advance the job; return None while it is running, and then the operator's outcome."""
-        from ....solver.errors import ScopeError
-
         assert state.job is not None
         try:
             if state.job.step():

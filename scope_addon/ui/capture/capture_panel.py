@@ -12,13 +12,13 @@ from ...footage import display_text
 from ...options import Section
 from ...scene.animation_data.stored_values import parse_spans
 from .. import warm_up
+from ..comparison import camera_of, cameras_of, is_looking_through, side_area
 from ..declared_properties import draw_section
 from ..export_operators import FORMATS, is_available
-from ..files.file_field import draw_file
+from ..file_field import draw_file
 from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_, warning_text
 from ..translations import CONTEXT
-from ..view.comparison import camera_of, cameras_of, is_looking_through, side_area
 from . import preview_picture
 from .capture_operators import CAPTURING, DONE, FAILED, WAITING, state
 from .captures import draw_captures, people_of, people_text, shown_capture, unit_text

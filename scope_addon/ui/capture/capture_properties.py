@@ -19,7 +19,7 @@ from bpy.props import (
 
 from ...options import Place
 from ..declared_properties import PATH_OPTIONS, with_options
-from ..files.file_field import path_text
+from ..file_field import path_text
 from .capture_operators import WAITING, state
 from .captures import show_index, shown_capture, shown_index
 

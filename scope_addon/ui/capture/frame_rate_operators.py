@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import bpy
 
+from ....solver.errors import ScopeError
 from ...notices import Notice, notice
 from ...scene.animation_data.stored_values import parse_spans, spans_text, stored_rate
+from ...scene.datablocks import holds
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from ..reporting import ReportingOperator, rpt_, tip_
 from .captures import people_of, shown_capture
@@ -145,8 +147,6 @@ def _exact(rate: float) -> float:
 
 def _motion(person: bpy.types.Object) -> Motion | None:
     """Return the person's motion; None if it is lost, without which keys can be moved too"""
-    from ....solver.errors import ScopeError
-
     try:
         return motion_of(person)
     except ScopeError:
@@ -160,7 +160,6 @@ def _update_results(
     warnings: list[Notice],
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate"""
-    from ...scene.datablocks import holds
     from ...scene.match_rate import retimed_spans
 
     for collection in scene.collection.children_recursive:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ..reporting import sentence
-from ..view.sidebar import is_over_tab, redraw_sidebars_twice
+from ..sidebar import is_over_tab, redraw_sidebars_twice
 
 
 class JobOperator(bpy.types.Operator):

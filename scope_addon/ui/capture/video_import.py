@@ -8,10 +8,10 @@ from pathlib import Path
 
 import bpy
 
-from ..files.file_field import FootageBrowser, stored_path
-from ..live.live_state import state as live_state
+from ..file_field import FootageBrowser, stored_path
+from ..live_properties import state as live_state
 from ..reporting import rpt_, tip_
-from ..view.sidebar import show_tab
+from ..sidebar import show_tab
 from .capture_operators import state
 
 

@@ -11,7 +11,7 @@ import bpy
 
 from ...scene.character.correction_list import store_corrections
 from ..captured_person import body_of, motion_of, set_motion_of
-from ..edit.edit_base import EditOperator
+from ..edit_base import EditOperator
 from ..preferences import keep_machine_code
 
 if TYPE_CHECKING:

@@ -15,10 +15,11 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...errors import UsageError
 from ...scene.animation_data.stored_values import LAST_FRAME
 from ...scene.character.correction_list import listed_corrections
 from ..captured_person import motion_of
-from ..edit.edit_base import EditOperator, SpanOperator
+from ..edit_base import EditOperator, SpanOperator
 from ..reporting import iface_, rpt_
 from .corrected_person import (
     CorrectionOperator,
@@ -346,8 +347,6 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
 
         :raises UsageError: there is no correction of this number.
         """
-        from ...errors import UsageError
-
         count = len(listed_corrections(armature))
         if self.index >= count:
             raise UsageError(

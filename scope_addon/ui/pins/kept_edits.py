@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import BoolProperty
 
+from ....solver.errors import ScopeError
 from ..captured_person import betas_of, captured_armature, motion_of
-from ..edit.edit_base import edit_clip
+from ..edit_base import edit_clip
 from ..reporting import tip_
 from .corrected_person import CorrectionOperator, change_corrections
 from .correction_operators import CorrectSpanOperator, floor_warning
@@ -126,7 +127,6 @@ class SCOPE_OT_refloor(CorrectionOperator):
 
 def _has_motion(armature: bpy.types.Object) -> bool:
     """Return whether the captured motion is there and can be read, with its corrections."""
-    from ....solver.errors import ScopeError
     from ...edit.pins.corrected_motion import corrections_of
 
     try:

@@ -15,14 +15,12 @@ from mathutils import Vector
 
 from ...scene.character.correction_list import listed_corrections
 from ..captured_person import captured_armature
-from ..edit.edit_base import may_edit
+from ..comparison import camera_of
+from ..edit_base import may_edit
 from ..reporting import iface_
-from ..view.comparison import camera_of
-from ..view.sidebar import redraw_sidebars
-from ..view.viewports import viewports
+from ..sidebar import redraw_sidebars, viewports
 from .correction_operators import last_pin_warnings
-from .drawing import draw_disc, draw_line, viewport_of
-from .pointer import Pointer
+from .drawing import Pointer, draw_disc, draw_line, viewport_of
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 HANDLES = ("head", "pelvis", *(f"{side}_{name}" for side in ("left", "right") for name in _SIDED))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Operators that correct what is upright in the world, by a line in the footage or in a view from
-the side.
+the side, and the floor's height, by a foot that rests on it.
 """
 
 from __future__ import annotations
@@ -9,18 +9,20 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import FloatVectorProperty
+from bpy.props import EnumProperty, FloatVectorProperty
 
+from ....solver.errors import ScopeError
+from ...errors import UsageError
 from ..captured_person import captured_armature, motion_of
-from ..edit.edit_base import may_edit
-from ..reporting import iface_, sentence, tip_
-from ..view.comparison import camera_of
+from ..comparison import camera_of
+from ..edit_base import may_edit
+from ..reporting import iface_, rpt_, sentence, tip_
 from .corrected_person import CorrectionOperator, change_world, shown_frame
-from .drawing import draw_line, redraw_viewport, viewport_of
-from .pointer import Pointer
+from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
 
 if TYPE_CHECKING:
     from ....solver.body import Body
+    from ...motion import Motion
 
 _HELP = (
     "Draw a line along something upright: a door or post in the footage, or a standing person in a "
@@ -29,6 +31,7 @@ _HELP = (
 )
 # how the types of events begin that move a view
 _NAVIGATION = ("MIDDLEMOUSE", "WHEEL", "TRACKPAD", "NUMPAD")
+_SAME_M = 0.002
 
 
 class SCOPE_OT_set_upright(CorrectionOperator):
@@ -199,8 +202,6 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         """Set what is upright, which is a step to undo of its own."""
         from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
-        from ....solver.errors import ScopeError
-
         view = area.spaces.active.region_3d
         ends = self._line.ends
         origins = [region_2d_to_origin_3d(region, view, at) for at in ends]
@@ -256,7 +257,6 @@ def _pixels(context: bpy.types.Context, points: list[object]) -> list[tuple[floa
     import numpy as np
 
     from ...edit.pins.corrected_motion import shot_of
-    from ...errors import UsageError
     from ...scene.character.corrected_keys import captured_points
 
     armature = captured_armature(context)
@@ -276,4 +276,70 @@ def _draw(line: _Line) -> None:
         draw_line(line.ends, (1.0, 0.8, 0.2, 0.9))
 
 
-CLASSES = (SCOPE_OT_set_upright, SCOPE_OT_set_upright_in_view, SCOPE_OT_upright_line)
+class SCOPE_OT_floor_here(CorrectionOperator):
+    """Let a foot rest on the floor in this frame"""
+
+    bl_description = (
+        "In this frame, a foot rests on the floor: move the capture and its camera up or down "
+        "until it does"
+    )
+    bl_idname = "scope.floor_here"
+    bl_label = "Floor Here"
+
+    foot: EnumProperty(
+        name="Foot",
+        items=(
+            ("lower", "Lower Foot", "The lower one of the two in this frame", 0),
+            ("left", "Left", "The left foot", 1),
+            ("right", "Right", "The right foot", 2),
+        ),
+        default="lower",
+        description="Which foot rests on the floor",
+    )
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Move everybody of the capture, and the camera."""
+        from ...edit.pins.corrections import Floor, added
+        from ...scene.character.corrected_keys import heights_of_foot
+
+        scene = context.scene
+        motion = motion_of(armature)
+        frame = shown_frame(scene, armature, motion)
+        height, shown = heights_of_foot(armature, body, rate, motion, (frame, self.foot))
+        floor = Floor(frame, height)
+        # Edited keys may have the foot elsewhere than the motion.
+        rise = height - shown if abs(height - shown) > _SAME_M else 0.0
+        change_world(scene, armature, rate, lambda present: added(present, floor), rise)
+        if warning := _others_under_floor(motion_of(armature), body):
+            self.report({"WARNING"}, warning)
+        return ""
+
+
+def _others_under_floor(motion: Motion, body: Body) -> str:
+    """Return the message about feet that are now under the floor in other frames; empty if there
+    are none.
+    """
+    from ...kinematics.foot_skin import UNDER_FLOOR_M, depth_under_floor
+
+    depth = depth_under_floor(motion, body)
+    under = depth > UNDER_FLOOR_M
+    if not under.any():
+        return ""
+    return rpt_(
+        "A foot is up to {depth:.0f} cm under this floor in {count} of {total} frames: press Floor "
+        "Here in a frame in "
+        "which it rests on the floor, or use Snap Feet to Floor",
+        depth=100 * depth.max(),
+        count=int(under.sum()),
+        total=len(motion),
+    )
+
+
+CLASSES = (
+    SCOPE_OT_set_upright,
+    SCOPE_OT_set_upright_in_view,
+    SCOPE_OT_upright_line,
+    SCOPE_OT_floor_here,
+)

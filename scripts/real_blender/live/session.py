@@ -30,7 +30,7 @@ def module(name: str):
 
 def state():
     """Return the state of live captures."""
-    return module("live.live_state").state
+    return module("live_properties").state
 
 
 def camera() -> Generator[float, None, subprocess.Popen]:

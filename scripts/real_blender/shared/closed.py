@@ -39,7 +39,7 @@ def stream(address: str) -> Iterator[float]:
     settings.stream = address
     use(bpy.ops.scope.live, "INVOKE_DEFAULT")
     state = sys.modules[
-        addon().__name__.replace("capture.capture_operators", "live.live_state")
+        addon().__name__.replace("capture.capture_operators", "live_properties")
     ].state
     yield from until(lambda: state.job is None or state.job.has_body, 300, "the first pose")
     return "capturing" if state.job else state.message

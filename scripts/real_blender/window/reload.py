@@ -58,7 +58,7 @@ def open_file(way: Callable[[], object]) -> Iterator[float]:
     for _ in range(10):
         yield 0.05
     assert addon().state.job is None
-    assert module("live.live_state").state.job is None
+    assert module("live_properties").state.job is None
     assert not module("pins.pin_tool").is_running()
 
 
@@ -86,7 +86,7 @@ def live(footage: str = FOOTAGE) -> Iterator[float]:
     settings.source = "FILE"
     settings.file = footage
     assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    state = module("live.live_state").state
+    state = module("live_properties").state
     yield from until(lambda: state.job is None or state.job.has_body, 120, "the first pose")
     assert state.job is not None, state.message
 
@@ -135,7 +135,7 @@ def removed_in_another_scene() -> Iterator[float]:
     yield 0.1
     use(bpy.ops.scope.cancel_live)
     yield from until(
-        lambda: module("live.live_state").state.job is None, 60, "the end of the live capture"
+        lambda: module("live_properties").state.job is None, 60, "the end of the live capture"
     )
     found = blocks_in_graph(scene)
     assert found == before, f"the hidden scene's graph has {found} datablocks, not {before}"

@@ -22,8 +22,8 @@ from scope.scope_addon.ui.capture.capture_job import CaptureJob, capture_request
 from scope.scope_addon.ui.capture.capture_operators import (
     state,
 )
+from scope.scope_addon.ui.comparison import cameras_of
 from scope.scope_addon.ui.preferences import cache
-from scope.scope_addon.ui.view.comparison import cameras_of
 from scope.solver.body_file import load_body
 from scope.solver.errors import ScopeError
 

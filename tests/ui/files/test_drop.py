@@ -11,15 +11,15 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.ui.files import drop
-from scope.scope_addon.ui.files.output_file import output_file
+from scope.scope_addon.ui import file_field
+from scope.scope_addon.ui.file_field import output_file
 
 from ...edit.walking import motion_of, walk
 from ...scene.made_rigs import build_rig, captured
 
 
 def test_dropped_files_become_the_footage(footage):
-    suffixes = drop.SCOPE_FH_footage.bl_file_extensions.split(";")
+    suffixes = file_field.SCOPE_FH_footage.bl_file_extensions.split(";")
     assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
     # What Blender does with a dropped file: the handler's operator, with a path.
     assert bpy.ops.scope.choose_footage("INVOKE_DEFAULT", filepath=str(footage)) == {"FINISHED"}
@@ -39,7 +39,7 @@ def test_dropped_motions_are_imported(tmp_path):
         betas=np.ones(16),
         mocap_framerate=np.array(120.0),
     )
-    assert drop.SCOPE_FH_motion.bl_file_extensions == ".npz"
+    assert file_field.SCOPE_FH_motion.bl_file_extensions == ".npz"
     assert bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(path)) == {"FINISHED"}
 
 

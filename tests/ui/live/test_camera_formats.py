@@ -8,9 +8,9 @@ import bpy
 import pytest
 from scope.scope_addon.job import live_cameras
 from scope.scope_addon.job.live_cameras import Camera
-from scope.scope_addon.ui.live import camera_formats, live_properties
-from scope.scope_addon.ui.live.live_operators import end_live
-from scope.scope_addon.ui.live.live_state import state
+from scope.scope_addon.ui import camera_formats, live_properties
+from scope.scope_addon.ui.live_operators import end_live
+from scope.scope_addon.ui.live_properties import state
 
 from ...job.processes import runs, wait_for
 

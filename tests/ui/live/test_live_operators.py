@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from scope.scope_addon.ui.capture.capture_operators import state as capture_state
-from scope.scope_addon.ui.live.live_operators import end_live
-from scope.scope_addon.ui.live.live_panel import SCOPE_PT_live, _speed
-from scope.scope_addon.ui.live.live_state import state
+from scope.scope_addon.ui.live_operators import end_live
+from scope.scope_addon.ui.live_panel import SCOPE_PT_live, _speed
+from scope.scope_addon.ui.live_properties import state
 
 
 class FakeJob:

@@ -2,7 +2,7 @@
 """Names and passwords of streams are taken out of addresses, and put in again."""
 
 import pytest
-from scope.scope_addon.ui.live.stream_logins import forget, take_login, with_login
+from scope.scope_addon.ui.live_properties import forget_logins, take_login, with_login
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ from scope.scope_addon.ui.live.stream_logins import forget, take_login, with_log
 def test_a_login_is_taken_out_and_put_in_again(typed, kept):
     assert take_login(typed) == kept
     assert with_login(kept) == typed.strip()
-    forget()
+    forget_logins()
     assert with_login(kept) == kept
 
 
@@ -33,4 +33,4 @@ def test_an_address_without_a_login_is_kept(address):
     taken = take_login(address)
     assert taken in (address, "udp://")
     assert with_login(taken) == address
-    forget()
+    forget_logins()

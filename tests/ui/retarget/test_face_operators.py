@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.animation_data import actions
 from scope.scope_addon.scene.build import build_scene
-from scope.scope_addon.ui.retarget.retarget_properties import offered_expressions
+from scope.scope_addon.ui.retarget_properties import offered_expressions
 
 from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face

@@ -11,8 +11,8 @@ import pytest
 from mathutils import Euler, Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.camera import view_number
-from scope.scope_addon.ui.view import comparison
-from scope.scope_addon.ui.view.view_operators import show_new_capture
+from scope.scope_addon.ui import comparison
+from scope.scope_addon.ui.view_operators import show_new_capture
 from scope.solver import load_body
 
 from ...made_motion import made_views

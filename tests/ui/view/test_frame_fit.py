@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.ui.view import comparison, sidebar
-from scope.scope_addon.ui.view.frame_fit import fit_frame, unfit_frame
-from scope.scope_addon.ui.view.side_extent import side_extent
-from scope.scope_addon.ui.view.view_operators import hide_startup_cube
+from scope.scope_addon.ui import comparison, sidebar
+from scope.scope_addon.ui.comparison import fit_frame, side_extent, unfit_frame
+from scope.scope_addon.ui.view_operators import hide_startup_cube
 
 from ...edit.walking import BODY, motion_of, walk
 

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The settings of live captures, stored with the scene."""
+"""The settings of live captures, stored with the scene; and what is never saved: the running live
+capture, the message of the last one, what cameras have told, and names and passwords of streams.
+"""
 
 from __future__ import annotations
+
+import re
+from typing import Any, ClassVar
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
-from ...options import Place
-from ..declared_properties import PATH_OPTIONS, with_options
-from ..files.file_field import path_text
-from .live_state import state
-from .stream_logins import take_login
+from ..footage import display_address, has_login
+from ..options import Place
+from .declared_properties import PATH_OPTIONS, with_options
+from .file_field import path_text
 
 _VIDEO = {"name": "Video", "description": "Video of a person, which is played in real time"}
+_addresses: dict[str, str] = {}  # whole ones, by what is left of them without their secrets
+_SECRET = re.compile(r"[?#;&][^=]*(auth|key|login|pass|pw|secret|sig|token|user)[^=]*=", re.I)
 
 
 def _forget_message(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
@@ -26,7 +32,7 @@ def _cameras(
     """Return the cameras whose number or name contains what was typed, with formats where these are
     known.
     """
-    from ...job.live_cameras import list_cameras
+    from ..job.live_cameras import list_cameras
 
     told = {
         (camera.number, camera.name): camera for camera in state.cameras.values() if camera.formats
@@ -122,3 +128,52 @@ def attach() -> None:
 def detach() -> None:
     """Remove the settings."""
     del bpy.types.Scene.scope_live
+
+
+class _State:
+    """The running live capture, the message of the last one, and what cameras have told."""
+
+    job: Any = None  # a LiveJob; named here, its module would import this one again
+    asking: Any = None  # a FormatsProcess, while a camera is asked for its formats
+    cameras: ClassVar[dict[int, Any]] = {}  # that were asked, each a Camera, by number
+    scene_uid = 0  # of the scene that the job or the message belongs to
+    message = ""  # why the last live capture failed
+
+
+state = _State()
+
+
+def stop_job() -> None:
+    """End the process in any state; the scene stays as it is."""
+    if state.job is not None:
+        state.job.close()
+    state.job = None
+
+
+def take_login(address: str) -> str:
+    """Return an address without names, passwords and keys, and remember the whole one."""
+    whole = address.strip()
+    scheme, separator, public = whole.partition("://")
+    if not separator:
+        return address
+    if has_login(public):
+        place, mark, query = public.partition("?")
+        is_before = "@" in place  # a password may have a question mark
+        public = place.rpartition("@")[2] + mark + query if is_before else public.rpartition("@")[2]
+    public = f"{scheme}://{public}"
+    if _SECRET.search(public):
+        public = display_address(public)
+    if public == whole:
+        return address
+    _addresses[public] = whole
+    return public
+
+
+def with_login(address: str) -> str:
+    """Return an address with what was taken out of it."""
+    return _addresses.get(address, address)
+
+
+def forget_logins() -> None:
+    """Forget all of them."""
+    _addresses.clear()

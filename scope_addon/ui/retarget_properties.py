@@ -16,14 +16,23 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..translations import CONTEXT
+from .retarget_maps import (
+    bones_move,
+    face_of_rig,
+    fill_expressions,
+    guess_into_list,
+    guessed_map,
+    has_targets,
+    target_names,
+)
+from .translations import CONTEXT
 
 
 def offered_parts(
     _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
 ) -> list[str]:
     """Return the body parts whose names contain what was typed so far, for Blender to suggest."""
-    from ...retarget.bone_map import PARTS
+    from ..retarget.bone_map import PARTS
 
     return [part for part in PARTS if typed.lower() in part]
 
@@ -46,7 +55,7 @@ def offered_expressions(
     _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
 ) -> list[str]:
     """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
-    from ...expression_names import EXPRESSIONS
+    from ..expression_names import EXPRESSIONS
 
     return [name for name in EXPRESSIONS if typed.lower() in name.lower()]
 
@@ -103,8 +112,6 @@ class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
 
 
 def _is_face(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    from .face_list import has_targets
-
     captured = obj.parent is not None and "scope_source" in obj.parent
     return not captured and has_targets(obj)
 
@@ -122,7 +129,6 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
     rig = settings.rig
     if rig is None:
         return
-    from .face_list import bones_move, face_of_rig
 
     if settings.face is None or bones_move(settings.face):
         settings.face = face_of_rig(rig)
@@ -132,7 +138,6 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
     settings.listed_bones = bones
     if len(settings.pairs) == 0:
         return  # nothing to replace: guessed when it is needed
-    from .bone_list import guess_into_list
 
     guess_into_list(settings)
 
@@ -141,8 +146,6 @@ def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.type
     """Replace the expression list of another face by a guess; keep that of one with the same shape
     keys or bones.
     """
-    from .face_list import fill_expressions, guessed_map, has_targets, target_names
-
     if not has_targets(settings.face):
         return
     keys = "\n".join(sorted(target_names(settings.face)))

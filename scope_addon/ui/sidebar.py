@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar of the 3D viewport, and its tab Scope."""
+"""All 3D viewports, and the sidebar of each with its tab Scope.
+
+A viewport is found again by its address: Blender frees a closed area, and a reference to it then
+crashes, so whatever runs later keeps the address alone.
+"""
 
 from __future__ import annotations
 
 import bpy
-
-from .viewports import viewport_at, viewports
 
 TAB = "Scope"
 _DRAWN_AFTER_S = 0.3  # a sidebar knows its tabs only after it has been drawn
@@ -87,3 +89,22 @@ def redraw_sidebars_twice() -> None:
     redraw_sidebars()
     if not bpy.app.background:
         bpy.app.timers.register(redraw_sidebars, first_interval=_DRAWN_AFTER_S)
+
+
+def viewports() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
+    """Return the viewports of all windows, each with its window."""
+    windows = bpy.context.window_manager.windows
+    return [
+        (window, area)
+        for window in windows
+        for area in window.screen.areas
+        if area.type == "VIEW_3D"
+    ]
+
+
+def viewport_at(pointer: int) -> tuple[bpy.types.Window, bpy.types.Area] | None:
+    """Return a viewport and its window; None once it was closed or became another editor.
+
+    :param pointer: ``as_pointer`` of the viewport's area.
+    """
+    return next((pair for pair in viewports() if pair[1].as_pointer() == pointer), None)

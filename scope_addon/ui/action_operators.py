@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators on the action of a captured person, or of a rig with their motion: take name, NLA."""
+"""Operators on the action of a captured person, or of a rig with their motion: take name,
+NLA, asset browser.
+"""
 
 from __future__ import annotations
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
-from ..capture.captures import show_again, shown_capture
-from ..captured_person import PERSON, captured_armature
-from ..reporting import ReportingOperator, rpt_, tip_
-from ..view import comparison
+from ...solver.errors import ScopeError
+from ..errors import UsageError
+from ..scene.animation_data.stored_values import start_frame, stored_text
+from ..scene.datablocks import short_name
+from . import comparison
+from .capture.captures import show_again, shown_capture
+from .captured_person import PERSON, captured_armature, motion_of
+from .reporting import ReportingOperator, rpt_, tip_
 
 
 def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -63,9 +69,8 @@ class SCOPE_OT_push_to_nla(ActionOperator):
 
         :raises UsageError: the armature is in Tweak Mode.
         """
-        from ...errors import UsageError
-        from ...scene.animation_data.actions import animated_together, push_to_nla
-        from ...scene.character.root_object import root_object
+        from ..scene.animation_data.actions import animated_together, push_to_nla
+        from ..scene.character.root_object import root_object
 
         armature = animated_armature(context)
         assert armature is not None  # checked by poll
@@ -127,9 +132,6 @@ class SCOPE_OT_rename_take(CaptureOperator):
 
         :raises UsageError: the name is empty.
         """
-        from ...errors import UsageError
-        from ...scene.datablocks import short_name
-
         if not self.name.strip():
             raise UsageError("the take has no name; enter one")
         _rename(context.scene.scope.result.collection, short_name(self.name.strip()))
@@ -148,7 +150,7 @@ class SCOPE_OT_delete_capture(CaptureOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Remove it, and show the capture before it."""
-        from ...scene.delete_capture import delete_capture
+        from ..scene.delete_capture import delete_capture
 
         collection = context.scene.scope.result.collection
         name = collection.name
@@ -163,7 +165,7 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     """Rename a capture, and its objects, their data and actions whose names begin with the
     capture's.
     """
-    from ...scene.rigs.rig_action import follow_renaming
+    from ..scene.rigs.rig_action import follow_renaming
 
     former = collection.name
     armatures = {
@@ -186,4 +188,117 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     follow_renaming({before: obj.name for before, obj in armatures.items()})
 
 
-CLASSES = (SCOPE_OT_push_to_nla, SCOPE_OT_rename_take, SCOPE_OT_delete_capture)
+def _offered_catalogs(
+    _operator: bpy.types.Operator, _context: bpy.types.Context, typed: str
+) -> list[str]:
+    """Return the asset catalogs whose paths contain what was typed so far, for Blender to
+    suggest.
+    """
+    from ..scene.action_asset import catalogs
+
+    return sorted(path for path in catalogs() if typed.lower() in path.lower())
+
+
+class SCOPE_OT_mark_asset(ActionOperator):
+    """Mark the captured motion as an asset with a preview image of its pose"""
+
+    bl_description = (
+        "Mark the captured motion as an asset with a preview image of its pose, for other files' "
+        "Asset Browser"
+    )
+    bl_idname = "scope.mark_asset"
+    bl_label = "Mark as Asset"
+
+    author: StringProperty(name="Author", description="Who made this asset")
+    description_text: StringProperty(
+        name="Description",
+        description="Description of the asset; the footage and its duration if left empty",
+    )
+    catalog: StringProperty(
+        name="Catalog",
+        search=_offered_catalogs,
+        description="Catalog of the Asset Browser, such as Motions/Walks; unassigned if left empty",
+    )
+    current_pose: BoolProperty(
+        name="Preview of Current Frame",
+        default=False,
+        description="Show the pose of the current frame in the preview image, instead of the first "
+        "one that needs no "
+        "review",
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the details; suggest those of the action if it is an asset."""
+        armature = animated_armature(context)
+        assert armature is not None  # checked by poll
+        data = armature.animation_data.action.asset_data
+        if data is not None:
+            self.author = data.author
+            self.description_text = data.description
+        else:
+            self.description_text = self.catalog = ""
+        outcome: set[str] = context.window_manager.invoke_props_dialog(self)
+        return outcome
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Mark the action and draw its picture.
+
+        :raises UsageError: the action is linked, or the catalog does not exist.
+        """
+        from ..scene.action_asset import AssetDetails, mark_action, set_preview
+
+        armature = animated_armature(context)
+        assert armature is not None  # checked by poll
+        action = armature.animation_data.action
+        description = self.description_text or _described(context, armature)
+        mark_action(action, AssetDetails(self.author.strip(), description, self.catalog.strip()))
+        set_preview(action, armature, self._frame(context, armature))
+        if not bpy.data.filepath:
+            return rpt_(
+                "'{action}' is an asset of this file; save the file in an asset library",
+                action=action.name,
+            )
+        return rpt_("'{action}' is now an asset", action=action.name)
+
+    def _frame(self, context: bpy.types.Context, armature: bpy.types.Object) -> float:
+        """Return the scene frame of the picture, within the action."""
+        from ..scene.action_asset import first_reliable_frame
+        from ..scene.animation_data.timing import keyed_rate
+
+        first, last = armature.animation_data.action.frame_range
+        frame = float(context.scene.frame_current)
+        person = _captured(armature)
+        if not self.current_pose:
+            frame = first
+            try:
+                motion = motion_of(person)
+                seconds = float(motion.timestamps[first_reliable_frame(motion)])
+                frame = start_frame(person) + seconds * keyed_rate(person, context.scene)
+            except ScopeError:
+                pass  # the motion is lost, but the keys are not
+        return float(min(max(frame, first), last))
+
+
+def _captured(armature: bpy.types.Object) -> bpy.types.Object:
+    """Return the captured armature whose motion an armature has; the armature itself if that is
+    unknown.
+    """
+    person = armature.get(PERSON)
+    return person if isinstance(person, bpy.types.Object) else armature
+
+
+def _described(context: bpy.types.Context, armature: bpy.types.Object) -> str:
+    """Return the description of an asset that the user has given none"""
+    first, last = armature.animation_data.action.frame_range
+    seconds = (last - first) * context.scene.render.fps_base / context.scene.render.fps
+    source = stored_text(_captured(armature), "scope_source") or armature.name
+    return rpt_("Captured from {source}, {seconds:.1f} s", source=source, seconds=seconds)
+
+
+CLASSES = (
+    SCOPE_OT_push_to_nla,
+    SCOPE_OT_rename_take,
+    SCOPE_OT_delete_capture,
+    SCOPE_OT_mark_asset,
+)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..capture.capture_panel import Tab
-from ..capture.captures import people_of, shown_capture
-from ..captured_person import draw_active_person, has_captured_person
-from ..translations import CONTEXT
+from .capture.capture_panel import Tab
+from .capture.captures import people_of, shown_capture
+from .captured_person import draw_active_person, has_captured_person
+from .translations import CONTEXT
 
 
 class SCOPE_PT_edit(Tab, bpy.types.Panel):

@@ -1,13 +1,90 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel for retargeting captured expressions, below that for bones."""
+"""The panel for retargeting a captured motion, and below it that for captured expressions."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..capture.capture_panel import Tab
-from ..translations import CONTEXT
-from .face_list import SHAPE_KEY, has_targets
+from .capture.capture_panel import Tab
+from .captured_person import draw_active_person, has_captured_person
+from .retarget_maps import SHAPE_KEY, common_prefix, has_targets
+from .translations import CONTEXT
+
+
+class SCOPE_UL_bone_pairs(bpy.types.UIList):
+    """Bones of the rig and the body parts that they follow."""
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        settings: bpy.types.PropertyGroup,
+        item: bpy.types.PropertyGroup,
+        _icon: int,
+        _settings_with_active: bpy.types.PropertyGroup,
+        _active_property: str,
+    ) -> None:
+        """Draw one entry: part, bone, and a question mark if the guess is uncertain.
+
+        Labels leave room for long names; the chosen entry is edited below the list. Blender's
+        further arguments, ``index`` and ``flt_flag``, are optional and left out.
+        """
+        rig = settings.rig
+        known = rig is not None and item.bone in rig.data.bones
+        row = layout.split(factor=0.4, align=True)
+        row.label(text=item.part, translate=False)
+        row = row.row(align=True)
+        row.alert = not known
+        prefix = common_prefix([pair.bone for pair in settings.pairs if pair.bone])
+        row.label(text=item.bone.removeprefix(prefix), translate=False)
+        if not known or item.confidence <= 0.6:  # certain guesses need no icon
+            row.label(text="", icon="QUESTION" if known else "ERROR")
+
+
+class SCOPE_PT_retarget(Tab, bpy.types.Panel):
+    """Retargeting of the captured motion to the user's rig."""
+
+    bl_idname = "SCOPE_PT_retarget"
+    bl_label = "Retarget"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a captured person."""
+        return has_captured_person(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the panel."""
+        layout = self.layout
+        settings = context.scene.scope_retarget
+        draw_active_person(layout, context)
+        layout.prop(settings, "rig")
+        if settings.rig is None:
+            return
+        row = layout.row(align=True)
+        row.operator("scope.guess_bones", icon="VIEWZOOM")
+        row.operator("scope.load_bone_map", text="", icon="FILE_FOLDER")
+        row.operator("scope.save_bone_map", text="", icon="FILE_TICK")
+        row.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
+        row = row.row(align=True)
+        row.enabled = len(settings.pairs) > 0
+        row.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
+        layout.template_list(
+            "SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5
+        )
+        for pair in settings.pairs[settings.active : settings.active + 1]:
+            column = layout.column(align=True)
+            column.prop(pair, "part", text="", placeholder="Body Part", icon="ARMATURE_DATA")
+            column.alert = pair.bone not in settings.rig.data.bones
+            column.prop_search(pair, "bone", settings.rig.data, "bones", text="")
+        layout.prop(settings, "feet")
+        layout.prop(settings, "travel")
+        column = layout.column()
+        column.label(text="Root Motion")
+        column.row(align=True).prop(settings, "root", expand=True)
+        column.label(text="Captured Body")
+        column.row(align=True).prop(settings, "captured", expand=True)
+        layout.operator("scope.retarget", icon="ARMATURE_DATA")
 
 
 class SCOPE_UL_expression_pairs(bpy.types.UIList):
@@ -26,7 +103,7 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         """Draw one entry: expression, and shape key or control with its channel; see
         `SCOPE_UL_bone_pairs`.
         """
-        from ...expression_names import EXPRESSIONS
+        from ..expression_names import EXPRESSIONS
 
         known = _is_known(settings.face, item)
         split = layout.split(factor=0.5, align=True)
@@ -102,4 +179,9 @@ def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> b
     )
 
 
-CLASSES = (SCOPE_UL_expression_pairs, SCOPE_PT_retarget_face)
+CLASSES = (
+    SCOPE_UL_bone_pairs,
+    SCOPE_PT_retarget,
+    SCOPE_UL_expression_pairs,
+    SCOPE_PT_retarget_face,
+)

@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .comparison import close_side_view, end, looks_through, side_area
-from .viewports import viewports
+from .sidebar import viewports
 
 _looked_through: set[int] = set()  # areas that showed a capture through its camera before the undo
 _sides: set[int] = set()  # areas that showed a capture from its side

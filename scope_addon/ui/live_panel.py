@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..capture.capture_panel import Tab, draw_text
-from ..files.file_field import draw_file
-from ..preferences import cache
-from ..reporting import iface_
 from . import camera_formats
-from .live_state import state
+from .capture.capture_panel import Tab, draw_text
+from .file_field import draw_file
+from .live_properties import state
+from .preferences import cache
+from .reporting import iface_
 
 if TYPE_CHECKING:
     from .live_job import LiveJob

@@ -7,17 +7,16 @@ from pathlib import Path
 
 import bpy
 
-from .. import warm_up
-from ..capture.capture_operators import state as capture_state
-from ..capture.job_operator import JobOperator
-from ..libraries import restore_libraries
-from ..preferences import cache
-from ..reporting import tip_, warning_text
-from ..view.sidebar import redraw_sidebars
-from ..view.view_operators import frame_selected, hide_startup_cube
-from ..view.viewports import viewports
-from . import camera_formats, stream_logins
-from .live_state import state, stop_job
+from ...solver.errors import ScopeError
+from . import camera_formats, live_properties, warm_up
+from .capture.capture_operators import state as capture_state
+from .capture.job_operator import JobOperator
+from .libraries import restore_libraries
+from .live_properties import state, stop_job
+from .preferences import cache
+from .reporting import tip_, warning_text
+from .sidebar import redraw_sidebars, viewports
+from .view_operators import frame_selected, hide_startup_cube
 
 
 def end_live() -> None:
@@ -26,7 +25,7 @@ def end_live() -> None:
     camera_formats.end()
     state.cameras.clear()
     state.message = ""
-    stream_logins.forget()
+    live_properties.forget_logins()
 
 
 class _LiveOperator(JobOperator):
@@ -58,7 +57,6 @@ class _LiveOperator(JobOperator):
         """Start the job; return whether that worked."""
         state.message = ""
         state.scene_uid = context.scene.session_uid
-        from ....solver.errors import ScopeError
 
         # Imported here: it loads numba and numpy, which would slow down the start of Blender.
         try:
@@ -81,8 +79,6 @@ class _LiveOperator(JobOperator):
 
     def step(self, context: bpy.types.Context) -> set[str] | None:
         """Advance the job; return None while it is running, and then the operator's outcome."""
-        from ....solver.errors import ScopeError
-
         job = state.job
         assert job is not None
         before = job.poses

@@ -7,10 +7,12 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from ..captured_person import captured_people
-from ..reporting import ReportingOperator, rpt_, tip_
+from ..scene.animation_data.stored_values import start_frame
+from ..scene.datablocks import holds
 from . import comparison
+from .captured_person import captured_people
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
+from .reporting import ReportingOperator, rpt_, tip_
 from .sidebar import redraw_sidebars_twice, viewport_of
 
 
@@ -51,8 +53,7 @@ def show_new_capture(context: bpy.types.Context) -> None:
     """Show the capture that was just added: the viewports leave the comparison of an earlier
     one.
     """
-    from ...scene.datablocks import holds
-    from ...scene.visibility import hide_again
+    from ..scene.visibility import hide_again
 
     hide_startup_cube(context)
     shown = context.scene.scope.result.collection
@@ -97,9 +98,8 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
-        from ...scene.camera import set_resolution
-        from ...scene.datablocks import holds
-        from ...scene.visibility import hide_again
+        from ..scene.camera import set_resolution
+        from ..scene.visibility import hide_again
 
         scene = context.scene
         camera = camera_of(context.scene)
@@ -144,7 +144,7 @@ class SCOPE_OT_compare_view(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and what the viewport shows."""
-        from ...scene.camera import set_resolution, view_number
+        from ..scene.camera import set_resolution, view_number
 
         scene = context.scene
         cameras = cameras_of(scene)
@@ -225,9 +225,8 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
-        from ...scene.animation_data.stored_values import start_frame
-        from ...scene.animation_data.timing import scene_rate
-        from ...scene.footage_strip import add_footage_strips, strips_of, turn_strip
+        from ..scene.animation_data.timing import scene_rate
+        from ..scene.footage_strip import add_footage_strips, strips_of, turn_strip
 
         scene = context.scene
         result = context.scene.scope.result

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that retarget a captured motion to the user's rig, and that guess, edit, save and load
-the bone map.
+"""Operators that retarget a captured motion to the user's rig and captured expressions to a face,
+and that guess, edit, save and load the bone map and the expression map.
 """
 
 from __future__ import annotations
@@ -10,15 +10,27 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from ..reporting import ReportingOperator, rpt_, tip_, warning_text
-from .bone_list import fill_list, listed_map
-from .face_list import bones_move, fill_expressions, listed_or_guessed
-from .map_operators import LoadMapOperator, SaveMapOperator, edit_list, is_in_view_layer
+from ..errors import UsageError
+from .captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
+from .reporting import ReportingOperator, rpt_, tip_, warning_text
+from .retarget_maps import (
+    LoadMapOperator,
+    SaveMapOperator,
+    bones_move,
+    edit_list,
+    fill_expressions,
+    fill_list,
+    guessed_map,
+    has_targets,
+    is_in_view_layer,
+    listed_expressions,
+    listed_map,
+    listed_or_guessed,
+)
 
 if TYPE_CHECKING:
-    from ...retarget.expression_map import ExpressionMap
-    from ...scene.rigs.rig_retarget import RetargetOptions, RetargetResult
+    from ..retarget.expression_map import ExpressionMap
+    from ..scene.rigs.rig_retarget import RetargetOptions, RetargetResult
 
 _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
@@ -44,7 +56,7 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Fill the list."""
-        from ...scene.rigs.rig_retarget import guess_bone_map, map_notices
+        from ..scene.rigs.rig_retarget import guess_bone_map, map_notices
 
         settings = context.scene.scope_retarget
         found = guess_bone_map(settings.rig)
@@ -125,9 +137,9 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
 
     :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
     """
-    from ...scene.animation_data.timing import scene_rate
-    from ...scene.rigs.rig_retarget import retarget, usable_guess
-    from ...scene.visibility import hide, show
+    from ..scene.animation_data.timing import scene_rate
+    from ..scene.rigs.rig_retarget import retarget, usable_guess
+    from ..scene.visibility import hide, show
 
     settings = context.scene.scope_retarget
     body = body_of(source)
@@ -171,7 +183,7 @@ def retarget_options(
 
     :param face: the expression map of the bones that move the rig's face, if any.
     """
-    from ...scene.rigs.rig_retarget import RetargetOptions
+    from ..scene.rigs.rig_retarget import RetargetOptions
 
     offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
     travel = settings.travel or None
@@ -190,7 +202,7 @@ class SCOPE_OT_save_bone_map(_RigOperator, SaveMapOperator):
 
     def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
         """Write the list."""
-        from ...retarget.bone_map import save_bone_map
+        from ..retarget.bone_map import save_bone_map
 
         save_bone_map(listed_map(settings), path)
 
@@ -203,7 +215,7 @@ class SCOPE_OT_load_bone_map(_RigOperator, LoadMapOperator):
 
     def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
         """Read the list."""
-        from ...retarget.bone_map import load_bone_map
+        from ..retarget.bone_map import load_bone_map
 
         fill_list(settings, load_bone_map(path))
 
@@ -238,10 +250,176 @@ def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:
     context.view_layer.objects.active = rig
 
 
+class _FaceOperator(ReportingOperator):
+    """An operator on the chosen face. Not registered"""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a mesh with shape keys, or a rig whose face is known, in the view layer."""
+        face = context.scene.scope_retarget.face
+        if not has_targets(face):
+            cls.poll_message_set(
+                tip_("Choose a mesh with shape keys, or a rig with face controls, first")
+            )
+            return False
+        return is_in_view_layer(cls, context, face)
+
+
+class SCOPE_OT_guess_expressions(_FaceOperator):
+    """Assign the face's shape keys"""
+
+    bl_description = (
+        "Assign the face's shape keys, named as by ARKit, Oculus or VRM, or the controls of a "
+        "known rig to expressions"
+    )
+    bl_idname = "scope.guess_expressions"
+    bl_label = "Guess Expressions"
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list.
+
+        :raises UsageError: no name is known; the list stays as it is.
+        """
+        settings = context.scene.scope_retarget
+        found = guessed_map(settings.face)
+        if not found.keys and not found.controls:
+            raise UsageError(
+                f"no shape key of '{settings.face.name}' has a name of ARKit, Oculus or VRM; add "
+                "entries to the list"
+            )
+        fill_expressions(settings, found)
+        if found.controls:
+            return rpt_("Found {count} controls; check the list", count=len(found.controls))
+        count = len(found.keys)
+        return rpt_(
+            "Found {count} shape key; check the list"
+            if count == 1
+            else "Found {count} shape keys; check the list",
+            count=count,
+        )
+
+
+class SCOPE_OT_retarget_face(_FaceOperator):
+    """Transfer the captured expressions to the mesh's shape keys or the rig's face"""
+
+    bl_description = (
+        "Transfer the captured expressions to the mesh's shape keys or the rig's face, as a new "
+        "action"
+    )
+    bl_idname = "scope.retarget_face"
+    bl_label = "Retarget Face"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a face that can be animated in this file, and a captured person."""
+        if not super().poll(context):
+            return False
+        face = context.scene.scope_retarget.face
+        # of what is animated
+        library = face.library if face.type == "ARMATURE" else face.data.library
+        if library is not None:
+            cls.poll_message_set(
+                tip_(
+                    "'{mesh}' is linked from {file}, so its keyframes would not be saved in this "
+                    "file: make it local",
+                    mesh=face.name,
+                    file=library.filepath,
+                )
+            )
+            return False
+        if captured_armature(context) is None:
+            cls.poll_message_set(tip_("Select the captured person whose face to retarget"))
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write the keys.
+
+        :raises UsageError: the person's face was not captured, or no shape key or control is
+            mapped.
+        """
+        from ..scene.rigs.face_bones import retarget_face_bones
+        from ..scene.rigs.face_retarget import captured_expressions, retarget_expressions
+
+        settings = context.scene.scope_retarget
+        source = captured_armature(context)
+        assert source is not None  # checked by poll
+        captured = captured_expressions(source)
+        if captured is None:
+            raise UsageError(
+                f"the face of '{source.name}' was not captured; capture again with Face"
+            )
+        chosen = listed_or_guessed(settings)
+        if bones_move(settings.face):
+            action = retarget_face_bones(captured, settings.face, chosen, source.name)
+        else:
+            (action,) = retarget_expressions(captured, [settings.face], chosen, source.name)
+        if not len(settings.face_pairs):
+            fill_expressions(settings, chosen)
+        return rpt_(
+            "'{mesh}' is now animated by the action '{action}'",
+            mesh=settings.face.name,
+            action=action.name,
+        )
+
+
+class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):
+    """Save the expression map as a JSON file for similar faces"""
+
+    bl_idname = "scope.save_expression_map"
+    bl_label = "Save Expression Map"
+
+    filepath: StringProperty(subtype="FILE_PATH", default="expressions.json")
+
+    def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Write the list."""
+        from ..retarget.expression_map import save_expression_map
+
+        save_expression_map(listed_expressions(settings), path)
+
+
+class SCOPE_OT_load_expression_map(_FaceOperator, LoadMapOperator):
+    """Load an expression map from a JSON file"""
+
+    bl_idname = "scope.load_expression_map"
+    bl_label = "Load Expression Map"
+
+    def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+        """Read the list."""
+        from ..retarget.expression_map import load_expression_map
+
+        fill_expressions(settings, load_expression_map(path))
+
+
+class SCOPE_OT_edit_expression_pair(_FaceOperator):
+    """Add an entry to the expression map, or remove the selected one"""
+
+    bl_idname = "scope.edit_expression_pair"
+    bl_label = "Edit Expression Map"
+
+    action: EnumProperty(
+        items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry"))
+    )
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the list."""
+        settings = context.scene.scope_retarget
+        settings.face_active = edit_list(self.action, settings.face_pairs, settings.face_active)
+        if self.action == "ADD" and bones_move(settings.face):
+            settings.face_pairs[settings.face_active].channel = "up"
+        count = len(settings.face_pairs)
+        return rpt_("{count} entry" if count == 1 else "{count} entries", count=count)
+
+
 CLASSES = (
     SCOPE_OT_guess_bones,
     SCOPE_OT_retarget,
     SCOPE_OT_save_bone_map,
     SCOPE_OT_load_bone_map,
     SCOPE_OT_edit_bone_pair,
+    SCOPE_OT_guess_expressions,
+    SCOPE_OT_retarget_face,
+    SCOPE_OT_save_expression_map,
+    SCOPE_OT_load_expression_map,
+    SCOPE_OT_edit_expression_pair,
 )

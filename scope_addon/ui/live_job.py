@@ -17,32 +17,32 @@ from typing import Any
 
 import bpy
 
-from ....solver.body import Body
-from ....solver.errors import ScopeError
-from ...capture_report import Report
-from ...errors import OfflineError, UsageError, VideoError
-from ...footage import display_text
-from ...job.live_cameras import camera_source
-from ...job.live_process import PRESENCES, LiveProcess, ShownPose
-from ...job.live_request import LiveRequest
-from ...job.process import START_SCRIPT
-from ...live.outputs.journal import read_about
-from ...live.outputs.unfinished import remove_recording, unfinished_video
-from ...notices import OTHER, Notice, notice
-from ...options import Place, options_at
-from ...options.body_choice import chosen_body
-from ...scene.datablocks import check_local, is_in_layer, scene_of
-from ...scene.live_body import LiveBody
-from ...scene.live_rig import LiveRig
-from ...scene.rigs.rig_retarget import usable_guess
-from ...scene.visibility import SceneBefore, hide, select_only
-from ...temporary import remove
-from ...untrusted.body_file import load_body
-from ..capture.capture_job import build_capture, build_options, chosen_values, window_shows
-from ..preferences import cache
-from ..retarget.bone_list import listed_map
-from ..retarget.retarget_operators import retarget_options, retarget_to_chosen_rig
-from .stream_logins import with_login
+from ...solver.body import Body
+from ...solver.errors import ScopeError
+from ..capture_report import Report
+from ..errors import OfflineError, UsageError, VideoError
+from ..footage import display_text
+from ..job.live_cameras import camera_source
+from ..job.live_process import PRESENCES, LiveProcess, ShownPose
+from ..job.live_request import LiveRequest
+from ..job.process import START_SCRIPT
+from ..live.outputs.journal import read_about
+from ..live.outputs.unfinished import remove_recording, unfinished_video
+from ..notices import OTHER, Notice, notice
+from ..options import Place, options_at
+from ..options.body_choice import chosen_body
+from ..scene.datablocks import check_local, is_in_layer, scene_of
+from ..scene.live_body import LiveBody
+from ..scene.live_rig import LiveRig
+from ..scene.rigs.rig_retarget import usable_guess
+from ..scene.visibility import SceneBefore, hide, select_only
+from ..temporary import remove
+from ..untrusted.body_file import load_body
+from .capture.capture_job import build_capture, build_options, chosen_values, window_shows
+from .live_properties import with_login
+from .preferences import cache
+from .retarget_maps import listed_map
+from .retarget_operators import retarget_options, retarget_to_chosen_rig
 
 NOTICE_S = 1.0  # for which poses that were under way when a notice came do not end it
 QUIET_S = 2.0  # without a pose, after which the panel says so

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import IntProperty
 
-from ..captured_person import body_of, captured_armature, library_of
-from ..reporting import ReportingOperator, tip_
+from ..errors import UsageError
+from .captured_person import body_of, captured_armature, library_of
+from .reporting import ReportingOperator, tip_
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ....solver.body import Body
-    from ...edit.clip import Clip
+    from ...solver.body import Body
+    from ..edit.clip import Clip
 
 
 def edit_clip(
@@ -32,7 +33,7 @@ def edit_clip(
     :param rate: of the scene, frames per second.
     :param change: returns the new poses, given the present ones and the scene frame of each, (T,).
     """
-    from ...scene.character.keys import read_clip, write_clip
+    from ..scene.character.keys import read_clip, write_clip
 
     clip, frames = read_clip(armature, body, rate)
     write_clip(armature, body, change(clip, frames), frames)
@@ -80,8 +81,8 @@ class EditOperator(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Edit the keys; if that fails, restore them."""
-        from ...scene.animation_data.timing import scene_rate
-        from ...scene.animation_data.transaction import all_or_nothing
+        from ..scene.animation_data.timing import scene_rate
+        from ..scene.animation_data.transaction import all_or_nothing
 
         message = ""
         people = self.people(context)
@@ -120,8 +121,6 @@ class SpanOperator(EditOperator):
 
         :raises UsageError: the span ends before it begins.
         """
-        from ...errors import UsageError
-
         if self.end < self.start:
             raise UsageError(
                 f"the span ends in frame {self.end}, before it begins in frame "

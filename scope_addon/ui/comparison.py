@@ -4,22 +4,35 @@ capture from its side.
 
 Views are not part of what Blender undoes and saves with a scene, so this state is read from the
 viewports themselves.
+
+The camera's frame is fitted into the part of a viewport that no sidebar or toolbar covers. Seen
+through a camera, a viewport of ``w`` × ``h`` pixels at zoom ``z`` shows the sensor ``f · max(w,
+h)`` pixels long, with ``f = (√2 + z / 50)² / 4``, and the offset ``(dx, dy)`` moves the frame by
+``-2 f (dx · w, dy · h)`` pixels. A sensor that is fitted horizontally or vertically has ``w`` or
+``h`` in place of ``max(w, h)``.
+
+The view from the side follows the pelvis of one person, so the others must stay within it on either
+side, in every frame.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
-from ...scene.datablocks import holds
-from ..capture.captures import captures_of
-from ..captured_person import captured_armature
-from .frame_fit import fit_frame, unfit_frame
-from .side_extent import side_extent
-from .viewports import viewport_at, viewports
+from ...solver.errors import ScopeError
+from ..scene.datablocks import holds
+from .capture.captures import captures_of
+from .captured_person import body_of, captured_armature
+from .sidebar import viewport_at, viewports
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _MIN_SIDE = 0.3  # of the viewport's width
 _DRAWN_AFTER_S = 0.2
@@ -27,11 +40,17 @@ _SIDE_TILT = math.radians(5.0)
 # a viewport shows the distance times this over its focal length, across its longer side
 _SENSOR_MM = 72.0
 _had_bones: dict[int, bool] = {}  # by viewport: whether it showed bones before the comparison
+_FILLED = 0.94  # of the visible part
+_ZOOMS = (-30.0, 600.0)  # Blender's limits
+# by viewport: zoom and offset before the first fit
+_former: dict[int, tuple[float, tuple[float, float]]] = {}
+_HALF_HEIGHT_M = 1.3  # above and below the pelvis of a person
+_HALF_WIDTH_M = 0.5  # to the left and right of it
 
 
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Return the cameras of the scene's last capture, the one of its first video first."""
-    from ...scene.camera import view_number
+    from ..scene.camera import view_number
 
     collection = scene.scope.result.collection
     cameras = [o for o in collection.all_objects if o.type == "CAMERA"] if collection else []
@@ -260,7 +279,7 @@ def _show_alone(
     """Show only the capture in local view, because other objects could hide the footage or the
     body.
     """
-    from ...scene.visibility import show
+    from ..scene.visibility import show
 
     selected = context.selected_objects
     active = context.view_layer.objects.active
@@ -285,3 +304,124 @@ def _in(window: bpy.types.Window, area: bpy.types.Area) -> bpy.types.ContextTemp
     """Return the context of a viewport's main region."""
     region = next(region for region in area.regions if region.type == "WINDOW")
     return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
+    """Zoom and move a viewport's camera view so that the whole frame of the scene's camera is
+    visible.
+    """
+    region = next((each for each in area.regions if each.type == "WINDOW"), None)
+    camera = scene.camera
+    space = area.spaces.active
+    if (
+        region is None
+        or camera is None
+        or camera.type != "CAMERA"
+        or min(region.width, region.height) < 2
+    ):
+        return
+    left, right, bottom, top = _visible(area, region)
+    render = scene.render
+    size = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
+    width, height = _frame_at_one(camera.data.sensor_fit, size, (region.width, region.height))
+    factor = _FILLED * min((right - left) / width, (top - bottom) / height)
+    view = space.region_3d
+    _former.setdefault(space.as_pointer(), (view.view_camera_zoom, tuple(view.view_camera_offset)))
+    zoom = 50.0 * (math.sqrt(4.0 * max(factor, 0.0)) - math.sqrt(2.0))
+    view.view_camera_zoom = min(max(zoom, _ZOOMS[0]), _ZOOMS[1])
+    factor = (math.sqrt(2.0) + view.view_camera_zoom / 50.0) ** 2 / 4.0
+    view.view_camera_offset = (
+        -((left + right - region.width) / 2.0) / (2.0 * factor * region.width),
+        -((bottom + top - region.height) / 2.0) / (2.0 * factor * region.height),
+    )
+
+
+def unfit_frame(space: bpy.types.SpaceView3D) -> None:
+    """Restore the zoom and offset from before the first fit."""
+    if (former := _former.pop(space.as_pointer(), None)) is not None:
+        space.region_3d.view_camera_zoom, space.region_3d.view_camera_offset = former
+
+
+def _frame_at_one(
+    fit: str, size: tuple[float, float], region: tuple[int, int]
+) -> tuple[float, float]:
+    """Return the width and height of the frame, pixels, where the sensor is as long as the
+    viewport.
+    """
+    horizontal = fit == "HORIZONTAL" or (fit == "AUTO" and size[0] >= size[1])
+    along = {"HORIZONTAL": region[0], "VERTICAL": region[1]}.get(fit, max(region))
+    scale = along / (size[0] if horizontal else size[1])
+    return size[0] * scale, size[1] * scale
+
+
+def _visible(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
+    """Return the left, right, bottom and top of what no other region covers, in pixels of the
+    viewport's region.
+    """
+    left = 0.0
+    right = float(region.width)
+    bottom = 0.0
+    top = float(region.height)
+    for other in area.regions:
+        if min(other.width, other.height) < 2:  # hidden
+            continue
+        x = other.x - region.x
+        y = other.y - region.y
+        if other.type == "TOOLS":
+            left = max(left, x + other.width)
+        elif other.type == "UI":
+            right = min(right, x)
+        elif other.type in ("HEADER", "TOOL_HEADER") and y > region.height / 2:
+            top = min(top, y)
+        elif other.type in ("HEADER", "TOOL_HEADER"):
+            bottom = max(bottom, y + other.height)
+    wide_enough = right - left > 0.2 * region.width and top - bottom > 0.2 * region.height
+    return (
+        (left, right, bottom, top)
+        if wide_enough
+        else (0.0, float(region.width), 0.0, float(region.height))
+    )
+
+
+def side_extent(
+    followed: bpy.types.Object,
+    people: Sequence[bpy.types.Object],
+    R_world_view: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Return the width and height, metres, that a view along -z must show around the pelvis of
+    ``followed``.
+
+    :param people: captured armatures; one whose keys are missing is left out.
+    :param R_world_view: (3, 3), view axes to world.
+    """
+    from ..scene.animation_data.timing import scene_rate
+
+    rate = scene_rate(bpy.context.scene)
+    far = np.zeros(2)
+    path = _pelvis_path(followed, rate)
+    paths = [_pelvis_path(person, rate) for person in people if person != followed]
+    if path is not None:
+        for their in (other for other in paths if other is not None):
+            place = np.stack(
+                [np.interp(path[:, 0], their[:, 0], their[:, k]) for k in (1, 2, 3)], axis=1
+            )
+            far = np.maximum(far, np.abs((place - path[:, 1:]) @ R_world_view[:, :2]).max(axis=0))
+    return 2.0 * (float(far[0]) + _HALF_WIDTH_M), 2.0 * (float(far[1]) + _HALF_HEIGHT_M)
+
+
+def _pelvis_path(armature: bpy.types.Object, rate: float) -> NDArray[np.float64] | None:
+    """Return the scene frame and the world position of the pelvis at every key, (T, 4); None
+    without keys.
+    """
+    from ..scene.character.keys import read_clip
+    from ..scene.character.root_object import clip_as_displayed, parent_transform, root_object
+
+    try:
+        clip, frames = read_clip(armature, body_of(armature), rate)
+    except ScopeError:
+        return None
+    empty = root_object(armature)
+    M = np.array(armature.matrix_world if empty is None else parent_transform(empty))
+    return np.column_stack(
+        [frames, clip_as_displayed(armature, clip, frames).root @ M[:3, :3].T + M[:3, 3]]
+    )

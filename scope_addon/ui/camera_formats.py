@@ -12,11 +12,13 @@ import sys
 
 import bpy
 
-from ..capture.capture_panel import draw_text
-from ..preferences import cache
-from ..reporting import iface_, sentence, tip_
-from ..view.sidebar import redraw_sidebars
-from .live_state import state
+from ...solver.errors import ScopeError
+from ..errors import UsageError
+from .capture.capture_panel import draw_text
+from .live_properties import state
+from .preferences import cache
+from .reporting import iface_, sentence, tip_
+from .sidebar import redraw_sidebars
 
 _INTERVAL_S = 0.1
 
@@ -38,9 +40,7 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Start to ask; the panel shows the answer."""
         # Imported here: it loads numpy, which would slow down the start of Blender.
-        from ....solver.errors import ScopeError
-        from ...errors import UsageError
-        from ...job.live_cameras import FormatsProcess, camera_source
+        from ..job.live_cameras import FormatsProcess, camera_source
 
         typed = context.scene.scope_live.camera
         state.message = ""
@@ -65,8 +65,6 @@ def step() -> float | None:
     """See whether the camera has answered; return in how many seconds to call again. A timer calls
     this.
     """
-    from ....solver.errors import ScopeError
-
     asking = state.asking
     if asking is None:
         return None
@@ -95,7 +93,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     if state.asking is not None:
         draw_text(context, layout, iface_("Querying the camera"))
     elif state.cameras:
-        from ...job.live_cameras import camera_number, camera_source
+        from ..job.live_cameras import camera_number, camera_source
 
         source = camera_source(context.scene.scope_live.camera)
         camera = state.cameras.get(camera_number(source)) if source is not None else None

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fields for files, and file browsers that show at first only what fits.
+"""Files in the interface: fields for them, file browsers that show at first only what fits, and
+footage and motion files that are dropped from the system's file browser into the 3D viewport.
 
 Blender draws a folder beside every path, which opens a browser that shows all files. A field is
 therefore drawn as a text of the same value, with a button of our own. Every browser's filter can be
@@ -15,10 +16,11 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
-from ...footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, display_text
-from ..reporting import rpt_
+from ..errors import UsageError
+from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, display_text
+from .reporting import rpt_
 
-_ASSETS = Path(__file__).resolve().parents[3] / "assets"
+_ASSETS = Path(__file__).resolve().parents[2] / "assets"
 _TEXT = "_text"  # ends the name of the text of a path
 _VIDEOS = ";".join(f"*{suffix}" for suffix in VIDEO_SUFFIXES)
 FOOTAGE = ";".join(f"*{suffix}" for suffix in FOOTAGE_SUFFIXES)
@@ -193,4 +195,54 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         return owner if self.setting in _FILTERS and hasattr(owner, self.setting) else None
 
 
-CLASSES = (SCOPE_OT_choose_file,)
+class SCOPE_FH_footage(bpy.types.FileHandler):
+    """Make a dropped video or image the scene's footage."""
+
+    bl_idname = "SCOPE_FH_footage"
+    bl_label = "Capture with Scope"
+    bl_import_operator = "scope.choose_footage"
+    bl_file_extensions = ";".join(FOOTAGE_SUFFIXES)
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Accept files over a 3D viewport, where the panel is."""
+        return bool(context.area) and context.area.type == "VIEW_3D"
+
+
+class SCOPE_FH_motion(bpy.types.FileHandler):
+    """Import dropped motion files."""
+
+    bl_idname = "SCOPE_FH_motion"
+    bl_label = "Import Motion with Scope"
+    bl_import_operator = "scope.import_motion"
+    bl_file_extensions = ".npz"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Accept files over a 3D viewport."""
+        return bool(context.area) and context.area.type == "VIEW_3D"
+
+
+CLASSES = (
+    SCOPE_OT_choose_file,
+    SCOPE_FH_footage,
+    SCOPE_FH_motion,
+)
+
+
+def output_file(typed: str, suffix: str) -> Path:
+    """Return the path of a file to write, with its suffix.
+
+    :param typed: as the user has entered it; ``//`` at its beginning is the folder of the .blend
+        file.
+    :param suffix: with its dot.
+    :raises UsageError: the file has no name, or is beside a .blend file that was never saved.
+    """
+    if not bpy.path.basename(typed).removesuffix(suffix):
+        raise UsageError("the file has no name; enter one")
+    if typed.startswith("//") and not bpy.data.filepath:
+        raise UsageError(
+            f"'{typed}' is relative to this .blend file, which was never saved; save it, or choose "
+            "a folder"
+        )
+    return Path(bpy.path.ensure_ext(bpy.path.abspath(typed), suffix))

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bone map and the expression map as the panel's lists show them, and what the operators on
+them share: their poll, their files, and editing their lists.
+
+The chosen face is a mesh with shape keys, or a rig whose bones move the face.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+
+from ...solver.errors import ScopeError
+from ..scene.datablocks import is_in_layer
+from .file_field import output_file
+from .reporting import ReportingOperator, rpt_, tip_
+
+if TYPE_CHECKING:
+    from ..retarget.bone_map import BoneMap
+    from ..retarget.expression_map import ExpressionMap
+
+SHAPE_KEY = "key"  # the channel of entries of shape keys
+
+
+def is_in_view_layer(
+    cls: type[bpy.types.Operator], context: bpy.types.Context, chosen: bpy.types.Object
+) -> bool:
+    """Return whether an object that was chosen can be animated here: one that is deleted stays
+    chosen.
+    """
+    if is_in_layer(context.view_layer, chosen):
+        return True
+    cls.poll_message_set(
+        tip_(
+            "'{rig}' is not in the scene's view layer: add it to the scene, or enable its "
+            "collection in the Outliner",
+            rig=chosen.name,
+        )
+    )
+    return False
+
+
+class MapFileOperator(ReportingOperator):
+    """An operator on the file of a map, which the file browser asks for. Not registered."""
+
+    filepath: StringProperty(subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+
+class SaveMapOperator(MapFileOperator):
+    """Writes a map; a subclass has ``save``, and the file's usual name. Not registered."""
+
+    bl_options = {"REGISTER"}  # it changes a file only, so there is nothing to undo
+
+    # the file browser asks before it overwrites
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Add the suffix while the name is typed, so that the file browser sees which file would be
+        overwritten.
+        """
+        path: str = bpy.path.ensure_ext(self.filepath, ".json")
+        changed = path != self.filepath
+        self.filepath = path
+        return bool(changed)
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Write the file.
+
+        :raises UsageError: the file has no name, or is beside a .blend file that was never saved.
+        """
+        path = str(output_file(self.filepath, ".json"))
+        self.save(context.scene.scope_retarget, path)
+        return rpt_("Saved {file}", file=path)
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def save(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+            """Write the map of the settings to a path.
+
+            :raises InputError: it could not be loaded again.
+            """
+
+
+class LoadMapOperator(MapFileOperator):
+    """Reads a map; a subclass has ``load``. Not registered."""
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Fill the list."""
+        self.load(context.scene.scope_retarget, bpy.path.abspath(self.filepath))
+        return rpt_("Loaded {file}", file=self.filepath)
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def load(self, settings: bpy.types.PropertyGroup, path: str) -> None:
+            """Fill the list of the settings from a path."""
+
+
+def edit_list(action: str, pairs: Any, active: int) -> int:
+    """Add an entry to a list's collection, or remove the active one; return which one is active
+    then.
+
+    :param action: ``ADD`` or ``REMOVE``.
+    """
+    if action == "ADD":
+        pairs.add()
+        return len(pairs) - 1
+    if len(pairs):
+        pairs.remove(active)
+        return max(0, min(active, len(pairs) - 1))
+    return active
+
+
+def guess_into_list(settings: bpy.types.PropertyGroup) -> None:
+    """Fill the list with a guess for the chosen rig; leave it empty if nothing can be guessed.
+
+    :param settings: of retargeting, with a rig.
+    """
+    from ..scene.rigs.rig_retarget import guess_bone_map
+
+    settings.pairs.clear()
+    try:
+        fill_list(settings, guess_bone_map(settings.rig))
+    except ScopeError:
+        return  # the operators report why
+
+
+def fill_list(settings: bpy.types.PropertyGroup, bone_map: BoneMap) -> None:
+    """Fill the list with a map, in the order of the body's parts."""
+    from ..retarget.bone_map import PARTS
+
+    settings.pairs.clear()
+    for bone, part in sorted(bone_map.parts.items(), key=lambda pair: PARTS.index(pair[1])):
+        pair = settings.pairs.add()
+        pair.bone = bone
+        pair.part = part
+        pair.confidence = bone_map.confidence.get(bone, 1.0)
+    settings.active = 0
+
+
+def listed_map(settings: bpy.types.PropertyGroup) -> BoneMap:
+    """Return the list as a map; entries without a bone or a part are left out."""
+    from ..retarget.bone_map import BoneMap
+
+    pairs = [pair for pair in settings.pairs if pair.bone and pair.part]
+    return BoneMap(
+        {pair.bone: pair.part for pair in pairs}, {pair.bone: pair.confidence for pair in pairs}
+    )
+
+
+def common_prefix(bones: list[str]) -> str:
+    """Return what all names begin with, up to a separator, such as ``mixamorig:``; empty if there
+    is nothing.
+    """
+    shared = os.path.commonprefix(bones) if len(bones) > 1 else ""
+    return shared[: 1 + max(shared.rfind(separator) for separator in ":_. ")]
+
+
+def bones_move(face: bpy.types.Object | None) -> bool:
+    """Return whether a face is a rig whose bones move it, and Scope knows which."""
+    from ..scene.rigs.face_bones import has_bone_face
+
+    return face is not None and "scope_source" not in face and has_bone_face(face)
+
+
+def has_targets(face: bpy.types.Object | None) -> bool:
+    """Return whether an object is a face: it has shape keys, or bones move it."""
+    if face is not None and face.type == "MESH":
+        return face.data.shape_keys is not None
+    return bones_move(face)
+
+
+def target_names(face: bpy.types.Object) -> list[str]:
+    """Return the names of a face's shape keys or bones."""
+    return list(
+        (face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks).keys()
+    )
+
+
+def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
+    """Return the rig if its bones move its face, and no shape keys of its meshes with names that
+    are known.
+    """
+    from ..scene.rigs.face_bones import only_bones_move
+    from ..scene.rigs.face_retarget import faces_of
+    from ..scene.rigs.rig_file import with_meshes
+
+    if not bones_move(rig):
+        return None
+    return (
+        rig if only_bones_move(rig, faces_of(with_meshes(rig, bpy.context.scene.objects))) else None
+    )
+
+
+def guessed_map(face: bpy.types.Object) -> ExpressionMap:
+    """Return the map that the names of a face's shape keys or bones suggest."""
+    from ..retarget.expression_map import guess_expression_map
+    from ..scene.rigs.face_bones import guess_face_bones
+    from ..scene.rigs.face_retarget import key_names
+
+    return guess_face_bones(face) if bones_move(face) else guess_expression_map(key_names([face]))
+
+
+def listed_or_guessed(settings: bpy.types.PropertyGroup) -> ExpressionMap:
+    """Return the list as a map or, if it is empty, the map that the names of the chosen face
+    suggest.
+    """
+    return listed_expressions(settings) if len(settings.face_pairs) else guessed_map(settings.face)
+
+
+def fill_expressions(settings: bpy.types.PropertyGroup, expression_map: ExpressionMap) -> None:
+    """Fill the list with a map, one entry for each expression of a shape key or of a control's
+    channel.
+    """
+    settings.face_pairs.clear()
+    entries = [(key, SHAPE_KEY, factors) for key, factors in expression_map.keys.items()]
+    entries += [
+        (bone, channel, factors)
+        for bone, channels in expression_map.controls.items()
+        for channel, factors in channels.items()
+    ]
+    for key, channel, factors in entries:
+        for expression, factor in factors.items():
+            pair = settings.face_pairs.add()
+            pair.key = key
+            pair.channel = channel
+            pair.expression = expression
+            pair.factor = factor
+    settings.face_active = 0
+
+
+def listed_expressions(settings: bpy.types.PropertyGroup) -> ExpressionMap:
+    """Return the list as a map; entries without a shape key or control, or without an expression,
+    are left out.
+    """
+    from ..retarget.expression_map import ExpressionMap
+
+    out = ExpressionMap({})
+    for pair in settings.face_pairs:
+        if not pair.key or not pair.expression:
+            continue
+        if pair.channel == SHAPE_KEY:
+            factors = out.keys.setdefault(pair.key, {})
+        else:
+            factors = out.controls.setdefault(pair.key, {}).setdefault(pair.channel, {})
+        factors[pair.expression] = round(pair.factor, 6)
+    return out
