@@ -35,6 +35,7 @@ from .command_line.outputs import (
     check_blender,
     check_outputs,
     checked_rigs,
+    confine,
     default_outputs,
     distinct_paths,
     files_to_read,
@@ -232,12 +233,18 @@ def _add_batch_files(batch: argparse.ArgumentParser) -> None:
     add_window_seconds(batch)
 
 
-def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) -> int:
+def main(
+    argv: Sequence[str] | None = None,
+    program: Sequence[str] = PROGRAM,
+    *,
+    own_process: bool = False,
+) -> int:
     """Run the command line and return the exit status. Errors are printed, not raised, except with
     SCOPE_TRACEBACK set.
 
     :param argv: arguments; those of the process if None.
     :param program: command that takes these arguments; a batch starts one such process per clip.
+    :param own_process: whether the process ends with the command, which may then confine it.
     """
     try:
         args, unknown = build_parser().parse_known_args(argv)
@@ -251,6 +258,7 @@ def main(argv: Sequence[str] | None = None, program: Sequence[str] = PROGRAM) ->
                 f"unknown arguments: {' '.join(unknown)} (see scope {args.command} --help{advice})"
             )
         args.program = list(program)
+        args.own_process = own_process
         given = [*program, *(sys.argv[1:] if argv is None else argv)]
         internal = STOP_WITH_STDIN, f"{FINISHED_FILE}="
         shown = shlex.join([each for each in given if not each.startswith(internal)])
@@ -325,8 +333,6 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     )
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
-    rigs = checked_rigs(args, outputs, args.hands != OFF)
-
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
@@ -339,6 +345,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .job.watched_footage import WatchedFootage
     from .report.capture_page import CapturedClip, write_capture_page
 
+    confine(args, outputs)
+    rigs = checked_rigs(args, outputs, args.hands != OFF)
     with ExitStack() as stack:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         if not args.views and (found := window_report(args, video, options, progress)):
@@ -474,7 +482,7 @@ def run() -> NoReturn:
     written and closed at this point, so the process exits without running destructors.
     """
     open_standard_streams()
-    status = main()
+    status = main(own_process=True)
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # a full disk, or a reader who went away
             stream.flush()

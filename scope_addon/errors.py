@@ -98,6 +98,8 @@ def system_error_message(error: OSError | MemoryError) -> str:
         advice = (
             "check the permissions of that file or folder, and whether another program has it open"
         )
+    elif isinstance(error, FileNotFoundError):
+        advice = "check that this file or folder, and the current folder, still exist"
     elif isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         advice = "choose a shorter name"
     else:

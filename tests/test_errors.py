@@ -62,6 +62,7 @@ def test_libraries_that_cannot_be_loaded(tmp_path) -> None:
             "check the permissions of that file or folder, and whether another program has it open",
         ),
         (errno.ENAMETOOLONG, "choose a shorter name"),
+        (errno.ENOENT, "check that this file or folder, and the current folder, still exist"),
     ],
 )
 def test_the_advice_fits_the_systems_error(number: int, advice: str) -> None:

@@ -18,6 +18,7 @@ from .outputs import (
     check_blender,
     check_outputs,
     checked_rigs,
+    confine,
     distinct_paths,
     stem_of,
     write_outputs,
@@ -59,6 +60,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     # Imported here, so that errors in the arguments are printed immediately.
     from ..smpl_import.convert import import_motions
 
+    confine(args, outputs)
     people = import_motions(args.motion, values["body"], values["up_axis"], values["motion_rate"])
     motions = [person.motion for person in people]
     body = people[0].body

@@ -19,7 +19,7 @@ from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths
 from .arguments import add_options, values_in_range
 from .memory_limit import check_memory_limit
-from .outputs import check_outputs
+from .outputs import check_outputs, confine
 from .signals import interrupted
 from .terminal import ProgressLine, print_message
 
@@ -60,10 +60,15 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     check_outputs(_paths(values), vars(args), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
     from ..live.outputs.unfinished import is_recording
+    from ..live.sources import is_stream
 
+    to_finish = [Path(args.source)] if is_recording(args.source) else []
+    is_served = values["json_port"] is not None or values["preview"]
+    connects = is_stream(args.source) or values["vmc"] is not None or is_served
+    confine(args, to_finish, connects=connects)
     report = (
         _finish_recording(Path(args.source), values["record"])
-        if is_recording(args.source)
+        if to_finish
         else _capture(args, values, options)
     )
     if not args.json:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...solver.body import Body
 from ...solver.body_file import ASSETS
+from ..confinement import confine_capture, folders_of
 from ..counts import counted
 from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url
@@ -71,6 +72,9 @@ OTHER_INPUTS = (
     *("motion", "body", "calibration", "camera_path", "retarget", "bone_map", "expression_map"),
     *("detector", "keypoints"),
 )
+
+# Arguments that name a file to write beside the results.
+OTHER_OUTPUTS = ("overlay", "report", "save_calibration", "finished_file", "record", "keep_footage")
 
 
 def files_to_read(values: Mapping[str, Any]) -> list[Path]:
@@ -142,6 +146,24 @@ def check_outputs(
         # Several people have a file each in formats that have room for one.
         written += path.parent.glob(f"{glob.escape(path.stem)}.person*{path.suffix}")
     refuse_inputs(written, files_to_read(inputs))
+
+
+def confine(args: argparse.Namespace, outputs: list[Path], *, connects: bool = False) -> None:
+    """Confine this process before it decodes what others have made, if it is the command's own
+    rather than Blender's, or that of a program which calls the command line.
+
+    :param outputs: result files.
+    :param connects: whether the command needs a network.
+    """
+    if not args.own_process:
+        return
+    values = vars(args)
+    written = [*outputs, *(values[name] for name in OTHER_OUTPUTS if values.get(name))]
+    folders = [folder for path in written for folder in folders_of(path)]
+    if values.get("windows_folder"):
+        folders.append(args.windows_folder)
+    own_networks = values.get("detector") or values.get("keypoints")
+    confine_capture(folders, connects=connects, starts_programs=bool(own_networks))
 
 
 def check_blender(outputs: list[Path]) -> None:

@@ -20,6 +20,7 @@ from ...solver.body_file import BUILT_IN
 from ...solver.errors import InputError
 from ..atomic_write import write_result
 from ..capture_report import Report
+from ..confinement import limits_files
 from ..footage import json_text
 from ..json_file import read_json_object
 from ..notices import PHRASES, SENTENCES
@@ -73,6 +74,7 @@ def run_problem_report(args: argparse.Namespace) -> dict[str, Any]:
     """
     check_output(args.output, (".json",))
     content: dict[str, Any] = {"versions": versions(), "computer": machine()}
+    content["limits_files"] = limits_files()
     if args.report:
         refuse_inputs([args.output], [args.report] if args.report.is_file() else [])
         content["capture"] = figures_without_names(_read_report(args.report))

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, NoReturn
 
 from ...solver.errors import ScopeError
+from ..confinement import confine_capture, folders_of
 from ..errors import exit_status, lacks_memory, system_error_message
 from ..footage import json_text
 from ..parent import end_with_parent
@@ -166,12 +167,13 @@ def main(job_folder: Path) -> NoReturn:
         _remove(job_folder)
         _exit(1)
     commands = Commands()
-    end_with_parent(lambda: _remove(job_folder), commands.receive)
     status = 1
     reporter = Reporter(stream)
     with contextlib.suppress(BrokenPipeError):
         try:
             request = _parsed(line)
+            _confine(request, job_folder)  # before there are other threads
+            end_with_parent(lambda: _remove(job_folder), commands.receive)
             _lower_priority(_NICENESS if request else 19)
             status = run(request, job_folder, reporter, commands)
         except ScopeError as error:
@@ -189,6 +191,23 @@ def _parsed(line: str) -> Request:
     if FormatsRequest.is_in(line):
         return FormatsRequest.from_json(line)
     return LiveRequest.from_json(line) if LiveRequest.is_in(line) else JobRequest.from_json(line)
+
+
+def _confine(request: Request, job_folder: Path) -> None:
+    """Confine this process, unless it reads nothing but our own clip: Python and numba then store
+    what they compile, wherever that is.
+    """
+    if request is None:
+        return
+    folders = [cache_of(job_folder) or job_folder.parent]
+    values = {} if isinstance(request, FormatsRequest) else request.values
+    if isinstance(request, LiveRequest) and values["keep_footage"]:
+        folders += folders_of(Path(values["keep_footage"]))
+    confine_capture(
+        folders,
+        connects=isinstance(request, LiveRequest) and request.online,
+        starts_programs=bool(values.get("detector") or values.get("keypoints")),
+    )
 
 
 def _exit(status: int) -> NoReturn:

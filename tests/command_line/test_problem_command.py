@@ -75,7 +75,8 @@ def test_no_name_of_the_users_is_in_the_file_and_every_figure_is(tmp_path, capsy
 
 def test_without_a_capture_the_computer_alone_is_described(tmp_path):
     assert main(["report-a-problem", "-o", str(tmp_path / "mine.json")]) == 0
-    assert set(json.loads((tmp_path / "mine.json").read_text("utf-8"))) == {"versions", "computer"}
+    found = json.loads((tmp_path / "mine.json").read_text("utf-8"))
+    assert set(found) == {"versions", "computer", "limits_files"}
 
 
 @pytest.mark.parametrize(

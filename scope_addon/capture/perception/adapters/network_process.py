@@ -54,7 +54,7 @@ class NetworkProcess:
         self._lock = threading.Lock()
         self._limit_bytes = BASE_BYTES + WEIGHT_COPIES * _bytes_of_weights(path)
         self._limit_s = OPENING_S.get(provider, DEFAULT_OPENING_S)
-        self._process = _start()
+        self._process = _start(str(path.resolve().parent) if provider == "cpu" else "")
         self._end = weakref.finalize(self, _end, self._process)
         providers, mem_pattern = session_options_of(provider)
         opened = self._ask(
@@ -138,10 +138,10 @@ class NetworkProcess:
         return RuntimeError(f"onnxruntime crashed in its process, which ended with status {status}")
 
 
-def _start() -> subprocess.Popen[bytes]:
+def _start(folder: str) -> subprocess.Popen[bytes]:
     # An empty entry means the current folder, which isolated Python omits on purpose.
     parent = str(os.getpid())
-    command = [sys.executable, "-I", "-S", str(SERVER), parent, *(p for p in sys.path if p)]
+    command = [sys.executable, "-I", "-S", str(SERVER), parent, folder, *(p for p in sys.path if p)]
     try:
         return subprocess.Popen(
             command,

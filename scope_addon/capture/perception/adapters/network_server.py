@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run one ONNX network in a process of its own, within limits of time and memory.
 
-    python -I -S network_server.py PARENT SEARCH_PATH...
+    python -I -S network_server.py PARENT FOLDER SEARCH_PATH...
 
-A script: of Scope it loads only the module that ends it with its parent, the process PARENT, so
-that it starts fast and a network finds little in its process. Requests come on standard input,
+A script: of Scope it loads only the modules that end it with its parent, the process PARENT, and
+that confine it to reading a network in FOLDER, so that it starts fast and a network finds little in
+its process. FOLDER is empty where a GPU's driver needs more. Requests come on standard input,
 answers leave on standard output: the length of a JSON text as four bytes, the text, and the
 contents of the arrays that it describes.
 
@@ -244,14 +245,21 @@ def _peak_on_windows() -> int:
     return int(counters.peak) if found else 0
 
 
-def main() -> None:
-    """Answer requests until the parent closes the pipe.
+def main(parent: int, folder: str) -> None:
+    """Answer requests until the parent closes the pipe, or ends, also in the middle of a run.
 
+    :param parent: process id.
+    :param folder: with the network; empty: the process is not confined.
     :raises ValueError: a message of the parent is damaged.
     """
     requests = os.fdopen(os.dup(0), "rb")
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever libraries print
+    parents_end = _module("parent")
+    if folder:
+        _confine(folder)
+    # In a thread, which is confined as well.
+    parents_end.end_with_parent(receive=None, parent=parent)
     server = Server()
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while True:
@@ -259,19 +267,28 @@ def main() -> None:
     os._exit(0)  # without the exit handlers, which would wait for threads
 
 
-def _end_with(parent: int) -> None:
-    """End this process with its parent, also in the middle of a run of the network."""
-    file = Path(__file__).resolve().parents[3] / "parent.py"
-    spec = importlib.util.spec_from_file_location("parent", file)
+def _module(name: str) -> ModuleType:
+    """Load a module of Scope's that needs no other."""
+    file = Path(__file__).resolve().parents[3] / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    module.end_with_parent(receive=None, parent=parent)
+    return module
+
+
+def _confine(folder: str) -> None:
+    """Let this process read the network, Python and the system, and write nothing."""
+    # Threads of numpy's, which are not needed, would not be confined.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    with contextlib.suppress(ImportError):  # which the first request meets again
+        load_runtime()  # whose libraries may lie anywhere
+    readable = [folder, sys.prefix, sys.base_prefix, *sys.path]
+    _module("confinement").confine([], map(Path, readable))
 
 
 if __name__ == "__main__":
-    parent, *search_path = sys.argv[1:]
+    parent, folder, *search_path = sys.argv[1:]
     sys.path[:] = search_path + [p for p in sys.path if p not in search_path]
-    _end_with(int(parent))
-    main()
+    main(int(parent), folder)
