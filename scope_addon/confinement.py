@@ -143,11 +143,12 @@ def _limit_files(library: Any, writable: Iterable[Path], readable: Iterable[Path
     for path, rights in rules:
         # What does not exist needs no rule.
         with suppress(OSError):
+            # It stays open: a folder that is mounted when needed would be unmounted meanwhile, and
+            # its rule be lost.
             handle = os.open(path, getattr(os, "O_PATH", 0) | os.O_CLOEXEC)
             if not path.is_dir():
                 rights &= _OF_FILES
             _call(library, _ADD_RULE, ruleset, _PATH_BENEATH, struct.pack("=Qi", rights, handle), 0)
-            os.close(handle)
     _call(library, _RESTRICT_SELF, ruleset, 0)
     os.close(ruleset)
 

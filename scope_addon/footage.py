@@ -3,8 +3,8 @@
 load it quickly.
 """
 
-import os
 import re
+import sys
 from pathlib import Path
 
 VIDEO_SUFFIXES = (
@@ -157,7 +157,11 @@ def unicode_text(path: str | Path) -> str:
     Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with
     them can name a file, but cannot be printed, or be part of JSON or of Blender's names.
     """
-    return os.fsencode(path).decode("utf-8", "replace") if not is_utf8(path) else str(path)
+    if is_utf8(path):
+        return str(path)
+    # Not by the system's encoding, which may lack other letters of the text.
+    as_bytes = str(path).encode("utf-8", sys.getfilesystemencodeerrors())
+    return as_bytes.decode("utf-8", "replace")
 
 
 def json_text(value: object, indent: int | None = None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -84,6 +85,20 @@ def test_names_that_are_no_text_can_be_shown() -> None:
     text = json_text({odd: [odd, "é", 1.5, None]})
     assert text.isascii()
     assert json.loads(text) == {display_text(odd): [display_text(odd), "é", 1.5, None]}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are Unicode on this system")
+def test_names_can_be_shown_with_other_text_where_the_system_has_ascii_alone() -> None:
+    code = (
+        "import os, sys; from scope.scope_addon.footage import json_text\n"
+        "name = os.fsdecode(b'\\xc3\\xa9')\n"
+        "print(json_text([name, '60\\xb0']), sys.getfilesystemencoding())"
+    )
+    ascii_alone = dict(os.environ, LC_ALL="C", PYTHONUTF8="0")
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=ascii_alone, timeout=600
+    )
+    assert ended.stdout == '["\\u00e9", "60\\u00b0"] ascii\n', ended.stderr
 
 
 @pytest.mark.parametrize(

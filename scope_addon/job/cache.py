@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..temporary import discard, new_folder, own_entries, remove
+from ..temporary import discard, new_folder, own_entries, remove, remove_abandoned
 
 REPORT = "report.json"
 RECORDINGS = "recordings"
@@ -63,7 +63,9 @@ class Cache:
         return self.root / "kernels"
 
     def find(self, key: str) -> CachedCapture | None:
-        """Return the finished capture with this key; None if there is none."""
+        """Return the finished capture with this key, and remove what killed processes have left
+        in the cache; None if there is none.
+        """
         import json
 
         from .messages import is_result
@@ -80,6 +82,9 @@ class Cache:
             return None
         with suppress(OSError):
             os.utime(folder)  # mark as used, so that it is pruned last
+        # Nobody else may come to write here.
+        for each in (self.root, self.root / "jobs"):
+            remove_abandoned(each)
         return CachedCapture(motions, content["report"])
 
     def recordings(self) -> list[Path]:

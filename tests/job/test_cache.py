@@ -117,6 +117,19 @@ def test_abandoned_jobs_are_removed_and_running_ones_kept(cache):
     assert not abandoned.exists()
 
 
+def test_a_capture_that_is_found_leaves_nothing_of_killed_processes(cache):
+    """No other process may ever write there."""
+    add(cache, "a")
+    abandoned = cache.new_job_folder()
+    times = temporary.claim(cache.root, ".times.", ".json")
+    times.write_bytes(b"{")
+    for path in (abandoned, times):
+        os.close(temporary._locks.pop(path))
+    cache.find(key("a"))
+    assert list((cache.root / "jobs").iterdir()) == []
+    assert not times.exists()
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
 @pytest.mark.parametrize("name", ["captures", "unfinished", "kernels", "jobs"])
 @pytest.mark.parametrize("is_link", [False, True])
