@@ -6,7 +6,6 @@ reads them.
 import copy
 import json
 import os
-import random
 
 import pytest
 from scope.scope_addon.retarget.rig_source import check_gltf
@@ -121,24 +120,6 @@ def test_a_pipe_beside_the_rig_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "rig.bin")
     with pytest.raises(InputError, match=r"rig\.bin is a pipe or a device"):
         check_gltf(glb(tmp_path / "rig.glb", changed("buffers", 0, "uri", to="rig.bin")))
-
-
-def test_random_damage_never_gives_a_traceback(tmp_path):
-    whole = glb(tmp_path / "rig.glb", GLTF).read_bytes()
-    chance = random.Random(3)
-    refused = 0
-    for _ in range(300):
-        data = bytearray(whole)
-        for _ in range(chance.randint(1, 5)):
-            data[chance.randrange(len(data) - 400)] = chance.randrange(256)
-        (tmp_path / "rig.glb").write_bytes(
-            data[: chance.choice((None, chance.randrange(len(data))))]
-        )
-        try:
-            check_gltf(tmp_path / "rig.glb")
-        except InputError:
-            refused += 1
-    assert refused > 200
 
 
 @pytest.mark.parametrize("extension", ["EXT_meshopt_compression", "KHR_meshopt_compression"])

@@ -6,8 +6,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from bpy_extras.object_utils import world_to_camera_view
-from mathutils import Vector
 from scope.scope_addon.footage_view import FootageView
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.camera import set_resolution, view_number
@@ -56,17 +54,6 @@ def test_the_camera_sees_joints_at_their_pixels(body, make_motion, joints_world,
     camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
     pixels = projected_by_blender(camera, joints_world(motion)[5])
     np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, 5), atol=0.05)
-
-
-def test_square_pixels_agree_with_blenders_own_helper(body, make_motion, joints_world):
-    K = np.array([[800.0, 0, 700.0], [0, 800.0, 500.0], [0, 0, 1]])
-    motion = make_motion(body, 3, image_size=(1280, 960), intrinsics=K)
-    camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
-    seen = [
-        world_to_camera_view(bpy.context.scene, camera, Vector(p)) for p in joints_world(motion)[2]
-    ]
-    pixels = np.array([[v.x * 1280, (1 - v.y) * 960] for v in seen])
-    np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, 2), atol=0.05)
 
 
 def test_a_moving_camera_is_keyed(body, make_motion, joints_world, blender):
@@ -330,19 +317,6 @@ def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make
     result = build_scene([motion], body, footage=clip)
     assert len(result.warnings) == 1
     assert "drifts from the motion by up to 4 frames" in str(result.warnings[0])
-
-
-def test_a_picture_is_shown_in_the_background(body, make_motion, tmp_path):
-    picture = tmp_path / "still.png"
-    image = bpy.data.images.new("still", 64, 48)
-    image.filepath_raw = str(picture)
-    image.file_format = "PNG"
-    image.save()
-    motion = make_motion(body, 1, image_size=(64, 48))
-    result = build_scene([motion], body, footage=picture)
-    background = result.people[0].camera.data.background_images[0]
-    assert (background.source, tuple(background.image.size)) == ("IMAGE", (64, 48))
-    assert result.warnings == []
 
 
 def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):

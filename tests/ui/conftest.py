@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -14,8 +15,14 @@ import bpy
 import numpy as np
 import pytest
 import scope
+from scope.scope_addon import ui
 from scope.scope_addon.job.process import WorkerProcess
+from scope.scope_addon.machine_code import code_folders
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.ui import preferences, translations
+from scope.scope_addon.ui.capture import capture_job, capture_operators
+from scope.scope_addon.ui.live import live_operators
+from scope.scope_addon.ui.pins import pin_tool
 from scope.solver import body_file
 from scope.solver.body import Body
 from scope.solver.body_file import load_body
@@ -40,17 +47,25 @@ def root() -> Path:
     return ROOT
 
 
+@pytest.fixture(scope="module", autouse=True)
+def registered_classes() -> Iterator[None]:
+    """Register the extension once for all tests of a module: it takes longer than most of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            translations, "blender_translations", cache(translations.blender_translations)
+        )
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        scope.register()
+        yield
+        scope.unregister()
+
+
 @pytest.fixture(autouse=True)
 def registered(tmp_path, monkeypatch):
-    """Register the extension in a fresh Blender. Each test has its own cache; all share the
-    compiled solver.
+    """Give a test the extension in a fresh Blender, and its own cache. All share the compiled
+    solver.
     """
-    from scope.scope_addon.machine_code import code_folders
-    from scope.scope_addon.ui import preferences
-    from scope.scope_addon.ui.capture import capture_job
-
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scope.register()
     monkeypatch.setattr(body_file, "load_body", load_body_once)
     monkeypatch.setattr(preferences, "user_folder", lambda: tmp_path / "user")
     # What this process compiles later would lie in a test's folder, where nobody finds it again.
@@ -61,7 +76,14 @@ def registered(tmp_path, monkeypatch):
         lambda request, folder, kernels, *rest: WorkerProcess(request, folder, None, *rest),
     )
     yield
-    scope.unregister()
+    # All that ends when the extension is disabled, and is attached when it is enabled again.
+    capture_operators.end_capture()
+    live_operators.end_live()
+    pin_tool.detach()
+    for _, detach in reversed(ui._attachments()):
+        detach()
+    for attach, _ in ui._attachments():
+        attach()
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ Message = tuple[str, str]  # context and text
 
 def stage_texts() -> set[str]:
     """Return what the progress of a capture says."""
-    source = (ROOT / "job" / "progress" / "job_progress.py").read_text(encoding="utf-8")
+    source = (ROOT / "job" / "job_progress.py").read_text(encoding="utf-8")
     return _STAGES | {
         text for _, text in _of_source(ast.parse(source)) if any(map(str.isalpha, text))
     }

@@ -146,18 +146,6 @@ def test_an_array_that_is_missing_or_holds_objects_makes_a_file_worthless(
         assert load_window(tmp_path, WINDOW, SIZE) is None
 
 
-def test_damaged_bytes_never_raise(tmp_path: Path) -> None:
-    path = save_window(tmp_path, record(), SIZE)
-    whole = path.read_bytes()
-    rng = np.random.default_rng(1)
-    for _ in range(60):
-        data = bytearray(whole)
-        for at in rng.integers(0, len(data), 8):
-            data[at] = rng.integers(256)
-        path.write_bytes(data[: rng.integers(1, len(data))] if rng.random() < 0.3 else data)
-        load_window(tmp_path, WINDOW, SIZE)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
 def test_a_full_disk_is_an_error_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

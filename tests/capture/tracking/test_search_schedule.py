@@ -12,7 +12,6 @@ from scope.scope_addon.capture.tracking.search_schedule import SearchSchedule
 from scope.scope_addon.capture.tracking.tracked_target import TrackedTarget
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
-RATES = (15, 30, 60)
 
 
 def person(side_px: float, seen_s: float = 0.0) -> TrackedTarget:
@@ -35,28 +34,6 @@ def searches(
             schedule.begin(IMAGE, live, lost)
             found.append(t / fps)
     return found
-
-
-@pytest.mark.parametrize("fps", RATES)
-def test_every_frame_is_searched_while_nobody_is_tracked(fps: int) -> None:
-    assert len(searches(None, fps, 2.0)) == 2 * fps
-    just_lost = [person(300.0, seen_s=10.0)]
-    assert len(searches(2, fps, 0.4, live=[person(300.0)], lost=just_lost)) == round(0.4 * fps)
-
-
-@pytest.mark.parametrize("fps", RATES)
-def test_a_large_person_alone_is_looked_beside_every_two_thirds_of_a_second(fps: int) -> None:
-    gaps = np.diff(searches(None, fps, 10.0, live=[person(300.0)]))
-    np.testing.assert_allclose(gaps, 20 / 30, atol=0.51 / fps)
-
-
-@pytest.mark.parametrize("fps", RATES)
-def test_newcomers_are_looked_for_more_often_while_people_are_missing(fps: int) -> None:
-    live = [person(300.0)]
-    np.testing.assert_allclose(np.diff(searches(3, fps, 10.0, live=live)), 8 / 30, atol=0.51 / fps)
-    complete = searches(1, fps, 12.0, live=live)
-    assert np.diff([t for t in complete if t < 2.0]).max() < 0.4  # in the opening
-    np.testing.assert_allclose(np.diff([t for t in complete if t > 3.0]), 20 / 30, atol=0.51 / fps)
 
 
 def test_somebody_small_may_be_in_the_background() -> None:

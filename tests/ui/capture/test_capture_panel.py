@@ -137,16 +137,6 @@ def test_a_motion_file_contains_the_captured_motion_and_the_edits_that_it_keeps(
     assert np.array_equal(Motion.load(tmp_path / "again.npz").poses, kept.poses)
 
 
-def test_a_reopened_file_needs_no_cache(fake_worker, footage, tmp_path):
-    captured(fake_worker, footage)
-    bpy.ops.scope.clear_cache()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    for strength in (0.0, 1.0, 2.5):
-        assert bpy.ops.scope.smooth(strength=strength) == {"FINISHED"}
-    assert bpy.ops.scope.export(filepath=str(tmp_path / "again.npz"), format="NPZ") == {"FINISHED"}
-
-
 def test_the_motion_is_undone_and_redone_with_the_capture(fake_worker, footage):
     bpy.context.scene.scope.footage = str(footage)
     bpy.ops.ed.undo_push(message="Footage")

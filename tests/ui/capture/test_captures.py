@@ -22,14 +22,23 @@ def capture(fake_worker, footage, people=1, warnings=("a warning",)):
     return shown_capture(bpy.context.scene)
 
 
+@pytest.fixture(scope="module")
+def file_of_two(tmp_path_factory):
+    """Where the first test that asks for `two` saves them."""
+    return tmp_path_factory.mktemp("captures") / "two.blend"
+
+
 @pytest.fixture
-def two(fake_worker, footage):
-    """Two captures, of one person and of two, by name."""
-    first = capture(fake_worker, footage, 1, ["first"])
-    other = footage.with_name("other.png")
-    footage.rename(other)
-    second = capture(fake_worker, other, 2, ["second"])
-    return first.name, second.name
+def two(fake_worker, footage, file_of_two):
+    """A file with two captures, of one person and of two; return their names."""
+    if not file_of_two.exists():
+        capture(fake_worker, footage, 1, ["first"])
+        other = footage.with_name("other.png")
+        footage.rename(other)
+        capture(fake_worker, other, 2, ["second"])
+        bpy.ops.wm.save_as_mainfile(filepath=str(file_of_two))
+    bpy.ops.wm.open_mainfile(filepath=str(file_of_two))
+    return "person", "other"
 
 
 def shown() -> tuple[str, int, str]:

@@ -112,9 +112,6 @@ EDITS = {
 }
 
 
-every_edit = pytest.mark.parametrize("name", EDITS)
-
-
 def edit_all():
     for edit, _, _ in EDITS.values():
         edit()
@@ -122,21 +119,6 @@ def edit_all():
 
 def check_all(rig):
     assert {name: holds(rig) for name, (_, holds, _) in EDITS.items()} == dict.fromkeys(EDITS, True)
-
-
-@every_edit
-def test_an_edit_is_still_there_after_smoothing(rig, name):
-    edit, holds, kind = EDITS[name]
-    for strength in (0.0, 2.5, 1.0):
-        bpy.ops.scope.smooth(strength=strength)
-        assert not holds(rig)
-    edit()
-    assert holds(rig)
-    assert kinds(rig) == [kind]
-    for strength in (0.0, 2.5, 1.0):
-        bpy.ops.scope.smooth(strength=strength)
-        assert holds(rig), strength
-    assert kinds(rig) == [kind]
 
 
 def test_edits_are_kept_together_and_with_pins(rig):
@@ -153,7 +135,7 @@ def test_edits_are_kept_together_and_with_pins(rig):
     check_all(rig)
 
 
-@every_edit
+@pytest.mark.parametrize("name", EDITS)
 @pytest.mark.parametrize("smoothing", [None, 2.5])
 def test_taken_back_the_keys_are_again_the_same_to_the_bit(rig, name, smoothing):
     if smoothing is not None:
@@ -192,17 +174,6 @@ def test_undo_takes_an_edit_back_also_for_later_smoothing(rig):
     assert kinds(rig) == []
     bpy.ops.scope.smooth(strength=1.0)
     assert not any(holds(rig) for _, holds, _ in EDITS.values())
-
-
-def test_redone_an_edit_is_there_again(rig):
-    bpy.ops.ed.undo_push(message="before")
-    edit_all()
-    bpy.ops.ed.undo_push(message="edited")
-    bpy.ops.ed.undo()
-    bpy.ops.ed.redo()
-    rig = bpy.context.view_layer.objects.active
-    bpy.ops.scope.smooth(strength=2.5)
-    check_all(rig)
 
 
 def test_a_reopened_file_and_a_duplicate_have_the_edits(rig, tmp_path):
@@ -252,18 +223,10 @@ def test_where_the_motion_is_lost_an_edit_changes_the_keys_only(rig):
         bpy.ops.scope.smooth(strength=1.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("interpolated_spans", np.zeros((5000, 2), int)),
-        ("snap_lift", np.array(["x"])),
-        ("snap_heights", np.array([np.inf])),
-    ],
-)
-def test_damaged_edits_in_a_file_are_a_sentence(rig, name, value):
+def test_damaged_edits_in_a_file_are_a_sentence(rig):
     edit_all()
     motion = stored_motion_of(rig)
-    motion.corrections[name] = value
+    motion.corrections["interpolated_spans"] = np.zeros((5000, 2), int)
     set_motion_of(rig, motion)
     before = keys(rig)
     with pytest.raises(RuntimeError, match="interpolated spans|corrections are damaged"):
@@ -388,12 +351,3 @@ def test_an_interpolation_of_what_was_edited_by_hand_is_of_what_is_displayed(rig
     bpy.ops.scope.foot_stands(start=70, end=73, foot="left")  # changes the keys once more
     now = read_clip(rig, BODY, RATE)[0].rotations[:, head]
     assert np.abs(now - turn).max() < 0.02
-
-
-def test_sides_that_are_swapped_twice_are_not_swapped(rig):
-    before = keys(rig)
-    for _ in range(2):
-        bpy.ops.scope.exchange_sides(start=62, end=70)
-    assert kinds(rig) == []
-    for curve, now in keys(rig).items():
-        np.testing.assert_array_equal(now, before[curve])

@@ -88,9 +88,8 @@ def two_people_who_meet():
     return people, rigs
 
 
-@pytest.mark.parametrize("root", ["bone", "object"])
-@pytest.mark.parametrize("travel", [1.0, 0.8])
-def test_rigs_of_two_people_meet_where_these_met_with_one_travel_scale(travel, root):
+@pytest.mark.parametrize(("root", "travel"), [("bone", 1.0), ("object", 0.8)])
+def test_rigs_of_two_people_meet_where_these_met_with_one_travel_scale(root, travel):
     people, rigs = two_people_who_meet()
     settings = bpy.context.scene.scope_retarget
     settings.travel = travel
