@@ -27,7 +27,16 @@ from .command_line.arguments import (
     with_bare_values,
 )
 from .command_line.blender_folder import discard_temporary
-from .command_line.cluster_runner import dask_runner, folder_argument, local_folders
+from .command_line.cluster_arguments import (
+    WINDOW_SECONDS,
+    add_window_arguments,
+    add_window_seconds,
+    dask_runner,
+    folder_argument,
+    local_folders,
+    window_report,
+    with_window_seconds,
+)
 from .command_line.import_command import add_import
 from .command_line.live_command import add_live
 from .command_line.memory_limit import check_memory_limit
@@ -50,13 +59,6 @@ from .command_line.terminal import (
     open_standard_streams,
     print_message,
     stdout_for_report,
-)
-from .command_line.windows import (
-    WINDOW_SECONDS,
-    add_window_arguments,
-    add_window_seconds,
-    window_report,
-    with_window_seconds,
 )
 from .errors import (
     FAILED,

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.face_record import parts
-from ...scope_addon.capture.tracking.face.expression_fit import fitted
-from ...scope_addon.capture.tracking.face.expression_motion import expression_motion
+from ...scope_addon.capture.tracking.expression_fit import fitted
+from ...scope_addon.capture.tracking.expression_motion import expression_motion
 from ...tools.calibrate_face.observe import SeenFaces, seen_faces
 from ...tools.render_faces.truth import SIZE, WIDTH_M
 from ..report import table

@@ -4,12 +4,26 @@
 Numba's cache fails on damaged files, for ever; throws a kernel's code away when its own file has
 changed, but not when one of those has that are inlined into it; and depends on the sources' times
 and the exact processor.
+
+Files are checked before they are used: a file's content is unpickled and run, so whoever can write
+it can run anything as the user.
+
+- A folder that comes with the program is trusted as the program's sources are: who can write there
+  can change those.
+- Anywhere else only a file of the user's own, or the system's, that nobody else may write to is
+  opened, wherever it lies: a folder in which others can write, such as the system's temporary one,
+  is no way in. (Windows, which keeps the user's folders from others by itself, reports no owner.)
+- The checksum finds damage (a full disk, a power cut, flipped bits), which would crash the process.
+  It is not a signature: it says nothing about who wrote the file.
 """
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import logging
+import os
+import stat
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -17,8 +31,8 @@ from typing import Any
 
 from numba.core.caching import _Cache
 
+from ..atomic_write import complete_file
 from ..temporary import remove, remove_abandoned
-from .code_files import SUFFIX, read_code, write_code
 from .code_folders import SOLVER, Area, digest_of, mark_used, name_in_package
 from .numba_internals import load_result, payload_of, use_cache, use_kernel_compiler
 
@@ -27,6 +41,10 @@ _LOG = logging.getLogger(__name__)
 _compiling: list[Path] = []
 _refused: list[OSError] = []  # why code could not be kept
 _announced: list[Path] = []  # the folder of which that has been said, once in a process
+SUFFIX = ".code"
+_MAGIC = b"Scope machine code 1\n"
+# a named pipe must not block
+_OPEN = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 def compiled_kernels(sources: Path = SOLVER) -> int:
@@ -165,3 +183,54 @@ def _used(area: Area, folder: Path) -> None:
     mark_used(folder)
     remove_abandoned(folder)
     area.remove_stale(folder)
+
+
+def read_code(path: Path, key: str, *, trusted: bool) -> bytes | None:
+    """Return what `write_code` wrote; None if there is no such file, or none that may be used.
+
+    A damaged file is removed, so that it is written anew.
+
+    :param key: what the code was compiled from and for; part of the checksum, so that a renamed
+        file does not pass.
+    :param trusted: whether the folder came with the program.
+    """
+    try:
+        descriptor = os.open(path, _OPEN)
+    except OSError:
+        return None
+    try:
+        with open(descriptor, "rb") as file:
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode) or not (trusted or _only_ours(status)):
+                return None
+            content = file.read()
+    except OSError:
+        return None
+    payload = content[len(_header(key, b"")) :]
+    if content != _header(key, payload) + payload:
+        remove(path)
+        return None
+    return payload
+
+
+def write_code(path: Path, key: str, payload: bytes) -> None:
+    """Write a file that is either complete or not there.
+
+    :raises OSError: the system refused.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # Nobody else may write to it, also where new files are the group's as well: it would not be
+    # read again.
+    with complete_file(path, durable=False, mode=0o644) as temporary:
+        temporary.write_bytes(_header(key, payload) + payload)
+
+
+def _header(key: str, payload: bytes) -> bytes:
+    return _MAGIC + hashlib.sha256(key.encode() + b"\n" + payload).digest()
+
+
+def _only_ours(status: os.stat_result) -> bool:
+    """Whether only this user or the system can have written the file."""
+    if not hasattr(os, "geteuid"):
+        return True
+    return status.st_uid in (0, os.geteuid()) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

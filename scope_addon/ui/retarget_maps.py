@@ -166,7 +166,7 @@ def common_prefix(bones: list[str]) -> str:
 
 def bones_move(face: bpy.types.Object | None) -> bool:
     """Return whether a face is a rig whose bones move it, and Scope knows which."""
-    from ..scene.rigs.face_bones import has_bone_face
+    from ..scene.rigs.face_retarget import has_bone_face
 
     return face is not None and "scope_source" not in face and has_bone_face(face)
 
@@ -189,8 +189,7 @@ def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
     """Return the rig if its bones move its face, and no shape keys of its meshes with names that
     are known.
     """
-    from ..scene.rigs.face_bones import only_bones_move
-    from ..scene.rigs.face_retarget import faces_of
+    from ..scene.rigs.face_retarget import faces_of, only_bones_move
     from ..scene.rigs.rig_file import with_meshes
 
     if not bones_move(rig):
@@ -203,8 +202,7 @@ def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
 def guessed_map(face: bpy.types.Object) -> ExpressionMap:
     """Return the map that the names of a face's shape keys or bones suggest."""
     from ..retarget.expression_map import guess_expression_map
-    from ..scene.rigs.face_bones import guess_face_bones
-    from ..scene.rigs.face_retarget import key_names
+    from ..scene.rigs.face_retarget import guess_face_bones, key_names
 
     return guess_face_bones(face) if bones_move(face) else guess_expression_map(key_names([face]))
 

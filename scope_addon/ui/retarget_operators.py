@@ -338,8 +338,11 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         :raises UsageError: the person's face was not captured, or no shape key or control is
             mapped.
         """
-        from ..scene.rigs.face_bones import retarget_face_bones
-        from ..scene.rigs.face_retarget import captured_expressions, retarget_expressions
+        from ..scene.rigs.face_retarget import (
+            captured_expressions,
+            retarget_expressions,
+            retarget_face_bones,
+        )
 
         settings = context.scene.scope_retarget
         source = captured_armature(context)

@@ -148,8 +148,12 @@ def load_times(path: Path) -> None:
     """Load the times of earlier captures, show a capture's remaining time by them, and keep those
     of this one.
     """
-    from scope.scope_addon.job.job_progress import STAGES, JobProgress
-    from scope.scope_addon.job.stage_times import load_stage_times, save_stage_times
+    from scope.scope_addon.job.job_progress import (
+        STAGES,
+        JobProgress,
+        load_stage_times,
+        save_stage_times,
+    )
 
     folder = path.with_name("times")
     folder.mkdir(exist_ok=True)
@@ -308,7 +312,7 @@ def cached_reports(folder: Path) -> list[bytes]:
 
 
 def times(folder: Path) -> list[bytes]:
-    from scope.scope_addon.job.stage_times import save_stage_times
+    from scope.scope_addon.job.job_progress import save_stage_times
 
     for kind in ("other", KEY):
         save_stage_times(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from scope.scope_addon.capture.media.exif import Exif, animation_length, read_exif
 from scope.scope_addon.capture.media.heif import read_layout
-from scope.scope_addon.job.stage_times import load_stage_times
+from scope.scope_addon.job.job_progress import load_stage_times
 from scope.solver.errors import ScopeError
 
 from .fuzz import CORPUS, check, inputs, random_inputs

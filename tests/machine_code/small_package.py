@@ -17,7 +17,7 @@ FILES = (
     "solver/errors.py",
     *(
         f"scope_addon/machine_code/{name}.py"
-        for name in ("__init__", "code_cache", "code_files", "code_folders", "numba_internals")
+        for name in ("__init__", "code_cache", "code_folders", "numba_internals")
     ),
 )
 # The callee is too long to be inlined: calls count much where LLVM decides that.

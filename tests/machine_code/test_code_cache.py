@@ -8,7 +8,7 @@ import pickle
 import shutil
 
 import pytest
-from scope.scope_addon.machine_code.code_files import SUFFIX, read_code, write_code
+from scope.scope_addon.machine_code.code_cache import SUFFIX, read_code, write_code
 from scope.scope_addon.temporary import claim, discard
 from scope.solver.shipped_code import can_run_shipped, shipped_processor
 

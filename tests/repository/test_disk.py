@@ -29,7 +29,7 @@ WRITES = {
     "scope_addon/ui/capture/scene_camera.py",
     # folders
     "scope_addon/temporary.py",
-    "scope_addon/machine_code/code_files.py",
+    "scope_addon/machine_code/code_cache.py",
     "scope_addon/private_folder.py",
     "scope_addon/job/cache.py",
     "scope_addon/job/unfinished.py",

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...scope_addon.atomic_write import atomic_path
-from ...scope_addon.capture.tracking.face.expression_fit import FILE
+from ...scope_addon.capture.tracking.expression_fit import FILE
 from .observe import seen_faces
 from .response import measure_response
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.face_landmarks import EXPRESSION_POINTS
-from ...scope_addon.capture.tracking.face.expression_fit import (
+from ...scope_addon.capture.tracking.expression_fit import (
     VIEW_TERMS,
     AlignedFaces,
     FaceResponse,

@@ -16,7 +16,7 @@ from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter, windows_around
-from ..tracking.face.head_direction import across_head, certainty
+from ..tracking.expression_fit import across_head, certainty
 from ..tracking.track import Track
 from .frame_measurements import EARS, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits, without_fingers

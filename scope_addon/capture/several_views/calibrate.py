@@ -4,6 +4,8 @@
 The person whom the first camera shows most prominently is looked for in every other camera: of all
 people there, the one whose motion fits best to theirs. All cameras are then adjusted together, and
 the other people follow from where the cameras are.
+
+Where cameras stand is first known roughly, from each one's own estimate of a person in 3D.
 """
 
 from __future__ import annotations
@@ -14,12 +16,11 @@ from enum import StrEnum
 
 import numpy as np
 
-from ....solver.rotations import exp, log
+from ....solver.rotations import exp, log, nearest_rotation
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.runs import runs
 from ..fitting.track_fit import spread
 from .bundle import KEYPOINT_SIGMA, CameraPlace, Given, adjust, image_residual, triangulate
-from .first_places import first_place
 from .seen_person import BONE_ENDS, BONE_STARTS, SeenPerson
 from .synchronize import APART_S, MOST_LIKELY, likely_offsets
 
@@ -48,6 +49,8 @@ CONTRADICTS_S = 0.5
 MOST_STRETCHED = 0.15
 _LEAST_KNOWN = 6  # keypoints or bones of a moment
 UNSEEN_S = 1.0  # for which a person is unseen by a camera before the report says so
+_ROUNDS = 10
+_FAR_M = 0.15  # from which on a lifted keypoint weighs less
 
 
 class Clock(StrEnum):
@@ -438,3 +441,33 @@ def _long_spans(wrong: BoolArray, times: Float64Array, least_s: float) -> list[t
         else:
             spans.append([start, stop])
     return [(start, stop) for start, stop in spans if stop - start >= least_s]
+
+
+def first_place(
+    first: SeenPerson, second: SeenPerson, times: Float64Array, clock: CameraPlace
+) -> CameraPlace | None:
+    """Return the second camera's place in the first one's axes; None if both hardly see the person
+    at once.
+
+    The rotation is the one that turns all lifted bodies of the first camera into those of the
+    second one, and the translation joins their hips, both by weights that fall with the distance.
+
+    :param times: (N,) of the first camera's clock, seconds.
+    :param clock: a place with the second camera's clock.
+    """
+    a = first.at(times)
+    b = second.at(clock.own_times(times))
+    both = a.seen & b.seen
+    if both.sum() < 3:
+        return None
+    start = a.points[both].reshape(-1, 3)
+    end = b.points[both].reshape(-1, 3)
+    confidence = np.minimum(a.confidence, b.confidence)[both].ravel()
+    weight = confidence
+    R = np.eye(3)
+    for _ in range(_ROUNDS):
+        R = nearest_rotation((end * weight[:, None]).T @ start)
+        error = np.linalg.norm(end - start @ R.T, axis=-1)
+        weight = confidence / (1.0 + np.square(error / _FAR_M))
+    moves = b.root[both] - a.root[both] @ R.T
+    return replace(clock, R_camera_first=R, t_camera_first=np.median(moves, axis=0))

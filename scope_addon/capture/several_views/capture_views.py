@@ -45,7 +45,7 @@ from .calibrate import (
 )
 from .person_in_views import PersonInViews, with_focal_scale
 from .seen_person import KEYPOINTS, SeenPerson, bone_lengths, seen_person
-from .sound_offset import offset_by_sound
+from .synchronize import offset_by_sound
 
 MOST_VIEWS = 8
 # Of the standard deviation of a camera's rotation, from which on the report warns.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The offset between the clocks of two cameras, from a person's own motion.
+"""The offset between the clocks of two cameras, from a person's own motion or from the sound of
+both.
 
 Distances between parts of a body, and angles of its joints, are the same from every side. With
 such signals s of both cameras, standardized, the offset of the second clock is
@@ -10,13 +11,27 @@ A person who hardly moves, or moves periodically, has several minima of nearly t
 who turns while walking also looks to both cameras alike a while apart, with the same errors of the
 lifted body. So the best minima are returned, and `calibrate` takes the one to which all keypoints
 fit best.
+
+Where the sound gets louder in several bands at once, as with claps, steps and syllables, is the
+same in both microphones, while levels, echoes and noise differ. With such onsets s of both, of mean
+0,
+
+    c(tau) = sum over t, bands of s(t) s'(t + tau) / sqrt(sum of s² · sum of s'²),
+
+the sums over what both hear at an offset tau, the offset is where c is largest, if it stands out.
+It is then measured in each part of the sound alone: the parts' spread gives its deviation, and a
+line through them the drift.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from ...arrays import BoolArray, Float64Array
+from ...arrays import BoolArray, Float32Array, Float64Array
+from ..media.sound import STEP_S as SOUND_STEP_S
+from .bundle import DRIFT_SIGMA
 from .seen_person import NAMES, SeenPerson
 
 LONGEST_OFFSET_S = 60.0
@@ -44,6 +59,20 @@ _ENDS = np.array([NAMES.index(b) for _, b in _PAIRS])
 _SHOULDERS = [NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
 _HIPS = [NAMES.index(f"{side}_hip") for side in ("left", "right")]
 _LEAST_DEVIATION = 0.05  # of a signal, in lengths of the trunk, so that noise is not standardized
+_ONSET_STEPS = 5  # between the two moments whose loudness is compared: 10 ms
+_MIN_OVERLAP_S = 2.0
+# The largest correlation, in deviations of all: chance reaches 6 in an hour. And in parts of the
+# largest one at another offset.
+_STANDS_OUT = 9.0
+_MARGIN = 1.3
+_APART_S = 0.1  # of another offset
+_PART_S = 10.0  # the least length of a part
+_MOST_PARTS = 40
+_NEAR_S = 0.06  # from the whole sound's offset, within which a part's is looked for
+# Sound takes 5 ms for 1.7 m, by which the cameras' distances from its source may differ.
+_PATH_SIGMA_S = 0.005
+_LEAST_SIGMA_S = 0.002  # of one part
+_ROUNDS = 10
 
 
 def likely_offsets(first: SeenPerson, second: SeenPerson) -> list[float]:
@@ -108,3 +137,120 @@ def _signals(person: SeenPerson, clock: Float64Array) -> tuple[Float64Array, Boo
     mean = signals[at.seen].mean(axis=0)
     deviation = np.maximum(signals[at.seen].std(axis=0), _LEAST_DEVIATION)
     return (signals - mean) / deviation, at.seen
+
+
+@dataclass(frozen=True)
+class SoundOffset:
+    """The time in a camera's file less that in the first camera's: ``seconds + drift * t``."""
+
+    seconds: float
+    drift: float
+    sigma_s: float  # of the offset in the middle of what both hear
+
+
+def offset_by_sound(first: Float32Array, second: Float32Array) -> SoundOffset | None:
+    """Return the offset of the second camera's clock; None where the sounds do not tell it.
+
+    :param first: (T, B) as `loudness` returns it. :param second: (T', B) likewise.
+    """
+    a = _onsets(first)
+    b = _onsets(second)
+    least = round(_MIN_OVERLAP_S / SOUND_STEP_S)
+    if min(len(a), len(b)) < least:
+        return None
+    lags, correlation = _correlation(a, b, round(LONGEST_OFFSET_S / SOUND_STEP_S), least)
+    best = int(np.argmax(correlation))
+    others = np.abs(lags - lags[best]) * SOUND_STEP_S > _APART_S
+    if not others.any():
+        return None
+    deviation = 1.4826 * np.median(np.abs(correlation - np.median(correlation)))
+    if correlation[best] < _STANDS_OUT * deviation:
+        return None
+    if correlation[best] < _MARGIN * correlation[others].max():
+        return None
+    lag = _vertex(lags, -correlation, best)
+    return _from_parts(a, b, lag)
+
+
+def _onsets(loudness: Float32Array) -> Float64Array:
+    """Return by how much louder each band gets (T, bands), as a share of its deviation."""
+    rise = np.zeros(loudness.shape)
+    change = loudness[_ONSET_STEPS:] - loudness[:-_ONSET_STEPS]
+    rise[_ONSET_STEPS // 2 : len(rise) - (_ONSET_STEPS - _ONSET_STEPS // 2)] = np.maximum(change, 0)
+    rise -= rise.mean(axis=0)
+    standardized: Float64Array = rise / np.maximum(rise.std(axis=0), 1e-6)
+    return standardized
+
+
+def _correlation(
+    a: Float64Array, b: Float64Array, longest: int, least: int
+) -> tuple[Float64Array, Float64Array]:
+    """Return offsets (n,) of b against a, in steps, and how alike both are there (n,)."""
+    size = 1 << int(np.ceil(np.log2(len(a) + len(b))))
+
+    def crossed(x: Float64Array, y: Float64Array) -> Float64Array:
+        """Return sum over t of x(t) y(t + lag), for lags from -len(x) + 1 to len(y) - 1."""
+        product = np.fft.irfft(np.conj(np.fft.rfft(x, size)) * np.fft.rfft(y, size), size)
+        return np.concatenate([product[size - len(x) + 1 :], product[: len(y)]])
+
+    lags = np.arange(-len(a) + 1, len(b))
+    total = np.zeros(len(lags))
+    for band in range(a.shape[1]):
+        total += crossed(a[:, band], b[:, band])
+    power_a = crossed(np.square(a).sum(axis=1), np.ones(len(b)))
+    power_b = crossed(np.ones(len(a)), np.square(b).sum(axis=1))
+    overlap = np.minimum(len(a), len(b) - lags) - np.maximum(0, -lags)
+    used = (np.abs(lags) <= longest) & (overlap >= least)
+    alike = total / np.sqrt(np.maximum(power_a * power_b, 1e-12))
+    # Short overlaps are alike by chance.
+    alike *= np.sqrt(overlap / overlap.max())
+    return lags[used].astype(float), alike[used]
+
+
+def _from_parts(a: Float64Array, b: Float64Array, lag: float) -> SoundOffset:
+    """Return the offset by parts of the sound, of which each tells one.
+
+    With the drift's prior of deviation σ_d, and parts at times t_i from their middle,
+
+        d = Σ t_i τ_i / (Σ t_i² + σ² / σ_d²).
+    """
+    whole = round(lag)
+    begin = max(0, -whole)
+    end = min(len(a), len(b) - whole)
+    count = int(np.clip((end - begin) * SOUND_STEP_S // _PART_S, 1, _MOST_PARTS))
+    bounds = np.linspace(begin, end, count + 1).astype(int)
+    near = round(_NEAR_S / SOUND_STEP_S)
+    times = []
+    offsets = []
+    for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+        lags = np.arange(whole - near, whole + near + 1)
+        alike = np.array([_product(a, b, start, stop, each) for each in lags])
+        best = int(np.argmax(alike))
+        deviation = 1.4826 * np.median(np.abs(alike - np.median(alike)))
+        if 0 < best < len(lags) - 1 and alike[best] > 3.0 * deviation:
+            times.append(0.5 * (start + stop) * SOUND_STEP_S)
+            offsets.append(SOUND_STEP_S * _vertex(lags.astype(float), -alike, best))
+    if not offsets:
+        return SoundOffset(
+            lag * SOUND_STEP_S, 0.0, np.hypot(_PATH_SIGMA_S, SOUND_STEP_S * near / 2)
+        )
+    middle_s = float(np.mean(times))
+    t = np.array(times) - middle_s
+    tau = np.array(offsets)
+    offset_s = float(np.median(tau))
+    drift = 0.0
+    for _ in range(_ROUNDS):
+        error = tau - offset_s - drift * t
+        sigma_s = max(_LEAST_SIGMA_S, 1.4826 * float(np.median(np.abs(error))))
+        weight = 1.0 / (1.0 + np.square(error / sigma_s))
+        offset_s = float(weight @ (tau - drift * t) / weight.sum())
+        known = weight @ np.square(t) + (sigma_s / DRIFT_SIGMA) ** 2
+        drift = float(weight @ (t * (tau - offset_s)) / known)
+    sigma_s = float(np.hypot(_PATH_SIGMA_S, sigma_s / np.sqrt(weight.sum())))
+    return SoundOffset(offset_s - drift * middle_s, drift, sigma_s)
+
+
+def _product(a: Float64Array, b: Float64Array, start: int, stop: int, lag: int) -> float:
+    first = max(start, -lag)
+    last = min(stop, len(b) - lag)
+    return float((a[first:last] * b[first + lag : last + lag]).sum()) if last > first else 0.0

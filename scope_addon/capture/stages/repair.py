@@ -10,7 +10,7 @@ import numpy as np
 from ..camera.intrinsics import Camera
 from ..perception.hand_landmarks import HAND_LENGTH_M, SIDES, pixels_per_metre
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..tracking.hands.hand_assignment import confirmed
+from ..tracking.hand_assignment import confirmed
 from ..tracking.keypoint_jumps import repair_keypoint_jumps
 from ..tracking.left_right import repair_left_right
 from ..tracking.limb_swap import repair_limb_swaps

@@ -22,8 +22,8 @@ from ..camera.line_segments import Lines
 from ..camera.odometry import Odometry
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..tracking.face.expression_fit import with_expressions
-from ..tracking.face.expression_motion import expression_motion
+from ..tracking.expression_fit import with_expressions
+from ..tracking.expression_motion import expression_motion
 from ..tracking.track import Track
 from .camera_path import CameraPath
 from .placement import PlacedTrack, RawMotion, rotation_vectors_of_joints

@@ -21,8 +21,13 @@ from ..build import BuildOptions, build_scene
 from ..export.export import ExportOptions, export
 from ..export.export_states import temporary_scene
 from ..export.output_paths import check_output
-from .face_bones import guess_face_bones, only_bones_move
-from .face_retarget import captured_expressions, faces_of, retarget_expressions
+from .face_retarget import (
+    captured_expressions,
+    faces_of,
+    guess_face_bones,
+    only_bones_move,
+    retarget_expressions,
+)
 from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
 from .rig_retarget import RetargetOptions, common_travel, retarget
 

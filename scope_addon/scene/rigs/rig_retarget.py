@@ -34,8 +34,7 @@ from ..character.root_object import (
     root_object,
     topmost,
 )
-from .face_bones import face_keys, key_face, rest_face
-from .face_retarget import captured_expressions
+from .face_retarget import captured_expressions, face_keys, key_face, rest_face
 from .rig_action import (
     BoneKeys,
     clear_offsets,

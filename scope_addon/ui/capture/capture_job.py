@@ -20,10 +20,9 @@ import bpy
 from ...capture_report import Report
 from ...errors import UsageError, VideoError
 from ...job.cache import Cache, CachedCapture
-from ...job.job_progress import BUILDING, JobProgress
+from ...job.job_progress import BUILDING, JobProgress, kind_of, load_stage_times, save_stage_times
 from ...job.process import ROOT, START_SCRIPT, WorkerProcess
 from ...job.request import JobRequest, code_version
-from ...job.stage_times import kind_of, load_stage_times, save_stage_times
 from ...motion import Motion
 from ...notices import notice
 from ...options import Place

@@ -16,7 +16,7 @@ from scope.scope_addon.capture.perception.face_record import record
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.face.expression_fit import load_response
+from scope.scope_addon.capture.tracking.expression_fit import load_response
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.clip_fit import fit_clip

@@ -5,7 +5,7 @@ import av
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.sound import STEP_S, loudness
-from scope.scope_addon.capture.several_views.sound_offset import offset_by_sound
+from scope.scope_addon.capture.several_views.synchronize import offset_by_sound
 
 RATE = 48000
 

@@ -4,7 +4,7 @@
 import json
 
 import pytest
-from scope.scope_addon.job.stage_times import kind_of, load_stage_times, save_stage_times
+from scope.scope_addon.job.job_progress import kind_of, load_stage_times, save_stage_times
 
 
 def test_times_of_a_frame_are_kept_for_each_kind(tmp_path):

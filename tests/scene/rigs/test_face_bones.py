@@ -14,13 +14,13 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.scene.animation_data import actions
-from scope.scope_addon.scene.rigs import face_bones
-from scope.scope_addon.scene.rigs.face_bones import (
+from scope.scope_addon.scene.rigs import face_retarget
+from scope.scope_addon.scene.rigs.face_retarget import (
+    CapturedExpressions,
     guess_face_bones,
     has_bone_face,
     retarget_face_bones,
 )
-from scope.scope_addon.scene.rigs.face_retarget import CapturedExpressions
 
 FRAMES = np.array([1.0, 2.0, 3.0])
 
@@ -152,7 +152,7 @@ def test_what_fails_changes_nothing(rigify_face, monkeypatch):
     retarget_face_bones(shown(jawOpen=1.0), rigify_face, guess_face_bones(rigify_face))
     before = heads(rigify_face, 3, "lip.B", "jaw_master")
     action = rigify_face.animation_data.action
-    monkeypatch.setattr(face_bones, "retire", lambda *_: 1 / 0)
+    monkeypatch.setattr(face_retarget, "retire", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         retarget_face_bones(shown(eyeBlinkLeft=1.0), rigify_face, guess_face_bones(rigify_face))
     assert list(bpy.data.actions) == [action]

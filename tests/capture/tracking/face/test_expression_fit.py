@@ -22,8 +22,8 @@ from scope.scope_addon.capture.perception.face_landmarks import (
 )
 from scope.scope_addon.capture.perception.face_record import RECORD, gaze, parts, record
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.face import expression_fit
-from scope.scope_addon.capture.tracking.face.expression_fit import (
+from scope.scope_addon.capture.tracking import expression_fit
+from scope.scope_addon.capture.tracking.expression_fit import (
     aligned,
     fitted,
     load_response,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.face_record import RECORD
-from scope.scope_addon.capture.tracking.face.expression_motion import RELEASE_S, expression_motion
+from scope.scope_addon.capture.tracking.expression_motion import RELEASE_S, expression_motion
 from scope.scope_addon.expression_names import EXPRESSIONS
 
 JAW = EXPRESSIONS.index("jawOpen")

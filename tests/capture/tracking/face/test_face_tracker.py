@@ -20,8 +20,8 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.capture.tracking.face import face_tracker
-from scope.scope_addon.capture.tracking.face.face_tracker import FaceTracker
+from scope.scope_addon.capture.tracking import face_tracker
+from scope.scope_addon.capture.tracking.face_tracker import FaceTracker
 from scope.solver.body_file import load_body
 
 IMAGE = np.zeros((800, 800, 3), np.uint8)

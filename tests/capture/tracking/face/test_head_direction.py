@@ -14,7 +14,7 @@ from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera
 from scope.scope_addon.capture.perception.face_landmarks import FaceEstimate, FaceNetwork
 from scope.scope_addon.capture.perception.face_record import RECORD, presence_of, record
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.face.head_direction import across_head, certainty
+from scope.scope_addon.capture.tracking.expression_fit import across_head, certainty
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 from scope.tools.render_faces.looks import draw_look

@@ -14,7 +14,7 @@ import pytest
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, WRISTS, HandEstimate
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.hands.hand_assignment import (
+from scope.scope_addon.capture.tracking.hand_assignment import (
     CERTAIN_PRESENCE,
     MAX_SIZE,
     PREDICTED,

@@ -12,7 +12,7 @@ from scope.scope_addon.capture.perception.hand_landmarks import HandEstimate
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.hands.hand_sight import (
+from scope.scope_addon.capture.tracking.hand_sight import (
     Sight,
     followed_regions,
     is_like,

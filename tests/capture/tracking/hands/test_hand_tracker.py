@@ -20,9 +20,9 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.capture.tracking.hands import hand_tracker
-from scope.scope_addon.capture.tracking.hands.hand_assignment import without_duplicates
-from scope.scope_addon.capture.tracking.hands.hand_tracker import HandTracker
+from scope.scope_addon.capture.tracking import hand_tracker
+from scope.scope_addon.capture.tracking.hand_assignment import without_duplicates
+from scope.scope_addon.capture.tracking.hand_tracker import HandTracker
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp

@@ -17,7 +17,7 @@ from scope.scope_addon.capture.perception.landmark_network import LandmarkNetwor
 from scope.scope_addon.capture.perception.observation import Observation, PersonMask
 from scope.scope_addon.capture.perception.region import MARGIN, Region
 from scope.scope_addon.capture.tracking import plausibility
-from scope.scope_addon.capture.tracking.mask_schedule import MASKS, MIN_STRIDE, MaskSchedule
+from scope.scope_addon.capture.tracking.search_schedule import MASKS, MIN_STRIDE, MaskSchedule
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track, single_frame_track
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)

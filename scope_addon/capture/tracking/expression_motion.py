@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....arrays import BoolArray, Float64Array, FloatArray
-from ....expression_names import EXPRESSIONS
-from ....kinematics.smoothing import gaussian_smooth
-from ....motion import FACE_KEYS
-from ...perception.face_record import CONTOURS, eye_light_of, parts
+from ...arrays import BoolArray, Float64Array, FloatArray
+from ...expression_names import EXPRESSIONS
+from ...kinematics.smoothing import gaussian_smooth
+from ...motion import FACE_KEYS
+from ..perception.face_record import CONTOURS, eye_light_of, parts
 
 CALM_HZ = 2.0  # cut-off frequency at rest
 NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face

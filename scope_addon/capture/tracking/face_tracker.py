@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....arrays import Float64Array, Uint8Array
-from ...perception.face_landmarks import (
+from ...arrays import Float64Array, Uint8Array
+from ..perception.face_landmarks import (
     HEAD,
     ExpressionNetwork,
     FaceEstimate,
@@ -22,11 +22,11 @@ from ...perception.face_landmarks import (
     facing,
     region_from_body,
 )
-from ...perception.face_record import record
-from ...perception.observation import Observation
-from ...perception.region import Region
-from ...perception.sessions import Execution
-from ..frame_clock import PATIENCE_S, is_search_due
+from ..perception.face_record import record
+from ..perception.observation import Observation
+from ..perception.region import Region
+from ..perception.sessions import Execution
+from .frame_clock import PATIENCE_S, is_search_due
 
 PRESENCE_THRESHOLD = 0.5
 # The largest distance of a face from where the body's head predicts it, in sides of that region.

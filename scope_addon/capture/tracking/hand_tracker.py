@@ -14,8 +14,8 @@ from itertools import chain
 
 import numpy as np
 
-from ....arrays import Float32Array, Float64Array, Uint8Array
-from ...perception.hand_landmarks import (
+from ...arrays import Float32Array, Float64Array, Uint8Array
+from ..perception.hand_landmarks import (
     HAND_POINTS,
     PALM_THRESHOLD,
     SIDES,
@@ -24,10 +24,10 @@ from ...perception.hand_landmarks import (
     PalmDetector,
     pixels_per_metre,
 )
-from ...perception.observation import Observation
-from ...perception.region import Region
-from ...perception.sessions import Execution
-from ..frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
+from ..perception.observation import Observation
+from ..perception.region import Region
+from ..perception.sessions import Execution
+from .frame_clock import EAGER_S, FRAME_S, PATIENCE_S, is_search_due
 from .hand_assignment import (
     DETECTED,
     FOLLOWED_BACK,

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....arrays import Float32Array, Float64Array, Uint8Array
-from ...perception.hand_landmarks import (
+from ...arrays import Float32Array, Float64Array, Uint8Array
+from ..perception.hand_landmarks import (
     HAND_LENGTH_M,
     HAND_POINTS,
     WRISTS,
@@ -18,9 +18,9 @@ from ...perception.hand_landmarks import (
     HandNetwork,
     region_from_body,
 )
-from ...perception.observation import Observation
-from ...perception.region import Region
-from ..appearance import sample
+from ..perception.observation import Observation
+from ..perception.region import Region
+from .appearance import sample
 from .hand_assignment import CERTAIN_PRESENCE, SAME_WRIST, Least, assigned, is_same_hand, side_of
 
 # From this motion of the wrist on, in hand lengths per frame, the region at rest is tried as well.

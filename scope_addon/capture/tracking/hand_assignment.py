@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....arrays import BoolArray, Float64Array, FloatArray
-from ...perception.hand_landmarks import ELBOWS, HAND_LENGTH_M, WRISTS, HandEstimate
-from ...perception.observation import Observation
+from ...arrays import BoolArray, Float64Array, FloatArray
+from ..perception.hand_landmarks import ELBOWS, HAND_LENGTH_M, WRISTS, HandEstimate
+from ..perception.observation import Observation
 
 WRIST_DISTANCE = 0.7  # largest distance between the hand's wrist and the body's, in hand lengths
 UNSURE_WRIST_DISTANCE = 1.2  # where the body's wrist is uncertain
