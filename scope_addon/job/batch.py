@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ...solver.errors import InputError
-from ..atomic_write import atomic_path, resolve_link
+from ..atomic_write import complete_file, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
 from ..footage import FOOTAGE_SUFFIXES, json_text
 from ..temporary import remove
@@ -223,7 +223,8 @@ class Batch:
             **runner.report(),
         }
         try:
-            with atomic_path(self.report_file) as temporary:
+            # A link of that name leads where nobody has asked to write.
+            with complete_file(self.report_file) as temporary:
                 temporary.write_text(json_text(report, indent=1), encoding="utf-8")
         except OSError as error:
             raise OutputError(

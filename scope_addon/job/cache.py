@@ -20,7 +20,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..temporary import discard, new_folder, own_entries, remove, remove_abandoned
+from ..temporary import (
+    discard,
+    new_folder,
+    own_entries,
+    remove,
+    remove_abandoned,
+    sync_folder,
+)
 
 REPORT = "report.json"
 RECORDINGS = "recordings"
@@ -112,7 +119,11 @@ class Cache:
         try:
             jobs.mkdir(parents=True, exist_ok=True)
             self.kernels.mkdir(exist_ok=True)
-            return new_folder("job", jobs)
+            folder = new_folder("job", jobs)
+            # The lock's name first: a power cut may leave the files in the folder, which are synced
+            # alone, and nobody would remove them.
+            sync_folder(jobs)
+            return folder
         except OSError as error:
             raise self._not_writable(error) from error
 

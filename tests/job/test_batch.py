@@ -211,6 +211,19 @@ def test_results_may_be_on_another_disk(folder, tmp_path):
     assert calls(folder / "later") == []
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
+def test_a_link_in_the_place_of_the_report_is_not_followed(tmp_path):
+    (tmp_path / "clips").mkdir()
+    (tmp_path / "clips" / "a.mp4").write_text("ok")
+    out = tmp_path / "out"
+    out.mkdir()
+    (tmp_path / "other").write_text("somebody's")
+    (out / REPORT_NAME).symlink_to(tmp_path / "other")
+    assert batch(tmp_path / "clips", out).run(1)["counts"]["done"] == 1
+    assert (tmp_path / "other").read_text() == "somebody's"
+    assert not (out / REPORT_NAME).is_symlink()
+
+
 def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
     batch(folder, tmp_path / "out").run(1)
     moved = tmp_path / "moved"

@@ -6,6 +6,7 @@ first.
 import hashlib
 import os
 import shutil
+import sys
 import time
 from pathlib import Path
 
@@ -115,6 +116,21 @@ def test_abandoned_jobs_are_removed_and_running_ones_kept(cache):
     cache.new_job_folder()
     assert running.exists()
     assert not abandoned.exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
+def test_the_name_of_a_jobs_lock_is_on_the_disk_before_its_files(cache, monkeypatch):
+    """A power cut on btrfs left files of a job that were synced, without the lock beside it."""
+    synced = []
+    true_sync = os.fsync
+
+    def sync(handle):
+        synced.append(os.readlink(f"/proc/self/fd/{handle}"))
+        true_sync(handle)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    folder = cache.new_job_folder()
+    assert synced == [str(folder.parent.resolve())]
 
 
 def test_a_capture_that_is_found_leaves_nothing_of_killed_processes(cache):
