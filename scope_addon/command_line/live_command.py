@@ -130,13 +130,27 @@ def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Pa
 
     :raises ScopeError: one is not where it should be; says where it is.
     """
+    video = []
+    failures: list[str] = []
+
+    def save_video(footage: Footage) -> None:
+        try:
+            video.append(footage.save())
+        except ScopeError:
+            for failure in failures:  # which would not be told after this one
+                print_message(failure)
+            raise
+
     with ExitStack() as stack:
-        video = []
         if footage is not None:
             # Runs at the end, also after an error of the recording's.
-            stack.callback(lambda: video.append(footage.save()))
+            stack.callback(save_video, footage)
         with interrupted(recording.whereabouts if recording else ""):
-            motions = recording.save() if recording is not None else []
+            try:
+                motions = recording.save() if recording is not None else []
+            except ScopeError as error:
+                failures.append(str(error))
+                raise
     if footage is not None and footage.missing:
         print_message(f"{footage.missing} in {video[0]}, since the computer was too busy")
     return [*motions, *(path for path in video if path)]

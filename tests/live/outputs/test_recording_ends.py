@@ -15,7 +15,8 @@ import pytest
 from scope.scope_addon import private_folder
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.cli import SAMPLE, main
-from scope.scope_addon.errors import NoPersonError, UsageError, VideoError
+from scope.scope_addon.command_line import live_command
+from scope.scope_addon.errors import NoPersonError, OutputError, UsageError, VideoError
 from scope.scope_addon.live import run
 from scope.scope_addon.live.outputs import journal
 from scope.scope_addon.live.outputs.journal import read_about, read_records
@@ -313,6 +314,22 @@ def test_the_command_finishes_the_recording_however_its_capture_ends(
     assert [file.name for file in path.parent.iterdir()] == ["take.npz"]
 
 
+def test_where_motion_and_images_are_is_said_if_neither_can_be_saved(
+    tmp_path, monkeypatch, capfd, body
+):
+    class Images:
+        def save(self):
+            raise OutputError("the images until then are in take.unfinished.mp4")
+
+    recording, (path,) = recorded(tmp_path / "full", body)
+    refusing(monkeypatch, tmp_path / "full")
+    with pytest.raises(OutputError, match="the images until then"):
+        live_command._save(recording, Images())
+    other = tmp_path / "user" / "recordings" / path.name
+    assert f"the recording is in {other}" in capfd.readouterr().err
+    assert other.is_file()
+
+
 def is_whole(path):
     """Whether all poses are in a recording on the disk."""
     about = read_about(path)
@@ -323,6 +340,7 @@ KILLED = """
 import os, signal, sys, time
 import pytest
 from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.command_line import live_command
 from scope.tests.live.outputs import test_recording_ends as tests
 def end():
     left = tests.Path(sys.argv[2]).with_suffix(".recording")
