@@ -279,7 +279,6 @@ def ankle_goal(
     scales: NDArray[np.float64],
     turn: NDArray[np.float64],
     ankle: NDArray[np.float64],
-    floor: float = 0.0,
     one_floor: bool = True,
 ) -> NDArray[np.float64]:
     """Compute the goals of the rig's ankles, for any number of frames and feet at once.
@@ -289,7 +288,6 @@ def ankle_goal(
     :param scales: (3,), t, t and s.
     :param turn: (..., 3, 3) D, the rotation of both feet from rest.
     :param ankle: (..., 3) the body's, metres.
-    :param floor: height of the body's floor, metres.
     :param one_floor: keep the feet above the floor; False on uneven ground.
     :return: (..., 3) metres.
     """
@@ -301,7 +299,7 @@ def ankle_goal(
         point = ankle + rotated(turn, s)
         rig_point = rotated(turn, q)
         # The height above its rest position on the floor.
-        above = point[..., 2] - floor - (source.height + s[..., 2])
+        above = point[..., 2] - (source.height + s[..., 2])
         place = scales * point
         place[..., 2] = scales[2] * above + rig.height + q[..., 2]
         goals.append(place + rotated(yaw, (q - scales * s) * _LEVEL) - rig_point)

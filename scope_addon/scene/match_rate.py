@@ -23,9 +23,9 @@ from .animation_data.actions import fcurves, frame_range
 from .animation_data.stored_values import FrameSpan, parse_spans, start_frame
 from .animation_data.timing import Retiming, action_strips, retime_keys, retime_strip
 from .camera import same_camera, show_footage_again, view_number
-from .character.confidence_curves import MARKER_NAMES
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
+from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
 from .character.shape_keys import shape_key_name
 from .datablocks import holds

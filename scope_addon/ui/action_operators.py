@@ -150,7 +150,7 @@ class SCOPE_OT_delete_capture(CaptureOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Remove it, and show the capture before it."""
-        from ..scene.delete_capture import delete_capture
+        from ..scene.build import delete_capture
 
         collection = context.scene.scope.result.collection
         name = collection.name

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, StringProperty
@@ -58,6 +58,15 @@ class SeveralFootageBrowser(FootageBrowser):
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
     )
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def execute(self, context: bpy.types.Context) -> set[str]:
+            """Use the chosen files."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Use a dropped file, or ask for some."""
+        return self.execute(context) if self.filepath else self.ask(context)
 
 
 def chosen_files(operator: Any) -> list[str]:

@@ -9,7 +9,7 @@ import bpy
 
 from ...solver.errors import ScopeError
 from . import camera_formats, live_properties, warm_up
-from .capture.capture_operators import state as capture_state
+from .capture.capture_operators import nothing_runs
 from .capture.job_operator import JobOperator
 from .libraries import restore_libraries
 from .live_properties import state, stop_job
@@ -41,10 +41,7 @@ class _LiveOperator(JobOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that nothing is running."""
-        if state.job is not None or capture_state.job is not None:
-            cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
-            return False
-        return True
+        return nothing_runs(cls)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Refuse to run without a window, whose timer applies the poses."""

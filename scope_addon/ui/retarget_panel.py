@@ -61,18 +61,7 @@ class SCOPE_PT_retarget(Tab, bpy.types.Panel):
         layout.prop(settings, "rig")
         if settings.rig is None:
             return
-        row = layout.row(align=True)
-        row.operator("scope.guess_bones", icon="VIEWZOOM")
-        row.operator("scope.load_bone_map", text="", icon="FILE_FOLDER")
-        row.operator("scope.save_bone_map", text="", icon="FILE_TICK")
-        row.operator("scope.edit_bone_pair", text="", icon="ADD").action = "ADD"
-        row = row.row(align=True)
-        row.enabled = len(settings.pairs) > 0
-        row.operator("scope.edit_bone_pair", text="", icon="REMOVE").action = "REMOVE"
-        layout.template_list(
-            "SCOPE_UL_bone_pairs", "", settings, "pairs", settings, "active", rows=5
-        )
-        for pair in settings.pairs[settings.active : settings.active + 1]:
+        for pair in _draw_map(layout, settings, "bone", "pairs", "active"):
             column = layout.column(align=True)
             column.prop(pair, "part", text="", placeholder="Body Part", icon="ARMATURE_DATA")
             column.alert = pair.bone not in settings.rig.data.bones
@@ -139,18 +128,7 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
         layout.prop(settings, "face")
         if not has_targets(settings.face):
             return
-        row = layout.row(align=True)
-        row.operator("scope.guess_expressions", icon="VIEWZOOM")
-        row.operator("scope.load_expression_map", text="", icon="FILE_FOLDER")
-        row.operator("scope.save_expression_map", text="", icon="FILE_TICK")
-        row.operator("scope.edit_expression_pair", text="", icon="ADD").action = "ADD"
-        row = row.row(align=True)
-        row.enabled = len(settings.face_pairs) > 0
-        row.operator("scope.edit_expression_pair", text="", icon="REMOVE").action = "REMOVE"
-        layout.template_list(
-            "SCOPE_UL_expression_pairs", "", settings, "face_pairs", settings, "face_active", rows=5
-        )
-        for pair in settings.face_pairs[settings.face_active : settings.face_active + 1]:
+        for pair in _draw_map(layout, settings, "expression", "face_pairs", "face_active"):
             column = layout.column(align=True)
             column.prop(pair, "expression", text="", placeholder="Expression", icon="SHAPEKEY_DATA")
             column.alert = not _is_known(settings.face, pair)
@@ -164,6 +142,32 @@ class SCOPE_PT_retarget_face(Tab, bpy.types.Panel):
             column.alert = False
             column.prop(pair, "factor")
         layout.operator("scope.retarget_face", icon="SHAPEKEY_DATA")
+
+
+def _draw_map(
+    layout: bpy.types.UILayout,
+    settings: bpy.types.PropertyGroup,
+    kind: str,
+    entries: str,
+    active: str,
+) -> list[bpy.types.PropertyGroup]:
+    """Draw the buttons and the list of a map; return its active entry alone, if there is one.
+
+    :param kind: ``bone`` or ``expression``, as in the names of operators and lists.
+    :param entries, active: properties of the settings.
+    """
+    row = layout.row(align=True)
+    row.operator(f"scope.guess_{kind}s", icon="VIEWZOOM")
+    row.operator(f"scope.load_{kind}_map", text="", icon="FILE_FOLDER")
+    row.operator(f"scope.save_{kind}_map", text="", icon="FILE_TICK")
+    row.operator(f"scope.edit_{kind}_pair", text="", icon="ADD").action = "ADD"
+    row = row.row(align=True)
+    listed = getattr(settings, entries)
+    row.enabled = len(listed) > 0
+    row.operator(f"scope.edit_{kind}_pair", text="", icon="REMOVE").action = "REMOVE"
+    layout.template_list(f"SCOPE_UL_{kind}_pairs", "", settings, entries, settings, active, rows=5)
+    chosen: int = getattr(settings, active)
+    return list(listed[chosen : chosen + 1])
 
 
 def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> bool:

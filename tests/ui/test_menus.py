@@ -11,8 +11,9 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 import scope
-from scope.scope_addon.ui import export_operators, keymap, menus, preferences, presets
-from scope.scope_addon.ui.presets import SCOPE_OT_add_capture_preset
+from scope.scope_addon.ui import export_operators, keymap, menus, preferences
+from scope.scope_addon.ui.capture import capture_panel
+from scope.scope_addon.ui.capture.capture_panel import SCOPE_OT_add_capture_preset
 
 ROOT = Path(scope.__file__).resolve().parent
 
@@ -104,7 +105,7 @@ def test_presets_store_settings_but_nothing_of_one_clip():
 
 def test_a_preset_brings_the_settings_back(monkeypatch, tmp_path):
     monkeypatch.setattr(bpy.utils, "user_resource", lambda *_, **__: str(tmp_path))
-    panel = presets.SCOPE_PT_capture_presets
+    panel = capture_panel.SCOPE_PT_capture_presets
     # Blender names the menu after the preset
     monkeypatch.setattr(panel, "bl_label", panel.bl_label)
     settings = bpy.context.scene.scope
@@ -136,7 +137,7 @@ def test_settings_of_file_windows_can_be_stored_but_not_the_file(operator):
 def test_without_presets_blender_does_not_complain_of_missing_paths(monkeypatch, tmp_path):
     scripts = tmp_path / "scripts"
     monkeypatch.setenv("BLENDER_USER_SCRIPTS", str(scripts))
-    panel = presets.SCOPE_PT_capture_presets
+    panel = capture_panel.SCOPE_PT_capture_presets
     labels = []
     assert not bpy.utils.preset_paths(panel.preset_subdir)
     stub = MagicMock(preset_subdir=panel.preset_subdir, preset_operator=panel.preset_operator)

@@ -193,7 +193,7 @@ def _handler(page: PreviewPage, token: str) -> type[BaseHTTPRequestHandler]:
         def do_GET(self) -> None:
             try:
                 if self.path == f"/{token}":
-                    self._answer("text/html; charset=utf-8", _PAGE.format(token=token).encode())
+                    self._send_page(_PAGE.format(token=token).encode())
                 elif self.path == f"/{token}.mjpeg":
                     self._stream()
                 else:
@@ -201,9 +201,9 @@ def _handler(page: PreviewPage, token: str) -> type[BaseHTTPRequestHandler]:
             except OSError:  # the browser left
                 pass
 
-        def _answer(self, kind: str, content: bytes) -> None:
+        def _send_page(self, content: bytes) -> None:
             self.send_response(200)
-            self.send_header("Content-Type", kind)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
             self.send_header("Content-Length", str(len(content)))
             self.send_header("Referrer-Policy", "no-referrer")
             self.end_headers()

@@ -4,6 +4,12 @@ bones, shape and expressions on the body.
 
 A loop cuts them to its cycle, so that the whole action, and a strip of it in the NLA, is as long as
 the cycle. Whoever restores the whole motion restores them from the captured one.
+
+The measurements are keys of confidence, standard deviation and contact on the bones, and timeline
+markers at review spans. ``confidence`` (0..1) is that of the keypoints in which the bone's rotation
+is visible. ``sigma_cm`` is the standard deviation of its joint's position (`docs/motion_file.md`),
+where it is known. ``contact`` (0..1) is the probability that the heel (on the ankle's bone) or the
+toes (on the foot's) are at rest on the floor; drivers and constraints can use it.
 """
 
 from __future__ import annotations
@@ -14,18 +20,42 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...motion import Motion
+from ...notices import REASONS
+from ...review_spans import find_review_spans
 from ..animation_data.actions import (
+    Channels,
     bone_property_path,
     fcurves,
     read_keys,
     rewrite_keys,
     shape_key_path,
 )
-from .confidence_curves import measurements_of
+from ..animation_data.stored_values import in_scene
 from .keys import channel_curves
 from .shape_keys import shape_key_name
 
 _CONSTANT = "CONSTANT"
+CONFIDENCE = "confidence"
+CONTACT = "contact"
+SIGMA = "sigma_cm"
+# The bones that carry the columns of ``Motion.foot_contact``.
+CONTACT_BONES = ("left_ankle", "left_foot", "right_ankle", "right_foot")
+_DESCRIPTIONS = {
+    CONFIDENCE: "Confidence of the keypoints that show how this bone is turned",
+    SIGMA: "Standard deviation of the position of this bone's joint, in centimetres",
+    CONTACT: "Probability that this end of the foot rests on the floor",
+}
+MARKER_NAMES = {
+    "unseen": "not seen",
+    "far": "check",
+    "unsure": "unsure",
+    "floor": "under floor",
+    "swing": "limb swings",
+    "lean": "leans",
+    "floating": "floats",
+}
+_MAX_MARKERS = 40  # more would clutter the timeline
+_GAP_S = 0.5  # spans closer than this share a marker
 
 
 def cut_to_cycle(armature: bpy.types.Object, body: Body, first: float, last: float) -> None:
@@ -85,3 +115,80 @@ def _curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
     ]
     blocks = [armature, *dict.fromkeys(block for block in keys if block is not None)]
     return [curve for block in blocks if block.library is None for curve in fcurves(block)]
+
+
+def key_measurements(
+    armature: bpy.types.Object,
+    channels: Channels,
+    body: Body,
+    motion: Motion,
+    frames: NDArray[np.float64],
+) -> None:
+    """Key confidence, standard deviation and contact as custom properties of the bones, at scene
+    frames (T,).
+
+    The curves are hidden in the graph editor, where they would obscure those of the rotations.
+    """
+    for (bone_name, name), values in measurements_of(body, motion).items():
+        # deviations are unknown in frames that are filled in, and in some motions
+        known = np.isfinite(values)
+        if not known.any():
+            continue
+        bone = armature.pose.bones[bone_name]
+        most = 1000.0 if name == SIGMA else 1.0
+        bone[name] = float(values[known][0])
+        bone.id_properties_ui(name).update(
+            min=0.0, max=most, soft_min=0.0, soft_max=most, description=_DESCRIPTIONS[name]
+        )
+        for curve in channels.write(
+            bone_property_path(bone_name, name), frames[known], values[known], group=name.title()
+        ):
+            curve.hide = True
+
+
+def measurements_of(body: Body, motion: Motion) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """Return the values (T,) by bone and property; NaN where one is not known."""
+    columns = {
+        (name, CONFIDENCE): motion.joint_confidence[:, i] for i, name in enumerate(body.joint_names)
+    }
+    columns |= {
+        (name, CONTACT): motion.foot_contact[:, i]
+        for i, name in enumerate(CONTACT_BONES)
+        if name in body.joint_names
+    }
+    sigma_cm = 100.0 * np.asarray(motion.joint_sigma_m, float)
+    columns |= {(name, SIGMA): sigma_cm[:, i] for i, name in enumerate(body.joint_names)}
+    return columns
+
+
+def add_review_markers(
+    scene: bpy.types.Scene,
+    prefix: str,
+    motion: Motion,
+    frames: NDArray[np.float64],
+    under_floor: NDArray[np.bool_] | None = None,
+) -> list[str]:
+    """Add a timeline marker at the start of each review span; return the names of the new ones.
+
+    If there are too many spans, the longest get a marker. Its name states the reason: "not seen
+    12-18".
+
+    :param prefix: of the marker's name, to distinguish several people.
+    :param frames: (T,) scene frame of each pose.
+    :param under_floor: (T,) poses with a foot under the floor.
+    """
+    spans = sorted(
+        find_review_spans(motion, _GAP_S, under_floor), key=lambda span: span.first - span.last
+    )[:_MAX_MARKERS]
+    names = []
+    there = {(marker.name, marker.frame) for marker in scene.timeline_markers}
+    for span in sorted(spans, key=lambda span: span.first):
+        at = in_scene(span, frames)
+        name = f"{prefix}{MARKER_NAMES[span.reason]} {at}"
+        if (name, at.first) not in there:
+            scene.timeline_markers.new(name, frame=at.first)
+            names.append(name)
+    return names
+
+
+assert MARKER_NAMES.keys() == REASONS.keys()

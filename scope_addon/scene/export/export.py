@@ -28,7 +28,7 @@ from ...notices import Notice
 from ...temporary import remove
 from ..animation_data import actions
 from ..budget import check_samples
-from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, Progress, build_scene
+from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, build_scene
 from ..character.bone_display import remove_if_unused
 from ..packed_motion import motion_texts, pack_motion
 from . import formats
@@ -213,7 +213,6 @@ def export_motions(
     footage: str | Path | None = None,
     build_options: BuildOptions | None = None,
     export_options: ExportOptions | None = None,
-    progress: Progress | None = None,
 ) -> tuple[list[Path], list[Notice]]:
     """Build the motions in a temporary scene, write one or more files, and leave the session as it
     was.
@@ -238,7 +237,7 @@ def export_motions(
         return written, warnings
     build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)
     with temporary_scene("Capturing"):
-        result = build_scene(motions, body, footage, build_options, progress)
+        result = build_scene(motions, body, footage, build_options)
         try:
             if any(Path(path).suffix.lower() == ".blend" for path in scene_paths):
                 for person in result.people:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import bpy
 from bpy.props import IntProperty
@@ -50,6 +50,16 @@ class _State:
 state = _State()
 
 
+def nothing_runs(cls: type[bpy.types.Operator]) -> bool:
+    """Return whether no capture is running, live or not; if one is, say so as the reason why the
+    operator cannot be used.
+    """
+    if state.job is None and live_state.job is None:
+        return True
+    cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
+    return False
+
+
 def end_capture() -> None:
     """End a running capture: the extension is being disabled, or a test begins."""
     stop_job()
@@ -63,12 +73,6 @@ class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
     bl_idname = "scope.choose_footage"
     bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
     bl_options = {"UNDO"}
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Use a dropped file, or ask for one."""
-        if self.filepath:
-            return self.execute(context)
-        return self.ask(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file, and queue the files if there are several."""
@@ -104,10 +108,6 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Use a dropped file, or ask for some."""
-        return self.execute(context) if self.filepath else self.ask(context)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add the chosen files."""
         settings = context.scene.scope
@@ -123,22 +123,29 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCOPE_OT_remove_view(bpy.types.Operator):
-    """Remove this video from the list; the file stays"""
+class _RemoveFromList:
+    """An operator that removes an entry of one of the footage's lists. Not registered."""
 
-    bl_idname = "scope.remove_view"
-    bl_label = "Remove View"
     bl_options = {"UNDO"}
+    listed: ClassVar[str]  # the list, of the settings
 
     index: IntProperty(min=0, options={"SKIP_SAVE", "HIDDEN"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove the view."""
-        views = context.scene.scope.views
-        if self.index >= len(views):
+        """Remove the entry."""
+        entries = getattr(context.scene.scope, self.listed)
+        if self.index >= len(entries):
             return {"CANCELLED"}
-        views.remove(self.index)
+        entries.remove(self.index)
         return {"FINISHED"}
+
+
+class SCOPE_OT_remove_view(_RemoveFromList, bpy.types.Operator):
+    """Remove this video from the list; the file stays"""
+
+    bl_idname = "scope.remove_view"
+    bl_label = "Remove View"
+    listed = "views"
 
 
 class SCOPE_OT_use_sample(bpy.types.Operator):
@@ -166,8 +173,7 @@ class CapturingOperator(JobOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that footage is chosen and nothing is running."""
-        if state.job is not None or live_state.job is not None:
-            cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
+        if not nothing_runs(cls):
             return False
         if not context.scene.scope.footage:
             cls.poll_message_set(tip_("Choose a video or image first"))
@@ -364,22 +370,12 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         return super().end(context, outcome)
 
 
-class SCOPE_OT_remove_clip(bpy.types.Operator):
+class SCOPE_OT_remove_clip(_RemoveFromList, bpy.types.Operator):
     """Remove this clip from the list; the file and its capture stay"""
 
     bl_idname = "scope.remove_clip"
     bl_label = "Remove Clip"
-    bl_options = {"UNDO"}
-
-    index: IntProperty(min=0, options={"SKIP_SAVE", "HIDDEN"})
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove the clip."""
-        queue = context.scene.scope.queue
-        if self.index >= len(queue):
-            return {"CANCELLED"}
-        queue.remove(self.index)
-        return {"FINISHED"}
+    listed = "queue"
 
 
 def _waits(clip: Any) -> bool:

@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture panels in the sidebar of the 3D viewport, tab Scope."""
+"""The capture panels in the sidebar of the 3D viewport, tab Scope. Presets of the capture
+settings are chosen, added and removed in the header of the first one.
+"""
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
 
 from ...footage import display_text
-from ...options import Section
+from ...options import Place, Section, options_at
 from ...scene.animation_data.stored_values import parse_spans
 from .. import warm_up
 from ..comparison import camera_of, cameras_of, is_looking_through, side_area
-from ..declared_properties import draw_section
+from ..declared_properties import draw_section, property_name
 from ..export_operators import FORMATS, is_available
 from ..file_field import draw_file
-from ..presets import SCOPE_PT_capture_presets
 from ..reporting import iface_, warning_text
 from ..translations import CONTEXT
 from . import preview_picture
@@ -30,6 +34,8 @@ if TYPE_CHECKING:
 
 _PIXELS_PER_CHARACTER = 7.0
 _STATUS_ICONS = {WAITING: "TIME", CAPTURING: "PLAY", DONE: "CHECKMARK", FAILED: "ERROR"}
+# What belongs to one clip, or to one person, is no preset.
+_OF_THE_CLIP = ("take", "use_range", "start", "end", "heights_m")
 
 
 class Tab:
@@ -369,6 +375,42 @@ def draw_text(
         column.label(text=line, icon=icon if index == 0 or icon == "NONE" else "BLANK1")
 
 
+class SCOPE_PT_capture_presets(PresetPanel, bpy.types.Panel):
+    """Presets of the capture settings."""
+
+    bl_label = "Capture Presets"
+    preset_subdir = "scope/capture"
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "scope.add_capture_preset"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the presets. Without a folder for them, Blender would complain of missing paths
+        before the first one.
+        """
+        if not bpy.utils.preset_paths(self.preset_subdir):
+            with contextlib.suppress(OSError):
+                bpy.utils.user_resource(
+                    "SCRIPTS", path=f"presets/{self.preset_subdir}", create=True
+                )
+        PresetPanel.draw(self, context)
+
+
+class SCOPE_OT_add_capture_preset(AddPresetBase, bpy.types.Operator):
+    """Add the capture settings as a preset, or remove a preset"""
+
+    bl_idname = "scope.add_capture_preset"
+    bl_label = "Add Capture Preset"
+    preset_menu = "SCOPE_PT_capture_presets"
+    preset_subdir = "scope/capture"
+    # Whole paths: a Blender before 4.4 does not find what ``preset_defines`` defines if its Python
+    # is 3.13.
+    preset_values = [
+        f"bpy.context.scene.scope.{property_name(option)}"
+        for option in options_at(Place.PANEL)
+        if option.name not in _OF_THE_CLIP
+    ]
+
+
 CLASSES = (
     SCOPE_PT_capture,
     SCOPE_PT_person,
@@ -376,4 +418,6 @@ CLASSES = (
     SCOPE_PT_result,
     SCOPE_PT_warnings,
     SCOPE_PT_figures,
+    SCOPE_PT_capture_presets,
+    SCOPE_OT_add_capture_preset,
 )

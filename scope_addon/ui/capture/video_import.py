@@ -9,10 +9,9 @@ from pathlib import Path
 import bpy
 
 from ..file_field import FootageBrowser, stored_path
-from ..live_properties import state as live_state
-from ..reporting import rpt_, tip_
+from ..reporting import rpt_
 from ..sidebar import show_tab
-from .capture_operators import state
+from .capture_operators import nothing_runs
 
 
 class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
@@ -25,10 +24,7 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that no capture is running."""
-        if state.job is not None or live_state.job is not None:
-            cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
-            return False
-        return True
+        return nothing_runs(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
