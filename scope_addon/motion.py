@@ -70,6 +70,8 @@ class Motion:
     footage_rotation: int = 0
     footage_mirrored: bool = False
     footage_speed: float = 1.0
+    # (T,) focal length of each frame over that of `intrinsics`; None: it is constant
+    zoom: NDArray[np.float64] | None = None
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named
     # CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -99,6 +101,8 @@ class Motion:
         self.footage_rotation = int(self.footage_rotation) % 360
         self.footage_mirrored = bool(self.footage_mirrored)
         self.footage_speed = float(self.footage_speed)
+        if self.zoom is not None:
+            self.zoom = np.asarray(self.zoom, np.float64)
         self.validate()
 
     @property
@@ -107,6 +111,14 @@ class Motion:
         motion.
         """
         return self.timestamps * self.footage_speed
+
+    @property
+    def intrinsics_of_frames(self) -> NDArray[np.float64]:
+        """(T, 3, 3) intrinsics of each frame."""
+        intrinsics = np.tile(self.intrinsics, (len(self), 1, 1))
+        if self.zoom is not None:
+            intrinsics[:, :2, :2] *= self.zoom[:, None, None]
+        return intrinsics
 
     @property
     def view(self) -> FootageView:
@@ -147,6 +159,7 @@ class Motion:
             world_from_camera=self.world_from_camera @ np.linalg.inv(T_view_camera),
             image_size=of_view["view_image_sizes"],
             source=str(of_view["view_sources"]),
+            zoom=None,
             face={},
             views={},
         )
@@ -181,6 +194,12 @@ class Motion:
             got = getattr(self, name).shape
             if got != expected:
                 raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
+        if self.zoom is not None and (
+            self.zoom.shape != (T,) or not ((self.zoom > 0) & (self.zoom < np.inf)).all()
+        ):
+            raise MotionFileError(
+                f"{where}: zoom must have a focal length above 0 for each of {T} frames"
+            )
         self._validate_face(where)
         self._validate_views(where)
 
@@ -275,7 +294,9 @@ class Motion:
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         arrays = {
-            f.name: np.asarray(getattr(self, f.name)) for f in fields(self) if f.name not in _GROUPS
+            f.name: np.asarray(getattr(self, f.name))
+            for f in fields(self)
+            if f.name not in _GROUPS and (f.name != "zoom" or self.zoom is not None)
         }
         return arrays | self.corrections | self.face | self.views
 
@@ -367,6 +388,7 @@ OPTIONAL_KEYS = {
     "footage_rotation",
     "footage_mirrored",
     "footage_speed",
+    "zoom",
     *CORRECTION_KEYS,
     *FACE_KEYS,
     *VIEW_KEYS,

@@ -113,8 +113,9 @@ SENTENCES = {
     "check how far the person travels",
     "unknown_travel": "{footage}: the camera travels, but how far is unknown, because neither a "
     "floor nor feet at rest are seen; it was left in place, so the people's paths are wrong",
-    "zoom": "{footage}: the lens zooms {times:times}, which was mistaken for people who come "
-    "nearer or go away; capture the parts without zoom separately, with a start and end time",
+    "zoom": "{footage}: the lens zooms, but by how much is not known everywhere, because the "
+    "camera also travels, or too little of the background is seen, so people may come nearer or go "
+    "away wrongly; capture the parts without zoom separately, with a start and end time",
     "given_floor": "{footage}: in the world of the given camera, the feet rest at z = "
     "{height_m:.2f} m; the capture was moved so that they rest at 0, with its own camera: move it "
     "by as much, or give the person's height if the floor should be at 0",

@@ -105,6 +105,23 @@ def test_a_missing_key_is_named(tmp_path):
         Motion.load(tmp_path / "thin.npz")
 
 
+def test_a_zoom_is_saved_and_loaded_and_absent_where_the_lens_does_not_zoom(tmp_path):
+    motion = make_motion()
+    motion.save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as file:
+        assert "zoom" not in file.files
+    np.testing.assert_array_equal(motion.intrinsics_of_frames[3], motion.intrinsics)
+    replace(motion, zoom=[1.0, 1.5, 2.0, 2.0]).save(tmp_path / "b.npz")
+    loaded = Motion.load(tmp_path / "b.npz")
+    np.testing.assert_array_equal(loaded.zoom, [1.0, 1.5, 2.0, 2.0])
+    K = loaded.intrinsics
+    expected = [[2 * K[0, 0], 0, K[0, 2]], [0, 2 * K[1, 1], K[1, 2]], [0, 0, 1]]
+    np.testing.assert_array_equal(loaded.intrinsics_of_frames[2], expected)
+    for wrong in ([1.0, 2.0], [1.0, 0.0, 1.0, 1.0], [1.0, np.nan, 1.0, 1.0]):
+        with pytest.raises(MotionFileError, match="zoom must have a focal length above 0"):
+            replace(motion, zoom=wrong)
+
+
 def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
     make_motion().save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as file:

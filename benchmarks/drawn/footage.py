@@ -81,7 +81,8 @@ def draw_clip(
     times = camera.times(seconds)
     R_world_camera, centers = camera.path(times)
     focal_px = np.array([camera.focal_px(t) for t in times])
-    stands_still = np.ptp(centers, axis=0).max() == 0 and np.ptp(R_world_camera, axis=0).max() == 0
+    moving = (centers, R_world_camera, focal_px)
+    is_background_static = all(np.ptp(values, axis=0).max() == 0 for values in moving)
     background = None
     skins = [_skin(walker, TINT + number) for number, walker in enumerate(walkers)]
     joints = []
@@ -93,7 +94,7 @@ def draw_clip(
     ):
         for time_s, R, center, focal in zip(times, R_world_camera, centers, focal_px, strict=True):
             K = intrinsics_of(focal)
-            if background is None or not stands_still:
+            if background is None or not is_background_static:
                 background = surroundings.draw(R, center, K, WIDTH, HEIGHT)
             poses = [walker.pose(time_s) for walker in walkers]
             joints.append([w.joints(pose) for w, pose in zip(walkers, poses, strict=True)])

@@ -48,6 +48,7 @@ def viewer_data(
     first = motions[0]
     camera = first.world_from_camera[rows, :3]
     static = bool((camera == camera[0]).all())
+    zoom = np.ones(len(first)) if first.zoom is None else first.zoom
     return {
         "parents": body.parents.tolist(),
         "joints": list(body.joint_names),
@@ -59,6 +60,7 @@ def viewer_data(
         "frames": encoded(first.frames[rows].astype(np.int32)),
         "camera": encoded(camera[: 1 if static else None].astype(np.float32)),
         "intrinsics": first.intrinsics.tolist(),
+        "zoom": encoded(zoom[rows].astype(np.float32)),
         "imageSize": first.image_size.tolist(),
         "people": [
             _person(motion, body, rows, color)

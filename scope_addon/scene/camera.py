@@ -90,7 +90,7 @@ def build_camera(
 ) -> bpy.types.Object:
     """Create a camera object with the intrinsics and the pose of the footage's camera.
 
-    :param frames: (T,) scene frame of each pose; a moving camera is keyed there.
+    :param frames: (T,) scene frame of each pose; a camera that moves or zooms is keyed there.
     """
     data = bpy.data.cameras.new(name)
     set_lens(data, motion)
@@ -108,6 +108,10 @@ def build_camera(
         channels = Channels(obj, bpy.data.actions.new(name))
         channels.write("location", frames, locations, group="Object Transforms")
         channels.write("rotation_quaternion", frames, rotations, group="Object Transforms")
+    if motion.zoom is not None:
+        Channels(data, bpy.data.actions.new(f"{name}_lens")).write(
+            "lens", frames, data.lens * motion.zoom
+        )
     return obj
 
 
@@ -159,8 +163,9 @@ def same_camera(a: Motion, b: Motion) -> bool:
     """
     return (
         np.array_equal(a.image_size, b.image_size)
-        and np.allclose(a.intrinsics, b.intrinsics, rtol=0, atol=1e-6)
         and np.array_equal(a.dist, b.dist)
+        and len(a) == len(b)
+        and np.allclose(a.intrinsics_of_frames, b.intrinsics_of_frames, rtol=0, atol=1e-6)
         and a.world_from_camera.shape == b.world_from_camera.shape
         and np.allclose(a.world_from_camera, b.world_from_camera, rtol=0, atol=1e-6)
     )
@@ -286,12 +291,12 @@ def show_footage_again(
     opacity = former.alpha
     visible = former.show_background_image
     action = camera.data.animation_data.action if camera.data.animation_data else None
-    if action is not None and all(
-        c.data_path.startswith("background_images[0].image_user") for c in fcurves_of(action)
-    ):
-        camera.data.animation_data.action = None
-        if action.users == 0:
-            bpy.data.actions.remove(action)
+    if action is not None:
+        Channels.of(camera.data).remove({_shown_frames_path(0)})
+        if not fcurves_of(action):
+            camera.data.animation_data.action = None
+            if action.users == 0:
+                bpy.data.actions.remove(action)
     # Blender goes on counting what a removed background image shows as used. A clip without users
     # stays, because the viewport may show it, until Blender saves the file without it.
     former.clip = former.image = None
@@ -384,9 +389,18 @@ def _key_footage(
     _show_frames(background.image_user, int(scene_frames[0]))
     offsets = shown - (scene_frames - scene_frames[0])
     changes = np.flatnonzero(np.diff(offsets, prepend=np.inf))
-    path = f"background_images[{len(camera.background_images) - 1}].image_user.frame_offset"
-    channels = Channels(camera, bpy.data.actions.new(f"{camera.name}_footage"))
+    path = _shown_frames_path(len(camera.background_images) - 1)
+    animation = camera.animation_data
+    if animation is not None and animation.action is not None:  # the keys of a lens that zooms
+        channels = Channels.of(camera)
+    else:
+        channels = Channels(camera, bpy.data.actions.new(f"{camera.name}_footage"))
     channels.write(path, scene_frames[changes], offsets[changes], "CONSTANT")
+
+
+def _shown_frames_path(number: int) -> str:
+    """Return the path of what says which frame a camera's background image shows."""
+    return f"background_images[{number}].image_user.frame_offset"
 
 
 def _show_frames(user: bpy.types.ImageUser, start: int) -> None:

@@ -63,6 +63,7 @@ def change_rate(
         here = [person for person in people if holds(collection, person)]
         for camera in [obj for obj in collection.objects if obj.type == "CAMERA"] if here else ():
             _retime(camera, moves[here[0]], done)
+            _retime(camera.data, moves[here[0]], done)  # Its lens may zoom.
     _retime_markers(scene, own, moves)
     current = scene.frame_current + scene.frame_subframe
     first = next(iter(moves.values()), Retiming(0.0, 1.0))

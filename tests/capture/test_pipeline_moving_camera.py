@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A real clip of a static camera, filmed again by a virtual camera that pans: the world must stay
-the same, whether the pan is estimated or given.
+"""A real clip of a static camera, filmed again by a virtual camera that pans and zooms: the world
+must stay the same, whether the pan is estimated or given.
 """
 
 import json
@@ -21,8 +21,10 @@ HEIGHT = 540
 FOV = 60.0
 
 
-def film(source, path, turn):
-    """Write a clip with each frame as seen by a camera rotated by turn(k) (rotation vector)."""
+def film(source, path, turn, zoom=lambda _: 1.0):
+    """Write a clip with each frame as seen by a camera rotated by turn(k) (rotation vector), whose
+    focal length is zoom(k) times as long.
+    """
     reader = cv2.VideoCapture(str(source))
     reader.set(cv2.CAP_PROP_POS_FRAMES, START)
     out = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30, (WIDTH, HEIGHT))
@@ -31,7 +33,7 @@ def film(source, path, turn):
         ok, frame = reader.read()
         assert ok
         S = np.diag([WIDTH / frame.shape[1], HEIGHT / frame.shape[0], 1.0])
-        H = K @ exp(turn(k)).T @ np.linalg.inv(K) @ S
+        H = K @ np.diag([zoom(k), zoom(k), 1.0]) @ exp(turn(k)).T @ np.linalg.inv(K) @ S
         out.write(cv2.warpPerspective(frame, H, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE))
     out.release()
 
@@ -74,10 +76,25 @@ def test_the_world_of_a_panning_camera_does_not_move(shared, tmp_path):
     pan = np.array([0.02, 0.10, 0.01])
     film(clip, tmp_path / "stand.mp4", lambda k: 0 * pan)
     film(clip, tmp_path / "pan.mp4", lambda k: np.sin(2 * np.pi * k / FRAMES) * pan)
+    factors = 1.6 ** np.clip((np.arange(FRAMES) - 10) / 30, 0, 1)
+    film(clip, tmp_path / "zoom.mp4", lambda _: 0 * pan, lambda k: factors[k])
     body = load_body("scope")
     options = CaptureOptions(quality="fast", fov_deg=FOV)
-    found = {name: capture(tmp_path / f"{name}.mp4", body, options) for name in ("stand", "pan")}
-    stand, moving = (found[name].motions[0] for name in ("stand", "pan"))
+    names = ("stand", "pan", "zoom")
+    found = {name: capture(tmp_path / f"{name}.mp4", body, options) for name in names}
+    stand, moving, zoomed = (found[name].motions[0] for name in names)
+
+    assert stand.zoom is None
+    assert moving.zoom is None
+    np.testing.assert_allclose(zoomed.zoom, factors, rtol=0.03)
+    far = np.linalg.norm(stand.joints_cam[:, 0], axis=1)
+    far_zoomed = np.linalg.norm(zoomed.joints_cam[:, 0], axis=1)
+    ratio = (far_zoomed / far)[10:]
+    np.testing.assert_allclose(ratio, np.median(ratio), rtol=0.06)
+    p = np.einsum("tij,tkj->tki", zoomed.intrinsics_of_frames, zoomed.joints_cam)
+    hips = zoomed.keypoints2d[:, [23, 24], :2].mean(axis=1)
+    own = (p[..., :2] / p[..., 2:])[:, [1, 2]].mean(axis=1)
+    assert np.median(np.linalg.norm(own - hips, axis=1)) < 15.0
 
     assert found["stand"].report.camera_turns_deg == 0.0
     assert np.ptp(stand.world_from_camera, axis=0).max() == 0.0

@@ -186,7 +186,7 @@ def test_every_key_of_the_motion_file_is_defined_once():
 
 
 def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
-    given = {"face": made_face(7), "views": made_views(0.5)}
+    given = {"zoom": np.ones(7), "face": made_face(7), "views": made_views(0.5)}
     motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)), **given)
     changes = (
         Pin(2, "head", (320.0, 200.0)),

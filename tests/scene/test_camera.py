@@ -33,7 +33,7 @@ def projected_by_blender(camera: bpy.types.Object, points_world: np.ndarray) -> 
 
 
 def projected_by_intrinsics(motion, t: int) -> np.ndarray:
-    p = motion.joints_cam[t] @ motion.intrinsics.T
+    p = motion.joints_cam[t] @ motion.intrinsics_of_frames[t].T
     return p[:, :2] / p[:, 2:]
 
 
@@ -63,6 +63,24 @@ def test_a_moving_camera_is_keyed(body, make_motion, joints_world, blender):
         blender.go_to(t)
         pixels = projected_by_blender(camera, joints_world(motion)[t])
         np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, t), atol=0.05)
+
+
+def test_a_lens_that_zooms_is_keyed(body, make_motion, joints_world, blender, clip):
+    """Beside the frames of the footage, and also after the scene's rate has changed."""
+    scene = bpy.context.scene
+    scene.render.fps = 20
+    motion = replace(
+        make_motion(body, 20, rate=30.0, image_size=(64, 48)), zoom=np.geomspace(1.0, 2.0, 20)
+    )
+    options = BuildOptions(resolution="set", start_frame=0.0)
+    person = build_scene([motion], body, footage=clip, options=options).people[0]
+    for rate in (20, 30, 15):
+        change_rate(scene, rate, {person.armature: motion}, [])
+        for t in (0, 8, 18):
+            blender.go_to(t * rate / 30)
+            pixels = projected_by_blender(person.camera, joints_world(motion)[t])
+            np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, t), atol=0.05)
+            assert abs(frame_shown(person.camera, round(t * rate / 30)) - t) <= 1.0
 
 
 def test_a_static_camera_has_no_keys(body, make_motion):

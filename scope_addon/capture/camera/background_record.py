@@ -23,13 +23,13 @@ import numpy as np
 from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.smoothing import fill_rotation_gaps
-from .corner_tracks import CornerTracks, joined_corners
+from .corner_tracks import SAMPLES_HZ, CornerTracks, joined_corners
 from .heading_drift import FrameEdges, remove_heading_drift
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
 from .odometry import Odometry, travel_of
+from .zoom import Zoom, find_zoom
 
-SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
 TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
 STATIC_DEG = 0.35  # largest rotation during a clip of a camera on a tripod
 REVEALING_S = 30.0  # from the first frame with edges on, edges that people hid in it are looked for
@@ -42,7 +42,6 @@ class CameraMotion:
     R_first_camera: Float64Array  # (T, 3, 3) the camera's axes in those of the first frame
     known: BoolArray  # (T,) frames in which it was estimated; elsewhere it is interpolated
     travel: Odometry | None = None
-    zooms: BoolArray | None = None  # (T,) frames in which the lens zooms; None: unknown
 
     @classmethod
     def given(cls, world_from_camera: Float64Array) -> CameraMotion:
@@ -80,6 +79,30 @@ class BackgroundRecord:
     bars: list[Float64Array] = field(default_factory=list)  # in the first of the edge frames
     corners: CornerTracks = field(default_factory=CornerTracks.none)
 
+    def steadied(
+        self, camera: Camera, image_size: tuple[int, int]
+    ) -> tuple[BackgroundRecord, Zoom | None]:
+        """Return the background as a lens sees it that keeps the focal length of the first frame,
+        and how the lens zooms; the record itself where it does not.
+
+        :param camera: the intrinsics that were assumed while the background was followed.
+        :param image_size: (width, height) in pixels.
+        """
+        zoom = find_zoom(self.corners, self.times, camera, max(image_size))
+        if zoom is None:
+            return self, None
+        factors = zoom.factors
+        points = camera.at_zoom(self.corners.points_px, 1.0 / factors[self.corners.rows, None])
+        steady = replace(
+            self,
+            R_first_camera=zoom.R_first_camera,
+            known=np.ones(len(factors), bool),
+            inlier_shares=[],  # The zoom has lowered them.
+            edge_frames=[edge.steadied(camera, factors[edge.row]) for edge in self.edge_frames],
+            corners=replace(self.corners, points_px=points.astype(np.float32)),
+        )
+        return steady, zoom
+
     def motion(
         self, followed_with: Camera, camera: Camera, image_size: tuple[int, int]
     ) -> CameraMotion:
@@ -113,8 +136,8 @@ class BackgroundRecord:
             R = remove_heading_drift(R, times, self.edge_frames, camera, image_size)
         odometry = travel_of(self.corners, R, times, camera, max(image_size))
         if odometry.travels:
-            return CameraMotion(odometry.R_first_camera, known, odometry, odometry.zooms)
-        return CameraMotion(R, known, zooms=odometry.zooms)
+            return CameraMotion(odometry.R_first_camera, known, odometry)
+        return CameraMotion(R, known)
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
         """Return the lines of the background in the first frame's axes.

@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array
 from ..perception.region import inside, surroundings
-from .background_record import REVEALING_S, SAMPLES_HZ, BackgroundRecord, is_rotated
+from .background_record import REVEALING_S, BackgroundRecord, is_rotated
 from .bars import find_bars
-from .corner_tracks import CornerFollower, follow_corners
+from .corner_tracks import SAMPLES_HZ, CornerFollower, follow_corners
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
 from .intrinsics import Camera
 from .line_segments import find_segments

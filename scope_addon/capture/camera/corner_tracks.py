@@ -18,6 +18,7 @@ import numpy as np
 from ...arrays import BoolArray, Float32Array, Float64Array, IndexArray, Uint8Array
 from ..perception.region import inside
 
+SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
 MAX_CORNERS = 220
 REPLENISHED_SHARE = 0.75  # of that number; with fewer, new corners are looked for
 SPACING_PX = 9  # between corners in the working image

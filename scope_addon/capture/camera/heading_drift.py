@@ -17,7 +17,7 @@ is solved from the drift half a second before, by Gauss-Newton steps with a narr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,13 @@ class FrameEdges:
 
     row: int
     segments: Segments
+
+    def steadied(self, camera: Camera, zoom: float) -> FrameEdges:
+        """Return the edges as a lens of the camera's focal length sees them, over which the
+        frame's is ``zoom``.
+        """
+        ends_px = camera.at_zoom(self.segments.ends_px, 1.0 / zoom)
+        return replace(self, segments=replace(self.segments, ends_px=ends_px))
 
 
 def remove_heading_drift(

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +55,16 @@ class Camera:
         undistorted = cv2.undistortPoints(flat, self.intrinsics, self.dist, P=self.intrinsics)
         reshaped: NDArray[Any] = undistorted.reshape(points_px.shape)
         return reshaped
+
+    def zoomed(self, zoom: float) -> Camera:
+        """Return the camera with ``zoom`` times the focal length."""
+        return replace(self, intrinsics=self.intrinsics @ np.diag([zoom, zoom, 1.0]))
+
+    def at_zoom(self, points_px: FloatArray, zoom: FloatArray | float) -> FloatArray:
+        """Return where pixels (..., 2) are with ``zoom`` times the focal length."""
+        center = self.intrinsics[:2, 2]
+        moved: FloatArray = center + zoom * (points_px - center)
+        return moved
 
     def rays(self, points_px: FloatArray) -> Float64Array:
         """Return the (..., 3) lines of sight of pixels (..., 2), in camera axes, with z = 1."""

@@ -16,7 +16,7 @@ Sources: Nistér 2004 (essential matrix from five points), Triggs et al. 2000 (b
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -38,9 +38,6 @@ MIN_ESSENTIAL_SHARE = 0.55  # of them that an essential matrix explains
 # Of the corners that an essential matrix explains, the share that a camera may explain which only
 # rotates and zooms.
 MAX_TURN_SHARE = 0.65
-MIN_ZOOM_SHARE = 0.8  # of all corners that a zoom must explain
-MIN_ZOOM = 0.05  # logarithm of the focal length's change
-LONGEST_ZOOM = 11  # frames in which it changes as much
 TURN_STEPS = 10
 TURN_PRIOR = (1e-9, 1e-9, 1e-9, 1e-3, 1e-6)  # small rotations do not tell the focal length
 _DIFFERENCE = 1e-6
@@ -71,7 +68,6 @@ class Odometry:
     part: IndexArray  # (T,) from 0; −1 where the camera does not travel, as far as is seen
     # Of each part, places (C, 3) of corners in the first frame's axes, in units of the part.
     maps: list[Float64Array]
-    zooms: BoolArray  # (T,) frames in which the lens zooms
 
     @property
     def travels(self) -> bool:
@@ -80,7 +76,7 @@ class Odometry:
 
 
 @dataclass
-class _Sightings:
+class Sightings:
     """The corners that each of S frames sees, as lines of sight."""
 
     rows: IndexArray  # (S,) numbers of the frames
@@ -89,7 +85,8 @@ class _Sightings:
     tolerance: float  # radians
 
     @classmethod
-    def of(cls, corners: CornerTracks, camera: Camera, longer_side_px: float) -> _Sightings:
+    def of(cls, corners: CornerTracks, camera: Camera, longer_side_px: float) -> Sightings:
+        """Return the corners of a clip whose images have this longer side."""
         rows, first = np.unique(corners.rows, return_index=True)
         rays = camera.rays(corners.points_px.astype(float))[:, :2]
         tolerance = INLIER_PX * longer_side_px / WORKING_SIDE_PX / camera.intrinsics[0, 0]
@@ -123,21 +120,13 @@ def travel_of(
     :param longer_side_px: of the image.
     """
     frames = len(times)
-    still = Odometry(
-        R_first_camera, np.zeros((frames, 3)), np.full(frames, -1), [], np.zeros(frames, bool)
-    )
+    still = Odometry(R_first_camera, np.zeros((frames, 3)), np.full(frames, -1), [])
     if not len(corners.rows):
         return still
-    sightings = _Sightings.of(corners, camera, longer_side_px)
+    sightings = Sightings.of(corners, camera, longer_side_px)
     tracker = _Tracker(sightings, R_first_camera[sightings.rows], corners.count)
     parts = tracker.parts()
-    for a, b in tracker.zooms:
-        still.zooms[sightings.rows[a] : sightings.rows[b] + 1] = True
-    if not parts:
-        return still
-    found = _joined(parts, sightings.rows, R_first_camera, times)
-    # In a few frames, a camera that goes back or forth looks like one that zooms.
-    return replace(found, zooms=still.zooms & (found.part < 0))
+    return _joined(parts, sightings.rows, R_first_camera, times) if parts else still
 
 
 @dataclass
@@ -169,14 +158,13 @@ class _Part:
 class _Tracker:
     """Places the frames of a clip, one after another."""
 
-    def __init__(self, sightings: _Sightings, R_first_camera: Float64Array, corners: int) -> None:
+    def __init__(self, sightings: Sightings, R_first_camera: Float64Array, corners: int) -> None:
         self._seen = sightings
         self._R_guess = np.swapaxes(R_first_camera, 1, 2)  # world to camera
         self._places = np.full((corners, 3), np.nan)
         self._is_outlier = np.zeros(corners, bool)
         self._first_ray = np.full((corners, 3), np.nan)  # in map axes
         self._first_center = np.full((corners, 3), np.nan)
-        self.zooms: list[tuple[int, int]] = []  # pairs of frames between which the lens zooms
 
     def parts(self) -> list[_Part]:
         """Return the parts of the path, in order."""
@@ -243,11 +231,8 @@ class _Tracker:
         if H is None:
             return None
         turn = Turn.nearest(np.asarray(H, float)).refined(rays_a, rays_b, tolerance)
-        by_turn = np.linalg.norm(turn.residuals(rays_a, rays_b), axis=1) < tolerance
+        by_turn = turn.explains(rays_a, rays_b, tolerance)
         if by_turn[explained].mean() > MAX_TURN_SHARE:
-            is_zoomed = abs(np.log(turn.zoom)) > MIN_ZOOM and b - a <= LONGEST_ZOOM
-            if is_zoomed and by_turn.mean() > MIN_ZOOM_SHARE:
-                self.zooms.append((a, b))
             return None
         count, R, t, _ = cv2.recoverPose(E, rays_a[explained], rays_b[explained], np.eye(3))
         if count < 0.6 * explained.sum():
@@ -393,12 +378,23 @@ class _Tracker:
 class Turn:
     """How lines of sight move while a camera only rotates and zooms: p_b ~ D(a g) R D(1 / a) p_a.
 
-    D(a) = diag(a, a, 1); ``focal`` a is the assumed focal length relative to the true one.
+    D(a) = diag(a, a, 1); ``focal`` a is the true focal length relative to the assumed one.
     """
 
     R: Float64Array  # (3, 3)
     focal: float
     zoom: float  # g, of the focal length from the first frame to the second
+
+    @classmethod
+    def none(cls, focal: float = 1.0) -> Turn:
+        """Return the turn of a camera that neither rotates nor zooms."""
+        return cls(np.eye(3), focal, 1.0)
+
+    @property
+    def assumed_rotation(self) -> Float64Array:
+        """The rotation (3, 3) that moves the picture as much by the assumed focal length."""
+        rotation: Float64Array = exp(log(self.R) * [self.focal, self.focal, 1.0])
+        return rotation
 
     @classmethod
     def nearest(cls, H: Float64Array) -> Turn:
@@ -425,13 +421,21 @@ class Turn:
         turned = homogeneous(rays_a / a) @ self.R.T
         return projected(turned) * (a * self.zoom) - rays_b
 
-    def refined(self, rays_a: Float64Array, rays_b: Float64Array, scale: float) -> Turn:
+    def explains(self, rays_a: Float64Array, rays_b: Float64Array, tolerance: float) -> BoolArray:
+        """Return (n,) whether the turn takes lines of sight (n, 2) to others (n, 2)."""
+        explained: BoolArray = np.linalg.norm(self.residuals(rays_a, rays_b), axis=1) < tolerance
+        return explained
+
+    def refined(
+        self, rays_a: Float64Array, rays_b: Float64Array, scale: float, steps: int = TURN_STEPS
+    ) -> Turn:
         """Return the turn that most lines of sight, (n, 2) and (n, 2), agree with, from this one.
 
         :param scale: of the robust kernel at the end, radians; it begins eight times as wide.
+        :param steps: at least 4, after which the kernel is as narrow.
         """
         turn = self
-        for step in range(TURN_STEPS):
+        for step in range(steps):
             residuals = turn.residuals(rays_a, rays_b)
             width = scale * max(1.0, 8.0 * 0.5**step)
             weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
@@ -531,4 +535,4 @@ def _joined(
         after = slice(seen[-1] + 1, frames)
         # What follows keeps its rotation relative to this part's last frame.
         R[after] = R[seen[-1]] @ R_before.T @ R[after]
-    return Odometry(R, center, part_of, maps, np.zeros(frames, bool))
+    return Odometry(R, center, part_of, maps)

@@ -16,14 +16,17 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from types import TracebackType
 
+import numpy as np
+
 from ...arrays import Float64Array
 from ...machine_code.code_cache import compiled_kernels
 from ..camera.background_record import BackgroundRecord
 from ..camera.bars import longer_content_side
 from ..camera.camera_rotation import BackgroundTracker
 from ..camera.intrinsics import Camera, assumed_camera
+from ..camera.zoom import Zoom
 from ..perception.observation import Observation
-from .focal_length import FocalFits, camera_by_edges, camera_by_fits
+from .focal_length import FocalFits, camera_by_edges, camera_by_fits, costs_before_zoom
 from .live_body import LiveBody
 
 _POLLING_INTERVAL_S = 0.2
@@ -52,7 +55,8 @@ class BackgroundEstimators:
         self._longer_px = float(max(width, height))
         self._assumed = assumed_camera(width, height, self._longer_px)
         self._by_edges: Future[Camera] | None = None
-        self._costs: list[Future[Float64Array | None]] = []
+        # Of fits, each with its time.
+        self._costs: list[tuple[float, Future[Float64Array | None]]] = []
         self._loading = self._solver.submit(live.load)
 
     def __enter__(self) -> BackgroundEstimators:
@@ -95,17 +99,30 @@ class BackgroundEstimators:
                 camera_by_edges, segments, *self._size, self._longer_px
             )
         if before is not None and self._fits.is_due(before[0]):
-            self._costs.append(self._solver.submit(self._fits.costs, before[1], self._assumed))
+            fit = self._solver.submit(self._fits.costs, before[1], self._assumed)
+            self._costs.append((before[0], fit))
 
-    def camera(self, record: BackgroundRecord) -> Camera:
-        """Return the clip's camera, once all frames were added; an assumed focal length is replaced
-        by the estimate from edges and fits.
+    def camera(self, record: BackgroundRecord, zoom: Zoom | None = None) -> Camera:
+        """Return the camera of the first frame, once all were added; an assumed focal length is
+        replaced by the estimate from edges and fits.
+
+        :param zoom: what the lens does in the clip.
         """
         self.add(math.inf, None, record)
         if self._by_edges is None:
             return self._given_camera
-        costs = [costs for each in self._costs if (costs := each.result()) is not None]
-        return camera_by_fits(self._by_edges.result(), self._assumed, costs, self._longer_px)
+        by_edges = self._by_edges.result()
+        if zoom is not None:
+            by_edges = by_edges.zoomed(1.0 / zoom.factors[record.edge_frames[0].row])
+        costs = []
+        for time_s, fit in self._costs:
+            found = fit.result()
+            if found is not None and zoom is not None:
+                factor = np.interp(time_s, record.times, zoom.factors)
+                found = costs_before_zoom(found, float(factor))
+            if found is not None:
+                costs.append(found)
+        return camera_by_fits(by_edges, self._assumed, costs, self._longer_px)
 
     def wait_for_solver(self, progress: Callable[[int], None]) -> None:
         """Wait until the solver is loaded.

@@ -168,6 +168,14 @@ class FocalFits:
         return np.array(costs)
 
 
+def costs_before_zoom(costs: Float64Array, zoom: float) -> Float64Array:
+    """Return the (5,) costs at focal lengths of the first frame, of a frame with ``zoom`` times as
+    long ones.
+    """
+    shifted: Float64Array = np.interp(LOG_RATIOS + np.log(zoom), LOG_RATIOS, costs)
+    return shifted
+
+
 def log_likelihood(costs: list[Float64Array], log_ratio: Float64Array) -> Float64Array:
     """Return the (n,) log likelihood of focal lengths, up to a constant.
 

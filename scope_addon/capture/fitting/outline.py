@@ -98,6 +98,7 @@ class OutlineMeasurer:
         11).
         """
         body = self._with_shape(fit.state.beta)
+        camera = self._camera if mask.zoom == 1.0 else self._camera.zoomed(mask.zoom)
         v = self.vertices
         R = fit.R_camera_part
         t = fit.t_camera_part
@@ -113,12 +114,12 @@ class OutlineMeasurer:
             & (np.linalg.norm(delta, axis=1) < MAX_BLENDING_M)
         )
         rows = np.flatnonzero(near)
-        at = self._crop(mask.region, points[rows])
-        ahead = self._crop(mask.region, points[rows] + 0.01 * normals[rows]) - at
+        at = _crop(camera, mask.region, points[rows])
+        ahead = _crop(camera, mask.region, points[rows] + 0.01 * normals[rows]) - at
         normal = ahead / np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
         beside = np.rint(at + BESIDE_PX * normal).astype(int)
         inside = ((beside >= 0) & (beside < SIZE)).all(axis=1)
-        covered = self._coverage(skin, mask.region)
+        covered = self._coverage(camera, skin, mask.region)
         free = inside & ~covered[tuple(np.where(inside[:, None], beside, 0).T[::-1])]
         rows = rows[free]
         at = at[free]
@@ -137,11 +138,8 @@ class OutlineMeasurer:
         m_px = m_px[visible]
         if not len(rows):
             return _NOTHING
-        m = self._camera.rays(m_px)[:, :2]
-        n = (
-            self._camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2]
-            - m
-        )
+        m = camera.rays(m_px)[:, :2]
+        n = camera.rays(mask.region.image_from_crop((contour + outward + 0.5) / SIZE))[:, :2] - m
         n /= np.linalg.norm(n, axis=1)[:, None]
         depth = points[rows, 2]
         sigmas = (OUTSIDE_SIGMA_M / depth) ** 2, (self._width[rows] / depth) ** 2
@@ -159,24 +157,24 @@ class OutlineMeasurer:
             self._shaped = betas.copy(), shaped
         return shaped
 
-    def _crop(self, region: Region, points_cam: Float64Array) -> Float64Array:
-        """Project points (n, 3) to pixels (n, 2) of the mask."""
-        if not len(points_cam):
-            return np.zeros((0, 2))
-        camera = self._camera
-        pixels = cv2.projectPoints(
-            points_cam, np.zeros(3), np.zeros(3), camera.intrinsics, camera.dist
-        )[0][:, 0]
-        return region.crop_from_image(pixels.astype(np.float64)) * SIZE - 0.5
-
-    def _coverage(self, skin: Float64Array, region: Region) -> BoolArray:
+    def _coverage(self, camera: Camera, skin: Float64Array, region: Region) -> BoolArray:
         """Return (256, 256) bool: where in the mask's region the body is."""
         at = np.full((len(skin), 2), np.nan)
         front = skin[:, 2] > NEAR_M
-        at[front] = self._crop(region, skin[front])
+        at[front] = _crop(camera, region, skin[front])
         covered = np.zeros((SIZE, SIZE), np.bool_)
         fill_silhouette(covered, at, self._triangles)
         return covered
+
+
+def _crop(camera: Camera, region: Region, points_cam: Float64Array) -> Float64Array:
+    """Project points (n, 3) to pixels (n, 2) of the mask."""
+    if not len(points_cam):
+        return np.zeros((0, 2))
+    pixels = cv2.projectPoints(
+        points_cam, np.zeros(3), np.zeros(3), camera.intrinsics, camera.dist
+    )[0][:, 0]
+    return region.crop_from_image(pixels.astype(np.float64)) * SIZE - 0.5
 
 
 def _crossings(

@@ -253,7 +253,7 @@ def prepare_track(
         is_stature_given=height_m is not None,
     )
     if track.face is not None:
-        across = across_head(track.face, camera)
+        across = across_head(track.face, camera, track.zoom)
         ears = lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
         prepared = replace(
             prepared, head=np.column_stack([across, certainty(track.face, across, ears)])

@@ -278,7 +278,7 @@ class _Painter:
             self._canvas,
             [camera_vertices(self._people[i], self._body, row) for i, row in shown],
             self._body.faces,
-            scaled_intrinsics(motion.intrinsics, self._scale),
+            scaled_intrinsics(motion.intrinsics_of_frames[shown[0][1]], self._scale),
             motion.dist,
             [self._colors[i] for i, _ in shown],
             [OPACITY * (1.0 if self._people[i].valid[row] else _FAINT) for i, row in shown],

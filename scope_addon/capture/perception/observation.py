@@ -19,12 +19,13 @@ class PersonMask:
     ``region``.
 
     ``image_size``: width and height of the image in pixels; beyond its border the mask says
-    nothing.
+    nothing. ``zoom``: the focal length over that of the camera.
     """
 
     region: Region
     probability: FloatArray
     image_size: tuple[int, int]
+    zoom: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -322,6 +322,11 @@ def _observe_view(
             f"the camera of {name} moves; several cameras must stand still: put them on tripods, "
             "or capture this video alone"
         )
+    if footage.zoom is not None:
+        raise UsageError(
+            f"the lens of {name} zooms; several cameras must keep their focal lengths: "
+            "capture this video alone"
+        )
     with clock.stage("solver"):
         shot = shot_of(video, body, options, footage)
         # People move on while a picture cuts, so that its times have no gap there.

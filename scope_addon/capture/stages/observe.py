@@ -25,6 +25,7 @@ from ..camera.camera_rotation import BackgroundTracker
 from ..camera.given_path import GivenPath, read_camera_path
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
+from ..camera.zoom import Zoom
 from ..fitting.background_estimators import BackgroundEstimators
 from ..fitting.focal_length import FocalFits
 from ..fitting.live_body import LiveBody
@@ -67,8 +68,9 @@ class Footage:
     """What is known of the footage once all frames were observed, apart from its people."""
 
     timestamps: Float64Array  # (T,) seconds
-    camera: Camera
+    camera: Camera  # with the lens of the first frame
     camera_motion: CameraMotion
+    zoom: Zoom | None  # None: the focal length is constant
     # (T, 4, 4) metres, z up, where the user gives the camera's path; None: it is estimated
     world_from_camera: Float64Array | None
     lines: Lines  # of the background, in the first frame's camera axes
@@ -348,6 +350,8 @@ def observe(
     if not tracks:
         raise _no_person_error(video, options, len(observed.timestamps))
     footage.warnings.extend(_warnings_about_people(video, tracks, left_out))
+    if footage.zoom is not None:
+        tracks = [track.steadied(footage.camera, footage.zoom.factors) for track in tracks]
     return footage, tracks
 
 
@@ -438,18 +442,23 @@ def no_frames_error(video: Video) -> VideoError:
 def _footage(job: ObservationJob, observed: Observed) -> Footage:
     """Return what is known of the footage apart from its people."""
     record = observed.background
-    camera = job.background.camera(record)
+    image_size = (job.video.width, job.video.height)
+    zoom = None
+    if job.path is None:
+        record, zoom = record.steadied(job.camera, image_size)
+    camera = job.background.camera(observed.background, zoom)
     times_s = np.array(observed.timestamps)
     given = None
     if job.path is not None:
         given = job.path.at(times_s)
         motion = CameraMotion.given(given)
     else:
-        motion = record.motion(job.camera, camera, (job.video.width, job.video.height))
+        motion = record.motion(job.camera, camera, image_size)
     return Footage(
         timestamps=times_s,
         camera=camera,
         camera_motion=motion,
+        zoom=zoom,
         world_from_camera=given,
         lines=record.lines(motion, camera),
         cuts_s=[observed.timestamps[row] for row in observed.cut_rows],

@@ -133,10 +133,8 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
     """
     times = footage.timestamps
     warnings = []
-    zooms = footage.camera_motion.zooms
-    if zooms is not None and zooms.any():
-        starts = [float(times[first]) for first, _ in runs(zooms)]
-        warnings.append(notice("zoom", footage=name, times=starts))
+    if footage.zoom is not None and not footage.zoom.is_certain:
+        warnings.append(notice("zoom", footage=name))
     if not solved.has_scale:
         warnings.append(notice("unknown_travel", footage=name))
     if footage.world_from_camera is not None:

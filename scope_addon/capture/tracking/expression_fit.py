@@ -311,11 +311,12 @@ def view_terms(turns: Float64Array) -> Float64Array:
     return np.column_stack([v, v**2, x * y, y * z, x * z, abs(y)])
 
 
-def across_head(face: FloatArray, camera: Camera) -> Float64Array:
+def across_head(face: FloatArray, camera: Camera, zoom: Float64Array | None = None) -> Float64Array:
     """Return the unit vectors d (T, 3) of the module's equation, in camera axes; zeros where no
     face was seen.
 
     :param face: (T, RECORD) see `face_record`.
+    :param zoom: (T,) focal length over the camera's.
     :raises ModelFileError: the response of the landmarks, which has the reference face, is missing
         or damaged.
     """
@@ -329,6 +330,8 @@ def across_head(face: FloatArray, camera: Camera) -> Float64Array:
     turns = aligned(landmarks, response.reference, response.shares).turns
     z = np.concatenate([landmarks[..., :2].mean(axis=1), np.ones((len(turns), 1))], axis=1)
     z = z @ np.linalg.inv(camera.intrinsics).T
+    if zoom is not None:
+        z[:, :2] /= zoom[seen, None]
     R_camera_virtual = np.swapaxes(camera_towards(z[:, :2]), 1, 2)
     directions[seen] = (R_camera_virtual @ _Y_DOWN @ exp(turns) @ exp(_HEAD_FROM_REFERENCE))[..., 0]
     return directions

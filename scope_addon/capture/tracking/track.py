@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray
+from ..camera.intrinsics import Camera
 from ..perception.face_record import RECORD
 from ..perception.landmark_network import KEYPOINT_COUNT
 from ..perception.observation import Observation, PendingReference, PersonMask
@@ -52,6 +53,9 @@ class Track:
     hands: FloatArray | None = None  # (T, 2, 21, 6)
     masks: tuple[tuple[int, PersonMask], ...] = ()
     face: FloatArray | None = None  # (T, RECORD)
+    # (T,) focal length over that by which keypoints and hands are given; None: it is constant.
+    # Masks and faces are given as they were seen.
+    zoom: Float64Array | None = None
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -60,6 +64,31 @@ class Track:
     def has_depth(self) -> bool:
         """Whether the landmark network estimated depth; a user's keypoint network does not."""
         return bool(self.world_landmarks.any())
+
+    def steadied(self, camera: Camera, zoom: Float64Array) -> Track:
+        """Return the track as it was seen by a lens that zooms, by a constant focal length.
+
+        :param camera: with that focal length.
+        :param zoom: (T,) the lens's over it.
+        """
+        steady = self.at_zoom(camera, 1.0 / zoom)
+        masks = tuple((row, replace(mask, zoom=float(zoom[row]))) for row, mask in self.masks)
+        return replace(steady, masks=masks, zoom=zoom)
+
+    def as_seen(self, camera: Camera) -> Track:
+        """Return the track with its keypoints and hands where they are in the image."""
+        return self if self.zoom is None else self.at_zoom(camera, self.zoom)
+
+    def at_zoom(self, camera: Camera, zoom: Float64Array) -> Track:
+        """Return the track with keypoints and hands at (T,) times the focal length."""
+        keypoints = camera.at_zoom(self.keypoints_px, zoom[:, None, None])
+        keypoints = np.where(self.seen[:, None, None], keypoints, self.keypoints_px)
+        hands = self.hands
+        if hands is not None:
+            hands = hands.copy()
+            moved = camera.at_zoom(hands[..., :2], zoom[:, None, None, None])
+            hands[..., :2] = np.where(hands[..., 2:3] != 0.0, moved, hands[..., :2])
+        return replace(self, keypoints_px=keypoints.astype(self.keypoints_px.dtype), hands=hands)
 
     def without_depth(self) -> Track:
         """Return the track without world landmarks, which take 43 MB for an hour."""

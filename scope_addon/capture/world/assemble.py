@@ -64,11 +64,12 @@ def assemble_motion(
         rotation_vectors_of_joints(placed.rotations),
     )
     joints = placed.place(placed.rotations, placed.root)[0]
-    keypoints = np.concatenate([track.keypoints_px, track.confidence[..., None]], axis=-1)
+    seen = track.as_seen(shot.camera)
+    keypoints = np.concatenate([seen.keypoints_px, seen.confidence[..., None]], axis=-1)
     names: tuple[str, ...] = KEYPOINT_NAMES
-    if track.hands is not None:
+    if seen.hands is not None:
         keypoints = np.concatenate(
-            [keypoints, track.hands[..., :3].reshape(len(track), -1, 3)], axis=1
+            [keypoints, seen.hands[..., :3].reshape(len(track), -1, 3)], axis=1
         )
         names += HAND_KEYPOINT_NAMES
     sigma = raw.joint_sigma_m
@@ -109,6 +110,7 @@ def assemble_motion(
         footage_rotation=shot.view.clockwise_deg,
         footage_mirrored=shot.view.is_mirrored,
         footage_speed=shot.speed,
+        zoom=track.zoom,
         face=face,
     )
 
@@ -172,7 +174,8 @@ def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) ->
         shot.path.R_first_camera,
         shot.path.center,
     )
-    return by_blocks(error, placed.rotations, placed.root, *rows)[0]
+    error_px: Float64Array = by_blocks(error, placed.rotations, placed.root, *rows)[0]
+    return error_px if track.zoom is None else error_px * track.zoom
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,10 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
     :param start: seconds of the clip's clock at the footage's time 0.
     """
     return Shot(
-        motion.frames, motion.timestamps + start, motion.world_from_camera, motion.intrinsics
+        motion.frames,
+        motion.timestamps + start,
+        motion.world_from_camera,
+        motion.intrinsics_of_frames,
     )
 
 
@@ -84,7 +87,8 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
             + T[:3, 3]
         )
     if pin.pixel is not None:
-        return float(np.linalg.norm(pixel_of((T, motion.intrinsics), place) - pin.pixel))
+        camera = T, motion.intrinsics_of_frames[rows[0]]
+        return float(np.linalg.norm(pixel_of(camera, place) - pin.pixel))
     target = np.array(pin_in_world(motion, pin).position, float)
     return float(np.linalg.norm(place - target))
 

@@ -64,7 +64,7 @@ class Shot:
     frames: NDArray[np.int64]  # (N,) source frames, increasing
     times: NDArray[np.float64]  # (N,) seconds, on the clock of the clip that is corrected
     world_from_camera: NDArray[np.float64]  # (N, 4, 4)
-    intrinsics: NDArray[np.float64]  # (3, 3)
+    intrinsics: NDArray[np.float64]  # (N, 3, 3)
 
     def time(self, frame: int) -> float:
         """Return the time of a source frame."""
@@ -73,7 +73,7 @@ class Shot:
     def camera(self, frame: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return world_from_camera (4, 4) and the intrinsics (3, 3) of a source frame."""
         row = int(np.abs(self.frames - frame).argmin())
-        return self.world_from_camera[row], self.intrinsics
+        return self.world_from_camera[row], self.intrinsics[row]
 
     def project(self, frame: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
         """Project a point (3,), world, to the pixel (2,) of a source frame."""

@@ -27,6 +27,7 @@ class CapturedMotion {
     this.frames = decodeArray(data.frames, Int32Array);
     this.camera = decodeArray(data.camera, Float32Array); // rows of 3 × 4, world from camera
     this.intrinsics = data.intrinsics;
+    this.zoom = decodeArray(data.zoom, Float32Array);
     this.imageSize = data.imageSize;
     this.triangles = decodeArray(data.triangles, data.wide ? Uint32Array : Uint16Array);
     this.skinJoints = decodeArray(data.skinJoints, Uint8Array);
@@ -47,6 +48,12 @@ class CapturedMotion {
   cameraAt(row) {
     const at = this.camera.length === 12 ? 0 : 12 * row;
     return this.camera.subarray(at, at + 12);
+  }
+
+  /** 3 × 3 intrinsics at a row. */
+  intrinsicsAt(row) {
+    const [[fx, s, cx], [, fy, cy]] = this.intrinsics, z = this.zoom[row];
+    return [[fx * z, s * z, cx], [0, fy * z, cy], [0, 0, 1]];
   }
 
   /** Pose of every part at a row: 3 × 4 each, part to world; its last column is the joint. */

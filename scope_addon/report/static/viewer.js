@@ -183,7 +183,7 @@ class MotionView {
   }
 
   throughCamera(width, height) {
-    const C = this.motion.cameraAt(this.row), K = this.motion.intrinsics, [w, h] = this.motion.imageSize;
+    const C = this.motion.cameraAt(this.row), K = this.motion.intrinsicsAt(this.row), [w, h] = this.motion.imageSize;
     const column = (j, sign) => [0, 4, 8].map((i) => sign * C[i + j]);
     const scale = 2 * Math.min(width / w, height / h);
     const x = [(scale * K[0][0]) / width, (-scale * (K[0][2] - (w - 1) / 2)) / width];
@@ -239,7 +239,7 @@ class MotionView {
   }
 
   drawFrustum(use) {
-    const { gl, motion } = this, C = motion.cameraAt(this.row), K = motion.intrinsics, [w, h] = motion.imageSize;
+    const { gl, motion } = this, C = motion.cameraAt(this.row), K = motion.intrinsicsAt(this.row), [w, h] = motion.imageSize;
     const world = (p) => [0, 4, 8].map((i) => C[i] * p[0] + C[i + 1] * p[1] + C[i + 2] * p[2] + C[i + 3]);
     const corner = (u, v) => world([((u - K[0][2]) / K[0][0]) * 0.35, ((v - K[1][2]) / K[1][1]) * 0.35, 0.35]);
     const c = [corner(0, 0), corner(w, 0), corner(w, h), corner(0, h)], o = world([0, 0, 0]);

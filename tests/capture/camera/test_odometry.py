@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A camera's travel from corners of a street, a room and a wall, at known places, as exact cameras
-see them.
+"""A camera's travel and zoom from corners of a street, a room and a wall, at known places, as exact
+cameras see them.
 """
 
 import numpy as np
@@ -9,6 +9,7 @@ from scope.scope_addon.capture.camera.bundle_adjustment import Bundle, adjust, r
 from scope.scope_addon.capture.camera.corner_tracks import CornerTracks, joined_corners
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.odometry import travel_of
+from scope.scope_addon.capture.camera.zoom import find_zoom
 from scope.solver.rotations import exp, log
 
 WIDTH, HEIGHT = 1280, 720
@@ -81,7 +82,6 @@ def test_a_camera_that_travels_through_a_street(velocity):
     found = travel_of(corners, np.tile(np.eye(3), (T, 1, 1)), TIMES, camera(), WIDTH)
     assert found.travels
     assert (found.part == 0).all()
-    assert not found.zooms.any()
     off = np.linalg.norm(aligned(found.center, center) - center, axis=1)
     length = np.linalg.norm(np.diff(center, axis=0), axis=1).sum()
     assert np.sqrt((off**2).mean()) < 0.02 * length
@@ -106,19 +106,68 @@ def test_a_camera_that_pans_does_not_travel(assumed):
     corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)))
     found = travel_of(corners, R, TIMES, camera(assumed * FOCAL_PX), WIDTH)
     assert not found.travels
-    assert not found.zooms.any()
     np.testing.assert_array_equal(found.R_first_camera, R)
 
 
-def test_a_lens_that_zooms_does_not_travel():
+@pytest.mark.parametrize("assumed", [0.8, 1.0, 1.25])
+@pytest.mark.parametrize("turn", [0.0, 0.04])
+@pytest.mark.parametrize("largest", [2.0, 0.6])
+def test_a_lens_that_zooms_while_the_camera_turns(assumed, turn, largest):
+    """Also where the assumed focal length is wrong, and one corner in ten is a passer-by."""
+    R = exp(np.stack([0 * TIMES, turn * TIMES, 0 * TIMES], axis=1) + SHAKE)
+    R = R[0].T @ R
+    share = np.clip(TIMES - 1, 0, 3) / 3
+    factors = largest**share
+    places = street(np.random.default_rng(0))
+    corners = seen(places, R, np.zeros((T, 3)), FOCAL_PX * factors, outliers=0.1)
+    zoom = find_zoom(corners, TIMES, camera(assumed * FOCAL_PX), WIDTH)
+    np.testing.assert_allclose(zoom.factors, factors, rtol=0.01)
+    assert zoom.is_certain
+    if assumed == 1.0:
+        turned = np.linalg.norm(log(np.swapaxes(R, 1, 2) @ zoom.R_first_camera), axis=1)
+        assert np.degrees(turned).max() < 1.0
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, -1.3), (0.0, 0.0, 1.3), (1.2, 0.0, 0.3)])
+def test_a_camera_that_travels_or_pans_does_not_zoom(velocity):
+    R = exp(np.stack([0 * TIMES, 0.12 * TIMES, 0 * TIMES], axis=1) + SHAKE)
+    places = street(np.random.default_rng(0))
+    for center in (np.zeros((T, 3)), TIMES[:, None] * np.array(velocity)):
+        corners = seen(places, R, center, outliers=0.1)
+        assert find_zoom(corners, TIMES, camera(), WIDTH) is None
+
+
+def test_a_lens_that_zooms_before_the_camera_travels():
+    """The zoom is known, and that the two may be confused."""
+    factors = 1.5 ** np.clip(TIMES, 0, 1.5)
+    center = np.clip(TIMES - 2.0, 0, None)[:, None] * [0.0, 0.0, -1.3]
     R = np.tile(np.eye(3), (T, 1, 1))
-    focal = FOCAL_PX * (1 + np.clip(TIMES - 2, 0, 2) / 2)
-    corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)), focal)
-    found = travel_of(corners, R, TIMES, camera(), WIDTH)
-    assert not found.travels
-    assert found.zooms[28:44].any()
-    assert not found.zooms[:12].any()
-    assert not found.zooms[58:].any()
+    corners = seen(street(np.random.default_rng(0)), R, center, FOCAL_PX * factors)
+    zoom = find_zoom(corners, TIMES, camera(), WIDTH)
+    assert not zoom.is_certain
+    np.testing.assert_allclose(zoom.factors, factors, rtol=0.05)
+
+
+def test_a_zoom_after_a_pause_begins_when_it_does():
+    """Corners are kept only where they move."""
+    factors = 1.0 + np.clip(TIMES - 3.0, 0, 1)
+    R = np.tile(np.eye(3), (T, 1, 1))
+    corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)), FOCAL_PX * factors)
+    moved = (corners.rows == 0) | (TIMES[corners.rows] > 3.05)
+    kept = CornerTracks(corners.rows[moved], corners.numbers[moved], corners.points_px[moved])
+    zoom = find_zoom(kept, TIMES, camera(), WIDTH)
+    np.testing.assert_allclose(zoom.factors, factors, rtol=0.01)
+
+
+def test_a_zoom_goes_on_where_all_corners_are_lost_for_a_moment():
+    factors = 1.0 + np.clip(TIMES - 1.0, 0, 3) / 3
+    R = np.tile(np.eye(3), (T, 1, 1))
+    corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)), FOCAL_PX * factors)
+    is_late = corners.rows >= 30
+    numbers = np.where(is_late, corners.numbers + corners.count, corners.numbers)
+    zoom = find_zoom(CornerTracks(corners.rows, numbers, corners.points_px), TIMES, camera(), WIDTH)
+    np.testing.assert_allclose(zoom.factors, factors, rtol=0.01)
+    assert not zoom.is_certain
 
 
 def test_without_corners_nothing_is_known():
@@ -126,6 +175,7 @@ def test_without_corners_nothing_is_known():
     found = travel_of(CornerTracks.none(), R, TIMES, camera(), WIDTH)
     assert not found.travels
     np.testing.assert_array_equal(found.center, 0.0)
+    assert find_zoom(CornerTracks.none(), TIMES, camera(), WIDTH) is None
 
 
 def test_windows_that_overlap_share_the_corners_of_common_frames():

@@ -19,7 +19,7 @@ SHOT = Shot(
     np.arange(T),
     TRUTH.times,
     level_camera(T),
-    np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]]),
+    np.tile([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]], (T, 1, 1)),
 )
 JOINTS = TRUTH.joints(BODY, BETAS)
 # the corrupted span
