@@ -311,7 +311,19 @@ def find_clips(
     # a full name may be another clip's short one
     while full := _full_names_of_shared(folder, names, several_people):
         names |= full
-    return {name: path for path, name in names.items()}
+    clips: dict[str, Path] = {}
+    taken: set[str] = set()
+    for path, name in names.items():
+        # The output folder may not tell names apart of which the case of a letter is all that
+        # differs.
+        unique = name
+        number = 1
+        while unique.casefold() in taken:
+            number += 1
+            unique = f"{name} {number}"
+        taken.add(unique.casefold())
+        clips[unique] = path
+    return clips
 
 
 def _full_names_of_shared(

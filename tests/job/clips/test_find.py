@@ -68,6 +68,19 @@ def test_names_that_differ_only_in_case_are_the_same(tmp_path):
     assert list(found_in(clips)) == ["Run", "Walk.mov", "walk.mp4"]
 
 
+def test_results_are_different_files_also_where_case_does_not_count(tmp_path):
+    clips = tmp_path / "clips"
+    paths = [clips / name for name in ("Walk.mp4", "walk.mp4", "A/x.mp4", "a/x.mp4")]
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("x")
+    if len(list(clips.iterdir())) < 4:
+        pytest.skip("case does not count in this folder")
+    found = found_in(clips, recursive=True)
+    assert sorted(found.values()) == sorted(paths)
+    assert len({name.casefold() for name in found}) == 4
+
+
 def test_names_are_unique_where_one_equals_another_without_suffix(tmp_path):
     clips = tmp_path / "clips"
     (clips / "b.mp4").mkdir(parents=True)
