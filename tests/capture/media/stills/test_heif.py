@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame_readers import decode_items
 from scope.scope_addon.capture.media.heif import assemble, read_layout
+from scope.scope_addon.capture.media.still_images import read_picture
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError
@@ -107,6 +108,29 @@ def test_tiles_of_different_sizes_are_refused() -> None:
     assert assemble(layout, pieces | {2: np.zeros((64, 32, 3), np.uint8)}) is None
     del pieces[3]
     assert assemble(layout, pieces) is None
+
+
+def test_damaged_files_raise_only_video_errors(tmp_path: Path) -> None:
+    whole = heic(slopes(64, 48), 32)
+    path = tmp_path / "a.heic"
+    for size in (30, 100, 300, len(whole) // 2, len(whole) - 40):
+        path.write_bytes(whole[:size])
+        with pytest.raises(VideoError, match=r"a\.heic"):
+            open_video(path)
+    whole = heic(slopes(64, 48), 32, focal_mm=26)
+    rng = np.random.default_rng(0)
+    boxes = whole.index(b"mdat")
+    refused = 0
+    for _ in range(150):
+        broken = bytearray(whole)
+        for at in rng.integers(24, boxes, 3):
+            broken[at] = rng.integers(256)
+        path.write_bytes(broken)
+        picture = read_picture(path)
+        refused += picture is None
+        if picture is not None:  # harmless damage, or another turn
+            assert picture.rgb.shape in {(48, 64, 3), (64, 48, 3)}
+    assert 0 < refused < 150
 
 
 def patched(data: bytes, name: bytes, content: bytes) -> bytes:
