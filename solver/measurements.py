@@ -47,24 +47,6 @@ _LEAST_SIGMA_2D = 1e-5
 
 
 @kernel
-def _all_usable(values: Array) -> bool:
-    """Whether all of (n,) are numbers below `LARGEST`."""
-    for k in range(values.shape[0]):
-        if not abs(values[k]) < LARGEST:
-            return False
-    return True
-
-
-@kernel
-def _all_weigh(w_R: Array, w_t: Array) -> bool:
-    """Whether of each row of (n,) at least one is positive."""
-    for k in range(w_R.shape[0]):
-        if not (w_R[k] > 0.0 or w_t[k] > 0.0):
-            return False
-    return True
-
-
-@kernel
 def _normalize(K: Array, pixels: Array, confidence: Array, out: Array) -> None:
     """Write normalized image coordinates and confidence."""
     for k in range(out.shape[0]):
@@ -365,11 +347,8 @@ def _pose_prior_rows(m: PosePriors, K: int) -> tuple[Array, Array]:
     check_rotations(R, "Rotations of pose priors", w_R)
     warn_of_distance(t[w_t > 0.0], "Positions of pose priors lie")
     ints, floats = pose_prior.pack(parts, R, t, w_R, w_t)
-    if not _all_weigh(w_R, w_t):
-        weigh = (w_R > 0.0) | (w_t > 0.0)
-        ints = ints[weigh]
-        floats = floats[weigh]
-    return _usable_rows((ints, floats))
+    weigh = (w_R > 0.0) | (w_t > 0.0)
+    return _usable_rows((ints[weigh], floats[weigh]))
 
 
 def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
@@ -418,7 +397,5 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
 def _usable_rows(table: tuple[Array, Array]) -> tuple[Array, Array]:
     """Return the rows of a residual's table in which everything is a number below `LARGEST`."""
     ints, floats = table
-    if _all_usable(floats.ravel()):
-        return table
     keep = (np.abs(floats) < LARGEST).all(axis=1)
     return ints[keep], floats[keep]

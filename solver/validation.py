@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import as_integers, described
 from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning
-from .kernel import allocating_kernel, kernel
+from .kernel import kernel
 from .part import Array
 
 # of the entries of R Rᵀ - I: rotations rounded to two decimals pass, scaled ones do not
@@ -153,10 +153,11 @@ def check_information(information: Array, name: str) -> None:
 
     :raises InvalidValueError: it is not symmetric, or has a negative eigenvalue.
     """
-    if _definiteness(information) == 1:
+    rounding = 1e-6 * np.abs(information).max(initial=0.0)
+    if (np.abs(information - information.T) > rounding).any():
         raise InvalidValueError(f"{name} must be symmetric, but differs from its transpose.")
-    if _definiteness(information) == 2:
-        least = np.linalg.eigvalsh(information).min()
+    least = np.linalg.eigvalsh(information).min(initial=0.0)
+    if least < -rounding:
         raise InvalidValueError(
             f"{name} must be positive semidefinite, as an inverse covariance is, but has the "
             f"eigenvalue {least:.6g}."
@@ -435,38 +436,6 @@ def _first_not_rotation(R: Array, weights: Array, every: bool) -> int:
         elif off > ROTATION_TOLERANCE or det < 0.0:
             return k
     return -1
-
-
-@allocating_kernel
-def _definiteness(A: Array) -> int:
-    """Return 0 if (P, P) is symmetric and positive semidefinite to rounding, 1 if not symmetric, 2
-    if indefinite.
-
-    By the pivots of Cholesky's decomposition, with a millionth of the largest diagonal entry added.
-    """
-    n = A.shape[0]
-    largest = 0.0
-    for i in range(n):
-        for j in range(n):
-            largest = max(largest, abs(A[i, j]))
-    for i in range(n):
-        for j in range(i):
-            if abs(A[i, j] - A[j, i]) > 1e-6 * largest:
-                return 1
-    L = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            s = 0.5 * (A[i, j] + A[j, i])
-            for k in range(j):
-                s -= L[i, k] * L[j, k]
-            if i == j:
-                s += 1e-6 * largest
-                if s < 0.0:
-                    return 2
-                L[i, i] = np.sqrt(s)
-            else:
-                L[i, j] = s / L[j, j] if L[j, j] > 0.0 else 0.0
-    return 0
 
 
 @kernel
