@@ -15,7 +15,8 @@ from ..temporal import Temporal
 from ..tree import BodyArrays, make_tree
 from ..validation import check_count, check_list, check_type
 from .clip import fit_clip
-from .frame_solver import FrameSolver
+from .frame_solver import FrameSolver, fit_tree
+from .misfit import warn_of_mirrored_clip
 
 _CHUNK = 16  # frames handed to a thread at a time: a thread changes hands in tens of microseconds
 
@@ -54,6 +55,7 @@ def fit_batch(
         check_states(init, len(measurements), (State, type(None)))
         starts = list(init)
     tree = make_tree(body)
+    by_default = priors is None and (init is None or isinstance(init, str))
     priors = default_priors(body) if priors is None else priors
     own = threading.local()
 
@@ -65,7 +67,12 @@ def fit_batch(
         return [solver.fit(measurements[k], starts[k]) for k in frames]
 
     chunks = _spread(some, range(0, len(measurements), _CHUNK), threads)
-    return [fitted for chunk in chunks for fitted in chunk]
+    fits = [fitted for chunk in chunks for fitted in chunk]
+    if by_default:
+        warn_of_mirrored_clip(
+            measurements, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
+        )
+    return fits
 
 
 def fit_clips(

@@ -41,6 +41,7 @@ from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_switch, check_type, check_weight
 from .frame_solver import fit_tree
+from .misfit import warn_of_mirrored_clip
 from .report import Outcome, cost_by_term, make_fit
 
 
@@ -106,6 +107,7 @@ def fit_clip(
     check_count(shape_frames, "shape_frames")
     check_switch(focal, "focal")
     states = given_states(init, len(measurements))
+    by_default = priors is None and states is None
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")
@@ -114,6 +116,7 @@ def fit_clip(
     if states is None:
         cold = MULTI if init is not None else None
         states = fit_in_order(tree, measurements, priors, options, temporal, cold=cold)
+    given = measurements
     if temporal is not None:
         pulled = [
             with_previous(m, s, temporal) for m, s in zip(measurements[1:], states, strict=False)
@@ -143,6 +146,10 @@ def fit_clip(
         else _fit_with_shape(fixed, measurements[k], states[k], beta, scale, priors, options)
         for k in range(len(frames))
     ]
+    if by_default:
+        warn_of_mirrored_clip(
+            given, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
+        )
     shares = joint.cost_by_term() if options.report else {}
     return ClipFit(
         fits,

@@ -15,6 +15,8 @@ from ..arrays import as_array
 from ..body import numbers_of
 from ..errors import InvalidValueError, ShapeError
 from ..fitting.clip import shape_information
+from ..fitting.frame_solver import fit_tree
+from ..fitting.misfit import some_of, warn_of_mirroring
 from ..gauss_newton.optimizer import SharedPriors, make_settings, optimize
 from ..gauss_newton.terms import pack_priors
 from ..kernel import announce_compilation
@@ -34,7 +36,7 @@ from ..validation import (
     warn_of_frame_numbers,
 )
 from .covariance import joint_covariances
-from .initial import initial_states, warn_of_transposed_cameras
+from .initial import first_view, initial_states, warn_of_cameras
 from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
 from .problem import ClipProblem, MotionTerms, linearize_half
@@ -133,7 +135,7 @@ def fit_motion(
         )
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
-    warn_of_transposed_cameras(frames)
+    warn_of_cameras(frames)
     check_type(motion, MotionPrior, "motion")
     # weights of their own are given by those who know how far apart their frames are
     if _weighs_by_default(motion):
@@ -142,6 +144,7 @@ def fit_motion(
     check_weight(focal_weight, "focal_weight")
     check_switch(focal, "focal")
     check_switch(covariance, "covariance")
+    by_default = priors is None and states is None
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
     check_type(options, Options, "options")
@@ -169,7 +172,21 @@ def fit_motion(
             _Settings(priors, options, focal, focal_weight, covariance),
             pool,
         )
-        return clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
+        found = clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
+    if by_default:
+        chosen = some_of(frames)
+        seen = [first_view(views_of(frames[k], ""), len(tree.point_part)) for k in chosen]
+        warn_of_mirroring(
+            [view.measurements for view in seen],
+            [
+                np.asarray(view.R_camera_world) @ found.states[k].R_camera_root
+                for k, view in zip(chosen, seen, strict=True)
+            ],
+            found.cost / max(1, found.measurements.sum()),
+            priors,
+            lambda m: fit_tree(tree, m, None, priors, options),
+        )
+    return found
 
 
 def _weighs_by_default(motion: MotionPrior) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import ScopeWarning
 from ..fitting.clip import Camera, fit_in_order
+from ..fitting.misfit import IMAGE_REMEDIES
 from ..measurements import Keypoints3D, Measurements
 from ..options import Options, Priors
 from ..part import Array
@@ -34,7 +35,7 @@ def initial_states(
 ) -> list[State]:
     """Return each frame's state in the world's axes, of one shape; `cold` as of `fit_in_order`."""
     views = [[View(frame)] if isinstance(frame, Measurements) else list(frame) for frame in frames]
-    chosen = [_first_view(v, len(tree.point_part)) for v in views]
+    chosen = [first_view(v, len(tree.point_part)) for v in views]
     cameras = [_camera_of(view) for view in chosen]
     states = fit_in_order(
         tree, [view.measurements for view in chosen], priors, options, None, cameras, cold
@@ -42,7 +43,7 @@ def initial_states(
     return [replace(state, beta=states[-1].beta) for state in states]
 
 
-def _first_view(views: Sequence[View], points: int) -> View:
+def first_view(views: Sequence[View], points: int) -> View:
     """Return what a frame is first fitted to: its triangulated points, or one camera's view where
     that says more.
     """
@@ -112,9 +113,10 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
     np.add.at(b, indices, (weight * value)[:, None] * row)
 
 
-def warn_of_transposed_cameras(frames: Sequence[Measurements | Sequence[View]]) -> None:
+def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]]) -> None:
     """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
-    R_camera_world is transposed, or its whole pose inverted; with `ScopeWarning`.
+    R_camera_world is transposed, its whole pose inverted, or its pixels are mirrored or swapped;
+    with `ScopeWarning`.
     """
     views = next((v for v in frames if not isinstance(v, Measurements) and len(v) > 1), None)
     if views is None or any(view.measurements.keypoints2d is None for view in views):
@@ -133,17 +135,20 @@ def warn_of_transposed_cameras(frames: Sequence[Measurements | Sequence[View]]) 
         t = np.asarray(view.t_camera_world, dtype=float)
         transposed.append(replace(view, R_camera_world=R))
         inverted.append(replace(view, R_camera_world=R, t_camera_world=-R @ t))
-    for changed, remedy in (
-        (transposed, "transpose R_camera_world"),
-        (inverted, "give R^T and -R^T t of the poses R_world_camera and t_world_camera"),
-    ):
-        if _median_error(changed, points) < 0.2 * given:
-            warnings.warn(
-                f"The cameras' rays to a point miss each other, but meet in other axes; {remedy}.",
-                ScopeWarning,
-                stacklevel=3,
-            )
-            return
+    others = {
+        "transpose R_camera_world": transposed,
+        "give R^T and -R^T t of the poses R_world_camera and t_world_camera": inverted,
+    }
+    for remedy, change in IMAGE_REMEDIES:
+        others[remedy] = [replace(view, measurements=change(view.measurements)) for view in views]
+    errors = {remedy: _median_error(changed, points) for remedy, changed in others.items()}
+    best = min(errors, key=errors.__getitem__)
+    if errors[best] < 0.2 * given:
+        warnings.warn(
+            f"The cameras' rays to a point miss each other, but meet in other axes; {best}.",
+            ScopeWarning,
+            stacklevel=3,
+        )
 
 
 def _median_error(views: Sequence[View], points: int) -> float:

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mirrored and exchanged axes are told of after the fit, and unusual people who are seen rightly
+are not: random people whose poses are drawn from the joint prior, and who lie or stand on the head.
+"""
+
+import warnings
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scope import solver
+from scope.benchmarks.solver.cold_starts import CAMERA, random_person, without_deviations
+from scope.solver import Keypoints2D, Measurements, OrientationField, ScopeWarning, View, rotations
+
+WIDTH = 2.0 * CAMERA[0, 2]
+PEOPLE = 6
+
+
+@cache
+def people():
+    body = solver.load_body("scope")
+    prior = solver.load_joint_prior()
+    return body, [random_person(body, prior, 5000 + seed) for seed in range(PEOPLE)]
+
+
+def in_space(m, change):
+    points = m.keypoints3d
+    return replace(m, keypoints3d=replace(points, points=change(points.points)))
+
+
+def in_image(m, change):
+    return replace(m, keypoints2d=replace(m.keypoints2d, pixels=change(m.keypoints2d.pixels)))
+
+
+def only_3d(m):
+    return Measurements(keypoints3d=m.keypoints3d)
+
+
+def from_right(p):
+    return p * [-1.0, 1.0] + [WIDTH, 0.0]
+
+
+def from_below(p):
+    return p * [1.0, -1.0] + [0.0, WIDTH]
+
+
+def row_and_column(p):
+    return p[:, ::-1]
+
+
+def left_handed(p):
+    return p * [-1.0, 1.0, 1.0]
+
+
+def y_up(p):
+    return p * [1.0, -1.0, 1.0]
+
+
+def mirrored_at_the_root(p):
+    center = p.mean(axis=0)
+    return left_handed(p - center) + center
+
+
+MISTAKES = {
+    "3D alone, x to the left": (lambda m: in_space(only_3d(m), left_handed), "negate one axis"),
+    "3D alone, y up": (lambda m: in_space(only_3d(m), y_up), "negate one axis"),
+    "3D of both, x to the left": (lambda m: in_space(m, left_handed), "negate one axis"),
+    "3D of both, y up": (lambda m: in_space(m, y_up), "negate one axis"),
+    "3D of both, about the root": (lambda m: in_space(m, mirrored_at_the_root), "negate one axis"),
+    "2D of both, flipped": (lambda m: in_image(m, from_right), "from the image's left"),
+    "2D of both, from below": (lambda m: in_image(m, from_below), "from the image's top"),
+    "2D of both, row and column": (lambda m: in_image(m, row_and_column), r"as \(x, y\) instead"),
+    "both flipped": (
+        lambda m: in_image(in_space(m, left_handed), from_right),
+        "flip back the image",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), MISTAKES.values(), ids=MISTAKES)
+def test_mirrored_measurements_are_told(change, message):
+    body, everyone = people()
+    for person in everyone[:3]:
+        for seen in (person.seen, without_deviations(person.seen)):
+            with pytest.warns(ScopeWarning, match=message):
+                solver.fit(body, change(seen))
+
+
+IMAGE_MISTAKES = {
+    "from below": (from_below, "from the image's top"),
+    "row and column": (row_and_column, r"as \(x, y\) instead"),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), IMAGE_MISTAKES.values(), ids=IMAGE_MISTAKES)
+def test_of_several_frames_2d_keypoints_alone_show_it(change, message):
+    body, everyone = people()
+    frames = [in_image(replace(each.seen, keypoints3d=None), change) for each in everyone]
+    with pytest.warns(ScopeWarning, match=message):
+        solver.fit_batch(body, frames)
+
+
+def rolled(person, turns):
+    """The measurements of a camera that is rolled by quarter turns."""
+    R = rotations.exp([0.0, 0.0, 0.5 * np.pi * turns])
+    center = CAMERA[:2, 2]
+    seen = in_image(person.seen, lambda p: (p - center) @ R[:2, :2].T + center)
+    return in_space(seen, lambda p: p @ R.T)
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+def test_people_who_lie_or_stand_on_the_head_are_no_mistake(turns):
+    body, everyone = people()
+    seen = [rolled(person, turns) for person in everyone]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for each in seen[:3]:
+            solver.fit(body, each)
+            solver.fit(body, only_3d(each))
+            solver.fit(body, without_deviations(each))
+        solver.fit_batch(body, [replace(each, keypoints3d=None) for each in seen])
+
+
+def test_noise_that_is_larger_than_stated_is_no_mirror():
+    body, everyone = people()
+    rng = np.random.default_rng(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for person in everyone:
+            noise = 0.05 * rng.standard_normal((17, 3))
+            seen = in_space(only_3d(person.seen), lambda p, noise=noise: p + noise)
+            solver.fit(body, without_sigma(seen))
+
+
+def without_sigma(m):
+    return replace(m, keypoints3d=replace(m.keypoints3d, sigma_m=None))
+
+
+def test_clips_motions_and_batches_are_told_as_well():
+    body, everyone = people()
+    frames = [in_space(only_3d(everyone[0].seen), y_up)] * 3
+    with pytest.warns(ScopeWarning, match="negate one axis"):
+        solver.fit_clip(body, frames)
+    with pytest.warns(ScopeWarning, match="negate one axis"):
+        solver.fit_motion(body, [[View(m)] for m in frames], [0.0, 0.1, 0.2])
+    with pytest.warns(ScopeWarning, match="negate one axis"):
+        solver.fit_batch(body, frames)
+
+
+def test_mirrored_directions_are_told():
+    body, everyone = people()
+    t = everyone[0].joints
+    child = np.arange(1, body.K + 1)
+    parent = np.asarray(body.parents)[child]
+    first = len(body.keypoint_names)
+    directions = left_handed(t[child] - t[parent])
+    seen = Measurements(
+        orientation_field=OrientationField(first + parent, first + child, directions)
+    )
+    with pytest.warns(ScopeWarning, match="negate one axis"):
+        solver.fit(body, seen)
+
+
+def seen_around(person, change, pitches):
+    """The views of three cameras, whose pixels are changed."""
+    views = []
+    for angle, pitch in zip((-0.8, 0.1, 0.9), pitches, strict=True):
+        R = rotations.exp([pitch, 0.0, 0.0]) @ rotations.exp([0.0, angle, 0.0])
+        t = np.array([0.1, 0.0, 4.0]) - R @ person.points.mean(axis=0)
+        p = person.points @ R.T + t
+        pixels = change(p[:, :2] / p[:, 2:] * CAMERA[0, 0] + CAMERA[:2, 2])
+        index = person.seen.keypoints2d.indices
+        views.append(View(Measurements(CAMERA, Keypoints2D(index, pixels)), R, t))
+    return views
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (from_right, "from the image's left"),
+        (from_below, "from the image's top"),
+        (row_and_column, r"as \(x, y\) instead"),
+    ],
+)
+def test_pixels_of_several_cameras_are_told_before_the_fit(change, message):
+    body, everyone = people()
+    person = everyone[0]
+    views = seen_around(person, change, (0.0, 0.4, -0.3))
+    short = solver.Options(stages=[solver.Stage(max_iterations=1)])
+    with pytest.warns(ScopeWarning, match=message):
+        solver.fit_motion(body, [views], [0.0], init=[person.state], options=short)
+
+
+def test_cameras_at_one_height_that_measure_from_below_see_a_mirrored_person():
+    """Their rays meet, but no body fits the points."""
+    body, everyone = people()
+    with pytest.warns(ScopeWarning, match="y down"):
+        solver.fit_motion(body, [seen_around(everyone[0], from_below, (0.0, 0.0, 0.0))], [0.0])
