@@ -31,6 +31,7 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .fitting.clip import fit_clip as fit_clip
     from .fitting.derivatives import SolutionDerivatives as SolutionDerivatives
     from .fitting.derivatives import solution_derivatives as solution_derivatives
+    from .fitting.derivatives import solution_gradient as solution_gradient
     from .fitting.frame_solver import FrameSolver as FrameSolver
     from .fitting.frame_solver import fit as fit
     from .fitting.frame_solver import fit_tree as fit_tree

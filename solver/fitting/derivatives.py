@@ -6,7 +6,10 @@ At a minimum x(m) of the cost E(x, m) the gradient g(x, m) = dE/dx vanishes, so 
     H dx/dm = -dg/dm,   H = dg/dx
 with the whole Hessian H: that of Gauss-Newton leaves out the curvature of residuals and robust
 kernels. g is exact; H, symmetric, and dg/dm are its central differences, in 2 (n + numbers)
-linearizations.
+linearizations. The gradient of a loss L(x) needs no H, but one adjoint a, H a = dL/dx, of which
+    dL/dm = -(dg/dm)ᵀ a
+It is found by conjugate gradients, each with H p as a difference of g, and preconditioned by the
+recursion's Gauss-Newton step: all in O(K + N).
 """
 
 import warnings
@@ -15,7 +18,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..arrays import as_array
 from ..errors import InvalidValueError
 from ..gauss_newton.terms import make_terms
 from ..measurements import Measurements
@@ -26,13 +31,19 @@ from ..residuals.registry import SHAPE_PRIOR, column_of, registered
 from ..rotations import hat
 from ..state import State
 from ..tree import BodyArrays, Tree
-from ..validation import check_list, check_type
-from .normal_equations import gradient, moved, problem_of
+from ..validation import check_finite, check_list, check_type
+from .normal_equations import gradient, moved, preconditioner, problem_of
 from .report import COLUMNS
 
 _STEP = 1e-5  # of the unknowns, radians, metres and shape
 _SHARE = 1e-6  # by which a measured number is changed, of a standard deviation its share
 _LEAST_CURVATURE = 1e-12  # smallest over largest eigenvalue of H: below, an unknown is not fixed
+_ADJOINT = 1e-7  # of its norm, by which conjugate gradients miss the adjoint's equation
+_UNSOLVED = 1e-3  # the same, of an adjoint that there is not
+_NO_MINIMUM = (
+    "The derivatives of a solution need a minimum, where the cost rises in every direction; fit "
+    "with a tolerance of 0, or give priors of what was not measured."
+)
 _WEIGHTS = "weights"
 # the measurements' numbers that a solution depends on smoothly
 _MEASURED = {
@@ -87,11 +98,7 @@ def solution_derivatives(
     H = problem.hessian()
     curvatures = np.linalg.eigvalsh(H)
     if not curvatures[0] > _LEAST_CURVATURE * curvatures[-1]:
-        raise InvalidValueError(
-            "The derivatives of a solution need a minimum, where the cost rises in every "
-            f"direction, but its Hessian has the eigenvalue {curvatures[0]:.3g}; fit with a "
-            "tolerance of 0, or give priors of what was not measured."
-        )
+        raise InvalidValueError(_NO_MINIMUM)
     motion = _motion_of_joints(problem.tree, state)
     unknowns = {}
     for name in wrt:
@@ -100,6 +107,40 @@ def solution_derivatives(
         unknowns[name] = change.reshape(mixed.shape)
     joints = {name: np.tensordot(motion, change, 1) for name, change in unknowns.items()}
     return SolutionDerivatives(unknowns, joints)
+
+
+def solution_gradient(
+    body: BodyArrays,
+    measurements: Measurements,
+    state: State,
+    loss: ArrayLike,
+    wrt: Sequence[str],
+    *,
+    priors: Priors | None = None,
+    options: Options = Options(),  # noqa: B008 - frozen
+) -> dict[str, Array]:
+    """Return the gradient of a loss of a frame's solution with respect to its measurements and
+    weights: the vector-Jacobian product of `solution_derivatives`, whose matrices it does not form.
+
+    :param loss: dL/dt (K+1, 3), by the joints' positions in the camera frame, per metre; or dL/dx
+        (n,), by the unknowns of `NormalEquations`.
+    :return: by the name of `wrt`, dL/dm of the shape of what was given.
+    :raises ShapeError: an array does not fit the body.
+    :raises InvalidValueError: as of `solution_derivatives`, whose other parameters these are.
+    """
+    check_type(measurements, Measurements, "measurements")
+    check_type(state, State, "state")
+    check_list(wrt, "wrt", "gradient")
+    problem = _Problem(body, numbered(body, measurements), state, priors, options)
+    motion = _motion_of_joints(problem.tree, state)
+    if np.ndim(loss) == 1:
+        by_unknowns = as_array(loss, motion.shape[2:], "loss")
+    else:
+        by_joints = as_array(loss, motion.shape[:2], "loss, by joints or by all unknowns,")
+        by_unknowns = np.tensordot(by_joints, motion, 2)
+    check_finite(by_unknowns, "loss")
+    adjoint = problem.adjoint(by_unknowns)
+    return {name: -np.tensordot(adjoint, problem.mixed(name), 1) for name in wrt}
 
 
 class _Problem:
@@ -121,13 +162,47 @@ class _Problem:
 
     def hessian(self) -> Array:
         """Return H (n, n)."""
-        columns = []
-        for step in _STEP * np.eye(3 + 3 * len(self.tree.parents) + self.tree.shape):
-            ahead = self._gradient_at(moved(self.tree, self.state, step))
-            behind = self._gradient_at(moved(self.tree, self.state, -step))
-            columns.append((ahead - behind) / (2.0 * _STEP))
-        H = np.array(columns)
+        axes = np.eye(3 + 3 * len(self.tree.parents) + self.tree.shape)
+        H: Array = np.array([self._hessian_along(axis) for axis in axes])
         return 0.5 * (H + H.T)
+
+    def adjoint(self, loss: Array) -> Array:
+        """Return a (n,) of H a = loss.
+
+        :raises InvalidValueError: there is none, because an unknown is not fixed, or the cost does
+            not rise in every direction.
+        """
+        step = preconditioner(self.tree, self.terms, self.stage, self.state, self.triggs)
+        found: Array = np.zeros(len(loss))
+        rest = loss
+        direction = step(rest)
+        size = float(rest @ direction)
+        least = _ADJOINT**2 * size
+        for _ in loss:
+            if not size > least:
+                break
+            along = self._hessian_along(direction)
+            curvature = float(direction @ along)
+            if not curvature > 0.0:
+                raise InvalidValueError(_NO_MINIMUM)
+            found += size / curvature * direction
+            rest = rest - size / curvature * along
+            stepped = step(rest)
+            size_before = size
+            size = float(rest @ stepped)
+            direction = stepped + size / size_before * direction
+        missed = np.abs(self._hessian_along(found) - loss).max() if found.any() else 0.0
+        if not missed <= _UNSOLVED * np.abs(loss).max(initial=0.0):
+            raise InvalidValueError(_NO_MINIMUM)
+        return found
+
+    def _hessian_along(self, direction: Array) -> Array:
+        """Return H p (n,)."""
+        length = _STEP / np.abs(direction).max()
+        ahead = self._gradient_at(moved(self.tree, self.state, length * direction))
+        behind = self._gradient_at(moved(self.tree, self.state, -length * direction))
+        along: Array = (ahead - behind) / (2.0 * length)
+        return along
 
     def mixed(self, name: str) -> Array:
         """Return dg/dm (n, ...) of the numbers that a name stands for.

@@ -10,13 +10,15 @@ Part i moves by x_i = x_par + U_i u_i, U_i = [I; [t_i - t_0]x], so that the spar
 The direction comes from the recursion in O(K) + O(N) and never forms H.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..gauss_newton.linearize import linearize as write_blocks
 from ..gauss_newton.linearize import make_blocks
-from ..gauss_newton.recursion import make_workspace, step
+from ..gauss_newton.optimizer import MIN_DAMPING
+from ..gauss_newton.recursion import Workspace, make_workspace, step
 from ..gauss_newton.terms import Terms, make_terms
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
@@ -86,12 +88,7 @@ def gauss_newton_step(
     """
     check_weight(damping, "damping")
     tree, terms, stage = problem_of(body, measurements, priors, options)
-    work = make_workspace(tree)
-    pose = state.pose(tree)
-    blocks = make_blocks(tree)
-    triggs = float(options.triggs)
-    write_blocks(tree, terms, stage, triggs, pose, blocks, work.scratch)
-    raise_failure()
+    _, pose, blocks, work = _linearized(tree, terms, stage, state, options.triggs)
     decrease = step(tree, pose, blocks, float(damping), 1.0 / options.root_length, work)
     joints = work.u[1:].ravel()
     direction = np.concatenate([work.x[0], joints, work.dbeta[: tree.shape]])
@@ -123,12 +120,8 @@ def equations(
 
     :param stage: (2, C) a row of weights and a row of 1/sigma, as of `Options.stage_table`.
     """
-    pose = state.pose(tree)
-    blocks = make_blocks(tree)
-    scratch = make_workspace(tree).scratch
-    cost = write_blocks(tree, terms, stage, float(triggs), pose, blocks, scratch)
-    raise_failure()
-    return NormalEquations(float(cost), *_dense(tree, pose, blocks))
+    cost, pose, blocks, _ = _linearized(tree, terms, stage, state, triggs)
+    return NormalEquations(cost, *_dense(tree, pose, blocks))
 
 
 def gradient(tree: Tree, terms: Terms, stage: Array, state: State, triggs: float = 0.0) -> Array:
@@ -136,19 +129,44 @@ def gradient(tree: Tree, terms: Terms, stage: Array, state: State, triggs: float
 
     The force and moment about the pelvis on a joint are those on all parts below it.
     """
+    _, pose, blocks, _ = _linearized(tree, terms, stage, state, triggs)
+    forces = blocks.A[:, :, GRADIENT].copy()
+    for i in range(len(tree.parents) - 1, 0, -1):
+        forces[tree.parents[i]] += forces[i]
+    moments = forces[1:, :3] - np.cross(pose.t[1:] - pose.t[0], forces[1:, 3:])
+    joints = blocks.H_u[1:, :, GRADIENT] + moments
+    return np.concatenate([forces[0], joints.ravel(), blocks.c[: tree.shape]])
+
+
+def preconditioner(
+    tree: Tree, terms: Terms, stage: Array, state: State, triggs: float = 0.0
+) -> Callable[[Array], Array]:
+    """Return the function that solves (H + Lambda) d = b (n,) by the recursion, hardly damped."""
+    _, pose, blocks, work = _linearized(tree, terms, stage, state, triggs)
+    end = 3 + 3 * len(tree.parents)
+
+    def solve(b: Array) -> Array:
+        blocks.A[:, :, GRADIENT] = 0.0
+        blocks.A[0, :, GRADIENT] = b[:6]
+        blocks.H_u[1:, :, GRADIENT] = b[6:end].reshape(-1, 3)
+        blocks.c[: tree.shape] = b[end:]
+        step(tree, pose, blocks, MIN_DAMPING, 1.0, work)
+        found: Array = np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[: tree.shape]])
+        return -found
+
+    return solve
+
+
+def _linearized(
+    tree: Tree, terms: Terms, stage: Array, state: State, triggs: float
+) -> tuple[float, Pose, Blocks, Workspace]:
+    """Return the cost, the placed parts and the blocks at a state, and memory for a step."""
     pose = state.pose(tree)
     blocks = make_blocks(tree)
-    scratch = make_workspace(tree).scratch
-    write_blocks(tree, terms, stage, float(triggs), pose, blocks, scratch)
+    work = make_workspace(tree)
+    cost = write_blocks(tree, terms, stage, float(triggs), pose, blocks, work.scratch)
     raise_failure()
-    forces = blocks.A[:, :, GRADIENT].copy()
-    joints = np.empty((len(tree.parents) - 1, 3))
-    for i in range(len(tree.parents) - 1, 0, -1):
-        moment, force = forces[i, :3], forces[i, 3:]
-        lever = pose.t[i] - pose.t[0]
-        joints[i - 1] = blocks.H_u[i, :, GRADIENT] + moment - np.cross(lever, force)
-        forces[tree.parents[i]] += forces[i]
-    return np.concatenate([forces[0], joints.ravel(), blocks.c[: tree.shape]])
+    return float(cost), pose, blocks, work
 
 
 def _dense(tree: Tree, pose: Pose, blocks: Blocks) -> tuple[Array, Array]:

@@ -21,8 +21,8 @@ from scope.solver import (
     load_body,
     register_residual,
 )
+from scope.solver.kernels import add_to_point
 from scope.solver.part import Part
-from scope.solver.residuals.accumulation import add_to_point
 
 from . import person
 

@@ -105,8 +105,16 @@ def of_the_solution(found, seen):
     fit = found["fit"]
     again = found["solver"].fit(found["body"], found["seen"], init=fit.state, options=options)
     before, after = (((each.t_camera_part - seen["joints"]) ** 2).sum() for each in (fit, again))
-    by_weight = (found["loss"] * found["found"].joints["weights.shape"]).sum()
-    assert float(by_weight) == pytest.approx((after - before) / 0.05, rel=0.1)
+    assert float(found["gradient"]["weights.shape"]) == pytest.approx(
+        (after - before) / 0.05, rel=0.1
+    )
+
+
+def with_own_kernel(found, seen):
+    errors = found["solver"].check_residual(
+        found["body"], "plane", [[found["wrist"]]], [[0.0, 0.6, 0.8, 2.5]]
+    )
+    assert max(errors.values()) < 1e-5
 
 
 def of_the_step(found, seen):
@@ -123,6 +131,7 @@ CHECKS = [
     from_clip,
     from_cameras,
     with_own_residual,
+    with_own_kernel,
     with_own_body,
     with_own_tree,
     of_the_step,

@@ -12,11 +12,13 @@ from scope.solver import (
     Measurements,
     Options,
     Priors,
+    ShapeError,
     Stage,
     State,
     Weights,
     fit,
     solution_derivatives,
+    solution_gradient,
 )
 
 from ..small_problem import BODY, K, M, P
@@ -101,6 +103,42 @@ def test_they_are_those_of_fits_with_other_weights(solution, name):
     np.testing.assert_allclose(joints, expected, rtol=0, atol=2e-3 * np.abs(expected).max())
 
 
+NAMES = ["keypoints3d.points", "keypoints2d.pixels", "keypoints2d.sigma_px", "weights.shape"]
+
+
+def test_a_gradient_is_the_product_of_a_loss_with_the_derivatives(solution):
+    """Of joints and of unknowns, without any matrix of the unknowns."""
+    found = solution_derivatives(BODY, SEEN, solution, NAMES, priors=PRIORS, options=options())
+    rng = np.random.default_rng(7)
+    by_joints = rng.standard_normal((K + 1, 3))
+    by_unknowns = rng.standard_normal(6 + 3 * K + P)
+    for loss, matrices, axes in (
+        (by_joints, found.joints, 2),
+        (by_unknowns, found.unknowns, 1),
+    ):
+        gradient = solution_gradient(
+            BODY, SEEN, solution, loss, NAMES, priors=PRIORS, options=options()
+        )
+        for name, matrix in matrices.items():
+            expected = np.tensordot(loss, matrix, axes)
+            assert np.shape(gradient[name]) == np.shape(expected)
+            error = np.abs(gradient[name] - expected).max()
+            assert error < 1e-5 * np.abs(expected).max(), name
+
+
+def test_a_gradient_is_that_of_the_loss_of_fits(solution):
+    loss = np.random.default_rng(8).standard_normal((K + 1, 3))
+    name = "keypoints3d.points"
+    found = solution_gradient(BODY, SEEN, solution, loss, [name], priors=PRIORS, options=options())
+    along = np.random.default_rng(9).standard_normal((M, 3))
+    fits = [
+        solved(with_array("keypoints3d", "points", ..., step * along), solution, options())
+        for step in (1e-3, -1e-3)
+    ]
+    ahead, behind = ((loss * each.t_camera_part).sum() for each in fits)
+    assert (found[name] * along).sum() == pytest.approx((ahead - behind) / 2e-3, rel=1e-3)
+
+
 class Point:
     """A body of one part without shape, which three points on it fix."""
 
@@ -133,3 +171,12 @@ def test_what_has_no_derivative_is_named(solution):
     alone = Measurements(keypoints3d=Keypoints3D([0], POINTS[:1]))
     with pytest.raises(InvalidValueError, match="need a minimum"):
         solution_derivatives(BODY, alone, solution, ["keypoints3d.points"], priors=PRIORS)
+    everywhere = np.ones(6 + 3 * K + P)
+    free = Priors(joint_weights=np.zeros(K))
+    with pytest.raises(InvalidValueError, match="need a minimum"):
+        solution_gradient(BODY, alone, solution, everywhere, ["keypoints3d.points"], priors=free)
+    with pytest.raises(ShapeError, match="loss"):
+        solution_gradient(BODY, SEEN, solution, np.ones((2, 3)), NAMES, priors=PRIORS)
+    assert not solution_gradient(
+        BODY, SEEN, solution, np.zeros((K + 1, 3)), NAMES[:1], priors=PRIORS
+    )[NAMES[0]].any()
