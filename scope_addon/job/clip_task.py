@@ -186,7 +186,7 @@ def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry
     """Return the entry of a clip that an earlier batch has finished; None if there is no such clip.
 
     :param entry: begun, with the clip's key.
-    :param record: see `finished`; None if no process leaves one.
+    :param record: see `finished_clip`; None if no process leaves one.
     """
     if task.previous and task.previous.get("key") == entry["key"]:
         return task.previous | {
