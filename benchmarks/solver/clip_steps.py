@@ -37,7 +37,7 @@ from .problem import make_problem
 RATE = 30.0
 LENGTHS = (75, 150, 300, 600)
 GAP = 30  # frames without measurements
-OUTLINE_WEIGHT = 3e5
+OUTLINE_WEIGHT = 1e5
 # larger ones need more conjugate gradients
 MOTION = MotionPrior(joints=0.1, root_rotation=0.1, root_position=3.0)
 

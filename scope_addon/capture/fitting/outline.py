@@ -55,12 +55,11 @@ MIN_MASKS = 4
 MAX_MASKS = 32
 ROUNDS = 3
 THREADS = 2
-# A rim point's inverse variance: 0.0018 in normalized coordinates, 7 mm at 4 m. The outline says
-# more of the shape than keypoints do, so the prior may weigh less. MPJPE-root on the four pose2sim
-# cameras with other weights of outline and prior: 72.7 mm with 0 and 10, 72.5 with 0 and 2, 72.1
-# with 5e4 and 10, 68.7 with 3e5 and 2, which are today's.
-OUTLINE_WEIGHT = 3e5
-PRIOR_SHARE = 2 / 3
+# A rim point's inverse variance: 0.0032 in normalized coordinates, 13 mm at 4 m. Clothes displace
+# the rim alike in all frames, so a larger weight distorts the shape: with 3e5 and two thirds of the
+# shape's prior, one of ten people in a studio had a coefficient of 8 standard deviations, and two
+# leaned by 10 degrees (benchmarks/notebook/shape.md).
+OUTLINE_WEIGHT = 1e5
 
 
 class OutlineMeasurer:
@@ -238,7 +237,7 @@ def fit_shape_to_outline(
         extended.measure(row, None if root_cam is None else root_cam[row]) for row, _ in masks
     ]
     base = prepared.weights
-    shape = PRIOR_SHARE * base.shape * len(masks)
+    shape = base.shape * len(masks)
     weights = replace(base, shape=shape, tables={**base.tables, "outline": OUTLINE_WEIGHT})
     cold, warm = (replace(ROBUST, stages=stages(weights)) for stages in (cold_stages, warm_stages))
     found = fit_clip(outline.body, measured, priors=prepared.priors, options=cold)

@@ -20,7 +20,7 @@ import numpy as np
 from ....solver import ClipFit, Fit, State, fit_clip
 from ...arrays import FloatArray, IndexArray
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
-from .outline import PRIOR_SHARE, fit_shape_to_outline, usable_masks
+from .outline import fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
 from .stature import stature_sigma, with_population
 from .weights import ROBUST, clip_weights, cold_stages
@@ -132,8 +132,7 @@ def _fit_shape(prepared: PreparedTrack, root_cam: FloatArray | None = None) -> C
 
 def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
     """Return the standard deviation of the stature of a shape of `_fit_shape`, metres."""
-    count = len(shape.frames) * (PRIOR_SHARE if usable_masks(prepared) else 1.0)
-    information = shape.beta_information / (count * prepared.weights.shape)
+    information = shape.beta_information / (len(shape.frames) * prepared.weights.shape)
     return stature_sigma(prepared.body, shape.beta, information, prepared.is_stature_given)
 
 
