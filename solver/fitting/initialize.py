@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..gauss_newton.linearize import make_pose, place_parts
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
 from ..kernel import kernel
-from ..rotations import exp
+from ..rotations import exp, nearest_rotation
 from ..state import State
 from ..tree import Tree
 
@@ -25,6 +25,7 @@ NEAREST = 0.3
 FARTHEST = 100.0
 FRONTAL = np.diag([1.0, -1.0, -1.0])  # upright and facing the camera
 DISTANCE = 3.0
+STEP = 2.0**-30  # to which first states are rounded
 _HEADINGS = tuple(k * math.pi / 6.0 for k in range(12))  # radians from where the body faces first
 
 
@@ -108,8 +109,15 @@ def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
     if not s[0] > 0 or s[1] < 1e-4 * s[0]:
         return None
     u[:, 2] *= np.linalg.det(u @ vt)
-    R: NDArray[np.float64] = u @ vt
-    return R
+    return nearest_rotation(_rounded(u @ vt))
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return values without their last bits, which differ between versions of LAPACK, and which a
+    first fit amplifies by many orders of magnitude.
+    """
+    rounded: NDArray[np.float64] = np.round(values / STEP) * STEP
+    return rounded
 
 
 def initial_states(
@@ -153,7 +161,7 @@ def initial_states(
             t = _position_in_image(terms, points, np.ascontiguousarray(turned))
         if t is None or not np.isfinite(t).all():
             t = np.array([0.0, 0.0, DISTANCE])
-        states.append(State(turned.copy(), t, joint_mean.copy(), beta.copy()))
+        states.append(State(turned.copy(), _rounded(t), joint_mean.copy(), beta.copy()))
     return states
 
 

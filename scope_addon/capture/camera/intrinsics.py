@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...arrays import Float64Array, FloatArray
 from ...errors import UsageError
 from ...footage_view import AS_IN_FILE, FootageView
+from ..rounding import round_number
 from .calibration import Calibration, read_calibration
 from .given_path import read_camera_path
 
@@ -28,6 +29,7 @@ from .given_path import read_camera_path
 # error relative to the pelvis by 7 mm at most.
 DEFAULT_FOV_DEG = 60.0
 ASSUMED_DEVIATION = 0.25  # relative error of the default, one standard deviation: 48 to 74 degrees
+FOCAL_STEP_PX = 2.0**-6  # to which estimates are rounded
 FILM_WIDTH_MM = 36.0  # "35 mm equivalent" focal lengths refer to this width along the longer side
 
 
@@ -194,7 +196,8 @@ def estimated_camera(
     """
     fov_deg = 2 * math.degrees(math.atan(longer_px / (2 * focal_px)))
     source = f"estimated, {fov_deg:.0f} degrees ± {100 * deviation:.0f} %"
-    return Camera(pinhole(width, height, focal_px), np.zeros(5), source, deviation)
+    intrinsics = pinhole(width, height, round_number(focal_px, FOCAL_STEP_PX))
+    return Camera(intrinsics, np.zeros(5), source, deviation)
 
 
 def _focal_from_fov(longer: float, fov_deg: float) -> float:

@@ -114,5 +114,5 @@ def find_segments(
         middle, [*(surroundings(points) for points in people), *(bar + margin for bar in bars)]
     )
     chosen = np.flatnonzero(keep)
-    chosen = chosen[np.argsort(-lengths[chosen])[:MAX_SEGMENTS]]
+    chosen = chosen[np.argsort(-lengths[chosen], kind="stable")[:MAX_SEGMENTS]]
     return Segments(ends[chosen].astype(float), lengths[chosen].astype(float))

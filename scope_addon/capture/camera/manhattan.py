@@ -126,7 +126,7 @@ class Edges:
         score = np.concatenate(
             [_explained(_sine2(block, equations)) @ self.weight for block in blocks]
         )
-        rest = found[np.argsort(-score)]
+        rest = found[np.argsort(-score, kind="stable")]
         chosen = list[NDArray[Any]]()
         while len(rest) and len(chosen) < UP_CANDIDATES:
             chosen.append(rest[0])

@@ -116,7 +116,7 @@ def _moments(log_ratio: Float64Array, log_p: Float64Array) -> tuple[float, float
     """Return mean and standard deviation of log(f / f_0), integrated over unevenly spaced
     values.
     """
-    order = np.argsort(log_ratio)
+    order = np.argsort(log_ratio, kind="stable")
     x = log_ratio[order]
     log_p = log_p[order]
     p = np.exp(log_p - log_p.max()) * np.gradient(x)

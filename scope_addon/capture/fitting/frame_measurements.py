@@ -18,6 +18,7 @@ from ....solver import Body, Keypoints2D, Keypoints3D, Measurements, Orientation
 from ....solver.measurements import SIGMA_3D
 from ...arrays import Float64Array, FloatArray
 from ..perception.landmark_network import KEYPOINT_NAMES
+from ..rounding import round_array
 from .weights import WEIGHTS
 
 # Weights relative to a wrist or knee: keypoints of the face and fingers lie close together and say
@@ -44,6 +45,7 @@ EARS = [KEYPOINT_NAMES.index(f"{side}_ear") for side in ("right", "left")]
 # than 60 degrees.
 MIN_CONFIDENCE = 0.3
 CONTRADICTION_COS = np.cos(np.radians(60.0))
+POINT_STEP_M = 2.0**-20  # to which measured points are rounded
 ROOT_SIGMA_M = 0.12  # of a pelvis above feet on the floor
 NEAREST_M = 0.3  # the least plausible distance of a person from the camera
 
@@ -109,7 +111,7 @@ class Measurer:
         place_cam = place(points, rays, confidence)
         if root_cam is not None:
             place_cam = place_cam * (root_cam[2] / max(place_cam[2], NEAREST_M))
-        placed = points + place_cam
+        placed = round_array(points + place_cam, POINT_STEP_M)
         placed[:, 2] = np.maximum(placed[:, 2], NEAREST_M)
         bones = points[self.to_landmark] - points[self.from_landmark]
         slope = np.hypot(sigma[self.to_landmark], sigma[self.from_landmark])

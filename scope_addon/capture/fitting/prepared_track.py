@@ -5,7 +5,7 @@ body.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter, windows_around
+from ..rounding import round_array
 from ..tracking.expression_fit import across_head, certainty
 from ..tracking.track import Track
-from .frame_measurements import EARS, Measurer
+from .frame_measurements import EARS, POINT_STEP_M, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits, without_fingers
 from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_stature, with_unknown_stature
@@ -43,6 +44,11 @@ class Stance:
     # (T, 6) probability that each contact point rests on the floor
     contact: FloatArray
     resting: FloatArray  # (T, 6) probability that it rests on anything
+
+    def rounded(self, step: float) -> Stance:
+        """Return the stance for the next stage; see `rounding`."""
+        arrays: list[FloatArray] = [getattr(self, field.name) for field in fields(self)]
+        return Stance(*(round_array(array, step) for array in arrays))
 
     def floor(self, k: int, indices: IndexArray) -> Floor:
         """Return the floor of frame ``k`` for the solver.
@@ -165,8 +171,9 @@ class PreparedTrack:
         :param R: (T, 3, 3) rotations in camera axes.
         """
         points = self.lifted.points
-        rotated = (points @ np.swapaxes(R, 1, 2).astype(points.dtype)).astype(points.dtype)
-        return replace(self, lifted=replace(self.lifted, points=rotated))
+        rotated = round_array(points.astype(np.float64) @ np.swapaxes(R, 1, 2), POINT_STEP_M)
+        lifted = replace(self.lifted, points=rotated.astype(points.dtype))
+        return replace(self, lifted=lifted)
 
     def with_stance(self, stance: Stance, betas: FloatArray) -> PreparedTrack:
         """Add the pelvis and the floor, and to the body points on the arms and the contact points

@@ -19,6 +19,7 @@ import numpy as np
 
 from ....solver import ClipFit, Fit, State, fit_clip
 from ...arrays import FloatArray, IndexArray
+from ..rounding import round_array
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline import fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance
@@ -27,6 +28,7 @@ from .weights import ROBUST, clip_weights, cold_stages
 
 SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
 PROGRESS_FRAMES = 16  # between two reports
+STEP = 2.0**-20  # to which shapes and positions, in metres, are rounded for the next stage
 
 
 def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:
@@ -37,7 +39,7 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     progress("finding the shape", 0, 0)
     shape = _fit_shape(prepared)
     track = prepared.track
-    frames = FrameSequence(prepared, shape.beta)
+    frames = FrameSequence(prepared, round_array(shape.beta, STEP))
     T = len(track)
     for k in range(T):
         if track.seen[k]:
@@ -45,7 +47,9 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
         frames.repeat_last(k)
         if k % PROGRESS_FRAMES == 0 or k == T - 1:
             progress("solving", k + 1, T)
-    return replace(frames.fitted(), height_sigma_m=_height_sigma(prepared, shape))
+    fitted = frames.fitted()
+    root_cam = round_array(fitted.t_camera_root, STEP)
+    return replace(fitted, t_camera_root=root_cam, height_sigma_m=_height_sigma(prepared, shape))
 
 
 def fit_single_frame(prepared: PreparedTrack) -> Fit | None:
@@ -70,12 +74,13 @@ def ground(
     :param stance: in each frame's camera.
     :return: the measurements, and the states and the shape to start from.
     """
+    stance = stance.rounded(STEP)
     prepared = prepared.rotated(stance.turn)
     betas = first.betas
     sigma = first.height_sigma_m
     if first.valid.any():
         shape = _fit_shape(prepared, stance.root_cam)
-        betas = shape.beta
+        betas = round_array(shape.beta, STEP)
         sigma = _height_sigma(prepared, shape)
     start = replace(first, t_camera_root=stance.root_cam, betas=betas, height_sigma_m=sigma)
     return prepared.with_stance(stance, betas), start

@@ -17,20 +17,36 @@ import cv2
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array
+from ..rounding import round_number
 from .letterbox import halved
 
 MARGIN = 1.25  # side of the square over the body circle's diameter
+# To which centre and side, in pixels, and the rotation, in radians, are rounded.
+STEP_PX = 2.0**-20
+STEP_RAD = 2.0**-30
 
 
 @dataclass(frozen=True)
 class Region:
     """A square of ``side_px`` around ``center_px`` (x, y), rotated by ``rotation`` radians,
     clockwise on screen.
+
+    All are rounded (`rounding`): a tracker finds each region from the keypoints in the one before
+    and extrapolates its motion, so differences in the last bit would grow to pixels within two
+    seconds.
     """
 
     center_px: tuple[float, float]
     side_px: float
     rotation: float
+
+    def __post_init__(self) -> None:
+        """Round the square."""
+        x, y = self.center_px
+        center = round_number(x, STEP_PX), round_number(y, STEP_PX)
+        object.__setattr__(self, "center_px", center)
+        object.__setattr__(self, "side_px", round_number(self.side_px, STEP_PX))
+        object.__setattr__(self, "rotation", round_number(self.rotation, STEP_RAD))
 
     @property
     def R_image_crop(self) -> Float64Array:

@@ -167,7 +167,7 @@ def _best_pair(
     if len(guesses) > 1:
         roughly = [(tried(guess, _ROUGH_FRAMES, _TURNS[:1]), guess) for guess in guesses]
         costs = [pair.cost if pair is not None else np.inf for pair, _ in roughly]
-        order = np.argsort(costs)[:_MOST_GUESSES]
+        order = np.argsort(costs, kind="stable")[:_MOST_GUESSES]
         guesses = [guesses[k] for k in order if costs[k] < _ROUGHLY * min(costs)]
     pairs = [pair for guess in guesses if (pair := tried(guess, _PAIR_FRAMES, _TURNS)) is not None]
 

@@ -225,7 +225,7 @@ def flesh_radii(body: Body, betas: FloatArray) -> Float64Array:
 def _weighted_median(heights: FloatArray, contact: FloatArray) -> float:
     """Return the median of the heights (T,), weighted by the contact (T, F) in each frame."""
     weight = contact.max(axis=1) + MIN_CONTACT
-    order = np.argsort(heights)
+    order = np.argsort(heights, kind="stable")
     sums = np.cumsum(weight[order])
     return float(heights[order[np.searchsorted(sums, 0.5 * sums[-1])]])
 
