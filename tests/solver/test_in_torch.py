@@ -18,7 +18,7 @@ def measured(points):
     return solver.Measurements(keypoints3d=solver.Keypoints3D(BODY.joint_names, points))
 
 
-class FittedJoints(torch.autograd.Function):
+class FittedJoints(torch.autograd.Function):  # type: ignore[name-defined]
     """The joints (24, 3) of the body that fits points (24, 3)."""
 
     @staticmethod

@@ -17,8 +17,8 @@ import numpy as np
 from ....solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from ....solver.measurements import SIGMA_3D
 from ...arrays import Float64Array, FloatArray
+from ...rounding import round_array
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..rounding import round_array
 from .weights import WEIGHTS
 
 # Weights relative to a wrist or knee: keypoints of the face and fingers lie close together and say

@@ -14,9 +14,9 @@ from ....solver.body_file import CHILD_BELOW_M
 from ...arrays import Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
+from ...rounding import round_array
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter, windows_around
-from ..rounding import round_array
 from ..tracking.expression_fit import across_head, certainty
 from ..tracking.track import Track
 from .frame_measurements import EARS, POINT_STEP_M, Measurer

@@ -31,7 +31,7 @@ from ....solver.errors import ModelFileError, ShapeError
 from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
-from ..rounding import round_array
+from ...rounding import round_array
 from .sessions import open_session
 
 LIFTER_FILE = Path(__file__).resolve().parents[3] / "assets" / "lifter" / "lifter.onnx"

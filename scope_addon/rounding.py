@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from ..arrays import FloatArray
+from .arrays import FloatArray
 
 
 def round_number(value: float, step: float) -> float:
