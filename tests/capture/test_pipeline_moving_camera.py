@@ -57,7 +57,9 @@ def test_a_given_pan_is_used_and_gives_the_same_path(shared, tmp_path):
     found = capture(tmp_path / "pan.mp4", load_body("scope"), options)
     motion = found.motions[0]
     assert (found.report.up, found.report.camera) == ("given", "camera path camera.json")
-    assert [notice.code for notice in found.report.warnings] == ["given_floor"]
+    # A second person walks behind, and is found or not.
+    codes = {notice.code for notice in found.report.warnings}
+    assert codes - {"left_out"} == {"given_floor"}
     np.testing.assert_allclose(motion.world_from_camera[:, :3, :3], poses[:, :3, :3], atol=1e-6)
     np.testing.assert_allclose(motion.world_from_camera[:, :2, 3], poses[:, :2, 3], atol=1e-6)
     assert 0.5 < motion.world_from_camera[0, 2, 3] < 2.5  # metres above the floor

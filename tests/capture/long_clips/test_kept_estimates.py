@@ -56,7 +56,7 @@ def test_only_the_same_network_region_and_pixels_count(tmp_path):
     for different in (
         kept.key("other", CROP, REGION),
         kept.key("net", other, REGION),
-        kept.key("net", CROP, replace(REGION, rotation=np.nextafter(0.1, 1))),
+        kept.key("net", CROP, replace(REGION, rotation=0.1 + 1e-6)),
     ):
         assert kept.find(different) is None
 

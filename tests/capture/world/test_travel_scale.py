@@ -57,7 +57,7 @@ def travel(places):
     """A camera that follows at the walker's speed, as the background shows it."""
     center = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
     still = np.tile(np.eye(3), (T, 1, 1))
-    odometry = Odometry(still, center / SCALE, np.zeros(T, int), [places], np.zeros(T, bool))
+    odometry = Odometry(still, center / SCALE, np.zeros(T, int), [places])
     return odometry, center
 
 

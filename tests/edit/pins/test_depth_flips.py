@@ -49,7 +49,7 @@ def seen(clip):
     """Return pixels (T, K+1, 2) and depths (T, K+1) along the rays, metres, of all joints."""
     camera = shot().world_from_camera[0]
     at = (clip.joints(BODY, BETAS) - camera[:3, 3]) @ camera[:3, :3]
-    pixels = at @ shot().intrinsics.T
+    pixels = at @ shot().intrinsics[0].T
     return pixels[..., :2] / pixels[..., 2:], np.linalg.norm(at, axis=-1)
 
 
