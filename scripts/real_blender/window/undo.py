@@ -122,17 +122,21 @@ def add_face(rig: bpy.types.Object) -> None:
     layer.objects.active = active
 
 
-def jaw_moves() -> bool:
-    """Return whether the action of the rig opens and closes its mouth."""
+def face_moves() -> bool:
+    """Return whether the action of the rig moves a bone of its face; in a part of the clip that is
+    looped, the mouth may stay closed.
+    """
     data = bpy.data.objects["rig"].animation_data
-    return data is not None and any('"jaw"' in curve.data_path for curve in curves_of(data.action))
+    return data is not None and any(
+        f'"{bone}"' in curve.data_path for curve in curves_of(data.action) for bone in FACE
+    )
 
 
 def retarget_face() -> None:
     """Move the captured expressions to the face of the rig."""
     assert bpy.context.scene.scope_retarget.face == bpy.data.objects["rig"]
     use(bpy.ops.scope.retarget_face)
-    assert jaw_moves(), "the face does not move"
+    assert face_moves(), "the face does not move"
 
 
 def edits() -> dict[str, Callable[[], object]]:
