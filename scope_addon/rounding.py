@@ -15,6 +15,8 @@ import numpy as np
 
 from .arrays import FloatArray
 
+STEP = 2.0**-20  # of arrays: metres, coefficients, and inputs of networks, which are about 1
+
 
 def round_number(value: float, step: float) -> float:
     """Return the multiple of a step, a power of two, that is nearest to a value; values that are
@@ -23,7 +25,7 @@ def round_number(value: float, step: float) -> float:
     return round(value / step) * step if math.isfinite(value) else value
 
 
-def round_array(values: FloatArray, step: float) -> FloatArray:
-    """Return the multiples of a step, a power of two, that are nearest to values."""
-    rounded: FloatArray = np.round(values / step) * step
+def round_array(values: FloatArray) -> FloatArray:
+    """Return the multiples of `STEP` that are nearest to values."""
+    rounded: FloatArray = np.round(values / STEP) * STEP
     return rounded

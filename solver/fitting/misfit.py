@@ -211,7 +211,7 @@ def warn_of_mirroring(
                 least = changed
                 best = remedy
                 unflipped = change
-        # a person who lies is found more surely once the image is turned
+        # Somebody who lies in the image is fitted better once it is turned, which is no mistake.
         if best and not in_space:
             turned = cost_of(lambda m: _FROM_THE_LEFT[1](unflipped(m)))[0]
             if least > turned / factor:

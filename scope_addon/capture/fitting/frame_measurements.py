@@ -45,7 +45,6 @@ EARS = [KEYPOINT_NAMES.index(f"{side}_ear") for side in ("right", "left")]
 # than 60 degrees.
 MIN_CONFIDENCE = 0.3
 CONTRADICTION_COS = np.cos(np.radians(60.0))
-POINT_STEP_M = 2.0**-20  # to which measured points are rounded
 ROOT_SIGMA_M = 0.12  # of a pelvis above feet on the floor
 NEAREST_M = 0.3  # the least plausible distance of a person from the camera
 
@@ -111,7 +110,7 @@ class Measurer:
         place_cam = place(points, rays, confidence)
         if root_cam is not None:
             place_cam = place_cam * (root_cam[2] / max(place_cam[2], NEAREST_M))
-        placed = round_array(points + place_cam, POINT_STEP_M)
+        placed = round_array(points + place_cam)
         placed[:, 2] = np.maximum(placed[:, 2], NEAREST_M)
         bones = points[self.to_landmark] - points[self.from_landmark]
         slope = np.hypot(sigma[self.to_landmark], sigma[self.from_landmark])

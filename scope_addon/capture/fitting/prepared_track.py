@@ -19,7 +19,7 @@ from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter, windows_around
 from ..tracking.expression_fit import across_head, certainty
 from ..tracking.track import Track
-from .frame_measurements import EARS, POINT_STEP_M, Measurer
+from .frame_measurements import EARS, Measurer
 from .hand_measurements import HandMeasurer, with_finger_limits, without_fingers
 from .keypoint_offsets import with_keypoint_offsets
 from .stature import with_stature, with_unknown_stature
@@ -45,10 +45,10 @@ class Stance:
     contact: FloatArray
     resting: FloatArray  # (T, 6) probability that it rests on anything
 
-    def rounded(self, step: float) -> Stance:
+    def rounded(self) -> Stance:
         """Return the stance for the next stage; see `rounding`."""
         arrays: list[FloatArray] = [getattr(self, field.name) for field in fields(self)]
-        return Stance(*(round_array(array, step) for array in arrays))
+        return Stance(*(round_array(array) for array in arrays))
 
     def floor(self, k: int, indices: IndexArray) -> Floor:
         """Return the floor of frame ``k`` for the solver.
@@ -171,7 +171,7 @@ class PreparedTrack:
         :param R: (T, 3, 3) rotations in camera axes.
         """
         points = self.lifted.points
-        rotated = round_array(points.astype(np.float64) @ np.swapaxes(R, 1, 2), POINT_STEP_M)
+        rotated = round_array(points.astype(np.float64) @ np.swapaxes(R, 1, 2))
         lifted = replace(self.lifted, points=rotated.astype(points.dtype))
         return replace(self, lifted=lifted)
 

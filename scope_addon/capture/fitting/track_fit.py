@@ -28,7 +28,6 @@ from .weights import ROBUST, clip_weights, cold_stages
 
 SHAPE_FRAMES = 64  # from which the shape is estimated; more frames add little
 PROGRESS_FRAMES = 16  # between two reports
-STEP = 2.0**-20  # to which shapes and positions, in metres, are rounded for the next stage
 
 
 def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]) -> FittedTrack:
@@ -39,7 +38,7 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
     progress("finding the shape", 0, 0)
     shape = _fit_shape(prepared)
     track = prepared.track
-    frames = FrameSequence(prepared, round_array(shape.beta, STEP))
+    frames = FrameSequence(prepared, round_array(shape.beta))
     T = len(track)
     for k in range(T):
         if track.seen[k]:
@@ -48,7 +47,7 @@ def fit_track(prepared: PreparedTrack, progress: Callable[[str, int, int], None]
         if k % PROGRESS_FRAMES == 0 or k == T - 1:
             progress("solving", k + 1, T)
     fitted = frames.fitted()
-    root_cam = round_array(fitted.t_camera_root, STEP)
+    root_cam = round_array(fitted.t_camera_root)
     return replace(fitted, t_camera_root=root_cam, height_sigma_m=_height_sigma(prepared, shape))
 
 
@@ -74,13 +73,13 @@ def ground(
     :param stance: in each frame's camera.
     :return: the measurements, and the states and the shape to start from.
     """
-    stance = stance.rounded(STEP)
+    stance = stance.rounded()
     prepared = prepared.rotated(stance.turn)
     betas = first.betas
     sigma = first.height_sigma_m
     if first.valid.any():
         shape = _fit_shape(prepared, stance.root_cam)
-        betas = round_array(shape.beta, STEP)
+        betas = round_array(shape.beta)
         sigma = _height_sigma(prepared, shape)
     start = replace(first, t_camera_root=stance.root_cam, betas=betas, height_sigma_m=sigma)
     return prepared.with_stance(stance, betas), start

@@ -37,7 +37,6 @@ from .sessions import open_session
 LIFTER_FILE = Path(__file__).resolve().parents[3] / "assets" / "lifter" / "lifter.onnx"
 KEYPOINT_COUNT = 33
 INPUT_SIZE = KEYPOINT_COUNT * 6 + 2
-INPUT_STEP = 2.0**-20  # to which the input is rounded
 WORLD_UNIT_M = 0.5
 TORSO = np.array([11, 12, 23, 24])  # shoulders and hips
 HIPS = np.array([23, 24])
@@ -127,7 +126,7 @@ def network_input(
         known,
         np.log(s),
     ]
-    return round_array(np.concatenate(parts, axis=1), INPUT_STEP), R
+    return round_array(np.concatenate(parts, axis=1)), R
 
 
 def mixture(estimates: list[Lifted], weights: list[float], R_virtual_camera: FloatArray) -> Lifted:
