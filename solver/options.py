@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How to fit: weights, stages, robust kernels, damping, and the priors on joints and shape."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace

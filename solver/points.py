@@ -3,6 +3,8 @@
 `Measurements` for each frame.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -10,6 +10,8 @@ The upper half are scalar functions for compiled kernels: they take and return p
 that nothing is allocated. The lower half does the same on numpy arrays with any leading dimensions.
 """
 
+from __future__ import annotations
+
 import math
 import warnings
 from typing import Any

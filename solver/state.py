@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The unknowns of one frame, and what a fit gives back."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -40,7 +42,7 @@ class State:
     beta: Array  # (P,)
 
     @classmethod
-    def rest(cls, K: int, P: int, distance: float = 3.0) -> "State":
+    def rest(cls, K: int, P: int, distance: float = 3.0) -> State:
         """Return the rest pose of K joints, beta (P,) zero, upright and facing a camera `distance`
         metres away.
 
@@ -89,7 +91,7 @@ class State:
         return R, t, Omega, as_array(self.beta, (tree.shape,), "beta")
 
     @classmethod
-    def from_pose(cls, tree: Tree, pose: Pose) -> "State":
+    def from_pose(cls, tree: Tree, pose: Pose) -> State:
         """Copy the state out of the kernels' arrays."""
         return cls(
             pose.R[0].copy(),
@@ -104,8 +106,8 @@ MULTI: Literal["multi"] = "multi"
 
 
 def given_states(
-    init: "Sequence[State] | Literal['multi'] | None", frames: int
-) -> "Sequence[State] | None":
+    init: Sequence[State] | Literal["multi"] | None, frames: int
+) -> Sequence[State] | None:
     """Return the initial states of a clip, checked; None if there are none, or for "multi".
 
     :raises InvalidValueError: they are not a list, or an entry is of another type.

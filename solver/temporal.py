@@ -6,6 +6,8 @@ The root's pose becomes a row of the pose prior, each joint's state one of the j
 Omega_mean the last frame's. Two-sided windows would couple frames and break the linear cost.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -3,6 +3,8 @@
 tree par(i) < i.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np

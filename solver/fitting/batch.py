@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many frames, or many clips, on all cores. The kernels release the GIL, so plain threads do."""
 
+from __future__ import annotations
+
 import os
 import threading
 from collections.abc import Callable, Iterable, Sequence

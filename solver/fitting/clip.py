@@ -10,6 +10,8 @@ back in every frame. That is the exact Gauss-Newton step of the clip. Causally, 
 matrix summed so far is the prior of the next frame (`carry`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -12,6 +12,8 @@ It is found by conjugate gradients, each with H p as a difference of g, and prec
 recursion's Gauss-Newton step: all in O(K + N).
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fitting one frame, and frame after frame in the same memory."""
 
+from __future__ import annotations
+
 import threading
 from collections.abc import Sequence
 from typing import Literal

@@ -10,6 +10,8 @@ Part i moves by x_i = x_par + U_i u_i, U_i = [I; [t_i - t_0]x], so that the spar
 The direction comes from the recursion in O(K) + O(N) and never forms H.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`fit_motion`: a whole clip as one problem."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -3,6 +3,8 @@
 stand.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
 

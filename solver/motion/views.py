@@ -7,6 +7,8 @@ has the components R w, R nu in camera axes and a joint's rotation R u, so that 
 blocks and likewise the rest. Nothing else in the solver knows of several cameras.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple

@@ -7,6 +7,8 @@ order of `_PROTOTYPE`. So it stays as it is on disk whatever is registered, and 
 a residual it makes no call.
 """
 
+from __future__ import annotations
+
 import ctypes
 import threading
 from collections.abc import Callable
