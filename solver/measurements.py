@@ -9,13 +9,15 @@ squared residual; zero, or a value that is not finite or beyond `LARGEST`, leave
 out.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_array, as_integers
+from .arrays import as_array, as_integers, described
 from .errors import InvalidValueError, ShapeError
 from .kernel import kernel
 from .part import Array
@@ -179,6 +181,11 @@ class Measurements:
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
                 check_type(value, (kind, type(None)), f"Measurements.{name}")
+        if isinstance(self.intrinsics, tuple(_KINDS.values())):
+            raise InvalidValueError(
+                "Measurements.intrinsics must be a camera matrix (3, 3), but is "
+                f"{described(self.intrinsics)}; name the other fields, as in keypoints3d=seen."
+            )
         for name in self.tables or ():
             if name in _FIELDS:
                 raise InvalidValueError(

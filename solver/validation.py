@@ -28,6 +28,7 @@ ROTATION_TOLERANCE = 0.01
 # metres between two points or joints of one person, one after the other in a list
 LARGEST_STEP = 10.0
 _FEWEST_TIMES = 5  # whole numbers that are no coincidence
+_LONGEST_INTERVAL = 2.0  # seconds from one frame of a motion to the next
 _NO_WEIGHTS = np.zeros(0)
 _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 _FEWEST_POINTS = 4  # that are no coincidence
@@ -237,13 +238,14 @@ def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
     if fault == 1:
         _warn(
             UnitsWarning,
-            "Pixels of 2D keypoints all lie in 0..1; multiply them by the image's size in pixels.",
+            "Pixels of 2D keypoints all lie in -1..1, as those of a normalized image; convert them "
+            "to pixels by its size.",
         )
     elif fault == 2:
         _warn(
             ScopeWarning,
-            "Pixels of 2D keypoints are (0, 0), as of keypoints that are missing; give these a "
-            "confidence of 0.",
+            "Pixels of 2D keypoints are (0, 0) or (-1, -1), as of keypoints that are missing; give "
+            "these a confidence of 0.",
         )
     elif fault == 3:
         _warn(
@@ -364,16 +366,19 @@ def warn_of_weight(weight: float, least: float, name: str) -> None:
 def warn_of_frame_numbers(times: Array) -> None:
     """Warn of times (T,) of a motion's frames that are probably no seconds, with `UnitsWarning`.
 
-    Frame numbers are whole, and so are milliseconds; of frames that are seconds apart, few are
-    captured.
+    Frame numbers are whole; milliseconds are whole or far apart. Of frames that are seconds apart,
+    few are captured.
     """
-    if len(times) >= _FEWEST_TIMES and not (times % 1.0).any():
+    if len(times) < _FEWEST_TIMES:
+        return
+    are_whole = not (times % 1.0).any()
+    if are_whole or np.median(np.diff(times)) > _LONGEST_INTERVAL:
+        kind = "whole numbers" if are_whole else "far apart"
         warnings.warn(
-            f"times are whole numbers, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame "
-            "numbers or "
-            "milliseconds instead of seconds; divide frame numbers by the frame rate, milliseconds "
-            "by 1000. For frames "
-            "that are seconds apart, give smaller weights of acceleration than MotionPrior's.",
+            f"times are {kind}, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame "
+            "numbers or milliseconds instead of seconds; divide frame numbers by the frame rate, "
+            "milliseconds by 1000. For frames that are seconds apart, give smaller weights of "
+            "acceleration than MotionPrior's.",
             UnitsWarning,
             stacklevel=3,
         )
@@ -461,13 +466,13 @@ def _fault_of_intrinsics(K: Array) -> int:
 
 @kernel
 def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
-    """Return 0, or what is wrong: 1 pixels in 0..1, 2 missing at (0, 0), 3 focal length, 4
+    """Return 0, or what is wrong: 1 pixels in -1..1, 2 missing, 3 focal length, 4
     confidence, 5 principal point.
     """
     count = 0
     positive = 0
     small = 0
-    zero = 0
+    missing = 0
     wide = 0
     confidence = 0.0
     for k in range(pixels.shape[0]):
@@ -477,10 +482,10 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
             continue
         count += 1
         confidence += normalized[k, 2]
-        if 0.0 <= x <= 1.0 and 0.0 <= y <= 1.0:
+        if abs(x) <= 1.0 and abs(y) <= 1.0:
             small += 1
-        if x == 0.0 and y == 0.0:
-            zero += 1
+        if x == y and (x == 0.0 or x == -1.0):
+            missing += 1
         if x > 0.0 and y > 0.0:
             positive += 1
         if abs(normalized[k, 0]) > _WIDEST or abs(normalized[k, 1]) > _WIDEST:
@@ -489,7 +494,7 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
         return 0
     if small == count and K[0, 2] > 2.0:
         return 1
-    if 0 < zero < count:
+    if 0 < missing < count:
         return 2
     if 2 * wide > count or K[0, 2] > _WIDEST * K[0, 0] or K[1, 2] > _WIDEST * K[1, 1]:
         return 3

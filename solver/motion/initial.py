@@ -115,8 +115,8 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
 
 def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]]) -> None:
     """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
-    R_camera_world is transposed, its whole pose inverted, or its pixels are mirrored or swapped;
-    with `ScopeWarning`.
+    R_camera_world is transposed, its place replaced by t_camera_world, its whole pose inverted, or
+    its pixels are mirrored or swapped; with `ScopeWarning`.
     """
     views = next((v for v in frames if not isinstance(v, Measurements) and len(v) > 1), None)
     if views is None or any(view.measurements.keypoints2d is None for view in views):
@@ -129,14 +129,17 @@ def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]]) -> None:
     if not given > _LARGEST_ERROR:
         return
     transposed = []
+    moved = []
     inverted = []
     for view in views:
-        R = np.asarray(view.R_camera_world, dtype=float).T
+        R = np.asarray(view.R_camera_world, dtype=float)
         t = np.asarray(view.t_camera_world, dtype=float)
-        transposed.append(replace(view, R_camera_world=R))
-        inverted.append(replace(view, R_camera_world=R, t_camera_world=-R @ t))
+        transposed.append(replace(view, R_camera_world=R.T))
+        moved.append(replace(view, t_camera_world=-R @ t))
+        inverted.append(replace(view, R_camera_world=R.T, t_camera_world=-R.T @ t))
     others = {
         "transpose R_camera_world": transposed,
+        "give t_camera_world = -R_camera_world c of the camera's place c in the world": moved,
         "give R^T and -R^T t of the poses R_world_camera and t_world_camera": inverted,
     }
     for remedy, change in IMAGE_REMEDIES:

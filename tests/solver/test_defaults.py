@@ -203,6 +203,13 @@ def joints_as_keypoints():
     solver.fit(body, Measurements(keypoints3d=seen))
 
 
+def joints_in_another_order():
+    body, _, everyone = people()
+    for person in everyone[:3]:
+        seen = Keypoints3D(body.joint_names, person.joints[::-1], sigma_m=0.01)
+        solver.fit(body, Measurements(keypoints3d=seen))
+
+
 def with_pose(t):
     return fitted(Measurements(pose_priors=PosePriors([0], [np.eye(3)], [t], [1.0], [1.0])))
 
@@ -222,6 +229,7 @@ MISTAKES = {
         "add its position",
     ),
     "joints numbered as keypoints": (joints_as_keypoints, ScopeWarning, "joint i is M "),
+    "joints in the wrong order": (joints_in_another_order, ScopeWarning, "each has its own point"),
     "a floor's normal down": (on_floor(-UP, -LOWEST), ScopeWarning, "must point up"),
     "a floor's offset": (on_floor(UP, LOWEST + 5.0), ScopeWarning, "below the floor"),
     "a floor in millimetres": (on_floor(UP, 1e3 * LOWEST - 400.0), UnitsWarning, "floor lies more"),
@@ -248,11 +256,21 @@ MISTAKES = {
         UnitsWarning,
         "probably frame numbers",
     ),
-    "pixels in 0..1": (pixels(IMAGE / 1000.0), UnitsWarning, r"lie in 0\.\.1; multiply"),
+    "pixels in 0..1": (pixels(IMAGE / 1000.0), UnitsWarning, r"lie in -1\.\.1, .* by its size"),
+    "pixels in -1..1": (
+        pixels(IMAGE / INTRINSICS[:2, 2] - 1.0),
+        UnitsWarning,
+        r"lie in -1\.\.1, .* by its size",
+    ),
     "missing at (0, 0)": (
         pixels(np.where(np.arange(M)[:, None] < 2, 0.0, IMAGE)),
         ScopeWarning,
-        r"are \(0, 0\), .* confidence of 0",
+        r"are \(0, 0\) or \(-1, -1\), .* confidence of 0",
+    ),
+    "missing at (-1, -1)": (
+        pixels(np.where(np.arange(M)[:, None] < 2, -1.0, IMAGE)),
+        ScopeWarning,
+        r"are \(0, 0\) or \(-1, -1\), .* confidence of 0",
     ),
     "millimetres of focal length": (pixels(IMAGE, SENSOR), UnitsWarning, "multiply millimetres"),
     "percentages": (pixels(IMAGE, confidence=np.full(M, 90.0)), ScopeWarning, "by 100"),
@@ -314,6 +332,7 @@ CHANGES = {
     "right": (lambda R, t: (R, t), None),
     "transposed": (lambda R, t: (R.T, t), "transpose R_camera_world"),
     "inverted": (lambda R, t: (R.T, -R.T @ t), r"R\^T and -R\^T t"),
+    "the place of the camera": (lambda R, t: (R, -R.T @ t), "-R_camera_world c"),
 }
 
 

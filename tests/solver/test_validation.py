@@ -392,11 +392,18 @@ def test_bodies_that_cannot_be_used_are_refused(given, error, message):
 
 
 @pytest.mark.parametrize(
-    "times", [np.arange(5), np.arange(10.0, 15.0), np.array([0, 33, 67, 100, 133])]
+    "times",
+    [
+        np.arange(5),
+        np.arange(10.0, 15.0),
+        np.array([0, 33, 67, 100, 133]),
+        np.arange(5) * 1000.0 / 30.0,
+    ],
 )
 def test_frame_numbers_or_milliseconds_for_seconds_bring_a_warning_and_a_motion(times):
     with pytest.warns(
-        UnitsWarning, match="times are whole numbers, .* divide frame numbers by the frame rate"
+        UnitsWarning,
+        match="times are (whole numbers|far apart), .* divide frame numbers by the frame rate",
     ):
         assert len(fit_motion(BODY, [SEEN] * 5, times, priors=Priors(), options=SHORT).states) == 5
 
