@@ -169,6 +169,13 @@ SENTENCES = {
     "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
     "no_translation": "the file holds no translation: the pelvis stays in place",
     "unsure_up": "the file's up axis is not clear from the motion; {axis} was assumed",
+    "other_skeleton": "limbs have the directions of the file's skeleton, but the body keeps its "
+    "proportions; distances were multiplied by {scale:.5g}, the ratio of the legs' lengths",
+    "missing_joints": "the file has no joints for {parts:names}, which only follow the rest",
+    "no_rest_pose": "the file's rest pose is not that of a standing person, so its frame {frame} "
+    "was taken for one with level feet and hanging or spread arms; check feet, hands and head",
+    "odd_joints": "these joints of the file cannot be what their names say: {joints:names}; check "
+    "the result",
     "other_up": "{axis} points up in the file; the motion was placed on the floor by its feet",
 }
 

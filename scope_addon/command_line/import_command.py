@@ -32,7 +32,7 @@ def add_import(parser: argparse.ArgumentParser) -> None:
         "motion",
         type=path_argument,
         metavar="MOTION",
-        help="motion of Scope, AMASS, or an SMPL-based tracker: .npz, .npy, .pkl or .pt",
+        help="motion of Scope, AMASS, or an SMPL-based tracker (.npz, .npy, .pkl or .pt), or .bvh",
     )
     parser.add_argument(
         "-o",

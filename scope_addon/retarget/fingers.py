@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finding the phalanges of a rig's fingers below the known wrists: by name, else by geometry."""
+"""Finding the phalanges of a rig's fingers below the known wrists: by name, else by geometry; and
+where mapped bones end, of which hands end at the knuckles.
+"""
 
 from __future__ import annotations
 
@@ -41,6 +43,31 @@ def find_fingers(rest: RestPose, wrists: dict[str, int]) -> dict[str, str]:
                 rest.names[i]: f"{side}_{finger}{k}" for k, i in enumerate(chain[:_PHALANGES], 1)
             }
     return found
+
+
+def bone_ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> NDArray[np.float64]:
+    """Return where the bones end (B, 3), metres; hands end at the knuckles of the long fingers."""
+    row = {name: index for index, name in enumerate(rest.names)}
+    wrists = {
+        part.partition("_")[0]: row[name] for name, part in parts.items() if part.endswith("_wrist")
+    }
+    phalanges = find_fingers(rest, wrists)
+    bone_of = {part: row[name] for name, part in parts.items()}
+    forward = np.zeros(3)
+    if {"left_hip", "right_hip"} <= bone_of.keys():
+        left = rest.heads[bone_of["left_hip"]] - rest.heads[bone_of["right_hip"]]
+        forward = np.cross(left, [0.0, 0.0, 1.0])
+        forward /= max(float(np.linalg.norm(forward)), 1e-9)
+    ends = []
+    for name in names:
+        side, _, kind = parts[name].partition("_")
+        knuckles = []
+        if kind == "wrist":
+            of_part = {part: row[bone] for bone, part in phalanges.items()}
+            long = [f"{side}_{finger}1" for finger in ("middle", "index", "ring", "pinky")]
+            knuckles = [of_part[part] for part in long if part in of_part][:1]
+        ends.append(rest.end(row[name], knuckles, forward if kind == "ankle" else None))
+    return np.array(ends).reshape(-1, 3)
 
 
 def _by_name(rest: RestPose, below: list[int]) -> dict[str, list[int]]:

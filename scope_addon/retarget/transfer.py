@@ -43,7 +43,7 @@ def leg_ratio(
         part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names
     }
     parts = {part: body.joint_names.index(part) for part in rows}
-    return _leg_length(rig.heads, rows) / _leg_length(body.rest_joints(betas), parts)
+    return leg_length(rig.heads, rows) / leg_length(body.rest_joints(betas), parts)
 
 
 class Transfer:
@@ -136,7 +136,7 @@ class Transfer:
         return out
 
 
-def _leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
+def leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
     """Return the length of both legs, metres; without an ankle, the shin is taken to be as long as
     the thigh.
     """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From an SMPL-style motion in its file's axes to a motion of one of our bodies in the world, z up.
+"""From a motion of another tool in its file's axes to one of our bodies in the world, z up. Of an
+SMPL-style motion,
 
 R_world_root = R_world_file R_file_root,   pelvis_world = R_world_file (J_0(β) + trans)
 """
@@ -26,8 +27,10 @@ from ..kinematics.standing import standing_probability
 from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
 from ..notices import Notice, notice
 from ..untrusted.body_file import load_body
+from ..untrusted.bvh_file import read_bvh
 from ..untrusted.files import npz_keys
-from .layouts import SmplMotion, read_smpl_motions
+from .layouts import HAND_JOINTS, SmplMotion, read_smpl_motions
+from .performer import find_performers
 
 DEFAULT_RATE = 30.0  # frames per second
 # by the axis that points up
@@ -49,8 +52,8 @@ class Imported:
 def import_motions(
     path: Path, body: str = "scope", up: str = "auto", rate: float = 0.0
 ) -> list[Imported]:
-    """Read a motion file: our own, or an SMPL-style one of another tool, which may be of several
-    people, each on the same body.
+    """Read a motion file: our own, a BVH file, or an SMPL-style one of another tool, which may be
+    of several people, each on the same body.
 
     :param body: ``scope``, the built-in body, with fingers if the motion has them; ``scope_h``; or
         a body's file.
@@ -70,6 +73,8 @@ def import_motions(
         chosen = own.body_model if body == "scope" else body
         if body != "scope" or chosen in BUILT_IN:
             return [_own(own, load_body(chosen), path)]
+    if path.suffix.lower() == ".bvh":
+        return _from_bvh(path, body, up)
     sources = read_smpl_motions(path)
     built_in = (
         sources[0].body_model
@@ -100,6 +105,26 @@ def _own(motion: Motion, body: Body, path: Path) -> Imported:
             f"{path}: its frame rate or timestamps cannot be used; choose another file"
         )
     return Imported(motion, body)
+
+
+def _from_bvh(path: Path, body: str, up: str) -> list[Imported]:
+    """Put the people of a BVH file on a body; each stands on the floor."""
+    performers = find_performers(read_bvh(path, MotionFileError), path, up)
+    fingers = {*HAND_JOINTS["left"], *HAND_JOINTS["right"]}
+    has_fingers = any(fingers.intersection(each.parts.values()) for each in performers)
+    built_in = "scope_h" if has_fingers else "scope"
+    loaded = load_body(built_in if body == "scope" else body)
+    betas = np.zeros(loaded.P)
+    found = []
+    for performer in performers:
+        poses, root, notes = performer.on_body(loaded, path)
+        rate = performer.file.rate
+        contact, floor = _standing(loaded, betas, poses, root, np.arange(len(root)) / rate)
+        trans = root - [0.0, 0.0, floor] - loaded.rest_joints(betas)[0]
+        motion = _motion(loaded, betas, poses, trans, contact, rate)
+        motion.source = path.name
+        found.append(Imported(motion, loaded, notes))
+    return found
 
 
 def convert(

@@ -32,7 +32,7 @@ MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
 _MAX_BETAS = 400
 _LARGEST_RATE = 10_000.0
 _ORTHONORMAL = 0.01  # largest deviation of RᵀR from the identity
-_FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
+FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
 
 # Names of one thing in the files of different tools, in the order in which they are preferred.
 _ALL_JOINTS = (
@@ -191,7 +191,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         position = position / (
             _positive(arrays, _SCALE, "a positive number", float(np.finfo(float).max), path) or 1.0
         )
-        if np.abs(position).max() > _FARTHEST_M:
+        if np.abs(position).max() > FARTHEST_M:
             raise MotionFileError(
                 f"{path}: {trans} is {np.abs(position).max():.3g} m from the origin; it must be in "
                 "metres"

@@ -29,7 +29,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
     """Import captured motions of Scope"""
 
     bl_description = (
-        "Import captured motions of Scope, AMASS or other tools that use SMPL's joints, as "
+        "Import captured motions of Scope, of tools that use SMPL's joints, and of BVH files, as "
         "animated bodies"
     )
     bl_idname = "scope.import_motion"
@@ -41,7 +41,9 @@ class SCOPE_OT_import_motion(ReportingOperator):
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"}
     )
-    filter_glob: StringProperty(default="*.npz;*.npy;*.pkl;*.pt", options={"HIDDEN", "SKIP_SAVE"})
+    filter_glob: StringProperty(
+        default="*.npz;*.npy;*.pkl;*.pt;*.bvh", options={"HIDDEN", "SKIP_SAVE"}
+    )
     up_axis: blender_property(option("up_axis"), {})
     motion_rate: blender_property(option("motion_rate"), {})
     body: blender_property(option("body"), {})
@@ -171,7 +173,7 @@ def _footage_beside(path: Path, source: str) -> Path | None:
 
 
 def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(SCOPE_OT_import_motion.bl_idname, text="Scope or SMPL Motion (.npz)")
+    menu.layout.operator(SCOPE_OT_import_motion.bl_idname, text="Scope, SMPL or BVH Motion")
 
 
 def attach() -> None:

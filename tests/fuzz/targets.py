@@ -263,6 +263,26 @@ def _smpl_motions(folder: Path) -> list[bytes]:
     return seeds
 
 
+def _skeleton_motions(folder: Path) -> list[bytes]:
+    """Return a BVH file of two frames: a pelvis with two legs and a head."""
+    rotation = "CHANNELS 3 Zrotation Xrotation Yrotation"
+    legs = "".join(
+        f"JOINT {side}Hip {{ OFFSET {x} 0 0 {rotation} "
+        f"JOINT {side}Knee {{ OFFSET 0 -4 0 {rotation} "
+        f"JOINT {side}Ankle {{ OFFSET 0 -4 0 {rotation} End Site {{ OFFSET 0 0 1 }} }} }} }}\n"
+        for side, x in (("Left", 1), ("Right", -1))
+    )
+    head = f"JOINT Head {{ OFFSET 0 6 0 {rotation} End Site {{ OFFSET 0 2 0 }} }}\n"
+    position = "Xposition Yposition Zposition"
+    root = f"ROOT Hips {{ OFFSET 0 0 0 {rotation.replace('3', '6 ' + position)}\n"
+    frames = "\n".join(" ".join(["1.5"] * 27) for _ in range(2))
+    seed = f"HIERARCHY\n{root}{legs}{head}}}\nMOTION\nFrames: 2\nFrame Time: 0.033\n{frames}\n"
+    path = folder / "seed.bvh"
+    path.write_text(seed)
+    _import_smpl_motion(path)
+    return [seed.encode()]
+
+
 def npz(arrays: dict[str, Any]) -> bytes:
     """Return the content of a .npz file."""
     out = io.BytesIO()
@@ -333,6 +353,7 @@ TARGETS = {
     "pickle": Target(_load_body, (".pkl",), _pickled_bodies),
     "motion": Target(_load_motion, (".npz",), _motions),
     "smpl_motion": Target(_import_smpl_motion, (".npz",), _smpl_motions),
+    "bvh": Target(_import_smpl_motion, (".bvh",), _skeleton_motions),
     "calibration": Target(_read_calibration, (".json",), _calibrations),
     "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
     "network": Target(_check_network, (".onnx",), _networks),

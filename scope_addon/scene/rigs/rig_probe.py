@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ....solver.errors import InputError
 from ...notices import Notice, notice
 from ...retarget.bone_map import PHALANGES, check_bone_count
-from ...retarget.fingers import find_fingers
+from ...retarget.fingers import bone_ends
 from ...retarget.rest_pose import RestPose
 from ...retarget.skeleton import Skeleton
 from ..character.root_object import root_object, topmost
@@ -74,7 +74,7 @@ def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
         parents,
         carriers,
         matrices[:, :3, 3],
-        _ends(whole, ordered, parts),
+        bone_ends(whole, ordered, parts),
         _rotations(matrices),
         _floor(rig, whole, parts),
     )
@@ -107,31 +107,6 @@ def _check_carried(
                 f"they cannot be {part.replace('_', ' ')} and {above.replace('_', ' ')}; choose "
                 "other bones in the bone map"
             )
-
-
-def _ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> NDArray[np.float64]:
-    """Return where the bones end (B, 3), metres; hands end at the knuckles of the long fingers."""
-    row = {name: index for index, name in enumerate(rest.names)}
-    wrists = {
-        part.partition("_")[0]: row[name] for name, part in parts.items() if part.endswith("_wrist")
-    }
-    phalanges = find_fingers(rest, wrists)
-    bone_of = {part: row[name] for name, part in parts.items()}
-    forward = np.zeros(3)
-    if {"left_hip", "right_hip"} <= bone_of.keys():
-        left = rest.heads[bone_of["left_hip"]] - rest.heads[bone_of["right_hip"]]
-        forward = np.cross(left, [0.0, 0.0, 1.0])
-        forward /= max(float(np.linalg.norm(forward)), 1e-9)
-    ends = []
-    for name in names:
-        side, _, kind = parts[name].partition("_")
-        knuckles = []
-        if kind == "wrist":
-            of_part = {part: row[bone] for bone, part in phalanges.items()}
-            long = [f"{side}_{finger}1" for finger in ("middle", "index", "ring", "pinky")]
-            knuckles = [of_part[part] for part in long if part in of_part][:1]
-        ends.append(rest.end(row[name], knuckles, forward if kind == "ankle" else None))
-    return np.array(ends).reshape(-1, 3)
 
 
 def _dependencies(
