@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _PIECE = 1 << 23  # bytes of an archive that are written at once, at least
+# What says that a file system never syncs or has no permissions, as some of networks, cameras'
+# cards and user space: no reason to write nothing. Windows lacks some of these numbers.
+_UNSUPPORTED = (errno.EINVAL, errno.ENOSYS, errno.EPERM, errno.EOPNOTSUPP)
 
 
 @contextmanager
@@ -68,8 +71,9 @@ def complete_file(target: Path, durable: bool = True, mode: int | None = None) -
             # The lock's name first: btrfs would write the content alone, which nobody would remove.
             sync_folder(target.parent)
             _sync(temporary)
-        # A library may have replaced the file by one of its own.
-        os.chmod(temporary, of_new_files if mode is None else mode)
+        with _where_supported():
+            # A library may have replaced the file by one of its own.
+            os.chmod(temporary, of_new_files if mode is None else mode)
         if durable:
             replace_durably(temporary, target)
         else:
@@ -113,9 +117,28 @@ def _sync(path: Path) -> None:
     # Windows syncs only what is open for writing.
     handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
     try:
-        os.fsync(handle)
+        sync_open_file(handle)
     finally:
         os.close(handle)
+
+
+def sync_open_file(handle: int) -> None:
+    """Wait until the content of an open file is on the disk, where the file system can.
+
+    :raises OSError: the disk refuses the content.
+    """
+    with _where_supported():
+        os.fsync(handle)
+
+
+@contextmanager
+def _where_supported() -> Iterator[None]:
+    """Go on where a file system does not know what is asked of it."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _UNSUPPORTED:
+            raise
 
 
 def replace_durably(source: Path, target: Path) -> None:
@@ -230,6 +253,16 @@ def reason(error: OSError) -> str:
     """Describe why a file could not be written, and what to do."""
     if error.errno == errno.ENAMETOOLONG:
         return f"{error.strerror}; choose a shorter name"
-    if error.errno == errno.ENOENT:
+    if error.errno == errno.ENOENT and not _is_in_folder(error.filename):
         return "its folder does not exist; create it or choose another"
+    if error.errno in (errno.ENOENT, errno.EINVAL, errno.EILSEQ):
+        return (
+            f"{error.strerror}; if the disk has no such names, choose one without signs such as "
+            ": ? * and without a dot at its end, or choose another folder"
+        )
     return f"{error.strerror or error}; free some space or choose another folder"
+
+
+def _is_in_folder(path: object) -> bool:
+    """Return whether the folder of a path, as an error has it, exists."""
+    return isinstance(path, str) and os.path.isdir(os.path.dirname(path) or os.curdir)

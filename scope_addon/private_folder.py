@@ -41,6 +41,7 @@ def lasting_folder() -> Path | None:
 
 def is_private(folder: Path) -> bool:
     """Return whether a folder, no link, is the user's own; take away what access others have to it.
+    Some disks, such as cameras' cards, have no permissions, and leave it to them.
 
     :raises OSError: it does not exist, or access cannot be changed.
     """
@@ -51,9 +52,14 @@ def is_private(folder: Path) -> bool:
         return True
     if status.st_uid != os.geteuid():
         return False
-    if stat.S_IMODE(status.st_mode) & 0o077:
+    if _is_open_to_others(status):
         folder.chmod(0o700)
+        return not _is_open_to_others(folder.lstat())
     return True
+
+
+def _is_open_to_others(status: os.stat_result) -> bool:
+    return bool(stat.S_IMODE(status.st_mode) & 0o077)
 
 
 def _caches() -> Path:

@@ -6,12 +6,14 @@ of the system. However that process ends, the system releases the lock; so what 
 abandoned, and whoever comes next removes it. Names of computers, numbers of processes and times do
 not say that: containers share names and numbers, and clocks differ.
 
-Where a file system has no locks, nothing is taken for abandoned. Blender loads this when it starts,
-so that what only removing needs is imported where it is used.
+Where a file system has no locks, or gives a file a new number each time it is asked, nothing is
+taken for abandoned. Blender loads this when it starts, so that what only removing needs is imported
+where it is used.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
@@ -28,6 +30,8 @@ _READ_WRITE = os.O_RDWR | getattr(os, "O_BINARY", 0)
 _UNTRUSTED = _READ_WRITE | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 # By which Blender and Python find the system's temporary folder.
 TEMPORARY_VARIABLES = ("TMPDIR", "TEMP", "TMP")
+# Names that `claim` tries, where others take them for abandoned: the last one is used in any case.
+_MOST_NAMES = 20
 _locks: dict[Path, int] = {}  # open files, by the names that this process holds
 
 
@@ -41,16 +45,19 @@ def claim(folder: Path, start: str = "", suffix: str = "") -> Path:
     :raises OSError: the folder cannot be written to.
     """
     remove_abandoned(folder)
-    while True:
+    for left in reversed(range(_MOST_NAMES)):
         name = f"{start}scope-{os.urandom(8).hex()}"
         lock = folder / f"{name}-lock"
         handle = os.open(lock, _READ_WRITE | os.O_CREAT | os.O_EXCL, _LOCK_MODE)
-        # Before it was locked, another process may have taken it for abandoned.
-        if _try_lock(handle) is not False and _is_name_of(lock, handle):
+        # Before it was locked, another process may have taken it for abandoned, and removed it.
+        # Nobody else makes a file of this name.
+        is_held = _try_lock(handle) is not False and os.path.lexists(lock)
+        if is_held or not left:
             path = folder / f"{name}{suffix}"
             _locks[path] = handle
             return path
-        os.close(handle)
+        _remove_lock(lock, handle)
+    raise AssertionError("the last name is used")
 
 
 def discard(path: Path) -> None:
@@ -65,10 +72,7 @@ def discard(path: Path) -> None:
     if found is None:
         remove(path)
         return
-    name = found[0]
-    _remove_all(path.parent, name)
-    handle = _locks.pop(path, None)
-    _remove_lock(path.parent / f"{name}-lock", handle)
+    _remove_all(path.parent, found[0], _locks.pop(path, None))
 
 
 def discard_all() -> None:
@@ -84,11 +88,9 @@ def remove_abandoned(folder: Path) -> None:
             found = _LOCK_NAME.fullmatch(name)
             if found is None:
                 continue
-            lock = folder / name
-            handle = _open_if_free(lock)
+            handle = _open_if_free(folder / name)
             if handle is not None:
-                _remove_all(folder, found["name"])
-                _remove_lock(lock, handle)
+                _remove_all(folder, found["name"], handle)
 
 
 @contextmanager
@@ -139,9 +141,16 @@ def hold(lock: Path) -> bool:
     :return: False if another process holds it, or it is no file of this user's own.
     :raises OSError: the file cannot be made, or the file system has no locks.
     """
+    is_new = False
     with suppress(FileExistsError):
         os.close(os.open(lock, _READ_WRITE | os.O_CREAT | os.O_EXCL, _LOCK_MODE))
-    handle = _open_if_free(lock)
+        is_new = True
+    try:
+        handle = _open_if_free(lock)
+    except OSError:
+        if is_new:
+            remove(lock)
+        raise
     if handle is None:
         return False
     _locks[lock] = handle
@@ -156,11 +165,12 @@ def release(lock: Path) -> None:
 
 def is_abandoned(lock: Path) -> bool:
     """Return whether a lock that `hold` has taken is there, and its process has ended."""
-    handle = _open_if_free(lock)
-    if handle is None:
-        return False
-    os.close(handle)
-    return True
+    with suppress(OSError):
+        handle = _open_if_free(lock)
+        if handle is not None:
+            os.close(handle)
+            return True
+    return False
 
 
 def sync_folder(folder: Path) -> None:
@@ -222,16 +232,29 @@ def own_entries(folder: Path, own_name: re.Pattern[str]) -> list[Path]:
     return found
 
 
-def _remove_all(folder: Path, name: str) -> None:
-    """Remove what has this name, with whatever suffix, and leave its lock."""
+def _remove_all(folder: Path, name: str, handle: int | None) -> None:
+    """Remove what has this name, with whatever suffix, and its lock as the last.
+
+    Where something stays, as in a network the folder of a file that is still open, so does the
+    lock, free, and whoever comes next tries again.
+
+    :param handle: open file that holds the lock; None: no process does.
+    """
+    lock = folder / f"{name}-lock"
+    is_empty = True
     with suppress(OSError):
         for found in os.listdir(folder):
-            if found.startswith(name) and found != f"{name}-lock":
+            if found.startswith(name) and found != lock.name:
                 remove(folder / found)
+                is_empty = is_empty and not os.path.lexists(folder / found)
+    if is_empty:
+        _remove_lock(lock, handle)
+    elif handle is not None:
+        os.close(handle)
 
 
 def _remove_lock(lock: Path, handle: int | None) -> None:
-    """Remove a lock, as the last of what it protects.
+    """Remove a lock.
 
     :param handle: open file that holds it; None: no process does.
     """
@@ -244,18 +267,23 @@ def _remove_lock(lock: Path, handle: int | None) -> None:
 
 
 def _open_if_free(lock: Path) -> int | None:
-    """Open and lock a file; None if a process holds it, or it is not what `claim` makes."""
+    """Open and lock a file; None if a process holds it, or it is not what `claim` makes.
+
+    :raises OSError: the file system has no locks.
+    """
     try:
         if not _is_lock(lock.lstat()):  # opening a device may do something
             return None
         handle = os.open(lock, _UNTRUSTED)
     except OSError:
         return None
-    with suppress(OSError):
-        if _is_lock(os.fstat(handle)) and _try_lock(handle) and _is_name_of(lock, handle):
-            return handle
-    os.close(handle)
-    return None
+    is_locked = False
+    try:
+        is_locked = _is_lock(os.fstat(handle)) and _is_locked_by_us(lock, handle)
+    finally:
+        if not is_locked:
+            os.close(handle)
+    return handle if is_locked else None
 
 
 def _is_lock(status: os.stat_result) -> bool:
@@ -267,11 +295,17 @@ def _is_own(status: os.stat_result) -> bool:
     return not hasattr(os, "geteuid") or status.st_uid == os.geteuid()
 
 
-def _is_name_of(path: Path, handle: int) -> bool:
-    """Return whether an open file still has that name."""
+def _is_locked_by_us(lock: Path, handle: int) -> bool:
+    """Lock an open file, and return whether this process has the lock of that name now.
+
+    :raises OSError: the file system has no locks.
+    """
+    is_free = _try_lock(handle)
+    if is_free is None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
     try:
-        return os.path.samestat(path.lstat(), os.fstat(handle))
-    except OSError:
+        return is_free and os.path.samestat(lock.lstat(), os.fstat(handle))
+    except OSError:  # another process has removed it
         return False
 
 
@@ -288,8 +322,10 @@ def _try_lock(handle: int) -> bool | None:
             import fcntl
 
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError):
+    except BlockingIOError:
         return False
+    except PermissionError:  # so Windows says that it is held, and others that they lock nothing
+        return False if sys.platform == "win32" else None
     except OSError:
         return None
     return True

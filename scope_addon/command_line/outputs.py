@@ -106,17 +106,32 @@ def refuse_inputs(paths: Iterable[Path], inputs: Iterable[Path]) -> None:
     :param inputs: existing files.
     :raises UsageError: a path is one of the inputs.
     """
-    read = {}
+    read: set[tuple[object, ...]] = set()
     for each in inputs:
-        status = each.stat()
-        read[status.st_dev, status.st_ino] = each
+        read.update(_identities(each))
     for path in paths:
         try:
-            status = path.stat()
+            written = _identities(path)
         except OSError:
             continue  # it does not exist yet
-        if (status.st_dev, status.st_ino) in read:
+        if read.intersection(written):
             raise UsageError(f"{path} is the input itself; choose another name")
+
+
+def _identities(path: Path) -> list[tuple[object, ...]]:
+    """Return what two paths of a file have in common.
+
+    A disk may take capital and small letters for the same, and give the file a number for each way
+    of writing its name, as exFAT does in user space: then size, time and letters are the same.
+
+    :raises OSError: there is no such file.
+    """
+    status = path.stat()
+    name = os.path.realpath(path).casefold()
+    return [
+        (status.st_dev, status.st_ino),
+        (status.st_dev, name, status.st_size, status.st_mtime_ns),
+    ]
 
 
 def check_outputs(

@@ -12,7 +12,6 @@ import hashlib
 import json
 import os
 import re
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -142,10 +141,14 @@ def _remove_old(own: Path) -> None:
         if is_ours and not lock.with_suffix("").exists() and is_abandoned(lock):
             remove(lock)
     found = []
+    with suppress(OSError):  # its time stays that at which it was made
+        os.utime(_lock_of(own))
     for folder in own_entries(own.parent, _FOLDER_NAME):
         with suppress(OSError):
+            # A server's clock may be another one than ours.
+            now_s = _lock_of(own).stat().st_mtime
             size, changed_s = _size_and_time(folder)
-            found.append((time.time() - changed_s, size, folder))
+            found.append((now_s - changed_s, size, folder))
     total = 0
     for age_s, size, folder in sorted(found):
         total += size

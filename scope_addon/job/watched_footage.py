@@ -31,6 +31,7 @@ class WatchedFootage:
         self._path = path
         self._rate_given = rate_given
         self._states = {file: state_of(file) for file in self._files()}
+        self._contents: dict[Path, bytes] = {}  # once they are asked for
         self._grows = self._ends()
         self._looked_s = time.monotonic()
 
@@ -40,10 +41,10 @@ class WatchedFootage:
         :raises OSError: one cannot be read.
         """
         digest = hashlib.sha256()
-        most_bytes = max(_LEAST_BYTES, _MOST_BYTES // max(1, len(self._states)))
         for file in self._states:
+            self._contents[file] = self._content_of(file)
             digest.update(repr(file.name).encode())
-            add_content(digest, file, most_bytes)
+            digest.update(self._contents[file])
         return digest.hexdigest()
 
     def check(self) -> None:
@@ -54,7 +55,7 @@ class WatchedFootage:
         """
         self._looked_s = time.monotonic()
         files = self._files()
-        changed = [file for file in files if state_of(file) != self._states.get(file)]
+        changed = [file for file in files if not self._is_as_it_was(file)]
         if self._has_grown():
             return
         if changed or len(files) != len(self._states):
@@ -63,6 +64,30 @@ class WatchedFootage:
                 f"{which} was changed while it was read, so the results would mix both; "
                 "capture again"
             )
+
+    def _content_of(self, file: Path) -> bytes:
+        digest = hashlib.sha256()
+        add_content(digest, file, max(_LEAST_BYTES, _MOST_BYTES // max(1, len(self._states))))
+        return digest.digest()
+
+    def _is_as_it_was(self, file: Path) -> bool:
+        """Return whether a file's state is that of the beginning, or differs in the number alone
+        that the file system gives it, and the content is the same: some file systems of networks
+        and of user space give a file another number after a while.
+        """
+        before = self._states.get(file, ())
+        now = state_of(file)
+        if now == before:
+            return True
+        if now[2:] != before[2:] or file not in self._contents:
+            return False
+        try:
+            is_same = self._content_of(file) == self._contents[file]
+        except OSError:
+            return False
+        if is_same:
+            self._states[file] = now
+        return is_same
 
     def watched(self, progress: Callable[..., None], to_end: bool = False) -> Callable[..., None]:
         """Return a function that reports progress, and looks at the files from time to time.

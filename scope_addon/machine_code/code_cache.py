@@ -19,6 +19,7 @@ it can run anything as the user.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import inspect
 import logging
@@ -223,6 +224,9 @@ def write_code(path: Path, key: str, payload: bytes) -> None:
     # read again.
     with complete_file(path, durable=False, mode=0o644) as temporary:
         temporary.write_bytes(_header(key, payload) + payload)
+    if not _only_ours(path.stat()):
+        remove(path)
+        raise PermissionError(errno.EACCES, "others can write to files there")
 
 
 def _header(key: str, payload: bytes) -> bytes:

@@ -17,7 +17,6 @@ import hashlib
 import os
 import re
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -98,11 +97,14 @@ class Area:
     def remove_stale(self, folder: Path) -> None:
         """Remove what lies beside the folder of an area, is of another program, and has not been
         used for long.
+
+        :param folder: has just been used, so that its time is that of the file system's own clock.
         """
         area = re.escape(folder.name[: -len(self._program)])
         for other in own_entries(folder.parent, re.compile(f"{area}[0-9a-f]{{12}}")):
             with suppress(OSError):  # another process has removed it
-                if other != folder and time.time() - other.stat().st_mtime > _STALE_S:
+                unused_s = folder.stat().st_mtime - other.stat().st_mtime
+                if other != folder and unused_s > _STALE_S:
                     remove(other)
 
     def _folder_name(self, processor: str) -> str:

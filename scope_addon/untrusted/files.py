@@ -27,8 +27,10 @@ from ...solver.errors import InputError, ModelFileError
 _LONGEST = 200  # characters
 
 
-def in_one_line(cause: Exception) -> str:
-    """Return what another library said, for a message: one line of moderate length."""
+def in_one_line(cause: object) -> str:
+    """Return what another library said, or a file has, for a message: one line of moderate
+    length.
+    """
     return " ".join(str(cause).split())[:_LONGEST]
 
 

@@ -389,7 +389,7 @@ class _BodyUnpickler(pickle._Unpickler):
             )
         found = stand_in(f"{module}.{name}")
         if found is None:
-            shown = f"{module:.80}.{name:.80}"
+            shown = in_one_line(f"{module:.80}.{name:.80}")
             raise ModelFileError(
                 f"it asks for {shown}, which such a file has no use for and which may be an attack"
             )

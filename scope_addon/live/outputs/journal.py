@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import queue
 import threading
 import time
@@ -29,7 +28,7 @@ import numpy as np
 
 from ....solver import Body
 from ....solver.errors import InputError
-from ...atomic_write import create_new, reason
+from ...atomic_write import create_new, reason, sync_open_file
 from ...errors import OutputError, UsageError
 from ...options.live import MAX_PEOPLE
 from ...private_folder import lasting_folder
@@ -128,7 +127,7 @@ class Journal:
             try:
                 self._file.write(self._packed(record))
                 if time.monotonic() - synced_s > _SYNC_S:
-                    os.fsync(self._file.fileno())
+                    sync_open_file(self._file.fileno())
                     synced_s = time.monotonic()
             except OSError as error:
                 self._go_on_elsewhere(error)
