@@ -50,8 +50,15 @@ FORMATS = (
         "For OpenSim: joint angles of the captured motion before any editing, one file per person",
         6,
     ),
+    (
+        "C3D",
+        "C3D",
+        "For Visual3D, Mokka and other biomechanics: markers of the captured motion before any "
+        "editing, one file per person",
+        7,
+    ),
 )
-_OF_MOTION = ("NPZ", "TRC", "MOT")  # formats that hold the captured motion, not the scene's
+_OF_MOTION = ("NPZ", "TRC", "MOT", "C3D")  # formats that hold the captured motion, not the scene's
 _NO_USD = "This Blender was built without USD; use a build from blender.org, or another format"
 _SUFFIX = {key: f".{key.lower()}" for key, *_ in FORMATS}
 

@@ -34,6 +34,7 @@ UNTRANSLATED = {
     "NPZ",
     "TRC",
     "MOT",
+    "C3D",
     "CPU",
     "CUDA",
     "TensorRT",

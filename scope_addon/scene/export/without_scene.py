@@ -3,7 +3,8 @@
 
 Track row column files (.trc) of Motion Analysis, which OpenSim and Pose2Sim read, hold markers over
 time, in metres, with OpenSim's axes. Markers are joint centres of the body, and points on its
-surface, under the names that Pose2Sim has for them.
+surface, under the names that Pose2Sim has for them. Files of the C3D format (.c3d) hold the same
+markers in millimetres, z up, with the deviations of their joints as residuals.
 
 Motion files (.mot) of OpenSim, and tables (.csv), hold joint angles over time, under the names of
 the coordinates of OpenSim's full-body model (Rajagopal 2015). Each segment has axes that, where a
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 from ...atomic_write import write_result
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
+from .c3d import c3d_bytes
 from .output_paths import person_paths
 
 if TYPE_CHECKING:
@@ -62,6 +64,8 @@ def write_without_scene(
         suffix = path.suffix.lower()
         if suffix == ".trc":
             write_trc(target, motion, body)
+        elif suffix == ".c3d":
+            write_c3d(target, motion, body)
         elif suffix in (".mot", ".csv"):
             write_angles(target, motion, body)
         else:
@@ -100,7 +104,7 @@ def trc_text(name: str, motion: Motion, body: Body) -> str:
 
     :param name: of the file, which stands in it.
     """
-    names, markers = world_markers(motion, body)
+    names, markers, _ = world_markers(motion, body)
     rate = motion.mocap_framerate
     columns = (markers @ R_OPENSIM_WORLD.T).reshape(len(motion), -1).T
     times_s, rows = at_one_rate(motion, list(columns))
@@ -120,8 +124,30 @@ def trc_text(name: str, motion: Motion, body: Body) -> str:
     return "\n".join(lines) + "\n"
 
 
-def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.float64]]:
-    """Return the names of the M markers, and where they are (T, M, 3), world, metres."""
+def write_c3d(path: Path, motion: Motion, body: Body) -> None:
+    """Write the markers of a motion; they are missing where the person was not seen.
+
+    :param body: that the motion was fitted with.
+    :raises OutputError: the file cannot be written.
+    """
+    names, markers, joints = world_markers(motion, body)
+    deviations = motion.joint_sigma_m
+    if deviations is None:
+        deviations = np.full((len(motion), len(body.joint_names)), np.nan)
+    columns = [*markers.reshape(len(motion), -1).T, *np.asarray(deviations, float)[:, joints].T]
+    _, rows = at_one_rate(motion, [*columns, motion.valid.astype(float)])
+    places, residuals, is_seen = np.split(rows, [3 * len(names), rows.shape[1] - 1], axis=1)
+    # A moment between a frame with the person and one without has none.
+    residuals_mm = np.where(is_seen > 1.0 - 1e-6, 1000.0 * residuals, -1.0)
+    parts = [body.joint_names[joint].replace("_", " ") for joint in joints]
+    points_mm = 1000.0 * places.reshape(len(rows), len(names), 3)
+    write_result(path, c3d_bytes(names, parts, points_mm, residuals_mm, motion.mocap_framerate))
+
+
+def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.float64], list[int]]:
+    """Return the names of the M markers, where they are (T, M, 3), world, metres, and the joint
+    that moves each.
+    """
     from ....solver import rotations  # Loads numba, and the command line starts without it.
 
     betas = np.asarray(motion.betas, float)
@@ -146,10 +172,11 @@ def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.flo
     between = joints[:, hips].mean(axis=1, keepdims=True)
     neck = joints[:, [body.joint_names.index("neck")]]
     names = ["Hip", "Neck", *of_joints, *of_keypoints]
+    moving = [hips[0], body.joint_names.index("neck"), *at, *body.keypoint_part[which].tolist()]
     markers: NDArray[np.float64] = np.concatenate(
         [between, neck, joints[:, at], on_surface], axis=1
     )
-    return names, markers
+    return names, markers, moving
 
 
 def write_angles(path: Path, motion: Motion, body: Body) -> None:

@@ -210,7 +210,7 @@ class Steps(FileSteps):
             },
             "export": {
                 "filepath": str(folder / "made"),
-                "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT")),
+                "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT", "C3D")),
                 "which": chance.choice(("ALL", "ALL", "ALL", "ACTIVE", "RIG")),
             },
             "loop": {"start": 1, "end": 60, "shortest": 0.5, "movement": 0.0},
