@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..scope_addon.expression_names import EXPRESSIONS
 from ..scope_addon.motion import Motion
-from ..scope_addon.scene.animation_data.actions import Channels
+from ..scope_addon.scene.actions import Channels
 from ..scope_addon.scene.build import BuildOptions, build_scene
 from ..scope_addon.scene.character.animation import animate_armature
 from ..scope_addon.scene.character.armature import build_armature, rest_pose

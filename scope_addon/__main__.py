@@ -12,7 +12,7 @@ import os
 import signal
 from types import FrameType
 
-from .command_line.address_space import address_space_limit
+from .command_line.memory_limit import address_space_limit
 from .command_line.signals import stopping_signals
 
 # bytes of address space; with less, numpy may load in part, and hang or fail later

@@ -4,7 +4,8 @@ the values in it are written.
 
 A part of Scope that warns returns a ``Notice``, made by ``notice("cuts", footage=..., times=...)``.
 Whoever shows it writes the sentence: ``str`` in English, ``text`` in another language, ``parts``
-with the times in the footage apart. Standard library only.
+with the times in the footage apart. ``counted`` is for messages in English alone. Standard library
+only.
 """
 
 from __future__ import annotations
@@ -340,3 +341,12 @@ def _times(times_s: list[float], translate: Translate) -> list[str | TimeText]:
     for index, time in enumerate(listed[1:], 2):
         written += [f" {translate(AND)} " if index == len(listed) else ", ", time]
     return written
+
+
+def counted(count: int, noun: str, nouns: str = "") -> str:
+    """Return a number with its noun: ``1 frame``, ``2 frames``, ``0 people``.
+
+    :param noun: for 1.
+    :param nouns: for every other number; if empty, ``noun`` and an s.
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {nouns or noun + 's'}"

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.command_line.live_command import _summary
-from scope.scope_addon.counts import counted
 from scope.scope_addon.errors import lacks_memory, system_error_message
+from scope.scope_addon.notices import counted
 
 from .fuzz.system_calls import AVAILABLE, NO_MEMORY, traced
 

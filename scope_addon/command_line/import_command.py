@@ -9,8 +9,8 @@ from typing import Any
 
 from ...solver.smpl_family import SKELETONS
 from ..capture_report import warnings_as_json
-from ..counts import counted
 from ..footage import display_text
+from ..notices import counted
 from ..options import Place
 from ..scene.export.output_paths import SUFFIXES
 from .arguments import add_options, path_argument, values_in_range

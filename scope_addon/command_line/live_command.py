@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...solver.errors import ScopeError
-from ..counts import counted
 from ..errors import NoPersonError, UsageError, system_error_message
 from ..installed import CAPTURE, check_installed, check_live
+from ..notices import counted
 from ..options import Place
 from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths

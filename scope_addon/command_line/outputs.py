@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 from ...solver.body import Body
 from ...solver.body_file import ASSETS
 from ..confinement import confine_capture, folders_of
-from ..counts import counted
 from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
-from ..notices import Notice
+from ..notices import Notice, counted
 from ..options import option
 from ..scene.export.output_paths import WITHOUT_SCENE, check_output
 from ..scene.export.without_scene import write_without_scene

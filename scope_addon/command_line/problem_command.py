@@ -22,10 +22,10 @@ from ..atomic_write import write_result
 from ..capture_report import Report
 from ..confinement import limits_files
 from ..footage import json_text
+from ..installed import machine, versions
 from ..json_file import read_json_object
 from ..notices import PHRASES, SENTENCES
 from ..options import option
-from ..report.machine import machine, versions
 from ..scene.export.output_paths import check_output
 from .arguments import path_argument
 from .outputs import refuse_inputs

@@ -22,7 +22,7 @@ from ..kinematics.smoothing import (
 )
 from ..motion import Motion
 from .clip import Clip, clip_from_motion, interpolate_rotations
-from .pins.corrected_motion import before_smoothing, corrected
+from .corrected_motion import before_smoothing, corrected
 
 # How far both ends are continued, per unit of strength beyond the finished motion: four standard
 # deviations of the slower filter.

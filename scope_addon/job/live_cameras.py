@@ -24,9 +24,9 @@ from typing import Any
 from ..errors import UsageError, VideoError
 from ..live.sources.system_cameras import camera_names, camera_with_modes, described
 from ..temporary import temporary_folder
-from .live_request import FormatsRequest
 from .messages import WARM_UP_FIELDS, Fields, WorkerFailedError
 from .process import START_SCRIPT, WorkerProcess
+from .request import FormatsRequest
 
 NAMES = Path("/sys/class/video4linux")
 DEVICES = Path("/dev")

@@ -20,7 +20,7 @@ from ..live.run import Listeners, LiveOptions, LiveProgress, run_live
 from ..live.sources import Picture, Source, open_source
 from ..notices import OTHER, Notice, notice
 from .cache import recordings_of
-from .live_request import Commands, LiveRequest
+from .request import Commands, LiveRequest
 
 if TYPE_CHECKING:
     from ...solver import Body
@@ -38,7 +38,7 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the
         recording.
     """
-    from ..live.clock import Clock
+    from ..live.sources.source import Clock
     from ..untrusted.body_file import load_body
 
     chosen = request.values

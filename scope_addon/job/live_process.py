@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..options.live import MAX_PEOPLE
-from .live_request import RECORD, STOP, LiveRequest
 from .messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
 from .process import START_SCRIPT, WorkerProcess
+from .request import RECORD, STOP, LiveRequest
 
 PRESENCES = ("seen", "held", "lost")
 _POSE = re.compile(rb'\{"event": "pose", "person": (\d),')

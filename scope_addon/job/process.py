@@ -14,7 +14,6 @@ from typing import Any
 
 from ..errors import SetupError
 from ..temporary import discard, remove
-from .live_request import FormatsRequest, LiveRequest
 from .messages import (
     CAPTURE_FIELDS,
     LONGEST_LINE,
@@ -23,7 +22,7 @@ from .messages import (
     WorkerFailedError,
     parse_message,
 )
-from .request import WARM_UP, JobRequest
+from .request import WARM_UP, FormatsRequest, JobRequest, LiveRequest
 from .start_worker import worker_command
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -18,8 +18,8 @@ from ..capture.options import CaptureOptions
 from ..capture.overlay.rasterizer import fill_silhouette
 from ..capture.pipeline import capture
 from ..capture.stages.clock import Progress
-from ..edit.pins.corrected_motion import with_corrections
-from ..edit.pins.corrections import Pin
+from ..edit.corrected_motion import with_corrections
+from ..edit.corrections import Pin
 from ..machine_code.code_cache import compiled_kernels
 from ..untrusted.body_file import load_body
 from .preview import load_rasterizer

@@ -21,8 +21,7 @@ from ..footage import json_text
 from ..parent import end_with_parent
 from ..temporary import discard, remove
 from .cache import cache_of
-from .live_request import Commands, FormatsRequest, LiveRequest
-from .request import WARM_UP, JobRequest
+from .request import WARM_UP, Commands, FormatsRequest, JobRequest, LiveRequest
 from .unfinished import unfinished_capture
 from .watched_footage import WatchedFootage
 

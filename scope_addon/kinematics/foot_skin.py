@@ -21,7 +21,7 @@ from ..motion import Motion
 from .axes import UP
 from .contact_points import FOOT_PARTS, with_points_on_parts
 from .frame_blocks import by_blocks
-from .runs import runs
+from .sequences import runs
 from .standing import LEVEL_M
 
 UNDER_FLOOR_M = 0.01  # A foot this deep counts as under the floor.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import shortest_turn
-from .runs import runs
+from .sequences import runs
 from .standing import line_of_sight
 
 LIMBS = (

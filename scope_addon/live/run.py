@@ -22,15 +22,15 @@ from ..capture.camera.intrinsics import assumed_camera, choose_camera
 from ..capture.fitting.live_body import LiveBody
 from ..capture.fitting.stature import require_stature
 from ..capture.media.frame import Frame
-from ..capture.media.opencv_threads import opencv_in_one_thread
+from ..capture.media.video import opencv_in_one_thread
 from ..capture.perception.sessions import Execution
 from ..capture.stages.observe import network_threads
 from ..capture.tracking.tracker import PeopleTracker
-from .clock import Clock
 from .people import LivePeople
 from .pose import LivePose, Presence
 from .sources import CAMERA_SIZE, Picture, Source
 from .sources.newest_frame import NewestFrame
+from .sources.source import Clock
 
 PROGRESS_S = 0.5  # between two lines of progress
 RECENT_S = 2.0  # over which the rate is shown

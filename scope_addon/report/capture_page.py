@@ -16,14 +16,13 @@ from ...solver.body import Body
 from ..atomic_write import write_result
 from ..capture.media.video_range import FootageRange
 from ..capture_report import Report
-from ..counts import counted
 from ..footage import unicode_text
+from ..installed import machine, versions
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
-from ..notices import REASONS, Notice, TimeText
+from ..notices import REASONS, Notice, TimeText, counted
 from ..review_spans import FAR_SHARE, Span, body_confidence, find_review_spans
 from . import page
-from .machine import machine, versions
 from .page import Markup, Picture, Progress, overlay_pictures
 from .plots import Axis, Curve, band_plot, line_plot
 from .plots import Span as MarkedSpan

@@ -63,7 +63,7 @@ def check_samples(scene: bpy.types.Scene, rigs: Sequence[bpy.types.Object]) -> N
 
     :raises OutputError: it does.
     """
-    from .animation_data import actions  # Loads bpy, which on loading may print to stdout.
+    from . import actions  # Loads bpy, which on loading may print to stdout.
 
     frames = scene.frame_end - scene.frame_start + 1
     bones = sum(len(rig.data.bones) for rig in rigs)

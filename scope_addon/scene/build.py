@@ -21,26 +21,17 @@ from ..kinematics.face import body_with_mouth, expressions_of
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from ..notices import Notice, notice
-from . import camera
-from .animation_data import timing
-from .animation_data.actions import Channels
-from .animation_data.transaction import all_or_nothing
+from . import camera, timing
+from .actions import Channels
 from .budget import check_content, check_last_frame
-from .character import (
-    animation,
-    armature,
-    body_mesh,
-    bone_display,
-    expression_keys,
-    other_curves,
-    shape_keys,
-)
+from .character import animation, armature, body_mesh, bone_display, expression_keys, other_curves
 from .character.bone_display import remove_if_unused
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
 from .character.root_object import ROOT_TAG
 from .datablocks import check_local, remove_blocks, short_name
 from .packed_motion import motion_texts
+from .transaction import all_or_nothing
 
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
 # Custom property of a capture's collection: the names of its markers on the timeline, by lines.
@@ -74,7 +65,7 @@ class BuildOptions:
         choices = {
             "frame_rate": timing.RATE_POLICIES,
             "resolution": timing.POLICIES,
-            "shape": shape_keys.MODES,
+            "shape": body_mesh.MODES,
         }
         for option, valid in choices.items():
             if getattr(self, option) not in valid:
@@ -238,8 +229,8 @@ def _build_person(
         rig["scope_resampled"] = True  # smoothing again resamples too
     of_keys = None
     if not baked and body.P:
-        shape_keys.add_shape_keys(mesh, drawn, motion.betas)
-        of_keys = shape_keys.key_shape(
+        body_mesh.add_shape_keys(mesh, drawn, motion.betas)
+        of_keys = body_mesh.key_shape(
             mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame"
         )
     if motion.face and expression_keys.add_expression_keys(mesh, drawn):

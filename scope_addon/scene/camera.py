@@ -30,10 +30,10 @@ from ..errors import VideoError
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
 from ..notices import Notice, notice
-from .animation_data.actions import Channels, fcurves_of
-from .animation_data.stored_values import stored_numbers
+from .actions import Channels, fcurves_of
 from .axes import blender_brown_distortion, blender_camera_matrix
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
+from .stored_values import stored_numbers
 
 # frames; footage that deviates less counts as synchronized, because 0.5 is rounding
 _MAX_OFFSET = 0.6

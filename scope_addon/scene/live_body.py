@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion
 from ..kinematics.axes import R_WORLD_MODEL
-from .character import armature, body_mesh, bone_display, shape_keys
+from .character import armature, body_mesh, bone_display
 from .character.animation import quaternion_from_matrix, quaternion_product
 from .datablocks import KINDS, NewDatablocks, found, remove, scene_of
 
@@ -69,7 +69,7 @@ class LiveBody:
         :param betas: (P,) shape coefficients, of which Blender can show ±10.
         :raises UsageError: it has to be created, and its scene was removed.
         """
-        betas = np.clip(np.asarray(betas, float), -shape_keys.SLIDER_LIMIT, shape_keys.SLIDER_LIMIT)
+        betas = np.clip(np.asarray(betas, float), -body_mesh.SLIDER_LIMIT, body_mesh.SLIDER_LIMIT)
         rig = self.armature
         mesh = found("objects", *self._mesh)
         if rig is not None and rig.mode == "EDIT":
@@ -139,7 +139,7 @@ class LiveBody:
             rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas)
         )
         if body.P:
-            shape_keys.add_shape_keys(mesh, body, betas)
+            body_mesh.add_shape_keys(mesh, body, betas)
         body_mesh.skin_to_armature(mesh, rig, body)
         ring = bpy.data.objects[bone_display.RING]  # which all captures share
         shared = {("objects", ring.session_uid), ("meshes", ring.data.session_uid)}

@@ -18,18 +18,18 @@ import bpy
 
 from ..motion import Motion
 from ..notices import Notice
-from .animation_data import timing
-from .animation_data.actions import fcurves, frame_range
-from .animation_data.stored_values import FrameSpan, parse_spans, start_frame
-from .animation_data.timing import Retiming, action_strips, retime_keys, retime_strip
+from . import timing
+from .actions import fcurves, frame_range
 from .camera import same_camera, show_footage_again, view_number
+from .character.body_mesh import shape_key_name
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
 from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
-from .character.shape_keys import shape_key_name
 from .datablocks import holds
 from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
+from .stored_values import FrameSpan, parse_spans, start_frame
+from .timing import Retiming, action_strips, retime_keys, retime_strip
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")
 

@@ -18,7 +18,8 @@ from . import (
     after_append,
     camera_formats,
     command,
-    edit_operators,
+    correction_operators,
+    correction_panel,
     edit_panel,
     export_operators,
     file_field,
@@ -28,44 +29,32 @@ from . import (
     live_panel,
     live_properties,
     menus,
+    pin_tool,
     preferences,
     retarget_operators,
     retarget_panel,
-    retarget_properties,
     translations,
+    upright_operators,
     view_after_undo,
     view_operators,
     warm_up,
 )
-from .capture import (
-    capture_operators,
-    capture_panel,
-    capture_properties,
-    captures,
-    frame_rate_operators,
-    video_import,
-)
-from .pins import correction_operators, correction_panel, kept_edits, pin_tool, upright_operators
+from .capture import capture_operators, capture_panel, captures, frame_rate_operators
 
 # Panels come last: they are drawn in this order, and those within another after it.
 _MODULES = (
-    capture_properties,
     preferences,
     capture_operators,
     export_operators,
     import_operators,
     view_operators,
     file_field,
-    video_import,
     menus,
     action_operators,
     frame_rate_operators,
-    edit_operators,
-    kept_edits,
     correction_operators,
     pin_tool,
     upright_operators,
-    retarget_properties,
     retarget_operators,
     live_properties,
     live_operators,
@@ -107,8 +96,8 @@ def unregister() -> None:
 def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
     """Return what attaches things other than classes to Blender, and what detaches them."""
     return [
-        (capture_properties.attach, capture_properties.detach),
-        (retarget_properties.attach, retarget_properties.detach),
+        (capture_panel.attach, capture_panel.detach),
+        (retarget_panel.attach, retarget_panel.detach),
         (live_properties.attach, live_properties.detach),
         (command.register, command.unregister),
         (correction_panel.attach, correction_panel.detach),

@@ -10,8 +10,8 @@ from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
-from ..scene.animation_data.stored_values import start_frame, stored_text
 from ..scene.datablocks import short_name
+from ..scene.stored_values import start_frame, stored_text
 from . import comparison
 from .capture.captures import show_again, shown_capture
 from .captured_person import PERSON, captured_armature, motion_of
@@ -69,7 +69,7 @@ class SCOPE_OT_push_to_nla(ActionOperator):
 
         :raises UsageError: the armature is in Tweak Mode.
         """
-        from ..scene.animation_data.actions import animated_together, push_to_nla
+        from ..scene.actions import animated_together, push_to_nla
         from ..scene.character.root_object import root_object
 
         armature = animated_armature(context)
@@ -264,7 +264,7 @@ class SCOPE_OT_mark_asset(ActionOperator):
     def _frame(self, context: bpy.types.Context, armature: bpy.types.Object) -> float:
         """Return the scene frame of the picture, within the action."""
         from ..scene.action_asset import first_reliable_frame
-        from ..scene.animation_data.timing import keyed_rate
+        from ..scene.timing import keyed_rate
 
         first, last = armature.animation_data.action.frame_range
         frame = float(context.scene.frame_current)

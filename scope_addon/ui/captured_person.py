@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ..errors import UsageError
-from ..scene.animation_data.stored_values import stored_numbers, stored_text
 from ..scene.datablocks import holds
+from ..scene.stored_values import stored_numbers, stored_text
 
 if TYPE_CHECKING:
     import numpy as np

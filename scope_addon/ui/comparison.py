@@ -394,7 +394,7 @@ def side_extent(
     :param people: captured armatures; one whose keys are missing is left out.
     :param R_world_view: (3, 3), view axes to world.
     """
-    from ..scene.animation_data.timing import scene_rate
+    from ..scene.timing import scene_rate
 
     rate = scene_rate(bpy.context.scene)
     far = np.zeros(2)

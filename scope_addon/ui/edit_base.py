@@ -81,8 +81,8 @@ class EditOperator(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Edit the keys; if that fails, restore them."""
-        from ..scene.animation_data.timing import scene_rate
-        from ..scene.animation_data.transaction import all_or_nothing
+        from ..scene.timing import scene_rate
+        from ..scene.transaction import all_or_nothing
 
         message = ""
         people = self.people(context)

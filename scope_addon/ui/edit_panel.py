@@ -1,14 +1,52 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel for editing a captured motion."""
+"""The panel and the operators that edit a captured motion: smoothing and root motion, and which
+keys it has: loop, key reduction, baking to a frame rate.
+
+All rewrite the keys of the active capture's armature; smoothing starts from the captured motion,
+which the .blend file stores. None uses the footage.
+
+Interpolated frames and feet on the floor are edits that the motion keeps, like corrections. Where
+the motion is lost, as in old .blend files without their cache, these edit the keys only.
+"""
 
 from __future__ import annotations
 
-import bpy
+import math
+from typing import TYPE_CHECKING
 
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+
+from ...solver.errors import ScopeError
+from ..scene.datablocks import holds
+from ..scene.stored_values import start_frame
 from .capture.capture_panel import Tab
-from .capture.captures import people_of, shown_capture
-from .captured_person import draw_active_person, has_captured_person
+from .capture.captures import captures_of, people_of, shown_capture
+from .captured_person import (
+    betas_of,
+    captured_armature,
+    draw_active_person,
+    has_captured_person,
+    library_of,
+    motion_of,
+    set_motion_of,
+)
+from .corrected_person import CorrectionOperator, change_corrections
+from .correction_operators import CorrectSpanOperator, floor_warning
+from .edit_base import EditOperator, SpanOperator, edit_clip
+from .preferences import keep_machine_code
+from .reporting import rpt_, tip_
 from .translations import CONTEXT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ...solver.body import Body
+    from ..edit.clip import Clip
+    from ..edit.corrections import Correction
 
 
 class SCOPE_PT_edit(Tab, bpy.types.Panel):
@@ -54,4 +92,390 @@ class SCOPE_PT_edit(Tab, bpy.types.Panel):
         column.operator("scope.bake_rate", icon="KEYFRAME_HLT")
 
 
-CLASSES = (SCOPE_PT_edit,)
+class SCOPE_OT_smooth(EditOperator):
+    """Smooth the captured motion again"""
+
+    bl_description = (
+        "Smooth the captured motion again, more or less strongly. Keeps corrections, discards "
+        "other changes"
+    )
+    bl_idname = "scope.smooth"
+    bl_label = "Smooth Motion"
+
+    strength: FloatProperty(
+        name="Strength",
+        default=1.0,
+        min=0.0,
+        soft_max=4.0,
+        max=20.0,
+        description="0 keeps every frame as captured, 1 is the default of a capture, higher values "
+        "smooth more",
+    )
+    everyone: BoolProperty(
+        name="All People",
+        description="Smooth everybody of the capture, and not only the selected person",
+    )
+
+    def people(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        """Return the active captured armature, or all local ones of its capture."""
+        (active,) = super().people(context)
+        capture = next((c for c in captures_of(context.scene) if holds(c, active)), None)
+        if not self.everyone or capture is None:
+            return [active]
+        return [person for person in people_of(capture) if library_of(person) is None]
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Replace the keys by those of the captured motion, smoothed."""
+        from ..edit.corrected_motion import uncorrected
+        from ..edit.smooth import smoothed
+        from ..scene.actions import animated_together, remove_cycles
+        from ..scene.character.keys import bake_whole_frames, write_clip
+        from ..scene.character.other_curves import restore_whole_motion
+        from ..scene.character.root_object import remove_root_object
+        from ..scene.character.uncorrected_keys import write_both
+        from ..scene.timing import is_cycle, key_frames, restore_scene_range, store_rate
+
+        motion = motion_of(armature)
+        if motion.corrections:  # which are solved again
+            keep_machine_code()
+        frames = key_frames(motion.timestamps, rate, start_frame(armature))
+        clip = smoothed(body, motion, self.strength)
+        if motion.corrections:
+            clips = smoothed(body, uncorrected(motion), self.strength), clip
+            keys = write_both(armature, body, clips, frames, rate)
+            set_motion_of(armature, motion, keys.to_bytes())
+        else:
+            write_clip(armature, body, clip, frames)
+        armature["scope_smoothing"] = self.strength
+        store_rate(armature, rate)
+        if is_cycle(armature):  # a loop becomes the whole motion again
+            restore_whole_motion(armature, body, motion, frames)
+        for block in animated_together(armature, None):
+            remove_cycles(block)
+        if armature.get("scope_resampled"):
+            bake_whole_frames(armature, body, rate)
+        restore_scene_range(context.scene, armature)
+        remove_root_object(armature)
+        return ""
+
+
+class SCOPE_OT_root_motion(EditOperator):
+    """Choose where the person's root motion is stored"""
+
+    bl_idname = "scope.root_motion"
+    bl_label = "Root Motion"
+
+    mode: EnumProperty(
+        name="Root Motion",
+        items=(
+            ("BONES", "In the Bones", "The pelvis moves through the scene, as captured", 0),
+            ("OBJECT", "On an Object", "An empty on the floor carries the root motion", 1),
+            ("IN_PLACE", "In Place", "No root motion: the person stays in place", 2),
+        ),
+        default="OBJECT",
+        description="Where the root motion is stored",
+    )
+    heading: BoolProperty(
+        name="With Heading",
+        default=True,
+        description="Include the rotation about the vertical axis in the root motion",
+    )
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Change all keys."""
+        from ..scene.character.root_object import (
+            move_root_motion_to_bones,
+            move_root_motion_to_object,
+        )
+
+        if self.mode == "BONES":
+            move_root_motion_to_bones(armature, body, rate)
+        else:
+            move_root_motion_to_object(
+                armature, body, rate, in_place=self.mode == "IN_PLACE", heading=self.heading
+            )
+        return ""
+
+
+class SCOPE_OT_loop(SpanOperator):
+    """Find the best cycle within a span of frames, close it, and repeat it"""
+
+    bl_idname = "scope.loop"
+    bl_label = "Make Loop"
+
+    shortest: FloatProperty(
+        name="Shortest",
+        default=0.5,
+        min=0.1,
+        soft_max=5.0,
+        subtype="TIME_ABSOLUTE",
+        description="Minimum duration of the cycle in seconds",
+    )
+    blend: FloatProperty(
+        name="Blend",
+        default=0.2,
+        min=0.0,
+        soft_max=1.0,
+        subtype="TIME_ABSOLUTE",
+        description="Duration in seconds, at the end of the cycle, over which it is closed",
+    )
+    movement: FloatProperty(
+        name="Least Movement",
+        default=0.05,
+        min=0.0,
+        soft_max=0.5,
+        description="Mean distance in metres by which the joints must move within the cycle; 0 "
+        "also loops a person who "
+        "stays still",
+    )
+    repeat: BoolProperty(
+        name="Repeat",
+        default=True,
+        description="Repeat the curves; each cycle starts where the previous one ended",
+    )
+
+    def default_span(self, scene: bpy.types.Scene) -> tuple[int, int]:
+        """Return the span to suggest without a preview range: the scene's frame range."""
+        return scene.frame_start, scene.frame_end
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Replace the keys by those of the closed cycle."""
+        from ..edit.loop import best_cycle, close_cycle
+        from ..scene.actions import add_cycles, animated_together
+        from ..scene.character.keys import location_path, read_clip, write_clip
+        from ..scene.character.other_curves import cut_to_cycle
+        from ..scene.character.root_object import clip_with_root_motion, remove_root_object
+        from ..scene.timing import play_cycle
+
+        clip, frames = read_clip(armature, body, rate)
+        clip = clip_with_root_motion(armature, clip, frames)
+        betas = betas_of(armature, body)
+        cycle = best_cycle(
+            clip, body, betas, self.start / rate, self.end / rate, self.shortest, self.movement
+        )
+        closed: Clip = close_cycle(clip, cycle, self.blend)
+        first = float(frames[cycle.first])
+        last = float(frames[cycle.last])
+        write_clip(armature, body, closed, frames[cycle.first : cycle.last + 1])
+        cut_to_cycle(armature, body, first, last)
+        if self.repeat:
+            add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
+            for face in animated_together(armature, None)[1:]:
+                add_cycles(face)
+        play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
+        remove_root_object(armature)
+        return rpt_(
+            "Cycle of {seconds:.2f} s, whose ends were {distance:.1f} cm apart",
+            seconds=closed.times[-1],
+            distance=100 * cycle.error_m,
+        )
+
+
+class SCOPE_OT_reduce_keys(EditOperator):
+    """Remove keys within a maximum error"""
+
+    bl_idname = "scope.reduce_keys"
+    bl_label = "Reduce Keys"
+
+    degrees: FloatProperty(
+        name="Rotation",
+        default=0.5,
+        min=0.01,
+        soft_max=5.0,
+        max=45.0,
+        description="Maximum rotation error of a bone in degrees",
+    )
+    millimetres: FloatProperty(
+        name="Position",
+        default=2.0,
+        min=0.01,
+        soft_max=50.0,
+        max=1000.0,
+        description="Maximum position error of the pelvis in millimetres",
+    )
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Remove keys bone by bone."""
+        from ..scene.character.keys import reduce_keys
+
+        betas = betas_of(armature, body)
+        found = reduce_keys(
+            armature, body, betas, rate, math.radians(self.degrees), self.millimetres / 1000.0
+        )
+        return rpt_(
+            "Reduced {before} key to {after}; maximum error {angle:.2f} degrees for bones, "
+            "{distance:.1f} mm for joints"
+            if found.before == 1
+            else "Reduced {before} keys to {after}; maximum error {angle:.2f} degrees for bones, "
+            "{distance:.1f} mm for joints",
+            before=found.before,
+            after=found.after,
+            angle=math.degrees(found.angle),
+            distance=1000 * found.joint_m,
+        )
+
+
+class SCOPE_OT_bake_rate(EditOperator):
+    """Replace the keys by keys at a constant frame rate"""
+
+    bl_idname = "scope.bake_rate"
+    bl_label = "Bake to Frame Rate"
+
+    rate: FloatProperty(
+        name="Keys per Second",
+        default=0.0,
+        min=0.0,
+        soft_max=120.0,
+        max=1000.0,
+        description="Frame rate of the keys; 0: one key on each frame of the scene",
+    )
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Replace all keys; at the scene's frame rate, they are on whole frames."""
+        from ..edit.clip import resample
+        from ..scene.character.keys import bake_whole_frames, read_clip, write_clip
+
+        if self.rate > 0:
+            clip, frames = read_clip(armature, body, rate)
+            baked = resample(clip, self.rate)
+            write_clip(armature, body, baked, baked.times * rate)
+            before = len(frames)
+            after = len(baked)
+        else:
+            before, after = bake_whole_frames(armature, body, rate)
+        return rpt_(
+            "Replaced {before} key by {after}"
+            if before == 1
+            else "Replaced {before} keys by {after}",
+            before=before,
+            after=after,
+        )
+
+
+class KeptSpanOperator(CorrectSpanOperator):
+    """An edit of a span of frames that the motion keeps. Not registered."""
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def change(self, body: Body, rate: float) -> Callable[[Clip, NDArray[np.float64]], Clip]:
+            """Return the edit of keys whose motion is lost, for ``edit_clip``."""
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Edit the keys, and keep that with the motion."""
+        if _has_motion(armature):
+            return super().edit(context, armature, body, rate)
+        edit_clip(armature, body, rate, self.change(body, rate))
+        return ""
+
+
+class SCOPE_OT_interpolate_span(KeptSpanOperator):
+    """Replace frames by an interpolation between the pose before and the pose after them"""
+
+    bl_idname = "scope.interpolate_span"
+    bl_label = "Interpolate Frames"
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the interpolation."""
+        from ..edit.corrections import Interpolation
+
+        return Interpolation(first, last)
+
+    def change(self, body: Body, rate: float) -> Callable[[Clip, NDArray[np.float64]], Clip]:
+        """Return the interpolation of keys."""
+        from ..edit.spans import interpolate
+
+        return lambda clip, _: interpolate(clip, self.start / rate, self.end / rate)
+
+
+class SCOPE_OT_refloor(CorrectionOperator):
+    """Put feet in contact on the floor, which is at the height of the armature's origin"""
+
+    bl_idname = "scope.refloor"
+    bl_label = "Snap Feet to Floor"
+
+    level: BoolProperty(
+        name="Level the World",
+        default=False,
+        description="Rotate the motion so that all foot contacts are level, after which the camera "
+        "no longer matches",
+    )
+    lift: BoolProperty(
+        name="Lift Sunken Feet",
+        default=True,
+        description="Raise the frames in which a foot is below the floor",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a motion with one floor: on stairs, everything below their middle would be raised
+        to it.
+        """
+        if not super().poll(context):
+            return False
+        armature = captured_armature(context)
+        if armature is not None and armature.get("scope_uneven_ground", False):
+            cls.poll_message_set(
+                tip_(
+                    "This motion was captured on uneven ground, where feet rest at any height: "
+                    "use Floor Here"
+                )
+            )
+            return False
+        return True
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Edit all keys, and keep that with the motion."""
+        from ..edit.corrections import FeetOnFloor, added
+        from ..scene.character.edited_keys import floored
+
+        feet = FeetOnFloor(self.level, self.lift)
+        if not _has_motion(armature):
+            betas = betas_of(armature, body)
+            edit_clip(
+                armature,
+                body,
+                rate,
+                lambda clip, frames: floored(armature, body, betas, (clip, frames), feet),
+            )
+            return ""
+        change_corrections(armature, body, rate, lambda present: added(present, feet), feet)
+        if warning := floor_warning(armature, body):
+            self.report({"WARNING"}, warning)
+        return ""
+
+
+def _has_motion(armature: bpy.types.Object) -> bool:
+    """Return whether the captured motion is there and can be read, with its corrections."""
+    from ..edit.corrected_motion import corrections_of
+
+    try:
+        corrections_of(motion_of(armature))
+    except ScopeError:
+        return False
+    return True
+
+
+CLASSES = (
+    SCOPE_PT_edit,
+    SCOPE_OT_smooth,
+    SCOPE_OT_root_motion,
+    SCOPE_OT_loop,
+    SCOPE_OT_reduce_keys,
+    SCOPE_OT_bake_rate,
+    SCOPE_OT_interpolate_span,
+    SCOPE_OT_refloor,
+)

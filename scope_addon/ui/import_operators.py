@@ -66,7 +66,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
         :raises UsageError: no file was chosen.
         """
-        from ..scene.animation_data.transaction import all_or_nothing
+        from ..scene.transaction import all_or_nothing
         from ..smpl_import.convert import import_motions
 
         body = self._body(context)

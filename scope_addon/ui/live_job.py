@@ -24,8 +24,8 @@ from ..errors import OfflineError, UsageError, VideoError
 from ..footage import display_text
 from ..job.live_cameras import camera_source
 from ..job.live_process import PRESENCES, LiveProcess, ShownPose
-from ..job.live_request import LiveRequest
 from ..job.process import START_SCRIPT
+from ..job.request import LiveRequest
 from ..live.outputs.journal import read_about
 from ..live.outputs.unfinished import remove_recording, unfinished_video
 from ..notices import OTHER, Notice, notice

@@ -11,10 +11,9 @@ from ...solver.errors import ScopeError
 from . import camera_formats, live_properties, warm_up
 from .capture.capture_operators import nothing_runs
 from .capture.job_operator import JobOperator
-from .libraries import restore_libraries
 from .live_properties import state, stop_job
 from .preferences import cache
-from .reporting import tip_, warning_text
+from .reporting import restore_libraries, tip_, warning_text
 from .sidebar import redraw_sidebars, viewports
 from .view_operators import frame_selected, hide_startup_cube
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import bpy
 
+from .correction_panel import draw_corrections
 from .export_operators import FORMATS, is_available
-from .pins.correction_panel import draw_corrections
 from .reporting import iface_
 
 

@@ -1,18 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texts in the user's language, and operators that report their result or error as a message."""
+"""Texts in the user's language, warnings as results in a .blend file store them, and operators that
+report their result or error as a message. Loaded while Blender starts.
+
+Before their work, operators put back the libraries that come with the extension. Blender keeps the
+wheels of all enabled extensions in one folder, and removes those of the others whenever a process
+ends or enables one: so one that was started with factory settings takes them away from all that
+run.
+"""
 
 from __future__ import annotations
 
+import importlib
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
 from ...solver.errors import ScopeError
+from ..errors import SetupError
 from ..footage import display_text
-from ..notices import Notice, Translate
-from .libraries import restore_libraries
+from ..notices import Notice, Translate, notice_from
+from ..scene.stored_values import FrameSpan, spans_text
 from .translations import CONTEXT
+
+_PACKAGE = __package__.rpartition(".scope_addon")[0]
+_NEEDED = ("numba", "llvmlite", "cv2", "onnxruntime", "av")
 
 
 def iface_(text: str, **values: object) -> str:
@@ -75,3 +91,56 @@ class ReportingOperator(bpy.types.Operator):
         if message:
             self.report({"INFO"}, display_text(message))
         return {"FINISHED"}
+
+
+def restore_libraries() -> None:
+    """Have Blender unpack the extension's wheels again if some are missing.
+
+    :raises SetupError: some are still missing.
+    """
+    if _PACKAGE not in bpy.context.preferences.addons or not _missing():
+        return
+    import addon_utils
+
+    addon_utils.extensions_refresh(ensure_wheels=True)
+    importlib.invalidate_caches()
+    if missing := _missing():
+        raise SetupError(
+            f"a part of Scope is missing ({', '.join(missing)}), which another Blender may have "
+            "removed: disable Scope in the preferences and enable it again; if that does not help, "
+            "reinstall it"
+        )
+
+
+def _missing() -> list[str]:
+    """Return the libraries that are not on the disk, where a worker would look for them."""
+    specs = {name: find_spec(name) for name in _NEEDED}
+    return [
+        name
+        for name, spec in specs.items()
+        if spec is None or not os.path.exists(spec.origin or "")
+    ]
+
+
+def add_warning(
+    shown: bpy.types.PropertyGroup, warning: Notice, spans: Sequence[FrameSpan] = ()
+) -> None:
+    """Store a warning with a result: its English text, and the record from which it is shown in the
+    user's language.
+    """
+    import json
+
+    stored = shown.warnings.add()
+    stored.text = warning_text(warning, str)
+    stored.record = json.dumps(warning.as_json())
+    stored.spans = spans_text(spans)
+
+
+def stored_warning(stored: bpy.types.PropertyGroup) -> Notice:
+    """Return a warning of a result. Of one whose record is damaged or missing, the text is left."""
+    import json
+
+    record = None
+    with suppress(ValueError, RecursionError):
+        record = json.loads(stored.record)
+    return notice_from(record, stored.text, lambda found: warning_text(found, str))

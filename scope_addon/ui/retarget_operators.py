@@ -137,8 +137,8 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
 
     :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
     """
-    from ..scene.animation_data.timing import scene_rate
     from ..scene.rigs.rig_retarget import retarget, usable_guess
+    from ..scene.timing import scene_rate
     from ..scene.visibility import hide, show
 
     settings = context.scene.scope_retarget

@@ -1,13 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel for retargeting a captured motion, and below it that for captured expressions."""
+"""The panel for retargeting a captured motion, and below it that for captured expressions,
+and their settings, stored with the scene: the rig and the bone map, the face and the expression
+map.
+"""
 
 from __future__ import annotations
 
 import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from .capture.capture_panel import Tab
 from .captured_person import draw_active_person, has_captured_person
-from .retarget_maps import SHAPE_KEY, common_prefix, has_targets
+from .retarget_maps import (
+    SHAPE_KEY,
+    bones_move,
+    common_prefix,
+    face_of_rig,
+    fill_expressions,
+    guess_into_list,
+    guessed_map,
+    has_targets,
+    target_names,
+)
 from .translations import CONTEXT
 
 
@@ -183,9 +205,222 @@ def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> b
     )
 
 
+def offered_parts(
+    _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
+) -> list[str]:
+    """Return the body parts whose names contain what was typed so far, for Blender to suggest."""
+    from ..retarget.bone_map import PARTS
+
+    return [part for part in PARTS if typed.lower() in part]
+
+
+class SCOPE_PG_bone_pair(bpy.types.PropertyGroup):
+    """One bone of the user's rig and the body part that it follows."""
+
+    bone: StringProperty(name="Bone", description="Bone of your rig")
+    part: StringProperty(
+        name="Body Part",
+        search=offered_parts,
+        description="Part of the captured body that this bone follows",
+    )
+    confidence: FloatProperty(
+        name="Confidence", min=0.0, max=1.0, description="Confidence of the guess"
+    )
+
+
+def offered_expressions(
+    _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
+) -> list[str]:
+    """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
+    from ..expression_names import EXPRESSIONS
+
+    return [name for name in EXPRESSIONS if typed.lower() in name.lower()]
+
+
+class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
+    """One shape key of the user's mesh, or channel of a rig's control, and an expression that it
+    follows.
+    """
+
+    key: StringProperty(
+        name="Shape Key or Control",
+        description="Shape key of your mesh, or bone of your rig's face",
+    )
+    channel: EnumProperty(
+        name="Channel",
+        items=(
+            ("key", "Shape Key", "Value of a shape key", 0),
+            (
+                "left",
+                "Left",
+                "Moves to the person's left, relative to mouth width, eye distance or lid gap",
+                1,
+            ),
+            ("up", "Up", "Moves up, relative to mouth width, eye distance or lid gap", 2),
+            (
+                "forward",
+                "Forward",
+                "Moves forward, relative to mouth width, eye distance or lid gap",
+                3,
+            ),
+            ("pitch", "Pitch", "Turns down, in degrees", 4),
+            ("yaw", "Yaw", "Turns to the person's left, in degrees", 5),
+            ("roll", "Roll", "Turns with the left side up, in degrees", 6),
+        ),
+        default="key",
+        translation_context=CONTEXT,
+        description="How a control follows the expression, along the axes of the rig's face",
+    )
+    expression: StringProperty(
+        name="Expression",
+        search=offered_expressions,
+        description="Captured expression that this entry follows",
+    )
+    factor: FloatProperty(
+        name="Factor",
+        default=1.0,
+        min=-180.0,
+        max=180.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+        description="Value where the expression is 1: at most 10, or 180 degrees; several "
+        "expressions add up",
+    )
+
+
+def _is_face(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    captured = obj.parent is not None and "scope_source" in obj.parent
+    return not captured and has_targets(obj)
+
+
+def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    return obj.type == "ARMATURE" and "scope_source" not in obj
+
+
+def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Replace the bone list of another rig by a guess; keep that of the same rig, or of one with
+    the same bones.
+
+    A rig whose bones move its face becomes the face as well, unless another one is chosen.
+    """
+    rig = settings.rig
+    if rig is None:
+        return
+
+    if settings.face is None or bones_move(settings.face):
+        settings.face = face_of_rig(rig)
+    bones = "\n".join(sorted(bone.name for bone in rig.data.bones))
+    if settings.listed_bones == bones:
+        return
+    settings.listed_bones = bones
+    if len(settings.pairs) == 0:
+        return  # nothing to replace: guessed when it is needed
+
+    guess_into_list(settings)
+
+
+def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Replace the expression list of another face by a guess; keep that of one with the same shape
+    keys or bones.
+    """
+    if not has_targets(settings.face):
+        return
+    keys = "\n".join(sorted(target_names(settings.face)))
+    if settings.listed_keys == keys:
+        return
+    settings.listed_keys = keys
+    if len(settings.face_pairs) == 0:
+        return  # nothing to replace: guessed when it is needed
+    fill_expressions(settings, guessed_map(settings.face))
+
+
+class SCOPE_PG_retarget(bpy.types.PropertyGroup):
+    """The settings of retargeting."""
+
+    rig: PointerProperty(
+        name="Rig",
+        type=bpy.types.Object,
+        poll=_is_armature,
+        update=_list_bones_of_new_rig,
+        description="Armature to animate with the captured motion",
+    )
+    # names of all bones of the rig that the list is for
+    listed_bones: StringProperty(options={"HIDDEN"})
+    pairs: CollectionProperty(type=SCOPE_PG_bone_pair)
+    active: IntProperty()
+    face: PointerProperty(
+        name="Face",
+        type=bpy.types.Object,
+        poll=_is_face,
+        update=_list_keys_of_new_face,
+        description="Mesh with shape keys, or rig whose bones move its face, to animate with the "
+        "captured expressions",
+    )
+    # names of all shape keys or bones that the list is for
+    listed_keys: StringProperty(options={"HIDDEN"})
+    face_pairs: CollectionProperty(type=SCOPE_PG_expression_pair)
+    face_active: IntProperty()
+    feet: BoolProperty(
+        name="Feet on the Floor",
+        default=True,
+        description="Lock feet that are in contact, scaled to the rig, and keep them above the "
+        "floor",
+    )
+    travel: FloatProperty(
+        name="Travel Scale",
+        default=0.0,
+        min=0.0,
+        soft_max=10.0,
+        precision=3,
+        description="Scale of positions on the floor. 0: the ratio of leg lengths, so that steps "
+        "fit the rig. Several "
+        "people who touch or meet need the same value for all their rigs",
+    )
+    root: EnumProperty(
+        name="Root Motion",
+        items=(
+            ("bone", "In Bones", "The pelvis moves through the scene", 0),
+            (
+                "object",
+                "On Object",
+                "An empty carries position and heading, the rig moves relative to it",
+                1,
+            ),
+            ("in-place", "In Place", "No root motion: the character stays in place", 2),
+        ),
+        default="bone",
+        description="Where the root motion of the rig is stored",
+    )
+    captured: EnumProperty(
+        name="Captured Body",
+        items=(
+            ("hide", "Hide", "Hide the captured person, except when comparing with the footage", 0),
+            ("beside", "Side by Side", "Show both, the rig to the left of the captured person", 1),
+            ("keep", "Overlap", "Show both in the same place", 2),
+        ),
+        default="hide",
+        # Blender's own translations are too long for three buttons in a row
+        translation_context=CONTEXT,
+        description="How the captured person is shown after retargeting",
+    )
+
+
+def attach() -> None:
+    """Add the settings to every scene."""
+    bpy.types.Scene.scope_retarget = PointerProperty(type=SCOPE_PG_retarget)
+
+
+def detach() -> None:
+    """Remove the settings."""
+    del bpy.types.Scene.scope_retarget
+
+
 CLASSES = (
     SCOPE_UL_bone_pairs,
     SCOPE_PT_retarget,
     SCOPE_UL_expression_pairs,
     SCOPE_PT_retarget_face,
+    SCOPE_PG_bone_pair,
+    SCOPE_PG_expression_pair,
+    SCOPE_PG_retarget,
 )

@@ -7,8 +7,8 @@ import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from ..scene.animation_data.stored_values import start_frame
 from ..scene.datablocks import holds
+from ..scene.stored_values import start_frame
 from . import comparison
 from .captured_person import captured_people
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
@@ -225,8 +225,8 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
-        from ..scene.animation_data.timing import scene_rate
         from ..scene.footage_strip import add_footage_strips, strips_of, turn_strip
+        from ..scene.timing import scene_rate
 
         scene = context.scene
         result = context.scene.scope.result

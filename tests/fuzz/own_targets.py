@@ -25,8 +25,7 @@ LARGEST_ARRAYS = 1 << 24
 
 
 def read_request(path: Path) -> None:
-    from scope.scope_addon.job.live_request import LiveRequest
-    from scope.scope_addon.job.request import JobRequest
+    from scope.scope_addon.job.request import JobRequest, LiveRequest
 
     text = path.read_bytes().decode("utf-8", "replace")
     (LiveRequest if LiveRequest.is_in(text) else JobRequest).from_json(text)
@@ -182,7 +181,7 @@ def read_batch_report(path: Path) -> None:
 
 
 def requests(_: Path) -> list[bytes]:
-    from scope.scope_addon.job.live_request import LiveRequest
+    from scope.scope_addon.job.request import LiveRequest
     from scope.scope_addon.options import Place, options_at
 
     values = {option.name: option.default for option in options_at(Place.WORKER)}

@@ -70,7 +70,7 @@ def _load_body(path: Path) -> None:
 
 
 def _load_motion(path: Path) -> None:
-    from scope.scope_addon.edit.pins.corrected_motion import corrections_of, uncorrected
+    from scope.scope_addon.edit.corrected_motion import corrections_of, uncorrected
     from scope.scope_addon.motion import Motion
 
     motion = Motion.load(path)
@@ -198,8 +198,8 @@ def _pickled_bodies(_: Path) -> list[bytes]:
 
 
 def _motions(_: Path) -> list[bytes]:
-    from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-    from scope.scope_addon.edit.pins.corrections import (
+    from scope.scope_addon.edit.corrected_motion import with_corrections
+    from scope.scope_addon.edit.corrections import (
         Contact,
         DepthFlip,
         Exchange,

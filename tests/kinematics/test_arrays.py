@@ -14,8 +14,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics import frame_blocks
-from scope.scope_addon.kinematics.runs import runs
-from scope.scope_addon.kinematics.viterbi import least_cost_path
+from scope.scope_addon.kinematics.sequences import least_cost_path, runs
 
 
 @pytest.mark.parametrize("frames", [0, 1, 4, 5, 6, 17])

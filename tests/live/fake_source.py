@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.sources import Picture
+from scope.scope_addon.live.sources.source import Clock
 
 
 class FakeClock(Clock):

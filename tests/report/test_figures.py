@@ -14,7 +14,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scope.scope_addon.report import machine
+from scope.scope_addon import installed
 from scope.scope_addon.report.capture_page import height_text, highest_speed, motion_figures
 from scope.scope_addon.report.page import Picture, bounded, small_picture, spread_rows
 
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_versions_are_those_that_run():
     stated = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
-    said = machine.versions().split(", ")
+    said = installed.versions().split(", ")
     assert {
         f"Scope {stated}",
         f"Python {platform.python_version()}",
@@ -34,16 +34,18 @@ def test_versions_are_those_that_run():
 
 
 def test_the_version_of_an_unknown_installation_is_said_to_be_unknown(tmp_path, monkeypatch):
-    monkeypatch.setattr(machine, "_ROOT", tmp_path)
+    monkeypatch.setattr(installed, "_ROOT", tmp_path)
     monkeypatch.setattr(
-        machine, "version", lambda name: (_ for _ in ()).throw(machine.PackageNotFoundError(name))
+        installed,
+        "version",
+        lambda name: (_ for _ in ()).throw(installed.PackageNotFoundError(name)),
     )
-    assert machine.scope_version() == "of an unknown version"
+    assert installed.scope_version() == "of an unknown version"
 
 
 def test_the_computer_is_described_in_one_line():
-    assert platform.system() in machine.machine()
-    assert "\n" not in machine.machine()
+    assert platform.system() in installed.machine()
+    assert "\n" not in installed.machine()
 
 
 def test_a_walk_of_known_length_and_speed(body):

@@ -46,7 +46,7 @@ WRITES = {
     "scope_addon/live/outputs/journal.py",
     # the content of temporary files
     "scope_addon/atomic_write.py",
-    "scope_addon/capture/media/file_names.py",
+    "scope_addon/capture/media/guards.py",
     "scope_addon/capture/overlay/overlay_video.py",
     "scope_addon/capture/overlay/video_writer.py",
     "scope_addon/job/finished_clip.py",

@@ -25,8 +25,8 @@ from scope.scope_addon.capture.perception.adapters.description import read_descr
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KEYPOINT_TYPES
 from scope.scope_addon.cli import SAMPLE, build_parser, main
 from scope.scope_addon.command_line.arguments import body_and_options
-from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import (
+from scope.scope_addon.edit.corrected_motion import with_corrections
+from scope.scope_addon.edit.corrections import (
     Contact,
     DepthFlip,
     Exchange,

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 
 # metres
 JOINT_TOLERANCE = 1e-3

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scope.scope_addon.errors import MotionFileError, OutputError
-from scope.scope_addon.scene.animation_data.actions import Channels, bone_path
+from scope.scope_addon.scene.actions import Channels, bone_path
 from scope.scope_addon.scene.budget import check_content, check_last_frame, check_samples
 from scope.scope_addon.scene.export.export import export_motions
 from scope.solver.body import Body

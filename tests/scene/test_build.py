@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import CancelledError, MotionFileError, UsageError, VideoError
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
-from scope.scope_addon.scene import build
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions, build
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 
 

@@ -19,11 +19,11 @@ import pytest
 import scope
 from scope.scope_addon.errors import MotionFileError, UsageError
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.animation_data.transaction import all_or_nothing
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.export.export import export_motions
 from scope.scope_addon.scene.footage_strip import add_footage_strips
 from scope.scope_addon.scene.packed_motion import MOTION, pack_motion, stored_motion
+from scope.scope_addon.scene.transaction import all_or_nothing
 
 from ..edit.walking import motion_of, walk
 from .conftest import dance

@@ -19,9 +19,8 @@ from scope.scope_addon import ui
 from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.machine_code import code_folders
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.ui import live_operators, preferences, translations
+from scope.scope_addon.ui import live_operators, pin_tool, preferences, translations
 from scope.scope_addon.ui.capture import capture_job, capture_operators
-from scope.scope_addon.ui.pins import pin_tool
 from scope.solver import body_file
 from scope.solver.body import Body
 from scope.solver.body_file import load_body

@@ -17,7 +17,7 @@ from scope.scope_addon import ui
 from scope.scope_addon.capture.stages.clock import PLACING
 from scope.scope_addon.job.job_progress import BUILDING, FIRST_ONLY, STAGES
 from scope.scope_addon.notices import PARTS, PHRASES, SENTENCES
-from scope.scope_addon.ui.pins.pin_tool import HANDLES
+from scope.scope_addon.ui.pin_tool import HANDLES
 from scope.scope_addon.ui.translations import CONTEXT
 
 ROOT = Path(scope.__file__).resolve().parent / "scope_addon"

@@ -10,13 +10,13 @@ from contextlib import suppress
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
-from scope.scope_addon.scene.animation_data.stored_values import parse_spans, spans_text
-from scope.scope_addon.scene.animation_data.timing import keyed_rate
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.camera import set_resolution
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.match_rate import retimed_spans
+from scope.scope_addon.scene.stored_values import parse_spans, spans_text
+from scope.scope_addon.scene.timing import keyed_rate
 from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for
 from scope.scope_addon.ui.captured_person import captured_armature
 

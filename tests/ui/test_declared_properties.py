@@ -13,8 +13,8 @@ import bpy
 import pytest
 from scope.scope_addon import options as declarations
 from scope.scope_addon.options import OPTIONS, Option, Place, Property, Section, option, options_at
-from scope.scope_addon.scene.animation_data.timing import RATE_POLICIES
-from scope.scope_addon.scene.character.shape_keys import MODES
+from scope.scope_addon.scene.character.body_mesh import MODES
+from scope.scope_addon.scene.timing import RATE_POLICIES
 from scope.scope_addon.ui.capture import capture_panel
 from scope.scope_addon.ui.capture.capture_job import capture_request
 from scope.scope_addon.ui.declared_properties import (

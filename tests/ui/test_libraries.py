@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from scope.scope_addon.errors import SetupError
-from scope.scope_addon.ui import libraries
+from scope.scope_addon.ui import reporting
 
 
 @pytest.fixture
@@ -16,10 +16,10 @@ def enabled(tmp_path, monkeypatch):
     folder = tmp_path / "wheels"
     folder.mkdir()
     monkeypatch.syspath_prepend(str(folder))
-    monkeypatch.setattr(libraries, "_NEEDED", ("scope_needs_this",))
-    preferences = SimpleNamespace(addons={libraries._PACKAGE: None})
+    monkeypatch.setattr(reporting, "_NEEDED", ("scope_needs_this",))
+    preferences = SimpleNamespace(addons={reporting._PACKAGE: None})
     monkeypatch.setattr(
-        libraries, "bpy", SimpleNamespace(context=SimpleNamespace(preferences=preferences))
+        reporting, "bpy", SimpleNamespace(context=SimpleNamespace(preferences=preferences))
     )
     return folder / "scope_needs_this.py"
 
@@ -38,14 +38,14 @@ def test_a_removed_library_is_put_back(enabled, monkeypatch):
         enabled.write_text("")
 
     use_blender(monkeypatch, extensions_refresh)
-    libraries.restore_libraries()
+    reporting.restore_libraries()
     assert asked == [True]
-    libraries.restore_libraries()
+    reporting.restore_libraries()
     assert asked == [True]
     # One that was loaded is missing for a worker all the same.
     __import__("scope_needs_this")
     enabled.unlink()
-    libraries.restore_libraries()
+    reporting.restore_libraries()
     assert asked == [True, True]
     del sys.modules["scope_needs_this"]
 
@@ -53,11 +53,11 @@ def test_a_removed_library_is_put_back(enabled, monkeypatch):
 def test_one_that_stays_missing_is_said_with_what_to_do(enabled, monkeypatch):
     use_blender(monkeypatch, lambda ensure_wheels: None)
     with pytest.raises(SetupError, match=r"missing \(scope_needs_this\).*disable Scope.*enable it"):
-        libraries.restore_libraries()
+        reporting.restore_libraries()
 
 
 def test_outside_of_an_extension_nothing_is_done(monkeypatch):
     use_blender(monkeypatch, lambda ensure_wheels: pytest.fail("it was asked"))
-    monkeypatch.setattr(libraries, "_NEEDED", ("scope_needs_this",))
-    assert libraries._PACKAGE not in bpy.context.preferences.addons
-    libraries.restore_libraries()
+    monkeypatch.setattr(reporting, "_NEEDED", ("scope_needs_this",))
+    assert reporting._PACKAGE not in bpy.context.preferences.addons
+    reporting.restore_libraries()

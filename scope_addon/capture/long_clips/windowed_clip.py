@@ -24,8 +24,7 @@ import numpy as np
 
 from ...errors import UsageError
 from ..media.frame import Frame
-from ..media.opencv_threads import opencv_in_one_thread
-from ..media.video import Video, open_video
+from ..media.video import Video, open_video, opencv_in_one_thread
 from ..options import CaptureOptions
 from ..perception.observation import Observation
 from ..perception.region import Region

@@ -22,9 +22,8 @@ from ...arrays import Uint8Array
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
 from .deinterlace import FIELD_CODECS, deinterlaced
-from .file_names import utf8_name
+from .guards import check_size, utf8_name
 from .hdr import hdr_rgb
-from .image_size import check_size
 
 if TYPE_CHECKING:
     import av

@@ -21,10 +21,9 @@ from ...errors import VideoError
 from ...footage import MAX_PIXELS
 from ...untrusted.files import check_regular
 from .exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
-from .file_names import utf8_name
 from .frame_readers import decode_items
+from .guards import check_depth, check_size, too_large, utf8_name
 from .heif import assemble, read_layout
-from .image_size import check_depth, check_size, too_large
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF

@@ -18,7 +18,7 @@ import re
 import stat
 import threading
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
@@ -427,3 +427,16 @@ class _Decoder:
     def _warn(self, warning: Notice) -> None:
         if warning not in self._video.warnings:
             self._video.warnings.append(warning)
+
+
+@contextmanager
+def opencv_in_one_thread() -> Iterator[None]:
+    """Leave the cores to stages and networks that run in parallel; OpenCV's threads would wait for
+    one another.
+    """
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)

@@ -30,8 +30,7 @@ from ..fitting.background_estimators import BackgroundEstimators
 from ..fitting.focal_length import FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.frame import AutoExposure, Frame
-from ..media.opencv_threads import opencv_in_one_thread
-from ..media.video import Video
+from ..media.video import Video, opencv_in_one_thread
 from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
 from ..perception.landmark_network import EstimateMemory

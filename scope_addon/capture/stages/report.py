@@ -15,7 +15,7 @@ from ....solver.names import BODY_JOINTS
 from ...arrays import Float64Array
 from ...capture_report import Report
 from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
-from ...kinematics.runs import runs
+from ...kinematics.sequences import runs
 from ...motion import Motion
 from ...notices import Notice, Value, notice
 from ...options.capture import ON

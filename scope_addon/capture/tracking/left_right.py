@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, IndexArray
-from ...kinematics.viterbi import least_cost_path
+from ...kinematics.sequences import least_cost_path
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..perception.lifter import default_lifter

@@ -31,7 +31,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
-from ...kinematics.viterbi import least_cost_path
+from ...kinematics.sequences import least_cost_path
 from ..perception.landmark_network import KEYPOINT_NAMES
 from .keypoint_jumps import scale_px_per_m
 from .left_right import MIRROR_PARTNER, reorder_keypoints, swap_keypoints

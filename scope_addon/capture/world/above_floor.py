@@ -32,7 +32,7 @@ from ...kinematics.contact_points import FOOT_PARTS, SOLES
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin, lower_floors
 from ...kinematics.frame_blocks import by_blocks
 from ...kinematics.leg_reach import move_feet, move_hands
-from ...kinematics.runs import runs
+from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
 from .placement import PlacedTrack
 

@@ -33,7 +33,7 @@ from ....solver.tree import Tree, with_fixed_shape
 from ...arrays import Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import BodySurface
 from ...kinematics.contact_points import contact_point_positions
-from ...kinematics.runs import runs
+from ...kinematics.sequences import runs
 from ..fitting.prepared_track import PreparedTrack
 from ..fitting.weights import CLIP_STEPS, ROBUST, clip_stages
 from .camera_path import CameraPath

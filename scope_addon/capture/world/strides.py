@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray
-from ...kinematics.runs import runs
+from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
 from .placement import PlacedTrack
 

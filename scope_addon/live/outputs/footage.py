@@ -19,8 +19,8 @@ from pathlib import Path
 from ....solver.errors import ScopeError
 from ...atomic_write import create_new, finish, reason
 from ...capture.overlay.video_writer import VideoWriter
-from ...counts import counted
 from ...errors import OutputError
+from ...notices import counted
 from ...temporary import remove
 from ..sources import Picture
 from .unfinished import unfinished_video

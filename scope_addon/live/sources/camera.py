@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
-from ..clock import Clock
 from . import system_cameras
-from .source import DEFAULT_FPS, Picture
+from .source import DEFAULT_FPS, Clock, Picture
 
 CAMERA_SIZE = (1280, 720)
 _OPEN_ERRORS = {

@@ -38,8 +38,7 @@ from numpy.typing import NDArray
 
 from ....solver.errors import ScopeError
 from ...errors import VideoError
-from ..clock import Clock
-from .source import Picture, Source
+from .source import Clock, Picture, Source
 from .stream import DAMAGED_S, STALLED_S
 
 _POLLING_INTERVAL_S = 0.2  # in which a waiting main thread reacts to Ctrl-C on every system

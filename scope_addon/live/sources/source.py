@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every source of frames is, the frames that it gives, and the simplest of them: a video that
-is played in real time.
+"""What every source of frames is, the frames that it gives, the clock that it runs by, and the
+simplest of them: a video that is played in real time.
 """
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...capture.media.video import open_video
-from ..clock import Clock
 
 DEFAULT_FPS = Fraction(30)
 # by which a frame is too late after a computer has slept: what it slept through is not made up for
@@ -82,3 +83,19 @@ class FileSource:
                 yield Picture(
                     frame.index, frame.timestamp_s, max(due_s, clock.now()), frame.image_rgb
                 )
+
+
+class Clock:
+    """Monotonic seconds, and sleep that ends early when the capture stops."""
+
+    def __init__(self) -> None:
+        self.stopped = threading.Event()
+
+    def now(self) -> float:
+        """Return the time in seconds since an arbitrary moment."""
+        return time.monotonic()
+
+    def sleep(self, seconds: float) -> None:
+        """Wait, but not after ``stopped`` is set."""
+        if seconds > 0:
+            self.stopped.wait(seconds)

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...capture.media.frame_readers import orientation, rgb, upright
-from ...capture.media.image_size import check_size
+from ...capture.media.guards import check_size
 from ...errors import VideoError
 from ...footage import display_address
-from ..clock import Clock
 from .damage import Damage
-from .source import DEFAULT_FPS, Picture
+from .source import DEFAULT_FPS, Clock, Picture
 
 if TYPE_CHECKING:
     import av

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import VideoError
-from ..clock import Clock
+from .source import Clock
 
 if TYPE_CHECKING:
     from av.container import InputContainer

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ...kinematics.axes import R_WORLD_MODEL
 from ...motion import Motion
-from ..animation_data.actions import Channels, bone_path
+from ..actions import Channels, bone_path
 from .armature import RestPose, rest_orientations
 
 

@@ -17,21 +17,15 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip, sample
+from ...edit.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
+from ...edit.corrections import Correction, FeetOnFloor, Pin, feet_on_floor, world_of
+from ...edit.edits import moved_clip
 from ...edit.floor import foot_height
-from ...edit.pins.corrected_motion import (
-    corrections_of,
-    floor_of,
-    pin_in_world,
-    shot_of,
-    uncorrected,
-)
-from ...edit.pins.corrections import Correction, FeetOnFloor, Pin, feet_on_floor, world_of
-from ...edit.pins.moved import moved_clip
-from ...edit.pins.solve_pins import missed, resolve
 from ...edit.smooth import smoothed
+from ...edit.solve_pins import missed, resolve
 from ...errors import UsageError
 from ...motion import Motion
-from ..animation_data.stored_values import smoothing_of, start_frame
+from ..stored_values import smoothing_of, start_frame
 from .edited_keys import KeyEdits, begin_with_edits, meet_floor
 from .keys import channel_curves, read_clip, write_keys
 from .root_object import clip_with_root_motion, root_object

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from ..animation_data.stored_values import LAST_FRAME
+from ..stored_values import LAST_FRAME
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ...edit.pins.corrections import Correction, Pin
+    from ...edit.corrections import Correction, Pin
     from ...motion import Motion
 
 _LIST = "scope_corrections"  # custom property of the armature
@@ -68,8 +68,8 @@ def store_corrections(
     """
     import json
 
-    from ...edit.pins.corrected_motion import corrections_of
-    from ...edit.pins.corrections import Pin
+    from ...edit.corrected_motion import corrections_of
+    from ...edit.corrections import Pin
 
     entries = []
     for correction in corrections_of(motion):
@@ -83,7 +83,7 @@ def _entry(
     armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float
 ) -> dict[str, Any]:
     """Describe a correction."""
-    from ...edit.pins.corrections import (
+    from ...edit.corrections import (
         FEET,
         Contact,
         DepthFlip,
@@ -143,7 +143,7 @@ def _missed(motion: Motion, pin: Pin, place: NDArray[np.float64] | None) -> str:
     """Return how far a joint is from a pin that it cannot reach, with the unit; empty if it is
     there.
     """
-    from ...edit.pins.corrected_motion import distance_from_pin
+    from ...edit.corrected_motion import distance_from_pin
 
     distance = distance_from_pin(motion, pin, place)
     if distance < (_MISSED_M if pin.pixel is None else _MISSED_PX):

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip
-from ...edit.pins.corrected_motion import corrections_of
-from ...edit.pins.corrections import Correction, FeetOnFloor, Interpolation, feet_on_floor
-from ...edit.pins.edits import edited, floor_above, interpolated, on_floor
-from ...edit.pins.solve_pins import Shot
+from ...edit.corrected_motion import corrections_of
+from ...edit.corrections import Correction, FeetOnFloor, Interpolation, feet_on_floor
+from ...edit.edits import edited, floor_above, interpolated, on_floor
 from ...edit.root_motion import relative_to_trajectory, with_trajectory
+from ...edit.solve_pins import Shot
 from ...motion import Motion
 from .keys import read_clip, write_keys
 from .root_object import removed_root_motion

@@ -14,8 +14,8 @@ from ...expression_names import EXPRESSIONS
 from ...kinematics.axes import R_WORLD_MODEL
 from ...kinematics.face import expressions_of, mouth_faces_of
 from ...motion import Motion
-from ..animation_data.actions import Channels, fcurves, read_keys, shape_key_path
-from ..animation_data.timing import whole_frames_of
+from ..actions import Channels, fcurves, read_keys, shape_key_path
+from ..timing import whole_frames_of
 from .body_mesh import colour_faces
 
 MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear

@@ -22,15 +22,8 @@ from ...edit.clip import Clip, band_limited, sample
 from ...edit.reduce import angles_between, select_position_keys, select_quaternion_keys
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
-from ..animation_data.actions import (
-    bone_path,
-    change_keys,
-    check_not_in_nla,
-    fcurves,
-    read_keys,
-    rewrite_keys,
-)
-from ..animation_data.timing import whole_frames_of
+from ..actions import bone_path, change_keys, check_not_in_nla, fcurves, read_keys, rewrite_keys
+from ..timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
 

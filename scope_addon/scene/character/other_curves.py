@@ -22,17 +22,10 @@ from ....solver.body import Body
 from ...motion import Motion
 from ...notices import REASONS
 from ...review_spans import find_review_spans
-from ..animation_data.actions import (
-    Channels,
-    bone_property_path,
-    fcurves,
-    read_keys,
-    rewrite_keys,
-    shape_key_path,
-)
-from ..animation_data.stored_values import in_scene
+from ..actions import Channels, bone_property_path, fcurves, read_keys, rewrite_keys, shape_key_path
+from ..stored_values import in_scene
+from .body_mesh import shape_key_name
 from .keys import channel_curves
-from .shape_keys import shape_key_name
 
 _CONSTANT = "CONSTANT"
 CONFIDENCE = "confidence"

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...edit.clip import Clip
-from ...edit.pins.moved import moved_clip
+from ...edit.edits import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
-from ..animation_data.actions import Channels, check_not_in_nla, fcurves, read_keys
-from ..animation_data.stored_values import stored_numbers
-from ..animation_data.timing import Retiming
+from ..actions import Channels, check_not_in_nla, fcurves, read_keys
 from ..datablocks import remove_blocks
+from ..stored_values import stored_numbers
+from ..timing import Retiming
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty

@@ -21,8 +21,8 @@ from ....solver.body import Body
 from ...edit.clip import Clip
 from ...errors import MotionFileError
 from ...untrusted.files import read_npz
-from ..animation_data.actions import read_keys
-from ..animation_data.stored_values import start_frame
+from ..actions import read_keys
+from ..stored_values import start_frame
 from .keys import channel_curves, write_clip
 
 _SAME = 2e-3  # frames; keys are single precision

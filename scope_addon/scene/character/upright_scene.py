@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
-from ..animation_data.actions import fcurves, read_keys, rewrite_keys
+from ..actions import fcurves, read_keys, rewrite_keys
 from .animation import on_one_hemisphere
 from .root_object import parent_transform
 

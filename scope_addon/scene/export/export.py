@@ -26,7 +26,7 @@ from ...errors import OutputError, UsageError
 from ...motion import Motion
 from ...notices import Notice
 from ...temporary import remove
-from ..animation_data import actions
+from .. import actions
 from ..budget import check_samples
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, build_scene
 from ..character.bone_display import remove_if_unused

@@ -12,11 +12,11 @@ import numpy as np
 from mathutils import Matrix
 
 from ...errors import UsageError
-from ..animation_data import actions
+from .. import actions
 from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
+from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
-from ..character.shape_keys import mixed_vertices, shape_key_name
 
 
 @contextmanager

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import OutputError
-from ..animation_data import timing
+from .. import timing
 from . import bvh
 from .fbx_file import correct_fbx
 

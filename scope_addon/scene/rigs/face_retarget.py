@@ -23,16 +23,9 @@ from ...retarget.face_controls import (
     guess_control_map,
     has_face_controls,
 )
-from ..animation_data.actions import (
-    Channels,
-    bone_path,
-    check_not_in_nla,
-    fcurves,
-    read_keys,
-    shape_key_path,
-)
-from ..animation_data.transaction import all_or_nothing
+from ..actions import Channels, bone_path, check_not_in_nla, fcurves, read_keys, shape_key_path
 from ..character.expression_keys import MOVES, has_expression_keys
+from ..transaction import all_or_nothing
 from .rig_action import channel_of_rotation, leave_tweak_mode, mark_written, override_nla, retire
 
 # change of a channel, as a share of the bone's length or in radians, below which it is none

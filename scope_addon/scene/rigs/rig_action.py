@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ....solver.rotations import quaternion_from_matrix
 from ...retarget.skeleton import Skeleton
-from ..animation_data.actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
-from ..animation_data.stored_values import stored_text
-from ..animation_data.timing import Retiming, retime_keys
+from ..actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from ..character.animation import on_one_hemisphere
+from ..stored_values import stored_text
+from ..timing import Retiming, retime_keys
 
 # Custom properties of an action: the checksum of its keys when they were written, and the captured
 # armature's name.

@@ -24,7 +24,6 @@ from ...retarget.rest_pose import rest_faults
 from ...retarget.rig_source import ROOTS
 from ...retarget.skeleton import Pose, Skeleton, basis
 from ...retarget.transfer import Transfer, leg_ratio
-from ..animation_data.transaction import all_or_nothing
 from ..character.keys import read_clip
 from ..character.root_object import (
     clip_as_displayed,
@@ -34,6 +33,7 @@ from ..character.root_object import (
     root_object,
     topmost,
 )
+from ..transaction import all_or_nothing
 from .face_retarget import captured_expressions, face_keys, key_face, rest_face
 from .rig_action import (
     BoneKeys,

@@ -9,12 +9,11 @@ import bpy
 
 from ....solver.errors import ScopeError
 from ...notices import Notice, notice
-from ...scene.animation_data.stored_values import parse_spans, spans_text, stored_rate
 from ...scene.datablocks import holds
+from ...scene.stored_values import parse_spans, spans_text, stored_rate
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
-from ..reporting import ReportingOperator, rpt_, tip_
+from ..reporting import ReportingOperator, add_warning, rpt_, stored_warning, tip_
 from .captures import people_of, shown_capture
-from .stored_warnings import add_warning, stored_warning
 
 if TYPE_CHECKING:
     from ...motion import Motion
@@ -102,10 +101,10 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Change the rate and move the captures in time."""
-        from ...scene.animation_data.timing import keyed_rate, scene_rate
-        from ...scene.animation_data.transaction import all_or_nothing
         from ...scene.character.keys import bake_whole_frames, read_clip
         from ...scene.match_rate import change_rate, other_animation
+        from ...scene.timing import keyed_rate, scene_rate
+        from ...scene.transaction import all_or_nothing
 
         scene = context.scene
         people = captured_people(context)
@@ -139,7 +138,7 @@ def _library(block: bpy.types.ID) -> bpy.types.Library | None:
 
 def _exact(rate: float) -> float:
     """Return the rate that Blender will store, which single precision has rounded"""
-    from ...scene.animation_data.timing import blender_rate
+    from ...scene.timing import blender_rate
 
     fps, base = blender_rate(rate)
     return fps / base

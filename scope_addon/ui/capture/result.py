@@ -16,10 +16,10 @@ from ...capture_report import Report
 from ...motion import Motion
 from ...notices import notice
 from ...review_spans import Span, find_review_spans
-from ...scene.animation_data.stored_values import FrameSpan, in_scene
 from ...scene.build import BuildResult
 from ...scene.camera import pixel_aspect
-from .stored_warnings import add_warning
+from ...scene.stored_values import FrameSpan, in_scene
+from ..reporting import add_warning
 
 _MAX_SPANS = 12  # number of buttons
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import pytest
-from scope.scope_addon.capture.media.file_names import utf8_name
+from scope.scope_addon.capture.media.guards import utf8_name
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.footage import display_text, is_utf8
 

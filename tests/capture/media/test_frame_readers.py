@@ -14,7 +14,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media import image_size
+from scope.scope_addon.capture.media import guards
 from scope.scope_addon.capture.media.frame_readers import PyavReader, exact_fps, upright
 from scope.scope_addon.errors import VideoError
 
@@ -97,7 +97,7 @@ def test_a_video_that_is_refused_is_closed(tmp_path, monkeypatch, video, reason)
             )
             sound.rate = 8000
             container.mux([*stream.encode(sound), *stream.encode()])
-    monkeypatch.setattr(image_size, "MAX_PIXELS", 100)
+    monkeypatch.setattr(guards, "MAX_PIXELS", 100)
     pyav_open = av.open
     monkeypatch.setattr(
         av,

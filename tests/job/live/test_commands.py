@@ -6,8 +6,7 @@ The request of a live capture as one line, told from that of other footage.
 
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.job.live_request import RECORD, STOP, Commands, LiveRequest
-from scope.scope_addon.job.request import WARM_UP, JobRequest
+from scope.scope_addon.job.request import RECORD, STOP, WARM_UP, Commands, JobRequest, LiveRequest
 
 
 @pytest.mark.parametrize("size", [1, 3, 100])

@@ -13,10 +13,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.sources import camera
 from scope.scope_addon.live.sources.camera import CameraSource, device_problem
 from scope.scope_addon.live.sources.newest_frame import NewestFrame
+from scope.scope_addon.live.sources.source import Clock
 
 from ..fake_source import FakeClock
 

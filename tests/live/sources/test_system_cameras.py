@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.job.live_cameras import camera_source, camera_with_formats, list_cameras
-from scope.scope_addon.live.clock import Clock
 from scope.scope_addon.live.sources import open_source, system_cameras
+from scope.scope_addon.live.sources.source import Clock
 
 BLUE = np.full((48, 64, 3), (10, 20, 240), np.uint8)
 

@@ -3,7 +3,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import CancelledError
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.solver.rotations import exp
 

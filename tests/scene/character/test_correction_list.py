@@ -7,8 +7,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.edit.pins.corrected_motion import with_corrections
-from scope.scope_addon.edit.pins.corrections import (
+from scope.scope_addon.edit.corrected_motion import with_corrections
+from scope.scope_addon.edit.corrections import (
     Contact,
     DepthFlip,
     Exchange,

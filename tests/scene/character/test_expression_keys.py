@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.kinematics.face import expressions_of
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
-from scope.scope_addon.scene.character.shape_keys import mixed_vertices
+from scope.scope_addon.scene.character.body_mesh import mixed_vertices
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
 
 from ...made_motion import made_face

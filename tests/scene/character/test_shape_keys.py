@@ -5,9 +5,9 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.character.shape_keys import mixed_vertices
+from scope.scope_addon.scene.character.body_mesh import mixed_vertices
 
 
 def test_names_range_and_values(body, make_motion):

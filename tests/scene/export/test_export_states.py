@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.export.export import ExportOptions, export
 

@@ -13,7 +13,7 @@ import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.rigs import face_retarget
 from scope.scope_addon.scene.rigs.face_retarget import (
     CapturedExpressions,

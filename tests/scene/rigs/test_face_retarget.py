@@ -12,7 +12,7 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.expression_names import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.retarget.rig_source import RigSource
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.rigs import face_retarget

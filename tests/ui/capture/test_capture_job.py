@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.job.job_progress import JobProgress
 from scope.scope_addon.job.messages import WorkerFailedError
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui.capture import capture_job

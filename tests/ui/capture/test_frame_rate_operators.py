@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture_report import Report
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import pack_motion

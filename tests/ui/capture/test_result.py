@@ -6,12 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 from scope.scope_addon.capture_report import Report
 from scope.scope_addon.notices import OTHER, notice
-from scope.scope_addon.scene.animation_data.stored_values import FrameSpan
 from scope.scope_addon.scene.build import build_scene
+from scope.scope_addon.scene.stored_values import FrameSpan
 from scope.scope_addon.ui.capture import capture_panel
 from scope.scope_addon.ui.capture.result import review_spans, show_result
-from scope.scope_addon.ui.capture.stored_warnings import add_warning, stored_warning
-from scope.scope_addon.ui.reporting import sentence
+from scope.scope_addon.ui.reporting import add_warning, sentence, stored_warning
 
 from ...made_motion import made_motion
 

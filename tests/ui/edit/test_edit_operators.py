@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.keys import read_clip
 from scope.scope_addon.scene.character.root_object import root_object

@@ -17,11 +17,11 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.foot_skin import foot_heights
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import pack_motion, stored_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
-from scope.scope_addon.ui.pins.correction_operators import last_pin_warnings
+from scope.scope_addon.ui.correction_operators import last_pin_warnings
 
 from ...edit.walking import BETAS, BODY, NAMES, motion_of, walk
 from ...scene import made_rigs

@@ -4,9 +4,9 @@
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.edit.pins.moved import moved_motion
+from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 

@@ -10,7 +10,7 @@ from which it was made.
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.character.keys import read_clip, write_clip
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of

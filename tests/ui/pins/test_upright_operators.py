@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix, Vector
-from scope.scope_addon.edit.pins.corrected_motion import shot_of
-from scope.scope_addon.edit.pins.moved import moved_motion
+from scope.scope_addon.edit.corrected_motion import shot_of
+from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.animation_data.actions import fcurves, read_keys
+from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of

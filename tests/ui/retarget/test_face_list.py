@@ -11,7 +11,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.ui.retarget_maps import common_prefix
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.animation_data import actions
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import build_scene
-from scope.scope_addon.ui.retarget_properties import offered_expressions
+from scope.scope_addon.ui.retarget_panel import offered_expressions
 
 from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face

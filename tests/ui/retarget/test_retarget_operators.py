@@ -12,7 +12,7 @@ from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
-from scope.scope_addon.ui.retarget_properties import offered_parts
+from scope.scope_addon.ui.retarget_panel import offered_parts
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ...retarget.naming_schemes import PLACES

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
-from scope.scope_addon.edit.pins.corrected_motion import shot_of
-from scope.scope_addon.edit.pins.corrections import FeetOnFloor, Interpolation
+from scope.scope_addon.edit.corrected_motion import shot_of
+from scope.scope_addon.edit.corrections import FeetOnFloor, Interpolation
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.character.edited_keys import KeyEdits, begin_with_edits, floored
 

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A motion with corrections: which can be changed and removed again, and outlive another smoothing.
+
+The motion keeps what was corrected, and of the frames that this changed how they were before.
+
+What a fit could not meet is measured afterwards: how far pins put feet under the floor, and how far
+from it parts stay that shall rest there. The fit keeps feet above it unless a pin asks for more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.names import BODY_JOINTS
+from ...solver.rotations import exp, log
+from ..errors import MotionFileError
+from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
+from ..kinematics.smoothing import smooth_rotations
+from ..motion import Motion
+from ..untrusted.files import in_one_line
+from .clip import Clip, clip_from_motion
+from .corrections import (
+    Contact,
+    Correction,
+    DepthFlip,
+    Exchange,
+    Pin,
+    floor_height,
+    from_arrays,
+    to_arrays,
+    world_of,
+)
+from .depth_flips import flipped
+from .edits import edited, moved_clip, moved_motion
+from .pose_refit import pixel_of
+from .solve_pins import Shot, lowest_skin, resolve, resting_joints
+from .spans import swap_sides
+
+_KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
+# Smoothing has mixed left and right within this time of a span's end.
+_MIXED_S = 0.12
+_NOTICED_M = 0.002
+
+
+def corrections_of(motion: Motion) -> tuple[Correction, ...]:
+    """Return what was corrected.
+
+    :raises MotionFileError: the motion's arrays are damaged.
+    """
+    return from_arrays(motion.corrections)
+
+
+def shot_of(motion: Motion, start: float = 0.0) -> Shot:
+    """Return when and from where the motion's frames were taken.
+
+    :param start: seconds of the clip's clock at the footage's time 0.
+    """
+    return Shot(
+        motion.frames,
+        motion.timestamps + start,
+        motion.world_from_camera,
+        motion.intrinsics_of_frames,
+    )
+
+
+def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | None = None) -> float:
+    """Return how far a joint is from its pin: pixels of a pin in the image, metres of one in space.
+
+    :param place: (3,) metres, the joint in the world; if None, the motion's own.
+    :return: the distance; 0 in frames that the motion does not have, and for fingers without
+        ``place``, because they depend on the body.
+    """
+    rows = np.flatnonzero(motion.frames == pin.frame)
+    if not len(rows) or (place is None and pin.joint not in BODY_JOINTS):
+        return 0.0
+    T = motion.world_from_camera[rows[0]]
+    if place is None:
+        place = (
+            T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
+            + T[:3, 3]
+        )
+    if pin.pixel is not None:
+        camera = T, motion.intrinsics_of_frames[rows[0]]
+        return float(np.linalg.norm(pixel_of(camera, place) - pin.pixel))
+    target = np.array(pin_in_world(motion, pin).position, float)
+    return float(np.linalg.norm(place - target))
+
+
+def pin_in_world(motion: Motion, pin: Pin) -> Pin:
+    """Return a pin in the world of the motion, which an upright line or a floor may have moved."""
+    transform = world_of(corrections_of(motion))
+    if pin.position is None or transform is None:
+        return pin
+    x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
+    return replace(pin, position=(float(x), float(y), float(z)))
+
+
+def uncorrected(motion: Motion) -> Motion:
+    """Return the motion as it was before any correction.
+
+    :raises MotionFileError: the motion's arrays are damaged.
+    """
+    if "uncorrected_rows" not in motion.corrections:
+        return motion
+    rows = motion.corrections["uncorrected_rows"]
+    before: dict[str, Any] = {}
+    try:
+        for name in _KEPT:
+            before[name] = getattr(motion, name).copy()
+            before[name][rows] = motion.corrections[f"uncorrected_{name}"]
+        if "uncorrected_world_from_camera" in motion.corrections:
+            before["world_from_camera"] = motion.corrections["uncorrected_world_from_camera"]
+        return replace(motion, **before, corrections={})
+    except (LookupError, ValueError, TypeError, OverflowError, MotionFileError) as error:
+        raise MotionFileError(
+            f"the motion's corrections are damaged: {in_one_line(error)}; capture the footage again"
+        ) from error
+
+
+def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, ...]) -> Motion:
+    """Return the motion with these corrections in place of those that it has.
+
+    :raises MotionFileError: the motion's corrections are damaged.
+    :raises UsageError: a pin names a joint that the body does not have.
+    """
+    base = uncorrected(motion)
+    if not corrections:
+        return base
+    wanted = replace(base, corrections=to_arrays(corrections))
+    captured = before_smoothing(wanted, body)
+    values: dict[str, Any] = {}
+    changed = np.zeros(len(base), bool)
+    for raw in (False, True):
+        before = clip_from_motion(body, base, raw)
+        after = _pinned(clip_from_motion(body, captured, raw), wanted, body)
+        turned = (after.rotations != before.rotations).any((1, 2, 3))
+        new = turned | (after.root != before.root).any(1)
+        changed |= new
+        poses, trans = ("poses_raw", "trans_raw") if raw else ("poses", "trans")
+        values[poses] = getattr(base, poses).copy()
+        values[trans] = getattr(base, trans).copy()
+        values[poses][turned] = log(after.rotations[turned]).reshape(values[poses][turned].shape)
+        values[trans][new] = after.root[new] - body.rest_joints(base.betas)[0]
+        if not raw:
+            values["joints_cam"] = base.joints_cam.copy()
+            T = base.world_from_camera[new]
+            joints = after.rows(new).joints(body, base.betas)
+            values["joints_cam"][new] = (joints - T[:, None, :3, 3]) @ T[:, :3, :3]
+    out = replace(wanted, **values)
+    transform = world_of(corrections)
+    if transform is not None:
+        out = moved_motion(out, body, transform)
+        changed = np.ones(len(base), bool)
+    rows = np.flatnonzero(changed)
+    kept = {f"uncorrected_{name}": getattr(base, name)[rows] for name in _KEPT}
+    if transform is not None:
+        kept["uncorrected_world_from_camera"] = base.world_from_camera
+    return replace(out, corrections={**wanted.corrections, "uncorrected_rows": rows, **kept})
+
+
+def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
+    """Apply the motion's flips in depth, edits, contacts, pins, upright line and floor to another
+    smoothing of it.
+
+    :param clip: the motion in the captured world, with its sides exchanged already.
+    :raises MotionFileError: the motion's corrections are damaged.
+    """
+    clip = _pinned(clip, motion, body)
+    transform = world_of(corrections_of(motion))
+    return clip if transform is None else moved_clip(clip, transform)
+
+
+def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
+    """Apply the flips in depth, the edits, then the contacts and pins, in the captured world."""
+    corrections = corrections_of(motion)
+    shot = shot_of(uncorrected(motion))
+    flips = [c for c in corrections if isinstance(c, DepthFlip)]
+    clip = flipped(clip, body, motion.betas, flips, shot)
+    clip = edited(clip, body, motion.betas, corrections, shot)
+    wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
+    if not wanted:
+        return clip
+    # An upright line turns the world about a point on the floor, so the floor's height is nearly
+    # the same before it.
+    return resolve(clip, body, motion.betas, wanted, shot, floor=floor_of(motion, corrections))
+
+
+def floor_of(motion: Motion, corrections: Iterable[Correction] = ()) -> float:
+    """Return the floor's height z with these corrections, metres; −∞ on uneven ground, which has no
+    floor.
+    """
+    return -np.inf if motion.uneven_ground else floor_height(corrections)
+
+
+def before_smoothing(motion: Motion, body: Body) -> Motion:
+    """Return the motion as it would have been captured with left and right as they are in the
+    user's eyes.
+
+    At the ends of an exchanged span, smoothing has mixed both sides: there, the raw motion is
+    smoothed again.
+
+    :raises MotionFileError: the motion's corrections are damaged.
+    """
+    base = uncorrected(motion)
+    exchanges = [c for c in corrections_of(motion) if isinstance(c, Exchange)]
+    if not exchanges:
+        return base
+    raw = clip_from_motion(body, base, raw=True)
+    finished = clip_from_motion(body, base, raw=False)
+    mixed = np.zeros(len(base), bool)
+    for exchange in exchanges:
+        span = np.flatnonzero((base.frames >= exchange.first) & (base.frames <= exchange.last))
+        if len(span):
+            first, last = base.timestamps[span[[0, -1]]]
+            raw = swap_sides(raw, body, first, last, exchange.limbs)
+            finished = swap_sides(finished, body, first, last, exchange.limbs)
+            for k, neighbour in ((span[0], span[0] - 1), (span[-1], span[-1] + 1)):
+                if 0 <= neighbour < len(base):
+                    mixed |= np.abs(base.timestamps - base.timestamps[k]) < _MIXED_S
+    smooth = smooth_rotations(raw.rotations, raw.times)
+    sided = np.flatnonzero([name.startswith(("left_", "right_")) for name in body.joint_names])
+    again = np.ix_(np.flatnonzero(mixed), sided)
+    finished.rotations[again] = smooth[again]
+    new_raw, new = (
+        _poses(clip, getattr(base, poses))
+        for clip, poses in ((raw, "poses_raw"), (finished, "poses"))
+    )
+    return replace(base, poses_raw=new_raw, poses=new)
+
+
+def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return axis-angle vectors (T, 3(K+1)), unchanged in the frames that the clip has not
+    changed.
+    """
+    rotations = exp(before.reshape(len(before), -1, 3).astype(float))
+    new = (clip.rotations != rotations).any((1, 2, 3))
+    poses = before.copy()
+    poses[new] = log(clip.rotations[new]).reshape(poses[new].shape)
+    return poses
+
+
+def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
+    """Return how far a foot is under the floor because of what was measured, metres, and in how
+    many frames.
+
+    :param body: the motion's body.
+    :return: the largest depth and the number of frames, of feet that are more than
+        `UNDER_FLOOR_M` under the floor and lower than without pins; 0 and 0 if there are none,
+        and on uneven ground.
+    :raises MotionFileError: the motion's corrections are damaged.
+    """
+    if motion.uneven_ground:
+        return 0.0, 0
+    free = with_corrections(
+        motion, body, tuple(c for c in corrections_of(motion) if not isinstance(c, Contact | Pin))
+    )
+    lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
+    under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
+    return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)
+
+
+def distance_from_floor(motion: Motion, body: Body, contact: Contact) -> float:
+    """Return how far from the floor a part stays at most that rests there, metres; 0 on uneven
+    ground, whose height is unknown.
+
+    :param body: the motion's body.
+    :param contact: of a part other than a foot.
+    """
+    rows = np.flatnonzero((motion.frames >= contact.first) & (motion.frames <= contact.last))
+    if motion.uneven_ground or not len(rows):
+        return 0.0
+    clip = clip_from_motion(body, motion, raw=False).rows(rows)
+    heights = [
+        lowest_skin(clip, body, motion.betas, joint) for joint in resting_joints(contact.part)
+    ]
+    return float(np.abs(heights).max())

@@ -1,0 +1,426 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user corrects in a motion, as values and as the plain arrays of a motion file.
+
+Frames are those of the footage (``Motion.frames``), so that corrections stay valid whatever
+smoothing or frame rate the keys have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MotionFileError, UsageError
+from ..untrusted.files import in_one_line
+
+REACH_S = 0.4  # Time over which a correction fades out on each side.
+FEET = ("left", "right")
+# What can rest on the floor beside feet.
+RESTING_PARTS = (
+    *(f"{side}_{part}" for part in ("hand", "elbow", "knee") for side in FEET),
+    "seat",
+    "back",
+)
+BODY = "body"
+# What can be mirrored in depth: whole limbs, their lower bones alone, and the body.
+DEPTH_PARTS = (
+    *(f"{side}_{part}" for part in ("arm", "leg", "forearm", "shin") for side in FEET),
+    BODY,
+)
+_HIGHEST_M = 1e3
+_LAST_FRAME = 1 << 53
+_MAX_INTERPOLATIONS = 1000
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A joint's position in one frame: in the image, or in the world if ``position`` is given."""
+
+    frame: int
+    joint: str
+    pixel: tuple[float, float] | None = None  # In the upright frame, without lens distortion.
+    # Metres, in the captured world, before an upright line turns it.
+    position: tuple[float, float, float] | None = None
+    reach: float = REACH_S  # seconds
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: neither or both of pixel and position are given, or a number is not
+            finite.
+        """
+        if (self.pixel is None) == (self.position is None):
+            raise UsageError(
+                f"a pin of {self.joint} needs either a pixel or a position in the world"
+            )
+        numbers = [*(self.pixel or ()), *(self.position or ()), self.reach]
+        if not np.isfinite(numbers).all() or self.reach <= 0:
+            raise UsageError(
+                f"the pin of {self.joint} in frame {self.frame} has the values {numbers}, which no "
+                "fit can use"
+            )
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A foot that stands still on the floor from one frame to another, both inclusive, or another
+    part that rests there.
+    """
+
+    first: int
+    last: int
+    part: str  # "left" or "right" for the foot, or one of `RESTING_PARTS`
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the part cannot rest, or the span is empty.
+        """
+        if self.part not in (*FEET, *RESTING_PARTS):
+            raise UsageError(
+                f"the foot must be left or right, or what rests one of {', '.join(RESTING_PARTS)}, "
+                f"not {self.part!r}"
+            )
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Left and right limbs are exchanged from one frame to another, both inclusive."""
+
+    first: int
+    last: int
+    limbs: str = "both"  # "arms", "legs" or "both"
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the limbs are unknown, or the span is empty.
+        """
+        if self.limbs not in ("arms", "legs", "both"):
+            raise UsageError(f"limbs must be arms, legs or both, not {self.limbs!r}")
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class DepthFlip:
+    """A limb or the body is mirrored in depth, as the camera sees it, from one frame to another,
+    both inclusive.
+    """
+
+    first: int
+    last: int
+    part: str  # One of `DEPTH_PARTS`.
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the part is unknown, or the span is empty.
+        """
+        if self.part not in DEPTH_PARTS:
+            raise UsageError(f"part must be one of {', '.join(DEPTH_PARTS)}, not {self.part!r}")
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """The motion from one frame to another, both inclusive, is interpolated from the frames around
+    them.
+    """
+
+    first: int
+    last: int
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the span is empty.
+        """
+        _check_span(self.first, self.last)
+
+
+@dataclass(frozen=True)
+class FeetOnFloor:
+    """Feet in contact are put on the floor of the world that the upright line has turned; see
+    `edit.floor.refloor`.
+    """
+
+    # Whether the soles in contact are levelled too, by turning the motion without the camera.
+    level: bool = False
+    # Whether frames in which a foot is under the floor are raised as well.
+    lift: bool = True
+    # Height in metres of the floor as it was corrected before, on which the feet are put.
+    height: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the height is not a number of metres that a world has.
+        """
+        if not abs(self.height) < _HIGHEST_M:
+            raise UsageError(
+                f"feet cannot be put on a floor at {self.height} m, which no capture has"
+            )
+
+
+@dataclass(frozen=True)
+class Upright:
+    """The world, with the camera, is turned so that a line that the user drew is upright."""
+
+    rows: tuple[float, ...]  # The rigid transform (4, 4) from the captured world, by rows.
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the transform is not rigid.
+        """
+        T = np.array(self.rows, float)
+        rigid = T.shape == (16,) and np.isfinite(T).all()
+        T = T.reshape(4, 4) if rigid else np.zeros((4, 4))
+        if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6) or not np.allclose(
+            T[3], [0, 0, 0, 1]
+        ):
+            raise UsageError("an upright line needs a rigid transform of the world")
+
+    @staticmethod
+    def of(transform: NDArray[np.float64]) -> Upright:
+        """Return the correction of a transform (4, 4)."""
+        return Upright(tuple(float(x) for x in transform.ravel()))
+
+    @property
+    def transform(self) -> NDArray[np.float64]:
+        """The transform (4, 4) from the captured world to the upright one."""
+        return np.array(self.rows).reshape(4, 4)
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The world, with the camera, is moved up or down so that a foot rests on the floor in one
+    frame.
+    """
+
+    frame: int
+    height: float  # Metres above z = 0 of the world that the upright line has turned.
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the height is not a number of metres that a world has.
+        """
+        if not abs(self.height) < _HIGHEST_M:
+            raise UsageError(
+                f"the floor in frame {self.frame} is {self.height} m high, which no capture has"
+            )
+
+    @property
+    def transform(self) -> NDArray[np.float64]:
+        """The transform (4, 4) from the upright world to the one whose floor is z = 0."""
+        out = np.eye(4)
+        out[2, 3] = -self.height
+        return out
+
+
+Correction = Pin | Contact | Exchange | DepthFlip | Interpolation | Upright | Floor | FeetOnFloor
+
+
+def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
+    """Return the transform (4, 4) of the captured world by the upright line, then the floor; None
+    without both.
+    """
+    out: NDArray[np.float64] | None = None
+    for c in sorted(
+        (c for c in corrections if isinstance(c, Upright | Floor)),
+        key=lambda c: isinstance(c, Floor),
+    ):
+        out = c.transform if out is None else c.transform @ out
+    return out
+
+
+def floor_height(corrections: Iterable[Correction]) -> float:
+    """Return the floor's height in metres, 0 where it was not corrected."""
+    return next((c.height for c in corrections if isinstance(c, Floor)), 0.0)
+
+
+def feet_on_floor(corrections: Iterable[Correction]) -> FeetOnFloor | None:
+    """Return how feet are put on the floor; None where they are not."""
+    return next((c for c in corrections if isinstance(c, FeetOnFloor)), None)
+
+
+def _check_span(first: int, last: int) -> None:
+    if max(abs(first), abs(last)) > _LAST_FRAME:
+        raise UsageError(f"there are no frames from {first} to {last}")
+    if last < first:
+        raise UsageError(
+            f"the span ends in frame {last}, before it begins in frame {first}; swap them"
+        )
+
+
+def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
+    """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
+
+    The same exchange or flip a second time undoes the first, so that neither remains. An upright
+    line and a floor move the world that those before have made, so that one of each remains. An
+    interpolation replaces those within its span. Feet are put on the floor that was corrected last.
+    """
+    if isinstance(new, Upright | Floor):
+        return _moved_on(corrections, new)
+    if isinstance(new, FeetOnFloor):
+        others = tuple(c for c in corrections if not isinstance(c, FeetOnFloor))
+        return (*others, replace(new, height=floor_height(corrections)))
+    if isinstance(new, Exchange | DepthFlip) and new in corrections:
+        return tuple(c for c in corrections if c != new)
+    if isinstance(new, Interpolation):
+        corrections = tuple(
+            c for c in corrections if not (isinstance(c, Interpolation) and _is_within(c, new))
+        )
+    if isinstance(new, Pin):
+        corrections = tuple(
+            c
+            for c in corrections
+            if not (isinstance(c, Pin) and (c.frame, c.joint) == (new.frame, new.joint))
+        )
+    return corrections if new in corrections else (*corrections, new)
+
+
+def removed(
+    corrections: tuple[Correction, ...], kinds: tuple[type[Correction], ...]
+) -> tuple[Correction, ...]:
+    """Return the corrections without these kinds; without a corrected floor, feet are put on the
+    captured one.
+    """
+    kept = tuple(c for c in corrections if not isinstance(c, kinds))
+    if floor_height(kept) == floor_height(corrections):
+        return kept
+    return tuple(replace(c, height=0.0) if isinstance(c, FeetOnFloor) else c for c in kept)
+
+
+def _is_within(inner: Interpolation, outer: Interpolation) -> bool:
+    return outer.first <= inner.first and inner.last <= outer.last
+
+
+def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tuple[Correction, ...]:
+    """Add what moves the present world: W' = N W, kept as W' = F' U' of a floor and an upright
+    line.
+
+    What is upright by a line is not levelled by the feet any more.
+    """
+    floor = next((c for c in corrections if isinstance(c, Floor)), None)
+    upright = next((c for c in corrections if isinstance(c, Upright)), None)
+    if isinstance(new, Floor):
+        floor = Floor(new.frame, new.height + (floor.height if floor else 0.0))
+    else:
+        before = np.eye(4) if upright is None else upright.transform
+        lowered = np.eye(4) if floor is None else floor.transform
+        upright = Upright.of(np.linalg.inv(lowered) @ new.transform @ lowered @ before)
+        corrections = tuple(
+            replace(c, level=False) if isinstance(c, FeetOnFloor) else c for c in corrections
+        )
+    others = tuple(c for c in corrections if not isinstance(c, Upright | Floor))
+    return (*others, *(c for c in (upright, floor) if c is not None))
+
+
+def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a motion file; see docs/motion_file.md. Coordinates that a pin does not
+    have are NaN.
+    """
+    pins = [c for c in corrections if isinstance(c, Pin)]
+    contacts = [c for c in corrections if isinstance(c, Contact)]
+    exchanges = [c for c in corrections if isinstance(c, Exchange)]
+    flips = [c for c in corrections if isinstance(c, DepthFlip)]
+    upright = [c for c in corrections if isinstance(c, Upright)]
+    floors = [c for c in corrections if isinstance(c, Floor)]
+    interpolations = [c for c in corrections if isinstance(c, Interpolation)]
+    snaps = [c for c in corrections if isinstance(c, FeetOnFloor)]
+    nan = float("nan")
+    return {
+        "pin_frames": np.array([p.frame for p in pins], np.int64),
+        "pin_joints": np.array([p.joint for p in pins], np.str_),
+        "pin_uv": np.array([p.pixel or (nan,) * 2 for p in pins], np.float64).reshape(-1, 2),
+        "pin_xyz": np.array([p.position or (nan,) * 3 for p in pins], np.float64).reshape(-1, 3),
+        "pin_reach": np.array([p.reach for p in pins], np.float64),
+        "contact_spans": np.array([(c.first, c.last) for c in contacts], np.int64).reshape(-1, 2),
+        "contact_feet": np.array([c.part for c in contacts], np.str_),
+        "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
+        "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
+        "depth_spans": np.array([(f.first, f.last) for f in flips], np.int64).reshape(-1, 2),
+        "depth_parts": np.array([f.part for f in flips], np.str_),
+        "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
+        "floor_frames": np.array([f.frame for f in floors], np.int64),
+        "floor_heights": np.array([f.height for f in floors], np.float64),
+        "interpolated_spans": np.array(
+            [(i.first, i.last) for i in interpolations], np.int64
+        ).reshape(-1, 2),
+        "snap_level": np.array([s.level for s in snaps], np.bool_),
+        "snap_lift": np.array([s.lift for s in snaps], np.bool_),
+        "snap_heights": np.array([s.height for s in snaps], np.float64),
+    }
+
+
+def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
+    """Read the corrections from the arrays of a motion file; keys may be missing.
+
+    :param arrays: named and shaped as `docs/motion_file.md` says, for example ``pin_uv`` (N, 2).
+    :raises MotionFileError: an array has the wrong shape, or a value is impossible.
+    """
+
+    def column(name: str, *shape: int) -> NDArray[Any]:
+        array = np.asarray(arrays.get(name, np.zeros((0, *shape))))
+        if array.shape[1:] != shape or array.ndim != 1 + len(shape):
+            raise MotionFileError(f"{name} must have shape {('N', *shape)}, but has {array.shape}")
+        return array
+
+    spans = column("contact_spans", 2), column("exchange_spans", 2)
+    flips = column("depth_spans", 2).tolist(), column("depth_parts").tolist()
+    floors = column("floor_frames"), column("floor_heights")
+    interpolated = column("interpolated_spans", 2)
+    snaps = (column("snap_level"), column("snap_lift"))
+    if len(interpolated) > _MAX_INTERPOLATIONS:
+        raise MotionFileError(
+            f"the motion has {len(interpolated)} interpolated spans, but may have at most "
+            f"{_MAX_INTERPOLATIONS}"
+        )
+    if any(len(flags) and flags.dtype != np.bool_ for flags in snaps):
+        raise MotionFileError(
+            "the motion's corrections are damaged: snap_level and snap_lift are not true or false"
+        )
+    try:
+        pins = zip(
+            *(
+                column("pin_frames"),
+                column("pin_joints"),
+                column("pin_uv", 2),
+                column("pin_xyz", 3),
+            ),
+            column("pin_reach"),
+            strict=True,
+        )
+        contacts = zip(*spans[0].T, column("contact_feet"), strict=True) if len(spans[0]) else ()
+        exchanges = zip(*spans[1].T, column("exchange_limbs"), strict=True) if len(spans[1]) else ()
+        return (
+            *(
+                Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r))
+                for f, j, uv, xyz, r in pins
+            ),
+            *(Contact(int(a), int(b), str(part)) for a, b, part in contacts),
+            *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
+            *(DepthFlip(int(a), int(b), str(part)) for (a, b), part in zip(*flips, strict=True)),
+            *(Interpolation(int(a), int(b)) for a, b in interpolated),
+            *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
+            *(Floor(int(f), float(h)) for f, h in [*zip(*floors, strict=True)][:1]),
+            *(
+                FeetOnFloor(bool(level), bool(lift), float(height))
+                for level, lift, height in [*zip(*snaps, column("snap_heights"), strict=True)][:1]
+            ),
+        )
+    except (ValueError, TypeError, OverflowError, UsageError) as error:
+        raise MotionFileError(
+            f"the motion's corrections are damaged: {in_one_line(error)}"
+        ) from error
+
+
+def _numbers(row: NDArray[np.float64]) -> Any:
+    return None if np.isnan(row).any() else tuple(float(x) for x in row)

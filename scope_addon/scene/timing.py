@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frame rates, the position of each key on Blender's timeline, and moving keys and NLA strips for a
+scene that gets another rate.
+
+Blender stores a rate as the integer ``fps`` over the float ``fps_base``; 29.97 is 30 / 1.001 there,
+never 29 or 30. A pose seen at ``timestamp`` seconds is keyed at ``start_frame + timestamp · rate``,
+so footage of variable frame rate keeps its timing; keys then lie between whole frames.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MotionFileError, UsageError
+from .actions import fcurves_of
+from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
+
+# Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24
+# / 1.001.
+TOLERANCE = 0.005
+BROADCAST = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 72, 96, 120, 240))
+POLICIES = ("keep", "set")
+RATE_POLICIES = (*POLICIES, "resample")
+# custom property of an armature: the frame range of the cycle, and that of the scene before it
+_CYCLE = "scope_cycle"
+_WHOLE = 1e-3  # keys this close to a whole frame are put on it
+
+
+def blender_rate(frames_per_second: float) -> tuple[int, float]:
+    """Return ``(fps, fps_base)``, whose quotient is the rate.
+
+    :raises UsageError: when Blender cannot store the rate.
+    """
+    lowest, highest = RATES
+    if not lowest <= frames_per_second <= highest:
+        raise UsageError(
+            f"the frame rate must be between {lowest:g} and {highest:g} frames per second, not "
+            f"{frames_per_second}"
+        )
+    for rate in BROADCAST:
+        if abs(frames_per_second - float(rate)) < TOLERANCE:
+            return rate.numerator // 1000, 1.001
+    nearest = round(frames_per_second)
+    if nearest and abs(frames_per_second - nearest) < TOLERANCE:
+        return nearest, 1.0
+    fps = math.ceil(frames_per_second)
+    return fps, fps / frames_per_second
+
+
+def scene_rate(scene: bpy.types.Scene) -> float:
+    """Return the frame rate of a scene, frames per second."""
+    fps = scene.render.fps
+    base = scene.render.fps_base
+    # fps_base is a 32-bit float; the exact value is known for broadcast rates.
+    exact = min(BROADCAST, key=lambda rate: abs(float(rate) - fps / base))
+    return float(exact) if abs(float(exact) - fps / base) < 1e-5 else fps / base
+
+
+def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
+    """Set the frame rate of a scene.
+
+    :raises UsageError: when Blender cannot store the rate.
+    """
+    scene.render.fps, scene.render.fps_base = blender_rate(frames_per_second)
+
+
+def key_frames(
+    timestamps: NDArray[np.float64], rate: float, start_frame: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the scene frame of each pose: ``start_frame + timestamp · rate``, fractions kept.
+
+    Keys within a thousandth of a whole frame are snapped to it, because timestamps are rounded.
+
+    :param timestamps: (T,) seconds.
+    :param rate: frames per second of the scene.
+    :param start_frame: the scene frame of timestamp 0.
+    :return: (T,) scene frames.
+    :raises MotionFileError: when timestamps are not finite and increasing.
+    """
+    timestamps = np.asarray(timestamps, float)
+    if not np.isfinite(timestamps).all() or (np.diff(timestamps) <= 0).any():
+        raise MotionFileError(
+            "the motion's timestamps must be finite and increasing; capture the video again"
+        )
+    frames = start_frame + timestamps * rate
+    whole = np.round(frames)
+    return np.where(np.abs(frames - whole) < 1e-3, whole, frames)
+
+
+def whole_frames_of(frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the whole frames (N,) within the span of keys (T,); the nearest if all keys lie
+    between two of them.
+    """
+    whole = np.arange(math.ceil(frames[0] - 1e-4), math.floor(frames[-1] + 1e-4) + 1, dtype=float)
+    return whole if len(whole) else np.round(frames[:1])
+
+
+def store_rate(armature: bpy.types.Object, rate: float) -> None:
+    """Store the frame rate for which an armature's keys were written, frames per second."""
+    armature[RATE] = rate
+
+
+def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
+    """Return the frame rate for which an armature's keys were written; older files do not say, and
+    have the scene's.
+    """
+    return stored_rate(armature, scene_rate(scene))
+
+
+def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:
+    """Set the scene's frame range to that of the keys, rounded outwards to whole frames."""
+    start = math.floor(first)
+    end = math.ceil(last)
+    scene.frame_end = max(end, scene.frame_start)  # Blender keeps start <= end at every step
+    scene.frame_start = start
+    scene.frame_end = end
+
+
+def play_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, first: int, last: int) -> None:
+    """Set the scene's frame range to a cycle of an armature's motion, and store the range before
+    it.
+    """
+    cycle, before = _stored_ranges(armature)
+    if cycle != (scene.frame_start, scene.frame_end):
+        before = scene.frame_start, scene.frame_end
+    scene.frame_start = first
+    scene.frame_end = last
+    armature[_CYCLE] = f"{scene.frame_start} {scene.frame_end} {before[0]} {before[1]}"
+
+
+def is_cycle(armature: bpy.types.Object) -> bool:
+    """Return whether an armature's motion was cut to a cycle."""
+    return bool(_stored_ranges(armature)[0])
+
+
+def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: Retiming) -> None:
+    """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of
+    the cycle.
+    """
+    cycle, before = _stored_ranges(armature)
+    if len(cycle) != 2 or len(before) != 2:
+        return
+    start = math.ceil(retiming.frame(cycle[0]))
+    end = math.floor(retiming.frame(cycle[1] + 1)) - 1
+    if cycle == (scene.frame_start, scene.frame_end):
+        set_frame_range(scene, start, end)
+    armature[_CYCLE] = "{} {} {} {}".format(start, end, *retiming.span(*before))
+
+
+def restore_scene_range(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
+    """Restore the scene's frame range from before the cycle, unless the user has changed it
+    meanwhile.
+    """
+    cycle, before = _stored_ranges(armature)
+    if _CYCLE in armature:
+        del armature[_CYCLE]
+    if cycle == (scene.frame_start, scene.frame_end):
+        set_frame_range(scene, *before)
+
+
+def _stored_ranges(armature: bpy.types.Object) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the frame range of the cycle and the one before it; both are empty without a cycle."""
+    found = re.fullmatch(
+        r"(-?\d{1,7}) (-?\d{1,7}) (-?\d{1,7}) "
+        r"(-?\d{1,7})",
+        stored_text(armature, _CYCLE),
+        re.ASCII,
+    )
+    frames = tuple(int(frame) for frame in found.groups()) if found else ()
+    if (
+        not frames
+        or max(map(abs, frames)) > LAST_FRAME
+        or frames[0] > frames[1]
+        or frames[2] > frames[3]
+    ):
+        return (), ()
+    return frames[:2], frames[2:]
+
+
+@dataclass(frozen=True)
+class Retiming:
+    """Moves scene frames: ``origin`` stays, and the distance from it is multiplied by
+    ``factor``.
+    """
+
+    origin: float
+    factor: float
+
+    def frame(self, frame: float) -> float:
+        """Return where a frame is moved to."""
+        return self.origin + self.factor * (frame - self.origin)
+
+    def frames(self, frames: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return where keys (T,) are moved to; those within their precision of a whole frame are
+        put on it.
+        """
+        moved = self.origin + self.factor * (frames.astype(float) - self.origin)
+        whole = np.round(moved)
+        near = np.abs(moved - whole) < np.maximum(
+            _WHOLE, 4 * self.factor * np.spacing(np.abs(frames))
+        )
+        return np.where(near, whole, moved)
+
+    def span(self, first: int, last: int) -> tuple[int, int]:
+        """Return the whole frames that contain a span of frames after it is moved."""
+        return math.floor(self.frame(first) + _WHOLE), math.ceil(self.frame(last) - _WHOLE)
+
+
+def retime_keys(action: bpy.types.Action, retiming: Retiming) -> None:
+    """Move every key of an action, with its handles."""
+    for curve in fcurves_of(action):
+        keys = curve.keyframe_points
+        for name in ("co", "handle_left", "handle_right"):
+            values = np.empty(2 * len(keys), np.float32)
+            keys.foreach_get(name, values)
+            values[::2] = retiming.frames(values[::2])
+            keys.foreach_set(name, values)
+        curve.update()
+
+
+def action_strips(animation: bpy.types.AnimData) -> list[bpy.types.NlaStrip]:
+    """Return the NLA strips of a datablock that play an action."""
+    return [
+        s for track in animation.nla_tracks for s in track.strips if s.type == "CLIP" and s.action
+    ]
+
+
+def retime_strip(strip: bpy.types.NlaStrip, retiming: Retiming) -> None:
+    """Move an NLA strip, with the part of its action that it plays; the action's keys are not
+    moved.
+    """
+    ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
+    start, end, first, last = (retiming.frame(frame) for frame in ends)
+    # Blender keeps the end after the start
+    strip.action_frame_end = max(last, strip.action_frame_start + 1.0)
+    strip.action_frame_start = first
+    strip.action_frame_end = last
+    strip.frame_start_raw = start
+    strip.frame_end_raw = end

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rolling back work that fails or is cancelled: new datablocks are removed, and changed ones are
+restored.
+
+Datablocks are restored in place, never replaced, and so is the content of an action: a failed
+operator adds no step to undo, and Blender crashes when it undoes an earlier step in which another
+datablock uses one that was replaced since. Removed datablocks cannot be restored, so code under a
+transaction must remove them last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+import numpy as np
+
+from .actions import has_slots, read_modifiers, read_whole_keys, write_modifiers, write_whole_keys
+from .datablocks import NewDatablocks
+
+# Kinds of datablock that the work may create; shape keys go with their mesh.
+_KINDS = (
+    *(
+        "collections",
+        "objects",
+        "meshes",
+        "armatures",
+        "cameras",
+        "actions",
+        "materials",
+        "movieclips",
+        "images",
+    ),
+    "texts",  # packed motions
+)
+_SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
+_RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
+_SETTINGS = ("use_frame_range", "use_cyclic", "frame_start", "frame_end")
+_CURVE = (
+    "extrapolation",
+    "color_mode",
+    "color",
+    "select",
+    "mute",
+    "lock",
+    "hide",
+    "auto_smoothing",
+)
+_Curves = dict[tuple[str, int], bpy.types.FCurve]
+
+
+@contextmanager
+def all_or_nothing(
+    scene: bpy.types.Scene, *objects: bpy.types.Object, keys: Sequence[bpy.types.Key] = ()
+) -> Iterator[None]:
+    """Roll back new datablocks, scene settings and changes of ``objects`` when the block raises;
+    re-raise.
+
+    :param objects: the block may change their keys, action, parent, transform and custom
+        properties, and the custom properties of their bones.
+    :param keys: shape keys whose keyframes, action and values it may change.
+    """
+    unique = list(dict.fromkeys(objects))
+    animated = [_SavedAnimation(owner) for owner in (*unique, *keys)]
+    values = [(block, block.value) for key in keys for block in key.key_blocks]
+    new = NewDatablocks(_KINDS)
+    settings = _SavedScene(scene)
+    transforms = [_SavedTransform(obj) for obj in unique]
+    try:
+        yield
+    except BaseException:
+        settings.leave_edit_mode()
+        for transform in transforms:
+            transform.restore()
+        for saved in animated:
+            saved.restore()
+        for block, value in values:
+            block.value = value
+        new.remove()
+        settings.restore()
+        raise
+    for saved in animated:
+        saved.discard_copy()
+
+
+class _SavedScene:
+    """A scene's settings and markers, the selection, and the active object's mode."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._scene = scene
+        self._layer = bpy.context.view_layer
+        self._settings = {name: getattr(scene, name) for name in _SCENE}
+        self._render = {name: getattr(scene.render, name) for name in _RENDER}
+        self._current = scene.frame_current, scene.frame_subframe
+        self._active = self._layer.objects.active
+        self._mode = self._active.mode if self._active else "OBJECT"
+        self._markers = set(scene.timeline_markers.values())
+        self._selected = [
+            obj for obj in self._layer.objects if obj.select_get(view_layer=self._layer)
+        ]
+
+    def leave_edit_mode(self) -> None:
+        """Leave Edit Mode, in which the active object cannot be removed."""
+        now = self._layer.objects.active
+        if now is not None and now.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    def restore(self) -> None:
+        """Restore the scene; the new objects must have been removed."""
+        scene = self._scene
+        for marker in [m for m in scene.timeline_markers if m not in self._markers]:
+            scene.timeline_markers.remove(marker)
+        for name, value in self._render.items():
+            setattr(scene.render, name, value)
+        scene.frame_end = max(self._settings["frame_end"], scene.frame_start)
+        for name, value in self._settings.items():
+            setattr(scene, name, value)
+        scene.frame_set(self._current[0], subframe=self._current[1])
+        for obj in self._layer.objects:
+            obj.select_set(obj in self._selected, view_layer=self._layer)
+        self._layer.objects.active = self._active
+        if self._active is not None and self._mode != self._active.mode:
+            bpy.ops.object.mode_set(mode=self._mode)
+
+
+class _SavedTransform:
+    """An object's parent, transform and custom properties, and the custom properties of its
+    bones.
+    """
+
+    def __init__(self, obj: bpy.types.Object) -> None:
+        self._obj = obj
+        self._parent = obj.parent
+        self._parenting = obj.parent_type, obj.parent_bone
+        self._matrices = obj.matrix_parent_inverse.copy(), obj.matrix_basis.copy()
+        owners = [obj, *(obj.pose.bones if obj.pose else ())]
+        self._properties = [(owner, _restorable(owner)) for owner in owners]
+
+    def restore(self) -> None:
+        """Restore the object."""
+        obj = self._obj
+        obj.parent = self._parent
+        obj.parent_type, obj.parent_bone = self._parenting
+        obj.matrix_parent_inverse, obj.matrix_basis = self._matrices
+        for owner, properties in self._properties:
+            for name in [name for name in _restorable(owner) if name not in properties]:
+                del owner[name]
+            for name, value in properties.items():
+                owner[name] = value
+        obj.update_tag()
+
+
+class _SavedAnimation:
+    """The action assigned to an object or shape keys, and a copy of its content in case the block
+    changes it.
+    """
+
+    def __init__(self, obj: bpy.types.Object | bpy.types.Key) -> None:
+        self._obj = obj
+        data = obj.animation_data
+        self._had_data = data is not None
+        self._action: bpy.types.Action | None = data.action if data else None
+        slot = getattr(data, "action_slot", None)
+        self._slot = slot.identifier if slot else None
+        self._fake_user = self._action.use_fake_user if self._action else False
+        self._copy = self._action.copy() if self._action else None
+
+    def restore(self) -> None:
+        """Restore the action as it was, for every object that it animates."""
+        if not self._had_data:
+            self._obj.animation_data_clear()
+            return
+        data = self._obj.animation_data
+        action = self._action
+        copy = self._copy
+        if action is None or copy is None:
+            data.action = None
+            return
+        restore_content(action, copy)
+        bpy.data.actions.remove(copy)
+        if data.action != action:
+            data.action = action
+        if self._slot is not None:
+            data.action_slot = next(slot for slot in action.slots if slot.identifier == self._slot)
+        action.use_fake_user = self._fake_user
+
+    def discard_copy(self) -> None:
+        """Remove the copy after success."""
+        if self._copy is not None:
+            bpy.data.actions.remove(self._copy)
+
+
+def _restorable(owner: bpy.types.bpy_struct) -> dict[str, bool | int | float | str | bpy.types.ID]:
+    """Return the custom properties that are single values or datablocks."""
+    kinds = (bool, int, float, str, bpy.types.ID)
+    return {name: owner[name] for name in owner.keys() if isinstance(owner[name], kinds)}
+
+
+def restore_content(action: bpy.types.Action, copy: bpy.types.Action) -> None:
+    """Give an action the curves of an earlier copy of it; curves that are the same are not touched.
+
+    :param action: since the copy was made, it has lost no slot, layer or strip.
+    """
+    _remove_new_containers(action, copy)
+    wanted = dict(_owners(copy))
+    for place, owner in _owners(action):
+        _restore_curves(owner, wanted[place])
+    for name in _SETTINGS:
+        if getattr(action, name) != getattr(copy, name):
+            setattr(action, name, getattr(copy, name))
+
+
+def _owners(action: bpy.types.Action) -> Iterator[tuple[tuple[int, int, int], Any]]:
+    """Yield what has ``fcurves`` and ``groups``, with its place: the action itself, or the
+    channelbag of each slot.
+    """
+    if not has_slots():
+        yield (0, 0, 0), action
+        return
+    for row, layer in enumerate(action.layers):
+        for column, strip in enumerate(layer.strips):
+            for bag in strip.channelbags:
+                yield (row, column, bag.slot_handle), bag
+
+
+def _remove_new_containers(action: bpy.types.Action, copy: bpy.types.Action) -> None:
+    """Remove the slots and layers, with their channelbags, that the copy does not have."""
+    if not has_slots():
+        return
+    kept = {slot.handle for slot in copy.slots}
+    for slot in [slot for slot in action.slots if slot.handle not in kept]:
+        action.slots.remove(slot)
+    for layer in list(action.layers)[len(copy.layers) :]:
+        action.layers.remove(layer)
+    places = {place for place, _ in _owners(copy)}
+    for (row, column, _), bag in [
+        (place, bag) for place, bag in _owners(action) if place not in places
+    ]:
+        action.layers[row].strips[column].channelbags.remove(bag)
+
+
+def _restore_curves(owner: Any, wanted: Any) -> None:
+    present: _Curves = {(c.data_path, c.array_index): c for c in owner.fcurves}
+    before: _Curves = {(c.data_path, c.array_index): c for c in wanted.fcurves}
+    for key in present.keys() - before.keys():
+        owner.fcurves.remove(present[key])
+    for key, source in before.items():
+        curve = present.get(key)
+        if curve is None:
+            curve = owner.fcurves.new(source.data_path, index=source.array_index)
+            for name in _CURVE:
+                setattr(curve, name, getattr(source, name))
+            if source.group is not None:
+                group = source.group.name
+                curve.group = owner.groups.get(group) or owner.groups.new(group)
+        _restore_keys(curve, source)
+        if read_modifiers(curve) != (modifiers := read_modifiers(source)):
+            write_modifiers(curve, modifiers)
+
+
+def _restore_keys(curve: bpy.types.FCurve, source: bpy.types.FCurve) -> None:
+    wanted = read_whole_keys(source)
+    present = read_whole_keys(curve)
+    if not all(np.array_equal(present[name], wanted[name]) for name in wanted):
+        write_whole_keys(curve, wanted)

@@ -1,0 +1,382 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that add and remove corrections; the tool with the mouse is in ``pin_tool.py``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
+
+from ..errors import UsageError
+from ..scene.character.correction_list import listed_corrections
+from ..scene.stored_values import LAST_FRAME
+from .captured_person import motion_of
+from .corrected_person import (
+    CorrectionOperator,
+    change_corrections,
+    change_world,
+    pin_at,
+    without_kinds,
+)
+from .edit_base import EditOperator, SpanOperator
+from .reporting import iface_, rpt_
+
+if TYPE_CHECKING:
+    from ...solver.body import Body
+    from ..edit.corrections import Correction
+
+_RESTS_M = 0.02  # from the floor, within which what shall rest there does
+_NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the current one
+
+# Of the last pin. Blender does not show what an operator reports that another one has called, so
+# that one shows these.
+last_pin_warnings: list[str] = []
+
+
+def _pin_warnings(armature: bpy.types.Object, body: Body, joint: str, frame: int) -> list[str]:
+    """Return what to warn of after a pin in a scene frame: that its joint cannot reach it, feet
+    under the floor.
+    """
+    return [*filter(None, (_unreached(armature, joint, frame), floor_warning(armature, body)))]
+
+
+def floor_warning(armature: bpy.types.Object, body: Body) -> str:
+    """Return the message about feet that corrections have put under the floor; empty if there are
+    none.
+    """
+    from ..edit.corrected_motion import feet_under_floor
+
+    motion = motion_of(armature)
+    depth, count = feet_under_floor(motion, body)
+    if not count:
+        return ""
+    return rpt_(
+        "The corrections put a foot up to {depth:.0f} cm under the floor: move the pin up"
+        if len(motion) == 1
+        else "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of "
+        "{total} frames: "
+        "move the pin up",
+        depth=100 * depth,
+        count=count,
+        total=len(motion),
+    )
+
+
+def _unreached(armature: bpy.types.Object, joint: str, frame: int) -> str:
+    """Return the message about a joint that cannot reach its pin in a scene frame; empty if it
+    does.
+    """
+    for entry in listed_corrections(armature):
+        is_here = entry["first"] - 1 <= frame <= entry["last"] + 1
+        if entry["joint"] == joint and is_here and entry["missed"]:
+            return rpt_(
+                "{joint} cannot reach the pin and stays {distance} away: move the pin closer, or "
+                "pin the pelvis too",
+                joint=iface_(entry["text"]),
+                distance=entry["missed"],
+            )
+    return ""
+
+
+class SCOPE_OT_add_pin(EditOperator):
+    """Pin a joint to a place in one frame, and solve the motion around it again"""
+
+    bl_idname = "scope.add_pin"
+    bl_label = "Add Pin"
+
+    joint: StringProperty(
+        name="Joint", default="left_wrist", description="Name of the joint's bone"
+    )
+    location: FloatVectorProperty(
+        name="Location",
+        subtype="TRANSLATION",
+        unit="LENGTH",
+        description="Where the joint is in that frame",
+    )
+    frame: IntProperty(
+        name="Frame",
+        default=_NOW,
+        min=_NOW,
+        description="Scene frame; the current one if left out",
+        options={"HIDDEN"},
+    )
+    in_image: BoolProperty(
+        name="In the Image",
+        default=False,
+        description="Pin the joint only in the camera's image; its distance from the camera is "
+        "free, except the "
+        "pelvis's",
+    )
+    reach: FloatProperty(
+        name="Reach",
+        default=0.4,
+        min=0.02,
+        soft_max=2.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds before and after the frame over which the correction fades out",
+    )
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Add the pin and change the keys around it."""
+        from ..edit.corrections import added
+
+        scene = context.scene
+        current = scene.frame_current, scene.frame_subframe
+        if self.frame != _NOW:
+            scene.frame_set(self.frame)
+        try:
+            place = tuple(self.location), self.in_image, self.reach
+            pin = pin_at(context, armature, motion_of(armature), self.joint, place)
+            change_corrections(armature, body, rate, lambda present: added(present, pin), pin)
+            here = scene.frame_current
+        finally:
+            scene.frame_set(current[0], subframe=current[1])
+        last_pin_warnings[:] = _pin_warnings(armature, body, self.joint, here)
+        for warning in last_pin_warnings:
+            self.report({"WARNING"}, warning)
+        return ""
+
+
+class CorrectSpanOperator(CorrectionOperator, SpanOperator):
+    """A correction of a span of frames. Not registered."""
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def correction(self, first: int, last: int) -> Correction:
+            """Return the correction of these frames of the footage."""
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Add the correction and change the keys."""
+        from ..edit.corrections import added
+        from ..scene.character.corrected_keys import source_frame, whole_span
+
+        motion = motion_of(armature)
+        begins, ends = whole_span(armature, motion, rate)
+        span = self.start, self.end
+        if begins <= self.end and self.start <= ends:  # the part of it in which there is a motion
+            span = max(self.start, begins), min(self.end, ends)
+        first, last = (source_frame(armature, motion, frame, rate) for frame in span)
+        new = self.correction(first, last)
+        change_corrections(armature, body, rate, lambda present: added(present, new), new)
+        if warning := floor_warning(armature, body):
+            self.report({"WARNING"}, warning)
+        return ""
+
+
+class SCOPE_OT_foot_stands(CorrectSpanOperator):
+    """Keep a foot in place on the floor from the first to the last frame"""
+
+    bl_idname = "scope.foot_stands"
+    bl_label = "Foot Stands"
+
+    foot: EnumProperty(
+        name="Foot",
+        items=(("left", "Left", "The left foot", 0), ("right", "Right", "The right foot", 1)),
+        default="left",
+        description="Which foot stands",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the contact."""
+        from ..edit.corrections import Contact
+
+        return Contact(first, last, self.foot)
+
+
+class SCOPE_OT_this_rests(CorrectSpanOperator):
+    """Let a part of the body rest on the floor, in one place, from the first to the last frame"""
+
+    bl_idname = "scope.this_rests"
+    bl_label = "This Rests"
+
+    part: EnumProperty(
+        name="Part",
+        items=(
+            ("left_hand", "Left Hand", "The lowest point of the hand is on the floor", 0),
+            ("right_hand", "Right Hand", "The lowest point of the hand is on the floor", 1),
+            ("left_elbow", "Left Elbow", "The lowest point of the forearm is on the floor", 2),
+            ("right_elbow", "Right Elbow", "The lowest point of the forearm is on the floor", 3),
+            ("left_knee", "Left Knee", "The lowest point of the shin is on the floor", 4),
+            ("right_knee", "Right Knee", "The lowest point of the shin is on the floor", 5),
+            ("seat", "Seat", "The person sits on the floor", 6),
+            ("back", "Back", "The person lies with seat and back on the floor", 7),
+        ),
+        default="left_hand",
+        description="What rests on the floor",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the contact."""
+        from ..edit.corrections import Contact
+
+        return Contact(first, last, self.part)
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Add the correction, and say where the body cannot reach the floor."""
+        message = super().edit(context, armature, body, rate)
+        if warning := self._off_floor(armature, body):
+            self.report({"WARNING"}, warning)
+        return message
+
+    def _off_floor(self, armature: bpy.types.Object, body: Body) -> str:
+        """Return the message about a part that stays away from the floor; empty if it rests."""
+        from ..edit.corrected_motion import corrections_of, distance_from_floor
+        from ..edit.corrections import Contact
+
+        motion = motion_of(armature)
+        own = [c for c in corrections_of(motion) if isinstance(c, Contact) and c.part == self.part]
+        distance = max((distance_from_floor(motion, body, each) for each in own), default=0.0)
+        if distance < _RESTS_M:
+            return ""
+        name = self.properties.bl_rna.properties["part"].enum_items[self.part].name
+        return rpt_(
+            "{part} stays up to {distance:.0f} cm from the floor: pin the pelvis, or what keeps it "
+            "there",
+            part=iface_(name),
+            distance=100 * distance,
+        )
+
+
+class ExchangeOperator(CorrectSpanOperator):
+    """An exchange of left and right limbs. Not registered."""
+
+    limbs: EnumProperty(
+        name="Limbs",
+        items=(
+            ("both", "Arms and Legs", "All four limbs", 0),
+            ("legs", "Legs", "Only the legs", 1),
+            ("arms", "Arms", "Only the arms", 2),
+        ),
+        default="both",
+        description="Which limbs are exchanged",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the exchange."""
+        from ..edit.corrections import Exchange
+
+        return Exchange(first, last, self.limbs)
+
+
+class SCOPE_OT_exchange_sides(ExchangeOperator):
+    """Exchange left and right from the first to the last frame; applying it again undoes it"""
+
+    bl_idname = "scope.exchange_sides"
+    bl_label = "Exchange Left and Right"
+
+
+class SCOPE_OT_flip_limb(CorrectSpanOperator):
+    """Mirror a limb in depth, as the camera sees it; applying it again undoes it"""
+
+    bl_description = (
+        "Mirror a limb in depth from the first to the last frame: it stays where it is in the "
+        "image, and points away from the camera instead of towards it, or the reverse. Applying "
+        "it again undoes it"
+    )
+    bl_idname = "scope.flip_limb"
+    bl_label = "Flip Limb in Depth"
+
+    limb: EnumProperty(
+        name="Limb",
+        items=(
+            ("left_arm", "Left Arm", "The whole left arm", 0),
+            ("right_arm", "Right Arm", "The whole right arm", 1),
+            ("left_leg", "Left Leg", "The whole left leg", 2),
+            ("right_leg", "Right Leg", "The whole right leg", 3),
+            ("left_forearm", "Left Forearm", "The left arm from the elbow on", 4),
+            ("right_forearm", "Right Forearm", "The right arm from the elbow on", 5),
+            ("left_shin", "Left Shin", "The left leg from the knee on", 6),
+            ("right_shin", "Right Shin", "The right leg from the knee on", 7),
+        ),
+        default="left_leg",
+        description="Which limb is mirrored",
+    )
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the flip."""
+        from ..edit.corrections import DepthFlip
+
+        return DepthFlip(first, last, self.limb)
+
+
+class SCOPE_OT_turn_around(CorrectSpanOperator):
+    """Turn the person to show the other side to the camera; applying it again undoes it"""
+
+    bl_description = (
+        "Mirror the whole person in depth from the first to the last frame, for frames in which "
+        "front and back are mistaken for each other. Applying it again undoes it"
+    )
+    bl_idname = "scope.turn_around"
+    bl_label = "Turn Around"
+
+    def correction(self, first: int, last: int) -> Correction:
+        """Return the flip of the whole body."""
+        from ..edit.corrections import BODY, DepthFlip
+
+        return DepthFlip(first, last, BODY)
+
+
+class SCOPE_OT_remove_correction(CorrectionOperator):
+    """Remove the correction and restore the motion around it"""
+
+    bl_idname = "scope.remove_correction"
+    bl_label = "Remove Correction"
+
+    index: IntProperty(
+        name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all"
+    )
+
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Remove it and change the keys back.
+
+        :raises UsageError: there is no correction of this number.
+        """
+        count = len(listed_corrections(armature))
+        if self.index >= count:
+            raise UsageError(
+                f"there is no correction {self.index}; '{armature.name}' has {count}, "
+                "counted from 0"
+            )
+        kinds = [entry["kind"] for entry in listed_corrections(armature)]
+        removed = set(kinds if self.index < 0 else kinds[self.index : self.index + 1])
+        if shared := removed & {"UPRIGHT", "FLOOR"}:  # which others of the capture have too
+            change_world(
+                context.scene, armature, rate, lambda present: without_kinds(present, shared)
+            )
+        if removed - shared:
+            change_corrections(
+                armature,
+                body,
+                rate,
+                lambda present: tuple(
+                    c for k, c in enumerate(present) if self.index >= 0 and k != self.index
+                ),
+            )
+        return ""
+
+
+CLASSES = (
+    SCOPE_OT_add_pin,
+    SCOPE_OT_foot_stands,
+    SCOPE_OT_this_rests,
+    SCOPE_OT_exchange_sides,
+    SCOPE_OT_flip_limb,
+    SCOPE_OT_turn_around,
+    SCOPE_OT_remove_correction,
+)

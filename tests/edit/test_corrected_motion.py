@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Corrections that stay with a motion: through files, smoothing and removal."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit.clip import Clip, clip_from_motion
+from scope.scope_addon.edit.corrected_motion import (
+    corrections_of,
+    shot_of,
+    uncorrected,
+    with_corrections,
+)
+from scope.scope_addon.edit.corrections import (
+    Contact,
+    Exchange,
+    FeetOnFloor,
+    Interpolation,
+    Pin,
+    Upright,
+)
+from scope.scope_addon.edit.smooth import smoothed
+from scope.scope_addon.edit.solve_pins import missed
+from scope.scope_addon.edit.spans import swap_sides
+from scope.scope_addon.errors import MotionFileError
+from scope.scope_addon.kinematics.smoothing import smooth_rotations
+from scope.scope_addon.motion import CORRECTION_KEYS, Motion
+from scope.solver.rotations import log
+
+from ..made_motion import made_motion
+from .walking import BODY, NAMES, RATE, angle, motion_of, walk
+
+TRUTH = walk(3.0)
+MOTION = motion_of(TRUTH, noise=0.05)
+
+
+def pin(name="right_wrist", frame=45, shift=(40.0, -25.0)):
+    where = clip_from_motion(BODY, MOTION, raw=False).joints(BODY, MOTION.betas)[
+        frame, NAMES.index(name)
+    ]
+    return Pin(frame, name, tuple(shot_of(MOTION).project(frame, where) + np.array(shift)))
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.5, 1.0, 2.5])
+def test_pins_hold_whatever_the_smoothing(strength):
+    pins = (pin(), pin("left_ankle", 50, (15.0, -10.0)))
+    motion = with_corrections(MOTION, BODY, pins)
+    clip = smoothed(BODY, motion, strength)
+    assert max(missed(clip, BODY, motion.betas, p, shot_of(motion)) for p in pins) < 2.0
+    plain = smoothed(BODY, MOTION, strength)
+    far = np.abs(TRUTH.times - 47 / RATE) > 0.6
+    np.testing.assert_array_equal(clip.rotations[far], plain.rotations[far])
+
+
+def test_the_file_keeps_the_corrections_and_removing_them_restores_the_motion(tmp_path):
+    corrections = (
+        pin(),
+        Contact(60, 66, "left"),
+        Exchange(10, 16),
+        Interpolation(70, 74),
+        FeetOnFloor(),
+    )
+    motion = with_corrections(MOTION, BODY, corrections)
+    motion.save(tmp_path / "a.npz")
+    back = Motion.load(tmp_path / "a.npz")
+    assert corrections_of(back) == corrections
+    assert set(back.corrections) == set(CORRECTION_KEYS) - {"uncorrected_world_from_camera"}
+    for restored in (with_corrections(back, BODY, ()), uncorrected(back)):
+        for name, value in vars(MOTION).items():
+            np.testing.assert_array_equal(getattr(restored, name), value, err_msg=name)
+    once = with_corrections(back, BODY, corrections[:1])
+    again = with_corrections(MOTION, BODY, corrections[:1])
+    np.testing.assert_array_equal(once.poses, again.poses)
+
+
+def test_joints_in_the_camera_are_those_of_the_corrected_pose():
+    motion = with_corrections(MOTION, BODY, (pin(),))
+    T = motion.world_from_camera[45]
+    at = motion.joints_cam[45, NAMES.index("right_wrist")]
+    pixel = motion.intrinsics @ at
+    np.testing.assert_allclose(pixel[:2] / pixel[2], pin().pixel, atol=0.5)
+    world = clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)[45]
+    np.testing.assert_allclose(motion.joints_cam[45] @ T[:3, :3].T + T[:3, 3], world, atol=1e-4)
+
+
+def swapped():
+    """A capture whose detector swaps the sides from frame 30 to 50; smoothing mixes them at both
+    ends of the span.
+    """
+    wrong = swap_sides(TRUTH, BODY, TRUTH.times[30], TRUTH.times[50])
+    poses = log(smooth_rotations(wrong.rotations, wrong.times)).reshape(len(TRUTH), -1)
+    raw = log(wrong.rotations).reshape(len(TRUTH), -1)
+    trans = TRUTH.root - BODY.rest_joints(np.zeros(BODY.P))[0]
+    return made_motion(BODY, poses, trans, RATE, poses_raw=raw)
+
+
+def test_sides_exchanged_before_smoothing_leave_no_mixed_poses():
+    captured = swapped()
+    fixed = with_corrections(captured, BODY, (Exchange(30, 50),))
+    right = smooth_rotations(TRUTH.rotations, TRUTH.times)
+    for strength in (1.0, 1.0001):
+        assert np.degrees(angle(smoothed(BODY, captured, strength).rotations, right).max()) > 20
+        assert np.degrees(angle(smoothed(BODY, fixed, strength).rotations, right).max()) < 1
+
+
+@pytest.mark.parametrize("pin_first", [False, True])
+def test_sides_are_exchanged_before_pins(pin_first):
+    """So a pin is on the limb that has its name in the user's eyes, and at the truth it changes
+    nothing.
+    """
+    captured = swapped()
+    right = Clip(TRUTH.times, smooth_rotations(TRUTH.rotations, TRUTH.times), TRUTH.root).joints(
+        BODY, captured.betas
+    )
+    at = right[40, NAMES.index("left_wrist")]
+    pin = Pin(40, "left_wrist", tuple(shot_of(captured).project(40, at)))
+    exchange = Exchange(30, 50)
+    fixed = with_corrections(captured, BODY, (pin, exchange) if pin_first else (exchange, pin))
+    alone = with_corrections(captured, BODY, (exchange,))
+    for motion in (fixed, alone):
+        joints = clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)
+        assert np.linalg.norm(joints - right, axis=-1).max() < 0.005
+    wrong = clip_from_motion(BODY, captured, raw=False).joints(BODY, captured.betas)
+    assert np.linalg.norm(wrong - right, axis=-1)[40].max() > 0.1
+
+
+def test_sides_exchanged_at_frames_that_the_motion_lacks_are_kept_and_change_nothing():
+    half = motion_of(TRUTH.rows(slice(40)), noise=0.05)
+    exchange = Exchange(80, 85)
+    motion = with_corrections(half, BODY, (exchange,))
+    assert corrections_of(motion) == (exchange,)
+    for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam"):
+        np.testing.assert_array_equal(getattr(motion, name), getattr(half, name), err_msg=name)
+
+
+def test_damaged_corrections_are_an_error():
+    motion = with_corrections(MOTION, BODY, (pin(),))
+    motion.corrections["uncorrected_rows"] = np.array([10_000])
+    with pytest.raises(MotionFileError, match="corrections are damaged"):
+        uncorrected(motion)
+
+
+@pytest.mark.parametrize("value", [np.array("text"), np.eye(3), np.full((90, 4, 4), "x")])
+def test_a_damaged_camera_before_the_corrections_is_an_error(value):
+    motion = with_corrections(MOTION, BODY, (Upright.of(np.eye(4)),))
+    motion.corrections["uncorrected_world_from_camera"] = value
+    with pytest.raises(MotionFileError, match="corrections are damaged"):
+        uncorrected(motion)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("pin_frames", np.array([np.inf])),
+        ("pin_uv", np.full((1, 2), "x")),
+        ("pin_reach", np.array(["x"])),
+    ],
+)
+def test_damaged_pins_are_an_error(name, value):
+    motion = with_corrections(MOTION, BODY, (pin(),))
+    motion.corrections[name] = value
+    with pytest.raises(MotionFileError, match="corrections are damaged"):
+        corrections_of(motion)

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Corrections as values and as arrays.
+
+A motion that is moved in the world, with its camera: every joint and the image stay where they
+belong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit.clip import clip_from_motion
+from scope.scope_addon.edit.corrections import (
+    Contact,
+    DepthFlip,
+    Exchange,
+    FeetOnFloor,
+    Floor,
+    Interpolation,
+    Pin,
+    Upright,
+    added,
+    from_arrays,
+    removed,
+    to_arrays,
+)
+from scope.scope_addon.edit.edits import moved_clip, moved_motion
+from scope.scope_addon.errors import MotionFileError, UsageError
+from scope.solver.rotations import exp
+
+from .walking import BETAS, BODY, motion_of, walk
+
+ALL = (
+    Pin(3, "left_wrist", pixel=(10.5, 20.25)),
+    Pin(9, "head", position=(0.1, -0.2, 1.7), reach=0.25),
+    Contact(4, 8, "left"),
+    Exchange(2, 6, "legs"),
+    DepthFlip(3, 5, "left_forearm"),
+    DepthFlip(7, 9, "body"),
+    Interpolation(4, 7),
+    Interpolation(1, 2),
+    Upright((1.0, 0, 0, 0.5, 0, 0, -1.0, 0, 0, 1.0, 0, 2.0, 0, 0, 0, 1.0)),
+    Floor(7, -0.125),
+    FeetOnFloor(level=True, lift=False, height=-0.125),
+)
+
+
+RESTS = (Contact(4, 8, "right_knee"), Contact(5, 9, "back"))
+
+
+@pytest.mark.parametrize("corrections", [ALL, ALL[:1], ALL[2:3], RESTS, ()])
+def test_arrays_give_the_corrections_back(tmp_path, corrections):
+    arrays = to_arrays(corrections)
+    np.savez(tmp_path / "a.npz", **arrays)
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
+        assert from_arrays(file) == corrections
+    assert from_arrays({}) == ()
+
+
+def test_damaged_arrays_are_an_error():
+    arrays = to_arrays(ALL)
+    for name, value in (
+        ("pin_uv", np.zeros((2, 3))),
+        ("pin_frames", np.zeros(5)),
+        ("contact_feet", np.array(["none"])),
+        ("depth_parts", np.array(["body"])),
+        ("depth_parts", np.array(["body", "tail"])),
+        ("depth_spans", np.array([[5, 4], [1, 2]])),
+        ("depth_spans", np.array([["a", "b"]] * 2)),
+        ("upright", 2 * np.eye(4)[None]),
+        ("upright", np.full((1, 4, 4), np.nan)),
+        ("floor_heights", np.array([np.inf])),
+        ("floor_heights", np.zeros(2)),
+        ("floor_frames", np.zeros((1, 2))),
+        ("interpolated_spans", np.zeros((1, 3), int)),
+        ("interpolated_spans", np.array([[5, 4]])),
+        ("interpolated_spans", np.array([[0, np.inf]])),
+        ("interpolated_spans", np.array([["a", "b"]])),
+        ("interpolated_spans", np.array([[0, 2**63]], np.uint64)),
+        ("interpolated_spans", np.zeros((1001, 2), int)),
+        ("snap_level", np.array([1.0])),
+        ("snap_lift", np.array(["yes"])),
+        ("snap_lift", np.zeros(2, bool)),
+        ("snap_heights", np.array([np.nan])),
+        ("snap_heights", np.array([1e6])),
+    ):
+        with pytest.raises(MotionFileError):
+            from_arrays(arrays | {name: value})
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Pin(1, "head"),
+        lambda: Pin(1, "head", (1.0, 2.0), (1.0, 2.0, 3.0)),
+        lambda: Pin(1, "head", (np.nan, 2.0)),
+        lambda: Pin(1, "head", (1.0, 2.0), reach=0.0),
+        lambda: Contact(5, 4, "left"),
+        lambda: Contact(1, 4, "both"),
+        lambda: Exchange(1, 4, "feet"),
+        lambda: DepthFlip(1, 4, "head"),
+        lambda: DepthFlip(5, 4, "body"),
+        lambda: Interpolation(5, 4),
+        lambda: FeetOnFloor(height=np.inf),
+    ],
+)
+def test_impossible_values_are_refused(make):
+    with pytest.raises(UsageError):
+        make()
+
+
+def test_a_new_pin_replaces_that_of_the_same_joint_and_frame():
+    moved = Pin(3, "left_wrist", pixel=(1.0, 2.0))
+    assert added(ALL, moved) == (*ALL[1:], moved)
+    assert added(ALL, Pin(4, "left_wrist", pixel=(1.0, 2.0)))[:-1] == ALL
+
+
+def test_a_second_upright_line_turns_what_the_first_has_made():
+    first = np.eye(4)
+    second = np.eye(4)
+    first[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    second[:3, 3] = [1, 2, 3]
+    (both,) = added((Upright.of(first),), Upright.of(second))
+    np.testing.assert_array_equal(both.transform, second @ first)
+
+
+def test_the_same_exchange_again_undoes_the_first():
+    assert added(ALL, ALL[3]) == (*ALL[:3], *ALL[4:])
+
+
+def test_an_interpolation_replaces_those_within_its_span():
+    assert added(ALL, Interpolation(3, 8)) == (*ALL[:6], *ALL[7:], Interpolation(3, 8))
+    assert added(ALL, Interpolation(5, 8)) == (*ALL, Interpolation(5, 8))
+
+
+def test_feet_are_put_on_the_floor_that_was_corrected_last():
+    assert added((Floor(3, 0.5),), FeetOnFloor()) == (Floor(3, 0.5), FeetOnFloor(height=0.5))
+    assert added(ALL[-1:], FeetOnFloor()) == (FeetOnFloor(),)
+
+
+def test_without_the_corrected_floor_feet_are_put_on_the_captured_one():
+    assert removed(ALL, (Floor,)) == (*ALL[:-2], FeetOnFloor(level=True, lift=False))
+    assert removed(ALL, (Upright,)) == (*ALL[:8], *ALL[9:])
+
+
+def test_an_upright_line_replaces_what_was_levelled():
+    line = Upright.of(np.eye(4))
+    assert added((FeetOnFloor(level=True, lift=False),), line) == (
+        FeetOnFloor(level=False, lift=False),
+        line,
+    )
+
+
+MOTION = motion_of(walk(1.0), noise=0.02)
+
+
+def transform(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    T = np.eye(4)
+    T[:3, :3] = exp(rng.normal(size=3))
+    T[:3, 3] = rng.normal(size=3)
+    return T
+
+
+@pytest.mark.parametrize("raw", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_joints_move_with_the_world_and_the_image_stays(seed: int, raw: bool) -> None:
+    T = transform(seed)
+    moved = moved_motion(MOTION, BODY, T)
+    before, after = (
+        clip_from_motion(BODY, m, raw=raw).joints(BODY, BETAS) for m in (MOTION, moved)
+    )
+    np.testing.assert_allclose(after, before @ T[:3, :3].T + T[:3, 3], atol=2e-6)
+    seen = [
+        np.einsum(
+            "tji,tkj->tki",
+            m.world_from_camera[:, :3, :3],
+            joints - m.world_from_camera[:, None, :3, 3],
+        )
+        for m, joints in ((MOTION, before), (moved, after))
+    ]
+    np.testing.assert_allclose(seen[1], seen[0], atol=5e-6)
+
+
+def test_a_clip_moves_as_its_motion_does() -> None:
+    T = transform(7)
+    found = moved_clip(clip_from_motion(BODY, MOTION, raw=False), T)
+    expected = clip_from_motion(BODY, moved_motion(MOTION, BODY, T), raw=False)
+    np.testing.assert_allclose(found.rotations, expected.rotations, atol=1e-5)
+    np.testing.assert_allclose(found.root, expected.root, atol=1e-5)
+
+
+def test_there_and_back_nothing_has_changed_and_the_given_motion_never_does() -> None:
+    T = transform(8)
+    poses = MOTION.poses.copy()
+    back = moved_motion(moved_motion(MOTION, BODY, T), BODY, np.linalg.inv(T))
+    np.testing.assert_array_equal(MOTION.poses, poses)
+    for name in ("trans", "trans_raw", "world_from_camera"):
+        np.testing.assert_allclose(getattr(back, name), getattr(MOTION, name), atol=1e-5)
+    np.testing.assert_allclose(
+        exp(back.poses.reshape(-1, 3)), exp(MOTION.poses.reshape(-1, 3)), atol=1e-5
+    )

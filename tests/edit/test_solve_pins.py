@@ -1,0 +1,386 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Solving a motion again around corrected frames, against a truth that was corrupted."""
+
+import numpy as np
+import pytest
+from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.edit.corrections import Contact, Pin
+from scope.scope_addon.edit.solve_pins import Shot, missed, resolve
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.kinematics.foot_skin import FootSkin
+from scope.solver.rotations import exp
+
+from ..made_motion import level_camera
+from .walking import BETAS, BODY, NAMES, RATE, walk
+
+TRUTH = walk(3.0)
+T = len(TRUTH)
+SHOT = Shot(
+    np.arange(T),
+    TRUTH.times,
+    level_camera(T),
+    np.tile([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]], (T, 1, 1)),
+)
+JOINTS = TRUTH.joints(BODY, BETAS)
+# the corrupted span
+FIRST = 30
+LAST = 60
+ARM = [NAMES.index(f"left_{name}") for name in ("elbow", "wrist")]
+
+
+def corrupted(joints=("left_shoulder", "left_elbow")):
+    """The walk with an arm that turns away by 40 degrees and comes back."""
+    share = np.clip(
+        1.6 * np.sin(np.pi * np.clip((np.arange(T) - FIRST) / (LAST - FIRST), 0, 1)), 0, 1
+    )
+    rotations = TRUTH.rotations.copy()
+    for name, axis in zip(joints, ([0.4, 0.3, 0.5], [0.2, -0.5, 0.4]), strict=False):
+        rotations[:, NAMES.index(name)] = rotations[:, NAMES.index(name)] @ exp(
+            share[:, None] * np.array(axis)
+        )
+    return Clip(TRUTH.times, rotations, TRUTH.root.copy())
+
+
+def pins(frames, names=("left_wrist",), image=True):
+    found = []
+    for frame in frames:
+        for name in names:
+            where = JOINTS[frame, NAMES.index(name)]
+            pixel = tuple(SHOT.project(frame, where)) if image else None
+            found.append(Pin(frame, name, pixel, None if image else tuple(where)))
+    return found
+
+
+def error(clip, joints=ARM):
+    """Mean distance from the truth over the corrupted span, metres."""
+    off = np.linalg.norm(clip.joints(BODY, BETAS) - JOINTS, axis=-1)
+    return off[FIRST : LAST + 1][:, joints].mean()
+
+
+def pixels(clip, joint):
+    """Mean distance from the truth in the image over the corrupted span, pixels."""
+    at = clip.joints(BODY, BETAS)[:, joint]
+    return np.mean(
+        [
+            np.linalg.norm(SHOT.project(f, at[f]) - SHOT.project(f, JOINTS[f, joint]))
+            for f in range(FIRST, LAST + 1)
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    ("frames", "left"),
+    [((45,), 0.6), ((40, 50), 0.35), ((37, 45, 53), 0.25)],
+    ids=["one", "two", "three"],
+)
+@pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
+def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
+    bad = corrupted()
+    wanted = pins(frames, ("left_elbow", "left_wrist"), image)
+    good = resolve(bad, BODY, BETAS, wanted, SHOT)
+    assert max(missed(good, BODY, BETAS, pin, SHOT) for pin in wanted) < (0.5 if image else 0.002)
+    if image:
+        assert pixels(good, ARM[1]) < left * pixels(bad, ARM[1])
+    else:
+        assert error(good) < left * error(bad)
+
+
+def test_other_limbs_and_other_frames_stay():
+    bad = corrupted()
+    pin = pins((45,))[0]
+    good = resolve(bad, BODY, BETAS, [pin], SHOT)
+    changed = np.flatnonzero(
+        (good.rotations != bad.rotations).any((1, 2, 3)) | (good.root != bad.root).any(1)
+    )
+    near = np.flatnonzero(np.abs(TRUTH.times - TRUTH.times[45]) < pin.reach)
+    assert set(changed) <= set(near)
+    assert len(changed) > 0.5 * len(near)
+    others = [
+        k
+        for k, name in enumerate(NAMES)
+        if not name.startswith("left_") or "hip" in name or "knee" in name
+    ]
+    moved = np.linalg.norm(good.joints(BODY, BETAS) - bad.joints(BODY, BETAS), axis=-1)
+    assert moved[:, ARM[1]].max() > 0.1
+    assert moved[:, others].max() < 0.005
+
+
+def test_the_correction_begins_and_ends_without_a_jump_of_velocity():
+    bad = corrupted()
+    good = resolve(bad, BODY, BETAS, pins((45,)), SHOT)
+    change = (good.joints(BODY, BETAS) - bad.joints(BODY, BETAS))[:, ARM[1]]
+    speed = np.linalg.norm(np.diff(change, axis=0), axis=1) * RATE
+    moving = np.flatnonzero(speed > 0)
+    assert max(speed[moving[0]], speed[moving[-1]]) < 0.25 * speed.max()
+    # nor one in between
+    assert np.linalg.norm(np.diff(change, 2, axis=0), axis=1).max() * RATE < speed.max()
+
+
+def test_a_pin_at_the_joint_itself_changes_nothing():
+    still = resolve(TRUTH, BODY, BETAS, pins((45,), ("left_wrist", "right_knee", "head")), SHOT)
+    np.testing.assert_allclose(still.joints(BODY, BETAS), JOINTS, atol=2e-4)
+
+
+def standing():
+    """Somebody who stands with bent knees."""
+    still = Clip(
+        TRUTH.times, np.repeat(TRUTH.rotations[:1], T, axis=0), np.repeat(TRUTH.root[:1], T, axis=0)
+    )
+    knees = [NAMES.index(name) for name in ("left_knee", "right_knee", "left_hip", "right_hip")]
+    for joint, angle in zip(knees, (0.8, 0.8, -0.4, -0.4), strict=True):
+        still.rotations[:, joint] = exp(np.array([angle, 0, 0]))
+    lowest = still.soles(BODY, BETAS)[..., 2].min()
+    return Clip(still.times, still.rotations, still.root - [0.0, 0.0, lowest])
+
+
+@pytest.mark.parametrize("height", [0.3, 1.0, 2.5])
+@pytest.mark.parametrize("down", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("joint", ["pelvis", "left_hip"])
+def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint, down, height):
+    still = standing()
+    number = NAMES.index(joint)
+    at = still.joints(BODY, BETAS)
+    soles = still.soles(BODY, BETAS)
+    camera = level_camera(T)
+    camera[:, 2, 3] = height
+    shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
+    pin = Pin(45, joint, tuple(shot.project(45, at[45, number] - [0.0, 0.0, down])))
+    moved = resolve(still, BODY, BETAS, [pin], shot)
+    assert missed(moved, BODY, BETAS, pin, shot) < 0.5
+    change = moved.joints(BODY, BETAS) - at
+    assert np.abs(change[:, number, 1]).max() < 0.02  # the camera looks along y
+    assert abs(change[45, number, 2] + down) < 0.01
+    assert np.linalg.norm(moved.soles(BODY, BETAS) - soles, axis=-1).max() < 0.01
+
+
+@pytest.mark.parametrize("pitch", [20.0, 70.0])
+def test_a_pelvis_in_the_image_stays_at_its_depth_whatever_the_camera_looks_at(pitch):
+    at = JOINTS[45, 0]
+    camera = np.tile(np.eye(4), (T, 1, 1))
+    c = np.cos(np.radians(pitch))
+    s = np.sin(np.radians(pitch))
+    camera[:, :3, :3] = np.stack([[1.0, 0, 0], [0, -s, -c], [0, c, -s]], axis=1)
+    camera[:, :3, 3] = at - 3.0 * camera[0, :3, 2]
+    shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
+    u, v = shot.project(45, at)
+    pin = Pin(45, "pelvis", (u + 15.0, v + 15.0))
+    moved = resolve(TRUTH, BODY, BETAS, [pin], shot)
+    assert missed(moved, BODY, BETAS, pin, shot) < 0.5
+    along = [0.0, 1.0, 0.0] if pitch < 45 else camera[0, :3, 2]
+    assert abs((moved.joints(BODY, BETAS)[45, 0] - at) @ along) < 0.01
+
+
+def test_a_dragged_pelvis_leaves_a_standing_foot_where_it_is():
+    still = standing()
+    at = still.joints(BODY, BETAS)
+    pin = Pin(45, "pelvis", position=tuple(at[45, 0] + [0.03, 0.0, -0.06]))
+    moved = resolve(still, BODY, BETAS, [pin], SHOT)
+    assert missed(moved, BODY, BETAS, pin, SHOT) < 0.002
+    assert np.linalg.norm(moved.soles(BODY, BETAS) - still.soles(BODY, BETAS), axis=-1).max() < 0.01
+
+
+def test_several_limbs_at_once_all_meet_their_pins():
+    bad = corrupted()
+    at = bad.joints(BODY, BETAS)
+    wanted = [
+        Pin(frame, name, position=tuple(at[frame, NAMES.index(name)] + shift))
+        for frame, name, shift in (
+            (40, "left_wrist", [0.0, 0.1, 0.1]),
+            (46, "left_elbow", [0.0, 0.05, 0.0]),
+            (44, "right_wrist", [0.0, -0.1, 0.1]),
+            (44, "right_ankle", [0.0, 0.05, 0.05]),
+            (47, "head", [0.03, 0.0, 0.0]),
+        )
+    ]
+    good = resolve(bad, BODY, BETAS, wanted, SHOT)
+    assert max(missed(good, BODY, BETAS, pin, SHOT) for pin in wanted) < 0.005
+
+
+def test_a_foot_that_stands_stays_on_the_floor():
+    # 3 cm above the floor
+    height = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.03
+    clip = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root - [0.0, 0.0, height])
+    fixed = resolve(clip, BODY, BETAS, [Contact(50, 62, "left")], SHOT)
+    soles = fixed.soles(BODY, BETAS)[50:63, :2]
+    assert np.linalg.norm(soles - soles[0], axis=-1).max() < 0.003
+    assert abs(soles[..., 2].min()) < 0.003
+    changed = np.flatnonzero((fixed.rotations != clip.rotations).any((1, 2, 3)))
+    assert changed[0] > 50 - 0.25 * RATE
+    assert changed[-1] < 62 + 0.25 * RATE
+
+
+# Poses, by the rotation vectors of joints and of the whole body, the height of their lowest vertex,
+# metres, and the parts whose skin rests.
+RESTS = {
+    "left_hand": (
+        {
+            "spine1": (0.9, 0.0, 0.0),
+            "spine2": (0.6, 0.0, 0.0),
+            **{f"{side}_hip": (-1.7, 0.0, 0.0) for side in ("left", "right")},
+            **{f"{side}_knee": (2.2, 0.0, 0.0) for side in ("left", "right")},
+            "left_shoulder": (0.0, -0.5, -1.2),
+        },
+        (0.0, 0.0, 0.0),
+        0.0,
+        ("left_wrist", "left_hand"),
+    ),
+    "right_elbow": (
+        {"right_shoulder": (0.0, 1.4, 0.0), "right_elbow": (0.0, 0.0, 1.3)},
+        (1.5, 0.0, 0.0),
+        -0.1,
+        ("right_elbow",),
+    ),
+    "left_knee": (
+        {"left_knee": (1.7, 0.0, 0.0), "right_hip": (-1.5, 0.0, 0.0)},
+        (0.0, 0.0, 0.0),
+        -0.07,
+        ("left_knee",),
+    ),
+    "seat": (
+        {f"{side}_hip": (-1.6, 0.0, 0.0) for side in ("left", "right")},
+        (0.0, 0.0, 0.0),
+        0.15,
+        ("pelvis", "left_hip", "right_hip"),
+    ),
+    "back": ({}, (-1.5, 0.0, 0.0), 0.12, ("pelvis", "left_hip", "right_hip", "spine3")),
+}
+
+
+@pytest.mark.parametrize("part", RESTS)
+def test_what_rests_stays_in_one_place_on_the_floor(part):
+    turns, turn, height, parts = RESTS[part]
+    rotations = np.tile(np.eye(3), (T, len(NAMES), 1, 1))
+    rotations[:, 0] = TRUTH.rotations[0, 0] @ exp(np.array(turn))
+    sway = 1.0 + 0.03 * np.sin(np.linspace(0.0, 12.0, T))
+    for name, vector in turns.items():
+        rotations[:, NAMES.index(name)] = exp(sway[:, None] * np.array(vector))
+    clip = Clip(TRUTH.times, rotations, np.zeros((T, 3)))
+    clip.root[:, 2] += depth(clip) + height
+    rests = resolve(clip, BODY, BETAS, [Contact(40, 46, part)], SHOT)
+    own = np.isin(BODY.strongest_joints, [NAMES.index(name) for name in parts])
+    R, t = BODY.forward_kinematics(rests.rotations, rests.root - BODY.rest_joints(BETAS)[0], BETAS)
+    lowest = [BODY.skin(R[k], t[k], BETAS)[own, 2].min() for k in range(40, 47)]
+    assert np.abs(lowest).max() < 0.004
+    joint = NAMES.index(parts[0])
+    assert np.ptp(t[40:47, joint, :2], axis=0).max() < 0.002
+    changed = np.flatnonzero((rests.root != clip.root).any(1))
+    assert changed[0] > 40 - 0.25 * RATE
+    assert changed[-1] < 46 + 0.25 * RATE
+
+
+def test_what_rests_on_uneven_ground_keeps_its_height():
+    still = standing()
+    rests = resolve(still, BODY, BETAS, [Contact(40, 46, "left_hand")], SHOT, floor=-np.inf)
+    hand = NAMES.index("left_wrist")
+    moved = rests.joints(BODY, BETAS)[:, hand] - still.joints(BODY, BETAS)[:, hand]
+    assert np.linalg.norm(moved, axis=-1).max() < 0.01
+
+
+WAYS = {
+    "side": (1.0, 0.0, 0.0),
+    "front": (0.0, -1.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "across": (-0.96, -0.28, 0.0),
+}
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+@pytest.mark.parametrize("image", [False, True], ids=["space", "image"])
+def test_a_pin_out_of_reach_stretches_the_arm_and_leaves_the_body(way, image):
+    shoulder, elbow, wrist = (
+        JOINTS[45, NAMES.index(f"left_{name}")] for name in ("shoulder", "elbow", "wrist")
+    )
+    length = np.linalg.norm(elbow - shoulder) + np.linalg.norm(wrist - elbow)
+    place = shoulder + (length + 0.6) * np.array(way)  # 60 cm beyond reach
+    pin = Pin(
+        45,
+        "left_wrist",
+        tuple(SHOT.project(45, place)) if image else None,
+        None if image else tuple(place),
+    )
+    moved = resolve(TRUTH, BODY, BETAS, [pin], SHOT).joints(BODY, BETAS)
+    off = np.linalg.norm(moved - JOINTS, axis=-1)
+    others = [
+        k
+        for k, name in enumerate(NAMES)
+        if not name.startswith("left_") or "hip" in name or "knee" in name
+    ]
+    assert off[:, others].max() < 0.035
+    if way == WAYS["front"] and image:
+        return  # towards the camera, where the picture says nothing about the distance
+    arm = moved[45, NAMES.index("left_wrist")] - moved[45, NAMES.index("left_shoulder")]
+    assert np.linalg.norm(arm) > 0.95 * length
+    towards = (place - shoulder) / np.linalg.norm(place - shoulder)
+    assert image or arm @ towards > 0.95 * length
+
+
+def test_a_pinned_elbow_out_of_reach_and_a_wrist_beyond_it_leave_the_body():
+    elbow = JOINTS[45, NAMES.index("left_elbow")]
+    wanted = [Pin(45, "left_elbow", position=tuple(elbow + [0.5, 0, 0]))]
+    wanted.append(Pin(45, "left_wrist", position=tuple(elbow + [1.2, 0, 0])))
+    moved = resolve(TRUTH, BODY, BETAS, wanted, SHOT).joints(BODY, BETAS)
+    assert np.linalg.norm(moved[:, 0] - JOINTS[:, 0], axis=-1).max() < 0.05
+
+
+def test_a_pinned_pelvis_moves_the_body_as_far_as_it_is_dragged():
+    pin = Pin(45, "pelvis", position=tuple(JOINTS[45, 0] + [0.6, 0.0, 0.0]))
+    assert missed(resolve(TRUTH, BODY, BETAS, [pin], SHOT), BODY, BETAS, pin, SHOT) < 0.002
+
+
+def test_corrections_at_frames_without_keys_are_left_out():
+    half = Clip(TRUTH.times[:40], TRUTH.rotations[:40], TRUTH.root[:40])
+    same = resolve(half, BODY, BETAS, [*pins((80,)), Contact(80, 85, "right")], SHOT)
+    np.testing.assert_array_equal(same.rotations, half.rotations)
+
+
+def test_an_unknown_joint_is_an_error_that_lists_the_joints():
+    with pytest.raises(UsageError, match=r"no joint 'left_paw'.*left_wrist"):
+        resolve(TRUTH, BODY, BETAS, [Pin(40, "left_paw", (1.0, 2.0))], SHOT)
+
+
+@pytest.fixture(scope="module")
+def on_floor():
+    """The walk with the lowest foot of every frame 5 mm under the floor at most."""
+    R, t = BODY.forward_kinematics(TRUTH.rotations, TRUTH.root - BODY.rest_joints(BETAS)[0], BETAS)
+    lowest = FootSkin(BODY, BETAS).heights(R, t, np.array([0, 0, 1.0])).min()
+    return Clip(TRUTH.times, TRUTH.rotations, TRUTH.root - [0, 0, lowest + 0.005])
+
+
+def depth(clip):
+    """How far the lowest vertex of the whole body's skin is under the floor, metres."""
+    R, t = BODY.forward_kinematics(clip.rotations, clip.root - BODY.rest_joints(BETAS)[0], BETAS)
+    return -min(BODY.skin(R[k], t[k], BETAS)[:, 2].min() for k in range(FIRST, LAST + 1))
+
+
+@pytest.mark.parametrize("name", ["left_ankle", "left_knee"])
+@pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
+def test_a_leg_that_is_pinned_leaves_its_foot_above_the_floor(on_floor, name, image):
+    shift = [0.0, 0.06, -0.025]  # within the leg's reach, and the foot would go under the floor
+    if image:
+        shift = [0.03, -0.05 if name == "left_ankle" else 0.05, -0.04]
+    at = on_floor.joints(BODY, BETAS)[45, NAMES.index(name)] + shift
+    pin = Pin(
+        45, name, tuple(SHOT.project(45, at)) if image else None, None if image else tuple(at)
+    )
+    corrected = resolve(on_floor, BODY, BETAS, [pin], SHOT)
+    assert missed(corrected, BODY, BETAS, pin, SHOT) < (0.5 if image else 0.002)
+    assert depth(corrected) < 0.01
+
+
+def test_no_floor_is_like_one_far_below(on_floor):
+    """As on uneven ground."""
+    at = on_floor.joints(BODY, BETAS)[45, NAMES.index("left_ankle")] + [0.0, 0.07, -0.02]
+    pin = Pin(45, "left_ankle", None, tuple(at))
+    none, low = (
+        resolve(on_floor, BODY, BETAS, [pin], SHOT, floor=floor) for floor in (-np.inf, -10.0)
+    )
+    assert missed(none, BODY, BETAS, pin, SHOT) < 0.002
+    np.testing.assert_allclose(none.joints(BODY, BETAS), low.joints(BODY, BETAS), atol=1e-6)
+
+
+def test_a_foot_stands_on_a_kerb_on_uneven_ground():
+    above = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.06
+    kerb = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root - [0.0, 0.0, above])  # 6 cm high
+    for floor, expected in ((0.0, 0.0), (-np.inf, 0.06)):
+        stands = resolve(kerb, BODY, BETAS, [Contact(50, 62, "left")], SHOT, floor=floor)
+        assert stands.soles(BODY, BETAS)[50:63, :2, 2].min() == pytest.approx(expected, abs=0.003)
