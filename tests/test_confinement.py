@@ -16,8 +16,7 @@ import pytest
 from scope.scope_addon.capture.perception.adapters import network_process
 from scope.scope_addon.capture.perception.adapters.network_process import SERVER, NetworkProcess
 from scope.scope_addon.confinement import limits_files
-from scope.scope_addon.job.messages import WorkerFailedError
-from scope.scope_addon.job.process import START_SCRIPT, WorkerProcess
+from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.temporary import TEMPORARY_VARIABLES
 

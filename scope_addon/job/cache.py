@@ -75,7 +75,7 @@ class Cache:
         """
         import json
 
-        from .messages import is_result
+        from .process import is_result
 
         folder = self.root / "captures" / key
         if not (folder / REPORT).is_file():  # opening a pipe would wait for a writer

@@ -24,8 +24,7 @@ from typing import Any
 from ..errors import UsageError, VideoError
 from ..live.sources.system_cameras import camera_names, camera_with_modes, described
 from ..temporary import temporary_folder
-from .messages import WARM_UP_FIELDS, Fields, WorkerFailedError
-from .process import START_SCRIPT, WorkerProcess
+from .process import START_SCRIPT, WARM_UP_FIELDS, Fields, WorkerFailedError, WorkerProcess
 from .request import FormatsRequest
 
 NAMES = Path("/sys/class/video4linux")

@@ -14,8 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..options.live import MAX_PEOPLE
-from .messages import CAPTURE_FIELDS, LONGEST_LINE, Fields, is_number, is_text, unreadable
-from .process import START_SCRIPT, WorkerProcess
+from .process import (
+    CAPTURE_FIELDS,
+    LONGEST_LINE,
+    START_SCRIPT,
+    Fields,
+    WorkerProcess,
+    is_number,
+    is_text,
+    unreadable,
+)
 from .request import RECORD, STOP, LiveRequest
 
 PRESENCES = ("seen", "held", "lost")

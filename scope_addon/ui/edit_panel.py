@@ -23,17 +23,23 @@ from ..scene.stored_values import start_frame
 from .capture.capture_panel import Tab
 from .capture.captures import captures_of, people_of, shown_capture
 from .captured_person import (
+    EditOperator,
+    SpanOperator,
     betas_of,
     captured_armature,
     draw_active_person,
+    edit_clip,
     has_captured_person,
     library_of,
     motion_of,
     set_motion_of,
 )
-from .corrected_person import CorrectionOperator, change_corrections
-from .correction_operators import CorrectSpanOperator, floor_warning
-from .edit_base import EditOperator, SpanOperator, edit_clip
+from .correction_operators import (
+    CorrectionOperator,
+    CorrectSpanOperator,
+    change_corrections,
+    floor_warning,
+)
 from .preferences import keep_machine_code
 from .reporting import rpt_, tip_
 from .translations import CONTEXT
@@ -440,7 +446,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
     ) -> str:
         """Edit all keys, and keep that with the motion."""
         from ..edit.corrections import FeetOnFloor, added
-        from ..scene.character.edited_keys import floored
+        from ..scene.character.corrected_keys import floored
 
         feet = FeetOnFloor(self.level, self.lift)
         if not _has_motion(armature):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from . import camera_formats
+from . import live_operators
 from .capture.capture_panel import Tab, draw_text
 from .file_field import draw_file
 from .live_properties import state
@@ -53,7 +53,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
             row = column.row(align=True)
             row.prop(settings, "camera", icon="CAMERA_DATA")
             row.operator("scope.camera_formats", text="", icon="FILE_REFRESH")
-            camera_formats.draw(context, column)
+            live_operators.draw_formats(context, column)
         elif settings.source == "STREAM":
             column.prop(settings, "stream", text="", icon="URL")
         else:

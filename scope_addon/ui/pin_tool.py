@@ -14,11 +14,10 @@ import bpy
 from mathutils import Vector
 
 from ..scene.character.correction_list import listed_corrections
-from .captured_person import captured_armature
+from .captured_person import captured_armature, may_edit
 from .comparison import camera_of
 from .correction_operators import last_pin_warnings
 from .drawing import Pointer, draw_disc, draw_line, viewport_of
-from .edit_base import may_edit
 from .reporting import iface_
 from .sidebar import redraw_sidebars, viewports
 

@@ -13,11 +13,10 @@ from bpy.props import EnumProperty, FloatVectorProperty
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
-from .captured_person import captured_armature, motion_of
+from .captured_person import captured_armature, may_edit, motion_of
 from .comparison import camera_of
-from .corrected_person import CorrectionOperator, change_world, shown_frame
+from .correction_operators import CorrectionOperator, change_world, shown_frame
 from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
-from .edit_base import may_edit
 from .reporting import iface_, rpt_, sentence, tip_
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ def read_request(path: Path) -> None:
 
 def read_reply(path: Path) -> None:
     from scope.scope_addon.job.job_progress import JobProgress
-    from scope.scope_addon.job.messages import parse_message
+    from scope.scope_addon.job.process import parse_message
 
     progress = JobProgress()
     for line in path.read_bytes().splitlines(keepends=True):
@@ -60,7 +60,7 @@ def read_recording(path: Path) -> None:
 
 def read_live_reply(path: Path) -> None:
     from scope.scope_addon.job import live_process
-    from scope.scope_addon.job.messages import parse_message
+    from scope.scope_addon.job.process import parse_message
 
     for line in path.read_bytes().splitlines(keepends=True):
         parse_message(line, live_process._FIELDS)

@@ -13,13 +13,13 @@ import sys
 import time
 
 import pytest
-from scope.scope_addon.job.messages import (
+from scope.scope_addon.job.process import (
     LONGEST_LINE,
     WARM_UP_FIELDS,
     WorkerFailedError,
+    WorkerProcess,
     parse_message,
 )
-from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.job.request import program_version
 
 FILES = (

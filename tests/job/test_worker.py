@@ -16,8 +16,7 @@ from scope.scope_addon.capture import pipeline
 from scope.scope_addon.capture.perception.lifter import LIFTER_FILE
 from scope.scope_addon.capture.perception.sessions import LANDMARK_NETWORK_OF_QUALITY, network_path
 from scope.scope_addon.errors import SetupError, UsageError
-from scope.scope_addon.job.messages import WorkerFailedError
-from scope.scope_addon.job.process import START_SCRIPT, WorkerProcess
+from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
 from scope.scope_addon.job.request import JobRequest, code_version
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.parent import STOPPED

@@ -12,7 +12,7 @@ import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.job.live_capture import MOTION, _Recorder, capture_live
 from scope.scope_addon.job.live_process import LiveProcess, parse_pose
-from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.job.request import RECORD, Commands, LiveRequest
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion

@@ -11,7 +11,7 @@ import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job import live_cameras
 from scope.scope_addon.job.live_cameras import Camera, FormatsProcess, ask_for_formats, list_cameras
-from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.job.request import FormatsRequest
 
 from ..processes import runs, wait_for

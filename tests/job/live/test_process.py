@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.job import live_process
 from scope.scope_addon.job.live_process import LiveProcess, parse_pose
-from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.job.request import LiveRequest
 
 from ..processes import wait_for

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.job.job_progress import JobProgress
-from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.packed_motion import stored_motion

@@ -8,7 +8,7 @@ import bpy
 import pytest
 from scope.scope_addon.job import live_cameras
 from scope.scope_addon.job.live_cameras import Camera
-from scope.scope_addon.ui import camera_formats, live_properties
+from scope.scope_addon.ui import live_operators, live_properties
 from scope.scope_addon.ui.live_operators import end_live
 from scope.scope_addon.ui.live_properties import state
 
@@ -47,7 +47,7 @@ def ask(camera="1: USB Camera"):
     bpy.ops.scope.camera_formats()
     process = state.asking
     assert not bpy.ops.scope.camera_formats.poll()  # one after another
-    wait_for(lambda: camera_formats.step() is None)
+    wait_for(lambda: live_operators.see_answer() is None)
     assert not runs(process.pid)
     assert not process.job_folder.exists()
 
@@ -59,7 +59,7 @@ def drawn():
     context = SimpleNamespace(
         preferences=bpy.context.preferences, region=None, scene=bpy.context.scene
     )
-    camera_formats.draw(context, SimpleNamespace(column=lambda align: column))
+    live_operators.draw_formats(context, SimpleNamespace(column=lambda align: column))
     return " ".join(texts)
 
 
@@ -105,4 +105,4 @@ def test_disabling_the_extension_ends_the_question(answering):
     assert drawn() == "Querying the camera"
     end_live()
     assert not runs(process.pid)
-    assert camera_formats.step() is None
+    assert live_operators.see_answer() is None

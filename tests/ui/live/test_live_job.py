@@ -16,7 +16,7 @@ import pytest
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
 from scope.scope_addon.job.live_process import LiveProcess
-from scope.scope_addon.job.messages import WorkerFailedError
+from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.scene.actions import fcurves
 from scope.scope_addon.ui import live_job
 from scope.scope_addon.ui.live_job import LiveJob, live_request

@@ -7,7 +7,7 @@ from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.edit.corrected_motion import shot_of
 from scope.scope_addon.edit.corrections import FeetOnFloor, Interpolation
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.scene.character.edited_keys import KeyEdits, begin_with_edits, floored
+from scope.scope_addon.scene.character.corrected_keys import KeyEdits, begin_with_edits, floored
 
 from ....edit.walking import BETAS, BODY, motion_of, walk
 from ...made_rigs import captured

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Restore the viewport when "Compare with Footage" is undone; views are not part of what Blender
-undoes.
+"""What is put right after Blender's own steps: views and appended files.
+
+Views are not part of what Blender undoes, so that the viewport is restored when "Compare with
+Footage" is undone. And Blender puts the rings that the bones of an appended armature show into the
+scene. Before 4.3, Blender says nothing of appended files, and they stay there.
 """
 
 from __future__ import annotations
@@ -16,15 +19,19 @@ _sides: set[int] = set()  # areas that showed a capture from its side
 
 
 def attach() -> None:
-    """Add the undo handlers."""
+    """Add the handlers."""
     bpy.app.handlers.undo_pre.append(_before)
     bpy.app.handlers.undo_post.append(_after)
+    if hasattr(bpy.app.handlers, "blend_import_post"):
+        bpy.app.handlers.blend_import_post.append(_unlink_rings)
 
 
 def detach() -> None:
-    """Remove the undo handlers."""
+    """Remove the handlers."""
     bpy.app.handlers.undo_pre.remove(_before)
     bpy.app.handlers.undo_post.remove(_after)
+    if hasattr(bpy.app.handlers, "blend_import_post"):
+        bpy.app.handlers.blend_import_post.remove(_unlink_rings)
 
 
 @persistent
@@ -58,3 +65,10 @@ def _leave() -> None:
     for window, side in [pair for pair in viewports() if left and pair[1].as_pointer() in _sides]:
         close_side_view(window, side)
     _looked_through.clear()
+
+
+@persistent
+def _unlink_rings(*_: object) -> None:
+    from ..scene.character.bone_display import unlink_rings
+
+    unlink_rings()
