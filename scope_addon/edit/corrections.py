@@ -7,9 +7,10 @@ smoothing or frame rate the keys have.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -323,104 +324,123 @@ def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tupl
     return (*others, *(c for c in (upright, floor) if c is not None))
 
 
-def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a motion file; see docs/motion_file.md. Coordinates that a pin does not
-    have are NaN.
+class _Array(NamedTuple):
+    """One of the arrays in which a motion file has the corrections of a kind, a row for each; see
+    docs/motion_file.md.
     """
-    pins = [c for c in corrections if isinstance(c, Pin)]
-    contacts = [c for c in corrections if isinstance(c, Contact)]
-    exchanges = [c for c in corrections if isinstance(c, Exchange)]
-    flips = [c for c in corrections if isinstance(c, DepthFlip)]
-    upright = [c for c in corrections if isinstance(c, Upright)]
-    floors = [c for c in corrections if isinstance(c, Floor)]
-    interpolations = [c for c in corrections if isinstance(c, Interpolation)]
-    snaps = [c for c in corrections if isinstance(c, FeetOnFloor)]
-    nan = float("nan")
+
+    name: str
+    value: type[int | float | str | bool]
+    row_shape: tuple[int, ...]
+    fields: tuple[str, ...]  # that a row holds
+
+    def made_of(self, corrections: Iterable[Correction]) -> NDArray[Any]:
+        """Return the array. Coordinates that a pin does not have are NaN."""
+        missing = (np.nan,) * math.prod(self.row_shape)
+        rows = []
+        for correction in corrections:
+            values = [getattr(correction, field) for field in self.fields]
+            rows.append([missing if value is None else value for value in values])
+        dtype = {int: np.int64, float: np.float64, str: np.str_, bool: np.bool_}[self.value]
+        return np.array(rows, dtype).reshape(-1, *self.row_shape)
+
+    def checked(self, arrays: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+        """Return the array of a motion file; an empty one if it is missing.
+
+        :raises MotionFileError: it has the wrong shape, or does not say what is true or false.
+        """
+        array = np.asarray(arrays.get(self.name, np.zeros((0, *self.row_shape))))
+        if array.ndim == 0 or array.shape[1:] != self.row_shape:
+            raise MotionFileError(
+                f"{self.name} must have shape {('N', *self.row_shape)}, but has {array.shape}"
+            )
+        if self.value is bool and len(array) and array.dtype != np.bool_:
+            raise MotionFileError(
+                f"the motion's corrections are damaged: {self.name} is not true or false"
+            )
+        return array
+
+    def values_of(self, row: Any) -> tuple[Any, ...]:
+        """Return the values of the fields that a row holds; None for coordinates that are NaN."""
+        if len(self.fields) > 1:
+            return tuple(self.value(value) for value in row)
+        if not self.row_shape:
+            return (self.value(row),)
+        numbers = tuple(float(value) for value in row.ravel())
+        return (None if np.isnan(numbers).any() else numbers,)
+
+
+_ARRAYS = {
+    Pin: (
+        _Array("pin_frames", int, (), ("frame",)),
+        _Array("pin_joints", str, (), ("joint",)),
+        _Array("pin_uv", float, (2,), ("pixel",)),
+        _Array("pin_xyz", float, (3,), ("position",)),
+        _Array("pin_reach", float, (), ("reach",)),
+    ),
+    Contact: (
+        _Array("contact_spans", int, (2,), ("first", "last")),
+        _Array("contact_feet", str, (), ("part",)),
+    ),
+    Exchange: (
+        _Array("exchange_spans", int, (2,), ("first", "last")),
+        _Array("exchange_limbs", str, (), ("limbs",)),
+    ),
+    DepthFlip: (
+        _Array("depth_spans", int, (2,), ("first", "last")),
+        _Array("depth_parts", str, (), ("part",)),
+    ),
+    Interpolation: (_Array("interpolated_spans", int, (2,), ("first", "last")),),
+    Upright: (_Array("upright", float, (4, 4), ("rows",)),),
+    Floor: (
+        _Array("floor_frames", int, (), ("frame",)),
+        _Array("floor_heights", float, (), ("height",)),
+    ),
+    FeetOnFloor: (
+        _Array("snap_level", bool, (), ("level",)),
+        _Array("snap_lift", bool, (), ("lift",)),
+        _Array("snap_heights", float, (), ("height",)),
+    ),
+}
+_ONCE = (Upright, Floor, FeetOnFloor)  # A motion has at most one of each.
+
+
+def to_arrays(corrections: tuple[Correction, ...]) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a motion file."""
     return {
-        "pin_frames": np.array([p.frame for p in pins], np.int64),
-        "pin_joints": np.array([p.joint for p in pins], np.str_),
-        "pin_uv": np.array([p.pixel or (nan,) * 2 for p in pins], np.float64).reshape(-1, 2),
-        "pin_xyz": np.array([p.position or (nan,) * 3 for p in pins], np.float64).reshape(-1, 3),
-        "pin_reach": np.array([p.reach for p in pins], np.float64),
-        "contact_spans": np.array([(c.first, c.last) for c in contacts], np.int64).reshape(-1, 2),
-        "contact_feet": np.array([c.part for c in contacts], np.str_),
-        "exchange_spans": np.array([(e.first, e.last) for e in exchanges], np.int64).reshape(-1, 2),
-        "exchange_limbs": np.array([e.limbs for e in exchanges], np.str_),
-        "depth_spans": np.array([(f.first, f.last) for f in flips], np.int64).reshape(-1, 2),
-        "depth_parts": np.array([f.part for f in flips], np.str_),
-        "upright": np.array([u.rows for u in upright], np.float64).reshape(-1, 4, 4),
-        "floor_frames": np.array([f.frame for f in floors], np.int64),
-        "floor_heights": np.array([f.height for f in floors], np.float64),
-        "interpolated_spans": np.array(
-            [(i.first, i.last) for i in interpolations], np.int64
-        ).reshape(-1, 2),
-        "snap_level": np.array([s.level for s in snaps], np.bool_),
-        "snap_lift": np.array([s.lift for s in snaps], np.bool_),
-        "snap_heights": np.array([s.height for s in snaps], np.float64),
+        array.name: array.made_of(c for c in corrections if isinstance(c, kind))
+        for kind, arrays in _ARRAYS.items()
+        for array in arrays
     }
 
 
 def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> tuple[Correction, ...]:
     """Read the corrections from the arrays of a motion file; keys may be missing.
 
-    :param arrays: named and shaped as `docs/motion_file.md` says, for example ``pin_uv`` (N, 2).
     :raises MotionFileError: an array has the wrong shape, or a value is impossible.
     """
-
-    def column(name: str, *shape: int) -> NDArray[Any]:
-        array = np.asarray(arrays.get(name, np.zeros((0, *shape))))
-        if array.shape[1:] != shape or array.ndim != 1 + len(shape):
-            raise MotionFileError(f"{name} must have shape {('N', *shape)}, but has {array.shape}")
-        return array
-
-    spans = column("contact_spans", 2), column("exchange_spans", 2)
-    flips = column("depth_spans", 2).tolist(), column("depth_parts").tolist()
-    floors = column("floor_frames"), column("floor_heights")
-    interpolated = column("interpolated_spans", 2)
-    snaps = (column("snap_level"), column("snap_lift"))
-    if len(interpolated) > _MAX_INTERPOLATIONS:
-        raise MotionFileError(
-            f"the motion has {len(interpolated)} interpolated spans, but may have at most "
-            f"{_MAX_INTERPOLATIONS}"
-        )
-    if any(len(flags) and flags.dtype != np.bool_ for flags in snaps):
-        raise MotionFileError(
-            "the motion's corrections are damaged: snap_level and snap_lift are not true or false"
-        )
-    try:
-        pins = zip(
-            *(
-                column("pin_frames"),
-                column("pin_joints"),
-                column("pin_uv", 2),
-                column("pin_xyz", 3),
-            ),
-            column("pin_reach"),
-            strict=True,
-        )
-        contacts = zip(*spans[0].T, column("contact_feet"), strict=True) if len(spans[0]) else ()
-        exchanges = zip(*spans[1].T, column("exchange_limbs"), strict=True) if len(spans[1]) else ()
-        return (
-            *(
-                Pin(int(f), str(j), _numbers(uv), _numbers(xyz), float(r))
-                for f, j, uv, xyz, r in pins
-            ),
-            *(Contact(int(a), int(b), str(part)) for a, b, part in contacts),
-            *(Exchange(int(a), int(b), str(limbs)) for a, b, limbs in exchanges),
-            *(DepthFlip(int(a), int(b), str(part)) for (a, b), part in zip(*flips, strict=True)),
-            *(Interpolation(int(a), int(b)) for a, b in interpolated),
-            *(Upright.of(np.asarray(T, float)) for T in column("upright", 4, 4)[:1]),
-            *(Floor(int(f), float(h)) for f, h in [*zip(*floors, strict=True)][:1]),
-            *(
-                FeetOnFloor(bool(level), bool(lift), float(height))
-                for level, lift, height in [*zip(*snaps, column("snap_heights"), strict=True)][:1]
-            ),
-        )
-    except (ValueError, TypeError, OverflowError, UsageError) as error:
-        raise MotionFileError(
-            f"the motion's corrections are damaged: {in_one_line(error)}"
-        ) from error
-
-
-def _numbers(row: NDArray[np.float64]) -> Any:
-    return None if np.isnan(row).any() else tuple(float(x) for x in row)
+    found: list[Any] = []
+    for kind, columns in _ARRAYS.items():
+        checked = [column.checked(arrays) for column in columns]
+        if kind is Interpolation and len(checked[0]) > _MAX_INTERPOLATIONS:
+            raise MotionFileError(
+                f"the motion has {len(checked[0])} interpolated spans, but may have at most "
+                f"{_MAX_INTERPOLATIONS}"
+            )
+        if len({len(array) for array in checked}) > 1:
+            raise MotionFileError(
+                "the motion's corrections are damaged: they have different numbers of "
+                f"{' and '.join(column.name for column in columns)}"
+            )
+        rows = [*zip(*checked, strict=True)]
+        try:
+            for row in rows[:1] if kind in _ONCE else rows:
+                values: dict[str, Any] = {}
+                for column, cell in zip(columns, row, strict=True):
+                    values |= zip(column.fields, column.values_of(cell), strict=True)
+                found.append(kind(**values))
+        except (ValueError, TypeError, OverflowError, UsageError) as error:
+            raise MotionFileError(
+                f"the motion's corrections are damaged: {in_one_line(error)}"
+            ) from error
+    return tuple(found)
