@@ -15,7 +15,7 @@ from ..scene.stored_values import start_frame, stored_text
 from . import comparison
 from .capture.captures import show_again, shown_capture
 from .captured_person import PERSON, captured_armature, motion_of
-from .reporting import ReportingOperator, rpt_, tip_
+from .reporting import ReportingOperator, refuse, rpt_, tip_
 
 
 def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -36,20 +36,20 @@ class ActionOperator(ReportingOperator):
         """
         armature = animated_armature(context)
         if armature is None:
-            cls.poll_message_set(tip_("Select the armature of a capture first"))
-            return False
+            return refuse(cls, tip_("Select the armature of a capture first"))
         if armature.library is not None:
             file = armature.library.filepath
-            cls.poll_message_set(
-                tip_("'{name}' is linked from {file}: make it local", name=armature.name, file=file)
+            return refuse(
+                cls,
+                tip_(
+                    "'{name}' is linked from {file}: make it local", name=armature.name, file=file
+                ),
             )
-            return False
         if armature.animation_data is None or armature.animation_data.action is None:
             name = armature.name
-            cls.poll_message_set(
-                tip_("'{name}' has no action; choose one in the Action Editor", name=name)
+            return refuse(
+                cls, tip_("'{name}' has no action; choose one in the Action Editor", name=name)
             )
-            return False
         return True
 
 
@@ -97,14 +97,10 @@ class CaptureOperator(ReportingOperator):
         """Require a capture that is stored in this file."""
         collection = context.scene.scope.result.collection
         if collection is None:
-            cls.poll_message_set(tip_("The scene contains no capture yet"))
-            return False
+            return refuse(cls, tip_("The scene contains no capture yet"))
         if collection.library is not None:
             file = collection.library.filepath
-            cls.poll_message_set(
-                tip_("The capture is linked from {file}: make it local", file=file)
-            )
-            return False
+            return refuse(cls, tip_("The capture is linked from {file}: make it local", file=file))
         return True
 
 

@@ -13,7 +13,7 @@ from bpy.props import IntProperty
 from ..errors import UsageError
 from ..scene.datablocks import holds
 from ..scene.stored_values import stored_numbers, stored_text
-from .reporting import ReportingOperator, tip_
+from .reporting import ReportingOperator, refuse, tip_
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -175,20 +175,19 @@ def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """
     armature = captured_armature(context)
     if armature is None:
-        cls.poll_message_set(tip_("Select the armature of a capture first"))
-        return False
+        return refuse(cls, tip_("Select the armature of a capture first"))
     library = library_of(armature)
     if library is not None:
-        cls.poll_message_set(
+        return refuse(
+            cls,
             tip_(
                 "'{name}' or its motion is linked from {file}, so changes would be lost: make both "
                 "local (Object > "
                 "Relations > Make Local > All) or edit them in that file",
                 name=armature.name,
                 file=library.filepath,
-            )
+            ),
         )
-        return False
     return True
 
 

@@ -41,7 +41,7 @@ from .correction_operators import (
     floor_warning,
 )
 from .preferences import keep_machine_code
-from .reporting import rpt_, tip_
+from .reporting import refuse, rpt_, tip_
 from .translations import CONTEXT
 
 if TYPE_CHECKING:
@@ -432,13 +432,13 @@ class SCOPE_OT_refloor(CorrectionOperator):
             return False
         armature = captured_armature(context)
         if armature is not None and armature.get("scope_uneven_ground", False):
-            cls.poll_message_set(
+            return refuse(
+                cls,
                 tip_(
                     "This motion was captured on uneven ground, where feet rest at any height: "
                     "use Floor Here"
-                )
+                ),
             )
-            return False
         return True
 
     def edit(

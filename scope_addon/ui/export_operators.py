@@ -17,8 +17,8 @@ from .capture.captures import captures_of, people_of, shown_capture
 from .captured_person import PERSON, body_of, motion_of
 from .comparison import cameras_of
 from .declared_properties import with_options
-from .file_field import output_file
-from .reporting import ReportingOperator, rpt_, tip_
+from .file_field import SavingOperator, output_file
+from .reporting import refuse, rpt_, tip_
 
 FORMATS = (
     (
@@ -64,7 +64,7 @@ _SUFFIX = {key: f".{key.lower()}" for key, *_ in FORMATS}
 
 
 @with_options(Place.EXPORT)
-class SCOPE_OT_export(ReportingOperator):
+class SCOPE_OT_export(SavingOperator):
     """Write captures to a file"""
 
     bl_idname = "scope.export"
@@ -73,7 +73,6 @@ class SCOPE_OT_export(ReportingOperator):
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(default="*.fbx", options={"HIDDEN", "SKIP_SAVE"})
-    check_existing: BoolProperty(default=True, options={"HIDDEN"})
     format: EnumProperty(
         name="Format",
         items=FORMATS,
@@ -136,24 +135,19 @@ class SCOPE_OT_export(ReportingOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture in the scene."""
         if not captures_of(context.scene):
-            cls.poll_message_set(tip_("The scene contains no capture yet"))
-            return False
+            return refuse(cls, tip_("The scene contains no capture yet"))
         return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
-        suffix = _SUFFIX[self.format]
-        self.filepath = str(_proposed(context, suffix))
-        self.filter_glob = f"*{suffix}"
+        self.filepath = str(_proposed(context, self.suffix()))
+        self.filter_glob = f"*{self.suffix()}"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def check(self, context: bpy.types.Context) -> bool:
-        """Correct the suffix while the name is typed."""
-        path: str = bpy.path.ensure_ext(self.filepath, _SUFFIX[self.format])
-        changed = path != self.filepath
-        self.filepath = path
-        return bool(changed)
+    def suffix(self) -> str:
+        """Return that of the format."""
+        return _SUFFIX[self.format]
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the options in the sidebar of the file browser."""
@@ -180,7 +174,7 @@ class SCOPE_OT_export(ReportingOperator):
         from ..scene.export.without_scene import write_without_scene
         from ..scene.rigs.rig_export import export_rig
 
-        path = output_file(self.filepath, _SUFFIX[self.format])
+        path = output_file(self.filepath, self.suffix())
         if not is_available(self.format):
             raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
         options = ExportOptions(
@@ -230,25 +224,27 @@ class SCOPE_OT_export(ReportingOperator):
         )
 
 
-class SCOPE_OT_save_calibration(ReportingOperator):
+class SCOPE_OT_save_calibration(SavingOperator):
     """Save the lenses and places of the cameras, for further takes of the same cameras"""
 
     bl_idname = "scope.save_calibration"
     bl_label = "Save Calibration"
-    bl_options = {"REGISTER"}
 
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN", "SKIP_SAVE"})
-    check_existing: BoolProperty(default=True, options={"HIDDEN"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture with several cameras."""
         return len(cameras_of(context.scene)) > 1
 
+    def suffix(self) -> str:
+        """Return that of a calibration."""
+        return ".toml"
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the file."""
-        self.filepath = str(_proposed(context, ".toml"))
+        self.filepath = str(_proposed(context, self.suffix()))
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -260,7 +256,7 @@ class SCOPE_OT_save_calibration(ReportingOperator):
         from ..capture.camera.calibration import write_calibration
         from ..scene.export.output_paths import check_output
 
-        path = check_output(output_file(self.filepath, ".toml"), (".toml",))
+        path = check_output(output_file(self.filepath, self.suffix()), (self.suffix(),))
         people = people_of(shown_capture(context.scene))
         if not people:
             raise UsageError("the captured person was deleted; undo that or capture again")

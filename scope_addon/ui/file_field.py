@@ -18,7 +18,7 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 
 from ..errors import UsageError
 from ..footage import FOOTAGE_SUFFIXES, VIDEO_SUFFIXES, display_text
-from .reporting import rpt_
+from .reporting import ReportingOperator, rpt_
 
 _ASSETS = Path(__file__).resolve().parents[2] / "assets"
 _TEXT = "_text"  # ends the name of the text of a path
@@ -67,6 +67,30 @@ class SeveralFootageBrowser(FootageBrowser):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Use a dropped file, or ask for some."""
         return self.execute(context) if self.filepath else self.ask(context)
+
+
+class SavingOperator(ReportingOperator):
+    """An operator that writes a file, for which the file browser asks. Not registered."""
+
+    bl_options = {"REGISTER"}  # it changes a file only, so there is nothing to undo
+
+    # the file browser asks before it overwrites
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
+
+    if TYPE_CHECKING:  # of each operator
+        filepath: str
+
+        def suffix(self) -> str:
+            """Return the suffix of the file, with its dot."""
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Add the suffix while the name is typed, so that the file browser sees which file would be
+        overwritten.
+        """
+        path: str = bpy.path.ensure_ext(self.filepath, self.suffix())
+        changed = path != self.filepath
+        self.filepath = path
+        return bool(changed)
 
 
 def chosen_files(operator: Any) -> list[str]:

@@ -49,6 +49,12 @@ def tip_(text: str, **values: object) -> str:
     return translated.format(**values) if values else translated
 
 
+def refuse(operator: type[bpy.types.Operator], reason: str) -> bool:
+    """Say why an operator cannot be used; return False, as its ``poll`` then does."""
+    operator.poll_message_set(reason)
+    return False
+
+
 def sentence(error: Exception | str, name: str = "") -> str:
     """Return an error's message with a capital first letter, as the panel shows it; a file's name
     keeps its own.

@@ -8,15 +8,15 @@ The chosen face is a mesh with shape keys, or a rig whose bones move the face.
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import EnumProperty, StringProperty
 
 from ...solver.errors import ScopeError
 from ..scene.datablocks import is_in_layer
-from .file_field import output_file
-from .reporting import ReportingOperator, rpt_, tip_
+from .file_field import SavingOperator, output_file
+from .reporting import ReportingOperator, refuse, rpt_, tip_
 
 if TYPE_CHECKING:
     from ..retarget.bone_map import BoneMap
@@ -33,14 +33,14 @@ def is_in_view_layer(
     """
     if is_in_layer(context.view_layer, chosen):
         return True
-    cls.poll_message_set(
+    return refuse(
+        cls,
         tip_(
             "'{rig}' is not in the scene's view layer: add it to the scene, or enable its "
             "collection in the Outliner",
             rig=chosen.name,
-        )
+        ),
     )
-    return False
 
 
 class MapFileOperator(ReportingOperator):
@@ -55,22 +55,12 @@ class MapFileOperator(ReportingOperator):
         return {"RUNNING_MODAL"}
 
 
-class SaveMapOperator(MapFileOperator):
+class SaveMapOperator(SavingOperator, MapFileOperator):
     """Writes a map; a subclass has ``save``, and the file's usual name. Not registered."""
 
-    bl_options = {"REGISTER"}  # it changes a file only, so there is nothing to undo
-
-    # the file browser asks before it overwrites
-    check_existing: BoolProperty(default=True, options={"HIDDEN"})
-
-    def check(self, context: bpy.types.Context) -> bool:
-        """Add the suffix while the name is typed, so that the file browser sees which file would be
-        overwritten.
-        """
-        path: str = bpy.path.ensure_ext(self.filepath, ".json")
-        changed = path != self.filepath
-        self.filepath = path
-        return bool(changed)
+    def suffix(self) -> str:
+        """Return that of maps."""
+        return ".json"
 
     def work(self, context: bpy.types.Context) -> str:
         """Write the file.
@@ -104,19 +94,38 @@ class LoadMapOperator(MapFileOperator):
             """Fill the list of the settings from a path."""
 
 
-def edit_list(action: str, pairs: Any, active: int) -> int:
-    """Add an entry to a list's collection, or remove the active one; return which one is active
-    then.
+class EditListOperator(ReportingOperator):
+    """Adds an entry to the list of a map, or removes the active one. Not registered."""
 
-    :param action: ``ADD`` or ``REMOVE``.
-    """
-    if action == "ADD":
-        pairs.add()
-        return len(pairs) - 1
-    if len(pairs):
-        pairs.remove(active)
-        return max(0, min(active, len(pairs) - 1))
-    return active
+    entries: ClassVar[str]  # the list, of the settings
+    active: ClassVar[str]  # the number of its active entry, of the settings
+
+    action: EnumProperty(
+        items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry"))
+    )
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def message(self, count: int) -> str:
+            """Return how many entries there are now."""
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the list."""
+        settings = context.scene.scope_retarget
+        listed = getattr(settings, self.entries)
+        active = getattr(settings, self.active)
+        if self.action == "ADD":
+            self.add(settings)
+            active = len(listed) - 1
+        elif len(listed):
+            listed.remove(active)
+            active = max(0, min(active, len(listed) - 1))
+        setattr(settings, self.active, active)
+        return self.message(len(listed))
+
+    def add(self, settings: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
+        """Add an entry, and return it."""
+        return getattr(settings, self.entries).add()
 
 
 def guess_into_list(settings: bpy.types.PropertyGroup) -> None:

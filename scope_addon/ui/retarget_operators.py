@@ -8,16 +8,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import StringProperty
 
 from ..errors import UsageError
 from .captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from .reporting import ReportingOperator, rpt_, tip_, warning_text
+from .reporting import ReportingOperator, refuse, rpt_, tip_, warning_text
 from .retarget_maps import (
+    EditListOperator,
     LoadMapOperator,
     SaveMapOperator,
     bones_move,
-    edit_list,
     fill_expressions,
     fill_list,
     guessed_map,
@@ -43,8 +43,7 @@ class _RigOperator(ReportingOperator):
         """Require a rig in the view layer."""
         rig = context.scene.scope_retarget.rig
         if rig is None:
-            cls.poll_message_set(tip_("Choose your rig first"))
-            return False
+            return refuse(cls, tip_("Choose your rig first"))
         return is_in_view_layer(cls, context, rig)
 
 
@@ -90,26 +89,26 @@ class SCOPE_OT_retarget(_RigOperator):
             return False
         rig = context.scene.scope_retarget.rig
         if rig.library is not None:
-            cls.poll_message_set(
+            return refuse(
+                cls,
                 tip_(
                     "'{rig}' is linked from {file}, so its motion would not be saved in this file: "
                     "make an override of "
                     "it (Object > Library Override > Make)",
                     rig=rig.name,
                     file=rig.library.filepath,
-                )
+                ),
             )
-            return False
         if captured_armature(context) is None:
-            cls.poll_message_set(
+            return refuse(
+                cls,
                 tip_(
                     "Several people are captured: select the armature of the one whose motion to "
                     "retarget"
                 )
                 if captured_people(context)
-                else tip_("The scene contains no capture yet")
+                else tip_("The scene contains no capture yet"),
             )
-            return False
         return True
 
     def work(self, context: bpy.types.Context) -> str:
@@ -220,21 +219,16 @@ class SCOPE_OT_load_bone_map(_RigOperator, LoadMapOperator):
         fill_list(settings, load_bone_map(path))
 
 
-class SCOPE_OT_edit_bone_pair(_RigOperator):
+class SCOPE_OT_edit_bone_pair(_RigOperator, EditListOperator):
     """Add an entry to the bone map, or remove the selected one"""
 
     bl_idname = "scope.edit_bone_pair"
     bl_label = "Edit Bone Map"
+    entries = "pairs"
+    active = "active"
 
-    action: EnumProperty(
-        items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry"))
-    )
-
-    def work(self, context: bpy.types.Context) -> str:
-        """Change the list."""
-        settings = context.scene.scope_retarget
-        settings.active = edit_list(self.action, settings.pairs, settings.active)
-        count = len(settings.pairs)
+    def message(self, count: int) -> str:
+        """Return how many bones are listed."""
         return rpt_("{count} bone" if count == 1 else "{count} bones", count=count)
 
 
@@ -258,10 +252,9 @@ class _FaceOperator(ReportingOperator):
         """Require a mesh with shape keys, or a rig whose face is known, in the view layer."""
         face = context.scene.scope_retarget.face
         if not has_targets(face):
-            cls.poll_message_set(
-                tip_("Choose a mesh with shape keys, or a rig with face controls, first")
+            return refuse(
+                cls, tip_("Choose a mesh with shape keys, or a rig with face controls, first")
             )
-            return False
         return is_in_view_layer(cls, context, face)
 
 
@@ -318,18 +311,17 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         # of what is animated
         library = face.library if face.type == "ARMATURE" else face.data.library
         if library is not None:
-            cls.poll_message_set(
+            return refuse(
+                cls,
                 tip_(
                     "'{mesh}' is linked from {file}, so its keyframes would not be saved in this "
                     "file: make it local",
                     mesh=face.name,
                     file=library.filepath,
-                )
+                ),
             )
-            return False
         if captured_armature(context) is None:
-            cls.poll_message_set(tip_("Select the captured person whose face to retarget"))
-            return False
+            return refuse(cls, tip_("Select the captured person whose face to retarget"))
         return True
 
     def work(self, context: bpy.types.Context) -> str:
@@ -394,23 +386,23 @@ class SCOPE_OT_load_expression_map(_FaceOperator, LoadMapOperator):
         fill_expressions(settings, load_expression_map(path))
 
 
-class SCOPE_OT_edit_expression_pair(_FaceOperator):
+class SCOPE_OT_edit_expression_pair(_FaceOperator, EditListOperator):
     """Add an entry to the expression map, or remove the selected one"""
 
     bl_idname = "scope.edit_expression_pair"
     bl_label = "Edit Expression Map"
+    entries = "face_pairs"
+    active = "face_active"
 
-    action: EnumProperty(
-        items=(("ADD", "Add", "Add an entry"), ("REMOVE", "Remove", "Remove the selected entry"))
-    )
+    def add(self, settings: bpy.types.PropertyGroup) -> bpy.types.PropertyGroup:
+        """Add an entry of the kind that the face has."""
+        entry = super().add(settings)
+        if bones_move(settings.face):
+            entry.channel = "up"
+        return entry
 
-    def work(self, context: bpy.types.Context) -> str:
-        """Change the list."""
-        settings = context.scene.scope_retarget
-        settings.face_active = edit_list(self.action, settings.face_pairs, settings.face_active)
-        if self.action == "ADD" and bones_move(settings.face):
-            settings.face_pairs[settings.face_active].channel = "up"
-        count = len(settings.face_pairs)
+    def message(self, count: int) -> str:
+        """Return how many entries there are."""
         return rpt_("{count} entry" if count == 1 else "{count} entries", count=count)
 
 

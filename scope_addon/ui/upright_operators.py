@@ -17,7 +17,7 @@ from .captured_person import captured_armature, may_edit, motion_of
 from .comparison import camera_of
 from .correction_operators import CorrectionOperator, change_world, shown_frame
 from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
-from .reporting import iface_, rpt_, sentence, tip_
+from .reporting import iface_, refuse, rpt_, sentence, tip_
 
 if TYPE_CHECKING:
     from ...solver.body import Body
@@ -135,13 +135,13 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             or space.type != "VIEW_3D"
             or not any(_takes_line(context.scene, area) for area in areas)
         ):
-            cls.poll_message_set(
+            return refuse(
+                cls,
                 tip_(
                     "Press Compare with Footage or switch to an orthographic side view; the line "
                     "is drawn there"
-                )
+                ),
             )
-            return False
         return may_edit(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -12,7 +12,7 @@ from ..scene.stored_values import start_frame
 from . import comparison
 from .captured_person import captured_people
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
-from .reporting import ReportingOperator, rpt_, tip_
+from .reporting import ReportingOperator, refuse, rpt_, tip_
 from .sidebar import redraw_sidebars_twice, viewport_of
 
 
@@ -75,25 +75,23 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that the last capture has a camera and is not hidden."""
         if is_side_view(context):
-            cls.poll_message_set(tip_("Use this in the viewport with the footage"))
-            return False
+            return refuse(cls, tip_("Use this in the viewport with the footage"))
         if camera_of(context.scene) is None:
-            cls.poll_message_set(
+            return refuse(
+                cls,
                 tip_(
                     "The scene has no camera of a capture: capture with the option Camera with "
                     "Footage"
-                )
+                ),
             )
-            return False
         collection = context.scene.scope.result.collection
         if not is_looking_through(context) and not _is_shown(
             collection, context.view_layer.layer_collection
         ):
             name = collection.name
-            cls.poll_message_set(
-                tip_("The collection '{name}' is hidden; show it in the Outliner", name=name)
+            return refuse(
+                cls, tip_("The collection '{name}' is hidden; show it in the Outliner", name=name)
             )
-            return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -179,8 +177,7 @@ class SCOPE_OT_side_view(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a viewport that compares a capture with its footage."""
         if not is_looking_through(context):
-            cls.poll_message_set(tip_("Compare with Footage first"))
-            return False
+            return refuse(cls, tip_("Compare with Footage first"))
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -219,8 +216,7 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture."""
         if not context.scene.scope.result.footage:
-            cls.poll_message_set(tip_("The capture does not say where its footage is"))
-            return False
+            return refuse(cls, tip_("The capture does not say where its footage is"))
         return True
 
     def work(self, context: bpy.types.Context) -> str:

@@ -17,7 +17,7 @@ from ....solver.errors import ScopeError
 from .. import warm_up
 from ..file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
 from ..live_properties import state as live_state
-from ..reporting import iface_, restore_libraries, rpt_, sentence, tip_
+from ..reporting import iface_, refuse, restore_libraries, rpt_, sentence, tip_
 from ..sidebar import redraw_sidebars, show_tab
 from ..view_operators import show_new_capture
 from . import preview_picture
@@ -56,8 +56,7 @@ def nothing_runs(cls: type[bpy.types.Operator]) -> bool:
     """
     if state.job is None and live_state.job is None:
         return True
-    cls.poll_message_set(tip_("A capture is running; wait for it or cancel it"))
-    return False
+    return refuse(cls, tip_("A capture is running; wait for it or cancel it"))
 
 
 def end_capture() -> None:
@@ -101,11 +100,9 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
         """Require footage, and that there may be another view."""
         settings = context.scene.scope
         if not settings.footage:
-            cls.poll_message_set(tip_("Choose a video or image first"))
-            return False
+            return refuse(cls, tip_("Choose a video or image first"))
         if len(settings.views) >= MOST_FURTHER_VIEWS:
-            cls.poll_message_set(tip_("There are at most eight cameras"))
-            return False
+            return refuse(cls, tip_("There are at most eight cameras"))
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -176,8 +173,7 @@ class CapturingOperator(JobOperator):
         if not nothing_runs(cls):
             return False
         if not context.scene.scope.footage:
-            cls.poll_message_set(tip_("Choose a video or image first"))
-            return False
+            return refuse(cls, tip_("Choose a video or image first"))
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -304,11 +300,9 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             return False
         settings = context.scene.scope
         if settings.views:
-            cls.poll_message_set(tip_("Remove the other cameras' videos first"))
-            return False
+            return refuse(cls, tip_("Remove the other cameras' videos first"))
         if not any(_waits(clip) for clip in settings.queue):
-            cls.poll_message_set(tip_("All clips of the list have been captured; choose others"))
-            return False
+            return refuse(cls, tip_("All clips of the list have been captured; choose others"))
         return True
 
     def begin(self, scene: bpy.types.Scene) -> bool:

@@ -12,7 +12,7 @@ from ...notices import Notice, notice
 from ...scene.datablocks import holds
 from ...scene.stored_values import parse_spans, spans_text, stored_rate
 from ..captured_person import PERSON, body_of, captured_people, library_of, motion_of
-from ..reporting import ReportingOperator, add_warning, rpt_, stored_warning, tip_
+from ..reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning, tip_
 from .captures import people_of, shown_capture
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         """
         scene = context.scene
         if scene.scope.result.footage_rate <= 0:
-            cls.poll_message_set(tip_("The scene contains no captured video or imported motion"))
-            return False
+            return refuse(cls, tip_("The scene contains no captured video or imported motion"))
         linked = next(
             (block for block in [scene, *captured_people(context)] if _library(block)), None
         )
@@ -93,10 +92,9 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         if linked is not None and library is not None:
             name = linked.name
             file = library.filepath
-            cls.poll_message_set(
-                tip_("'{name}' is linked from {file}: make it local", name=name, file=file)
+            return refuse(
+                cls, tip_("'{name}' is linked from {file}: make it local", name=name, file=file)
             )
-            return False
         return True
 
     def work(self, context: bpy.types.Context) -> str:
