@@ -26,6 +26,11 @@ from .untrusted.files import in_one_line, read_npz
 if TYPE_CHECKING:
     from ..solver.body import Body
 
+MAX_VIEWS = 100  # further cameras of a motion; of 20,000 Blender makes a scene in minutes
+_LARGEST_ZOOM = 1000.0
+# Of what is stated of cameras: pixels, metres, seconds, frames per second.
+_LARGEST_FIGURE = 1e9
+
 
 @dataclass
 class Motion:
@@ -195,10 +200,18 @@ class Motion:
             if got != expected:
                 raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
         if self.zoom is not None and (
-            self.zoom.shape != (T,) or not ((self.zoom > 0) & (self.zoom < np.inf)).all()
+            self.zoom.shape != (T,)
+            or not ((self.zoom >= 1.0 / _LARGEST_ZOOM) & (self.zoom <= _LARGEST_ZOOM)).all()
         ):
             raise MotionFileError(
-                f"{where}: zoom must have a focal length above 0 for each of {T} frames"
+                f"{where}: zoom must have a ratio of focal lengths from {1.0 / _LARGEST_ZOOM:g} "
+                f"to {_LARGEST_ZOOM:g} for each of {T} frames; capture again"
+            )
+        # An imported motion was seen by no camera.
+        if self.image_size.any() and not _is_lens(self.intrinsics, self.image_size):
+            raise MotionFileError(
+                f"{where}: intrinsics and image_size must be finite, and have focal lengths and "
+                "sides above 0; capture again"
             )
         self._validate_face(where)
         self._validate_views(where)
@@ -208,17 +221,33 @@ class Motion:
             return
         sizes = {"V": len(np.atleast_1d(self.views.get("view_sources", ())))}
         self._validate_group(where, self.views, _VIEW_SCHEMA, sizes, "further cameras")
+        if sizes["V"] > MAX_VIEWS:
+            raise MotionFileError(
+                f"{where} has {sizes['V']} further cameras; at most {MAX_VIEWS} are read"
+            )
         T_view_camera = self.views["view_from_camera"]
         R = T_view_camera[:, :3, :3]
         turned_back = R @ np.swapaxes(R, 1, 2)
         is_rigid = (
             np.allclose(turned_back, np.eye(3), atol=1e-3)
+            and (np.linalg.det(R) > 0).all()
             and (T_view_camera[:, 3] == [0.0, 0.0, 0.0, 1.0]).all()
+            and (np.abs(T_view_camera[:, :3, 3]) < _LARGEST_FIGURE).all()
         )
-        if not is_rigid or not (self.views["view_frame_rates"] > 0).all():
+        rates = self.views["view_frame_rates"]
+        has_times = ((rates > 0) & (rates < _LARGEST_FIGURE)).all() and (
+            np.abs(self.views["view_offsets_s"]) < _LARGEST_FIGURE
+        ).all()
+        if not is_rigid or not has_times:
             raise MotionFileError(
-                f"{where}: view_from_camera must be rotations and translations, and "
-                "view_frame_rates above 0; capture again"
+                f"{where}: view_from_camera must be rotations and translations, "
+                "view_frame_rates above 0, and all of them and view_offsets_s below "
+                f"{_LARGEST_FIGURE:g}; capture again"
+            )
+        if not _is_lens(self.views["view_intrinsics"], self.views["view_image_sizes"]):
+            raise MotionFileError(
+                f"{where}: view_intrinsics and view_image_sizes must have focal lengths and sides "
+                "above 0; capture again"
             )
 
     def _validate_face(self, where: str) -> None:
@@ -331,6 +360,18 @@ class Motion:
             raise MotionFileError(
                 f"{path} holds a value of the wrong kind ({in_one_line(error)}); capture again"
             ) from error
+
+
+def _is_lens(intrinsics: NDArray[np.float64], image_size: NDArray[np.int64]) -> bool:
+    """Return whether intrinsics (..., 3, 3) and the width and height of images (..., 2) are those
+    of lenses.
+    """
+    focal = intrinsics[..., (0, 1), (0, 1)]
+    return bool(
+        np.isfinite(intrinsics).all()
+        and ((focal > 0) & (focal < _LARGEST_FIGURE)).all()
+        and ((image_size > 0) & (image_size < _LARGEST_FIGURE)).all()
+    )
 
 
 # Only in files with corrections. The first rows say what was corrected, the others how the changed

@@ -477,4 +477,11 @@ def check_listing(folder: Path, targets: list[Target]) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except (OSError, subprocess.CalledProcessError) as error:
+        left_mb = shutil.disk_usage(ROOT).free >> 20
+        sys.exit(
+            f"build: {error}; {left_mb} MB are left on the disk of {ROOT}: if that is why, free "
+            "some space, and run this again"
+        )

@@ -174,9 +174,12 @@ def _numpy_wheel(python: str) -> Path:
             "--python-version",
             python,
             "--dest",
-            str(folder),
         ]
-        subprocess.run([*command, "--requirement", str(request)], check=True)
+        # pip copies a wheel to where it is wanted, and may be stopped half-way.
+        with tempfile.TemporaryDirectory(dir=folder) as fetched:
+            subprocess.run([*command, fetched, "--requirement", str(request)], check=True)
+            (wheel,) = Path(fetched).glob("*.whl")
+            wheel.replace(folder / wheel.name)
     return next(folder.glob("*.whl"))
 
 

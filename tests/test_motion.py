@@ -117,9 +117,28 @@ def test_a_zoom_is_saved_and_loaded_and_absent_where_the_lens_does_not_zoom(tmp_
     K = loaded.intrinsics
     expected = [[2 * K[0, 0], 0, K[0, 2]], [0, 2 * K[1, 1], K[1, 2]], [0, 0, 1]]
     np.testing.assert_array_equal(loaded.intrinsics_of_frames[2], expected)
-    for wrong in ([1.0, 2.0], [1.0, 0.0, 1.0, 1.0], [1.0, np.nan, 1.0, 1.0]):
-        with pytest.raises(MotionFileError, match="zoom must have a focal length above 0"):
+    for wrong in ([1.0, 2.0], *([1.0, z, 1.0, 1.0] for z in (0.0, -1.0, np.nan, 1e30, 1e-30))):
+        with pytest.raises(MotionFileError, match="zoom must have a ratio of focal lengths"):
             replace(motion, zoom=wrong)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("image_size", [640, -480]),
+        ("image_size", [2**62, 480]),
+        ("intrinsics", np.zeros((3, 3))),
+        ("intrinsics", -np.eye(3)),
+        ("intrinsics", 1e300 * np.eye(3)),
+        ("intrinsics", np.full((3, 3), np.inf)),
+    ],
+)
+def test_a_camera_that_none_can_be_is_an_error(tmp_path, key, value):
+    make_motion().save(tmp_path / "a.npz")
+    arrays = dict(np.load(tmp_path / "a.npz"))
+    np.savez(tmp_path / "a.npz", **arrays | {key: np.asarray(value)})
+    with pytest.raises(MotionFileError, match="focal lengths and sides above 0"):
+        Motion.load(tmp_path / "a.npz")
 
 
 def test_files_of_earlier_versions_have_unknown_deviations(tmp_path):
@@ -213,7 +232,13 @@ def test_a_further_camera_sees_the_same_people_at_its_own_time():
         ("view_offsets_s", np.zeros(3), "view_offsets_s must have shape \\(1,\\)"),
         ("view_offsets_s", np.array([np.nan]), "not finite"),
         ("view_from_camera", np.ones((1, 4, 4)), "rotations and translations"),
+        ("view_from_camera", np.diag([1.0, 1.0, -1.0, 1.0])[None], "rotations and translations"),
+        ("view_from_camera", np.eye(4)[None] + 1e300 * np.eye(4, k=3), "below 1e"),
         ("view_frame_rates", np.zeros(1), "above 0"),
+        ("view_frame_rates", np.array([1e300]), "below 1e"),
+        ("view_offsets_s", np.array([-1e300]), "below 1e"),
+        ("view_image_sizes", np.zeros((1, 2)), "sides above 0"),
+        ("view_intrinsics", np.zeros((1, 3, 3)), "focal lengths and sides above 0"),
     ],
 )
 def test_a_damaged_further_camera_is_an_error_that_names_it(tmp_path, key, value, message):
@@ -223,3 +248,9 @@ def test_a_damaged_further_camera_is_an_error_that_names_it(tmp_path, key, value
     np.savez(tmp_path / "a.npz", **arrays, **({} if value is None else {key: value}))
     with pytest.raises(MotionFileError, match=message):
         Motion.load(tmp_path / "a.npz")
+
+
+def test_a_motion_of_more_cameras_than_anybody_has_is_refused():
+    views = {name: np.repeat(value, 101, axis=0) for name, value in made_views(0.5).items()}
+    with pytest.raises(MotionFileError, match="101 further cameras; at most 100"):
+        replace(make_motion(), views=views)

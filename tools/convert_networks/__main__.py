@@ -33,6 +33,13 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     try:
         built = build_networks(arguments.out, arguments.downloads, force=arguments.force)
+    except OSError as error:
+        print(
+            f"convert_networks: {arguments.downloads} or {arguments.out} cannot be written "
+            f"({error}); free some space or choose others with --downloads and --out",
+            file=sys.stderr,
+        )
+        return 1
     except ScopeError as error:
         print(f"convert_networks: {error}", file=sys.stderr)
         return exit_status(error)
