@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
@@ -19,6 +20,9 @@ from .comparison import cameras_of
 from .declared_properties import with_options
 from .file_field import SavingOperator, output_file
 from .reporting import refuse, rpt_, tip_
+
+if TYPE_CHECKING:
+    from ..scene.export.export import ExportOptions
 
 FORMATS = (
     (
@@ -169,33 +173,43 @@ class SCOPE_OT_export(SavingOperator):
         :raises UsageError: the file has no name or folder, or there is nothing of what is to be
             written.
         """
-        from ..scene.export.export import ExportOptions, captures, export
-        from ..scene.export.output_paths import check_output
-        from ..scene.export.without_scene import write_without_scene
-        from ..scene.rigs.rig_export import export_rig
+        from ..scene.export.export import export
 
         path = output_file(self.filepath, self.suffix())
         if not is_available(self.format):
             raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
-        options = ExportOptions(
+        if self.which == "RIG":
+            written = self._write_rig(context.scene, path)
+        elif self.format in _OF_MOTION:
+            written = _write_motions(path, self._captures(context))
+        else:
+            written = export(path, self._captures(context), options=self._options())
+        return rpt_(
+            "Wrote {files} in {folder}",
+            files=", ".join(p.name for p in written),
+            folder=written[0].parent,
+        )
+
+    def _options(self) -> ExportOptions:
+        from ..scene.export.export import ExportOptions
+
+        return ExportOptions(
             camera=self.camera,
             shape=self.shape.lower(),
             separate=self.separate,
             bvh_unit=self.bvh_unit.lower(),
         )
+
+    def _captures(self, context: bpy.types.Context) -> list[bpy.types.Collection]:
+        """Return the captures that are to be written.
+
+        :raises UsageError: the active object belongs to none.
+        """
+        from ..scene.export.export import captures
+
         collections = captures(context.scene)
-        rig = context.scene.scope_retarget.rig
-        if self.which == "RIG" and self.format in _OF_MOTION:
-            raise UsageError(
-                f"a file of the format {self.format} contains the captured motion, not a rig; "
-                "choose another format"
-            )
-        if self.which == "RIG" and rig is None:
-            raise UsageError(
-                "no rig is chosen under Retarget; choose a rig there and press Retarget first"
-            )
         if self.which == "SHOWN":
-            collections = [c for c in collections if c == shown_capture(context.scene)]
+            return [c for c in collections if c == shown_capture(context.scene)]
         if self.which == "ACTIVE":
             active = context.view_layer.objects.active
             collections = [c for c in collections if active and holds(c, active)]
@@ -203,25 +217,46 @@ class SCOPE_OT_export(SavingOperator):
                 raise UsageError(
                     "the active object belongs to no capture; select one of a capture's objects"
                 )
+        return collections
+
+    def _write_rig(self, scene: bpy.types.Scene, path: Path) -> list[Path]:
+        """Write the chosen rig; return the files.
+
+        :raises UsageError: no rig is chosen, or the format has none.
+        """
+        from ..scene.export.export import captures
+        from ..scene.rigs.rig_export import export_rig
+
+        rig = scene.scope_retarget.rig
         if self.format in _OF_MOTION:
-            people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
-            if not people:
-                raise UsageError(
-                    f"cannot write {path.name}: the capture's armature was removed; undo that or "
-                    "capture again"
-                )
-            motions = [motion_of(obj) for obj in people]
-            bodies = [body_of(obj) for obj in people]
-            written = write_without_scene(check_output(path), motions, bodies)
-        elif self.which == "RIG":
-            written = export_rig(path, rig, replace(options, take=_take_of(rig, collections)))
-        else:
-            written = export(path, collections, options=options)
-        return rpt_(
-            "Wrote {files} in {folder}",
-            files=", ".join(p.name for p in written),
-            folder=written[0].parent,
+            raise UsageError(
+                f"a file of the format {self.format} contains the captured motion, not a rig; "
+                "choose another format"
+            )
+        if rig is None:
+            raise UsageError(
+                "no rig is chosen under Retarget; choose a rig there and press Retarget first"
+            )
+        return export_rig(path, rig, replace(self._options(), take=_take_of(rig, captures(scene))))
+
+
+def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[Path]:
+    """Write the captured motions themselves; return the files.
+
+    :raises UsageError: nobody is left of the captures.
+    """
+    from ..scene.export.output_paths import check_output
+    from ..scene.export.without_scene import write_without_scene
+
+    people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
+    if not people:
+        raise UsageError(
+            f"cannot write {path.name}: the capture's armature was removed; undo that or "
+            "capture again"
         )
+    motions = [motion_of(obj) for obj in people]
+    bodies = [body_of(obj) for obj in people]
+    return write_without_scene(check_output(path), motions, bodies)
 
 
 class SCOPE_OT_save_calibration(SavingOperator):
