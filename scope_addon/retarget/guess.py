@@ -376,45 +376,20 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
 
     :return: bone name -> body part; empty if no pair of legs is found.
     """
-    heads = rest.heads
+    upwards, leftwards = _places(rest)
     leaves = [
         bone
         for bone, children in enumerate(rest.children)
         if not children and not parse_names([rest.names[bone]])[0].is_goal
     ]
-    height = max(float(np.ptp(heads[:, 2])), 1e-9)
-    z = (heads[:, 2] - heads[:, 2].min()) / height
-    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # The arms extend along the wider axis.
-    across = heads[:, axis] - np.median(heads[:, axis])
-    across = across if axis == 0 else -across
-    chains: dict[str, list[int]] = {}
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        # Goals of IK lie at the feet as well, but on no leg.
-        legs = [
-            bone
-            for bone in leaves
-            if sign * across[bone] > 0.01 * height
-            and z[bone] < 0.15
-            and sum(sign * across[above] > 0.01 * height for above in rest.chains[bone]) >= 2
-            and any(
-                z[above] > 0.3 and sign * across[above] > 0.01 * height
-                for above in rest.chains[bone]
-            )
-        ]
-        arms = [bone for bone in leaves if sign * across[bone] > 0.1 * height and z[bone] > 0.3]
-        if legs:
-            chains[f"{side} leg"] = rest.chains[min(legs, key=lambda b: len(rest.chains[b]))]
-        if arms:
-            # One hand's fingers, not another chain that ends at the same place.
-            farthest = max(arms, key=lambda b: sign * across[b])
-            chains[f"{side} arm"] = rest.chains[farthest]
+    chains = _limb_chains(rest, leaves, upwards, leftwards)
     if not {"left leg", "right leg"} <= chains.keys():
         return {}
     shared = [bone for bone in chains["left leg"] if bone in chains["right leg"]]
     if not shared:
         return {}
-    central = [bone for bone in range(len(z)) if abs(across[bone]) < 0.1 * height]
-    top = rest.chains[max(central or leaves, key=lambda bone: z[bone])]
+    central = np.flatnonzero(abs(leftwards) < 0.1).tolist()
+    top = rest.chains[max(central or leaves, key=lambda bone: upwards[bone])]
     carrying = [bone for bone in shared if bone in top]
     found = {rest.names[carrying[-1] if carrying else shared[-1]]: "pelvis"}
     for limb, chain in chains.items():
@@ -432,6 +407,49 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
     if faces_backwards(_heads_of(rest, found)):
         return {bone: other_side(part) for bone, part in found.items()}
     return found
+
+
+def _places(rest: RestPose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how high and how far to the left each bone begins, as shares of the rig's height."""
+    heads = rest.heads
+    height = max(float(np.ptp(heads[:, 2])), 1e-9)
+    axis = int(np.argmax(np.ptp(heads[:, :2], axis=0)))  # The arms extend along the wider axis.
+    leftwards = heads[:, axis] - np.median(heads[:, axis])
+    leftwards = leftwards if axis == 0 else -leftwards
+    return (heads[:, 2] - heads[:, 2].min()) / height, leftwards / height
+
+
+def _limb_chains(
+    rest: RestPose,
+    leaves: list[int],
+    upwards: NDArray[np.float64],
+    leftwards: NDArray[np.float64],
+) -> dict[str, list[int]]:
+    """Return the bones from the root to the end of each limb that is found, such as ``left leg``.
+
+    :param leaves: bones without children.
+    """
+    chains: dict[str, list[int]] = {}
+    for side, outwards in (("left", leftwards), ("right", -leftwards)):
+        legs = [bone for bone in leaves if _is_leg(rest.chains[bone], upwards, outwards)]
+        arms = [bone for bone in leaves if outwards[bone] > 0.1 and upwards[bone] > 0.3]
+        if legs:
+            chains[f"{side} leg"] = min((rest.chains[bone] for bone in legs), key=len)
+        if arms:
+            # One hand's fingers, not another chain that ends at the same place.
+            chains[f"{side} arm"] = rest.chains[max(arms, key=lambda bone: outwards[bone])]
+    return chains
+
+
+def _is_leg(chain: list[int], upwards: NDArray[np.float64], outwards: NDArray[np.float64]) -> bool:
+    """Return whether bones lead down to a foot on one side. Goals of IK lie at the feet as well,
+    but on no leg.
+    """
+    foot = chain[-1]
+    if outwards[foot] <= 0.01 or upwards[foot] >= 0.15:
+        return False
+    beside = [bone for bone in chain if outwards[bone] > 0.01]
+    return len(beside) >= 2 and any(upwards[bone] > 0.3 for bone in beside)
 
 
 def _neck_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
