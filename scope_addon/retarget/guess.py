@@ -286,49 +286,47 @@ def _trunk_by_name(
         ]
         return sorted(bones, key=lambda bone: (len(rest.chains[bone]), rest.names[bone]))
 
-    taken = set(limbs.values())
     thighs = [limbs[part] for part in ("left_hip", "right_hip") if part in limbs]
     collars = [
         limbs.get(f"{side}_collar", limbs.get(f"{side}_shoulder", -1)) for side in _OTHER_SIDE
     ]
-    heads = [bone for bone in named("head") if bone not in taken]
-    head = heads[0] if heads else None
     arms = [bone for bone in collars if bone >= 0]
-    spine_named = [bone for bone in named("spine") if bone not in taken]
-    below_chest = arms if len(arms) == 2 else ([head] if head is not None else spine_named[-1:])
-    if head is not None and below_chest == arms:
-        below_chest = [*arms, head]
-    chest = rest.shared(below_chest) if below_chest else None
-    pelvis = _pelvis(rest, thighs, chest, [bone for bone in named("pelvis") if bone not in taken])
-    found: dict[int, str] = {}
-    if pelvis is not None:
-        found[pelvis] = "pelvis"
-    above_pelvis = rest.chains[chest] if chest is not None else []
-    if pelvis in above_pelvis:
-        # With Biped, a bone of the spine may carry the legs, and the neck the arms: they stay still
-        # in the pelvis and in the chest.
-        carrying_legs = {bone for thigh in thighs for bone in rest.chains[thigh]}
-        carrying_arms = named("neck") if len(arms) == 2 else []
-        between = [
-            bone
-            for bone in above_pelvis[above_pelvis.index(pelvis) + 1 :]
-            if bone not in carrying_legs and bone not in carrying_arms
-        ]
-        spine = [bone for bone in between if bone in spine_named] or _distinct(rest, between)
+    head = next(iter(named("head")), None)
+    chest = _chest(rest, arms, head, named("spine"))
+    pelvis = _pelvis(rest, thighs, chest, named("pelvis"))
+    central = rest.chains[chest] if chest is not None else []
+    # With Biped, a bone of the spine may carry the legs, and the neck the arms: they stay still
+    # in the pelvis and in the chest.
+    carrying = {bone for thigh in thighs for bone in rest.chains[thigh]}
+    carrying.update(named("neck") if len(arms) == 2 else [])
+    spine = named("spine")
+    if pelvis in central:
+        between = [b for b in central[central.index(pelvis) + 1 :] if b not in carrying]
+        spine = [bone for bone in between if bone in spine] or _distinct(rest, between)
         if chest == head:
             spine = [bone for bone in spine if bone != head]
     else:  # The hierarchy of a control rig need not lead from the pelvis to the arms.
-        spine = [bone for bone in spine_named if bone != pelvis]
-    necks = [bone for bone in named("neck") if bone not in taken]
-    if not necks and head is not None and chest in rest.chains[head]:
+        spine = [bone for bone in spine if bone != pelvis]
+    necks = named("neck")
+    if not necks and len(arms) == 2 and head is not None and chest in rest.chains[head]:
         chain = rest.chains[head]
-        necks = _distinct(rest, chain[chain.index(chest) + 1 : -1]) if len(arms) == 2 else []
-    necks = [bone for bone in necks if bone not in spine and bone not in above_pelvis]
+        necks = _distinct(rest, chain[chain.index(chest) + 1 : -1])
+    necks = [bone for bone in necks if bone not in spine and bone not in central]
+    found = {} if pelvis is None else {pelvis: "pelvis"}
     found |= dict(zip(spine, _spread(len(spine)), strict=True))
     found |= dict.fromkeys(necks, "neck")
-    if head is not None:
-        found[head] = "head"
-    return found
+    return found if head is None else found | {head: "head"}
+
+
+def _chest(rest: RestPose, arms: list[int], head: int | None, spine: list[int]) -> int | None:
+    """Return the bone that carries both arms and the head; without both arms, the head or, without
+    that too, the last bone of the spine, is the end of the trunk.
+    """
+    heads = [] if head is None else [head]
+    if len(arms) == 2:
+        return rest.shared([*arms, *heads])
+    carried = heads or spine[-1:]
+    return rest.shared(carried) if carried else None
 
 
 def _pelvis(rest: RestPose, thighs: list[int], chest: int | None, named: list[int]) -> int | None:
