@@ -63,6 +63,7 @@ def test_damaged_arrays_are_an_error():
         ("pin_uv", np.zeros((2, 3))),
         ("pin_frames", np.zeros(5)),
         ("contact_feet", np.array(["none"])),
+        ("contact_spans", np.zeros((0, 2), int)),
         ("depth_parts", np.array(["body"])),
         ("depth_parts", np.array(["body", "tail"])),
         ("depth_spans", np.array([[5, 4], [1, 2]])),
