@@ -59,7 +59,7 @@ def open_file(way: Callable[[], object]) -> Iterator[float]:
         yield 0.05
     assert addon().state.job is None
     assert module("live_properties").state.job is None
-    assert not module("pins.pin_tool").is_running()
+    assert not module("pin_tool").is_running()
 
 
 def prepared() -> Iterator[float]:
