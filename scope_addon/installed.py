@@ -23,7 +23,7 @@ EXTRAS = {
     "pythonosc": "live",
     "distributed": "cluster",
 }
-_ROOT = Path(__file__).resolve().parents[2]
+_ROOT = Path(__file__).resolve().parents[1]
 _PACKAGES = ("numpy", "numba", "onnxruntime", "opencv-contrib-python-headless", "av", "bpy")
 
 

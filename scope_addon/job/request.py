@@ -27,6 +27,7 @@ _DECIDES = {"solver": (".py",), "scope_addon": (".py",), "assets": (".onnx", ".n
 _DECIDE_NOTHING = ("scope_addon/ui", "assets/sample")
 # of footage, of which a larger file is sampled; reading gigabytes would block the window
 _MOST_BYTES = 1 << 25
+# commands to a running live capture
 RECORD = b"record\n"
 STOP = b"stop\n"
 _LONGEST = 4096  # bytes without an end of line, which is no command

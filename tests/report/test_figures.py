@@ -33,13 +33,18 @@ def test_versions_are_those_that_run():
     } <= set(said)
 
 
-def test_the_version_of_an_unknown_installation_is_said_to_be_unknown(tmp_path, monkeypatch):
-    monkeypatch.setattr(installed, "_ROOT", tmp_path)
+def test_the_version_is_the_manifests_and_that_of_an_unknown_installation_unknown(
+    tmp_path, monkeypatch
+):
+    # An extension has no metadata of a package.
     monkeypatch.setattr(
         installed,
         "version",
         lambda name: (_ for _ in ()).throw(installed.PackageNotFoundError(name)),
     )
+    stated = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
+    assert installed.scope_version() == stated
+    monkeypatch.setattr(installed, "_ROOT", tmp_path)
     assert installed.scope_version() == "of an unknown version"
 
 
