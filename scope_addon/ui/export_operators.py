@@ -61,8 +61,16 @@ FORMATS = (
         "editing, one file per person",
         7,
     ),
+    (
+        "VRMA",
+        "VRMA",
+        "For VRM avatars: an animation of the captured motion before any editing, without the "
+        "face, one file per person",
+        8,
+    ),
 )
-_OF_MOTION = ("NPZ", "TRC", "MOT", "C3D")  # formats that hold the captured motion, not the scene's
+# Formats that hold the captured motion, not the scene's.
+_OF_MOTION = ("NPZ", "TRC", "MOT", "C3D", "VRMA")
 _NO_USD = "This Blender was built without USD; use a build from blender.org, or another format"
 _SUFFIX = {key: f".{key.lower()}" for key, *_ in FORMATS}
 

@@ -35,6 +35,7 @@ UNTRANSLATED = {
     "TRC",
     "MOT",
     "C3D",
+    "VRMA",
     "CPU",
     "CUDA",
     "TensorRT",

@@ -13,7 +13,7 @@ from ...atomic_write import reason, resolve_link
 from ...errors import OutputError, UsageError
 
 # Formats that are written from the motion, without Blender.
-WITHOUT_SCENE = (".trc", ".c3d", ".mot", ".csv", ".npz")
+WITHOUT_SCENE = (".trc", ".c3d", ".vrma", ".mot", ".csv", ".npz")
 SUFFIXES = (".glb", ".fbx", ".blend", ".bvh", ".usdc", *WITHOUT_SCENE)
 PER_PERSON = (".bvh", *WITHOUT_SCENE)  # formats with one person per file
 

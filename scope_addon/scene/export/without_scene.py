@@ -30,6 +30,7 @@ from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
 from .c3d import c3d_bytes
 from .output_paths import person_paths
+from .vrma import vrma_bytes
 
 if TYPE_CHECKING:
     from ....solver.body import Body
@@ -66,6 +67,8 @@ def write_without_scene(
             write_trc(target, motion, body)
         elif suffix == ".c3d":
             write_c3d(target, motion, body)
+        elif suffix == ".vrma":
+            write_result(target, vrma_bytes(motion, body))
         elif suffix in (".mot", ".csv"):
             write_angles(target, motion, body)
         else:

@@ -210,7 +210,9 @@ class Steps(FileSteps):
             },
             "export": {
                 "filepath": str(folder / "made"),
-                "format": chance.choice(("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT", "C3D")),
+                "format": chance.choice(
+                    ("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT", "C3D", "VRMA")
+                ),
                 "which": chance.choice(("ALL", "ALL", "ALL", "ACTIVE", "RIG")),
             },
             "loop": {"start": 1, "end": 60, "shortest": 0.5, "movement": 0.0},

@@ -24,7 +24,8 @@ def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion,
 
 def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
     with pytest.raises(
-        UsageError, match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.trc, \.c3d, \.mot, \.csv, \.npz"
+        UsageError,
+        match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.trc, \.c3d, \.vrma, \.mot, \.csv, \.npz",
     ):
         export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
     assert list(tmp_path.iterdir()) == []

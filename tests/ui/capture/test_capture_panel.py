@@ -103,7 +103,10 @@ def test_buttons_are_disabled_until_their_input_exists(fake_worker, footage):
 
 @pytest.mark.parametrize(
     ("kind", "suffix"),
-    [(k, f".{k.lower()}") for k in ("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT", "C3D")],
+    [
+        (k, f".{k.lower()}")
+        for k in ("FBX", "GLB", "BVH", "USDC", "NPZ", "TRC", "MOT", "C3D", "VRMA")
+    ],
 )
 def test_export_buttons_write_files_and_do_not_change_the_scene(
     fake_worker, footage, tmp_path, contents, kind, suffix
