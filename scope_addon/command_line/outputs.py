@@ -91,10 +91,12 @@ def files_to_read(values: Mapping[str, Any]) -> list[Path]:
     for name in OTHER_INPUTS:
         value = values.get(name)
         for path in map(Path, value if isinstance(value, list) else [value] if value else []):
-            if name == "calibration" and ".toml#" in path.name:
-                path = path.with_name(path.name.partition("#")[0])
             # A network's description lies beside it.
             files += [path, path.with_suffix(".json")] if path.suffix == ".onnx" else [path]
+            if name == "calibration":
+                from ..capture.camera.calibration_tables import files_of_calibration
+
+                files += files_of_calibration(path)
     return [path for path in files if os.path.isfile(path)]
 
 

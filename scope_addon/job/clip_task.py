@@ -81,10 +81,14 @@ class CaptureSettings(NamedTuple):
             [program_version, sorted(values.items()), list(self.suffixes), self.extras]
         )
         digest = hashlib.sha256(text.encode())
-        for value in values.values():
-            files = [Path(value)] if value else []  # a body, a calibration, a network
+        for flag, value in values.items():
+            files = [Path(value)] if value else []  # a body, a network
             # a network's description
             files += [path.with_suffix(".json") for path in files if path.suffix == ".onnx"]
+            if value and flag == "--calibration":
+                from ..capture.camera.calibration_tables import files_of_calibration
+
+                files = files_of_calibration(Path(value))
             # unlike Path's, False for what is too long for a name
             _add_files(digest, filter(os.path.isfile, files))
         return digest.hexdigest()

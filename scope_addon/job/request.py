@@ -93,6 +93,9 @@ class JobRequest(LineRequest):
         :param code_version: differs between programs whose results may differ; see `code_version`.
         :raises OSError: the footage cannot be read.
         """
+        # Imported here, because Blender loads this module when it starts.
+        from ..capture.camera.calibration_tables import files_of_calibration
+
         options = [option for option in options_at(Place.WORKER) if option.decides_result]
         values = {option.name: self.values[option.name] for option in options}
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
@@ -103,11 +106,11 @@ class JobRequest(LineRequest):
             for option in options
             if option.value_type is Path or option.name == "body"
         ]
-        # the camera's name after a calibration's file is among the values
-        files = [str(name).partition(".toml#") for name in filter(None, named)]
-        for path in (Path(name + (".toml" if sign else "")) for name, sign, _ in files):
-            # a network's description lies next to it
-            for file in dict.fromkeys((path, path.with_suffix(".json"))):
+        for path in (Path(str(name)) for name in filter(None, named)):
+            # A network's description lies next to it. The camera's name after a calibration's file
+            # is among the values.
+            beside = (path.with_suffix(".json"), *files_of_calibration(path))
+            for file in dict.fromkeys((path, *beside)):
                 if file.is_file():  # the worker reports a missing file
                     _add_file(digest, file)
         return digest.hexdigest()[:32]

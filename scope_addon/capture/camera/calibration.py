@@ -40,7 +40,15 @@ from ...atomic_write import write_result
 from ...errors import UsageError
 from ...json_file import read_json_object
 from ...motion import Motion
-from .calibration_tables import SUFFIXES, Tables, camera_tables, has_tables
+from ...untrusted.files import in_one_line
+from .calibration_tables import (
+    Tables,
+    camera_tables,
+    has_tables,
+    is_place,
+    shown_names,
+    split_camera,
+)
 
 _FORMAT = (
     'write {"intrinsics": [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], '
@@ -145,7 +153,7 @@ def read_calibration(path: Path) -> Calibration:
     :raises InputError: the file cannot be read, or holds an unknown key or an impossible value; or
         it has several cameras, and none or another one is named.
     """
-    file, camera = calibration_file(path)
+    file, camera = split_camera(path)
     if has_tables(file):
         content = _lens_of(file, camera)
     else:
@@ -167,12 +175,6 @@ def calibration_of(path: Path, content: dict[str, Any]) -> Calibration:
     )
 
 
-def calibration_file(path: Path) -> tuple[Path, str]:
-    """Return the file of a calibration, and the name of the camera in it, which may be empty."""
-    file, _, camera = str(path).rpartition("#")
-    return (Path(file), camera) if camera and file.endswith(SUFFIXES) else (path, "")
-
-
 def placed_cameras(path: Path, stems: Sequence[str]) -> list[tuple[Path, Float64Array | None]]:
     """Return, for each video of a take, its calibration and its camera's (4, 4) world to camera,
     metres; None where the file does not say it.
@@ -184,7 +186,7 @@ def placed_cameras(path: Path, stems: Sequence[str]) -> list[tuple[Path, Float64
     :param stems: names of the videos without suffix.
     :raises InputError: the file cannot be read, or its cameras are not those of the videos.
     """
-    file, camera = calibration_file(path)
+    file, camera = split_camera(path)
     if not has_tables(file) or camera:
         return [(path, None)] * len(stems)
     cameras = _cameras(file)
@@ -198,7 +200,7 @@ def placed_cameras(path: Path, stems: Sequence[str]) -> list[tuple[Path, Float64
     if "" in keys or len(set(keys)) < len(keys):
         if len(cameras) != len(stems):
             raise InputError(
-                f"{file} has the cameras {', '.join(cameras)}, which are not the names of the "
+                f"{file} has the cameras {shown_names(cameras)}, which are not the names of the "
                 f"{len(stems)} videos: name them in the file after the videos, such as {stems[0]}"
             )
         keys = list(cameras)
@@ -218,8 +220,13 @@ def _world_to_camera(path: Path, name: str, table: dict[str, Any]) -> Float64Arr
     translation = _numbers(table["translation"])
     if rotation is None or translation is None or rotation.size != 3 or translation.size != 3:
         raise InputError(
-            f"{path}: rotation and translation of {name} must be three numbers each: a rotation "
-            "vector, world to camera, and metres"
+            f"{path}: rotation and translation of {in_one_line(name)} must be three numbers each: "
+            "a rotation vector, world to camera, and metres"
+        )
+    if not is_place(rotation.ravel(), translation.ravel()):
+        raise InputError(
+            f"{path}: the rotation of {in_one_line(name)} turns by more than two turns, or its "
+            "translation is no place; give a rotation vector in radians, and metres"
         )
     T = np.eye(4)
     T[:3, :3] = exp(rotation.ravel())
@@ -290,13 +297,13 @@ def _lens_of(path: Path, camera: str) -> dict[str, Any]:
     :raises InputError: the file cannot be read, or does not say which camera it is.
     """
     cameras = _cameras(path)
-    names = ", ".join(cameras) or "none"
+    names = shown_names(cameras)
     if camera and camera not in cameras:
         raise InputError(f"{path} has no camera {camera!r}; its cameras are {names}")
     if not camera and len(cameras) != 1:
         raise InputError(
             f"{path} has the cameras {names}: name the one that filmed the clip, as in "
-            f"{path.name}#{next(iter(cameras), 'camera')}"
+            f"{path.name}#{in_one_line(next(iter(cameras), 'camera'))}"
         )
     table = cameras[camera or next(iter(cameras))]
     if table.get("fisheye"):

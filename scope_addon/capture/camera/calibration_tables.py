@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +29,16 @@ _YAML = (".yml", ".yaml")
 _PICKLE = (".pickle", ".pkl")
 SUFFIXES = (*_TOML, *_YAML, *_PICKLE)
 _LARGEST = 1 << 20  # bytes
+_EASYMOCAP = ("intri", "extri")  # names of its files, of lenses and of places
 _MATRIX = "matrix"  # the key that a camera's table has, by any of its names
 # Cameras that are so many of the file's units apart are given in millimetres.
 _FAR_APART = 100.0
 _MM = 1000.0
+_LARGEST_TURN = 4.0 * np.pi  # of a rotation vector; more are degrees, or no rotation
+_FARTHEST_M = 1e6
 # A matrix of OpenCV's FileStorage: name, rows, columns and values; and a number.
 _YAML_MATRIX = re.compile(
-    r"^(\w+):\s*!!opencv-matrix\s+rows:\s*(\d+)\s+cols:\s*(\d+)\s+dt:\s*\w+\s+data:\s*\[([^\]]*)\]",
+    r"^(\w+):\s*!!opencv-matrix\s+rows:\s*(\d+)\s+cols:\s*(\d+)\s+dt:\s*\w+\s+data:\s*\[([^\]!]*)\]",
     re.M,
 )
 _YAML_NUMBER = re.compile(r"^(\w+):\s*([-+.\deE]+)\s*$", re.M)
@@ -43,6 +47,30 @@ _YAML_NUMBER = re.compile(r"^(\w+):\s*([-+.\deE]+)\s*$", re.M)
 def has_tables(path: Path) -> bool:
     """Return whether a file is of a kind with a table for each camera, by its suffix."""
     return path.suffix.lower() in SUFFIXES
+
+
+def split_camera(path: Path) -> tuple[Path, str]:
+    """Return the file of a calibration, and the name of the camera in it, which may be empty."""
+    file, _, camera = str(path).rpartition("#")
+    return (Path(file), camera) if camera and file.endswith(SUFFIXES) else (path, "")
+
+
+def files_of_calibration(path: Path) -> list[Path]:
+    """Return the files that a calibration is read from; they need not exist.
+
+    :param path: with or without the name of a camera.
+    """
+    file, _ = split_camera(path)
+    if file.suffix.lower() in _YAML:
+        return [file, *(file.with_name(f"{name}{file.suffix}") for name in _EASYMOCAP)]
+    if file.suffix.lower() in _PICKLE:
+        return [file, *_files_of_opencap(file)]
+    return [file]
+
+
+def shown_names(cameras: Iterable[str]) -> str:
+    """Return the names of a file's cameras for a message."""
+    return in_one_line(", ".join(cameras)) or "none"
 
 
 def camera_tables(path: Path, lens_names: tuple[str, ...]) -> Tables:
@@ -83,7 +111,7 @@ def _of_easymocap(path: Path) -> Tables:
     Rot_NAME, a matrix, and T_NAME, in metres.
     """
     values: dict[str, Any] = {}
-    for name in ("intri", "extri"):
+    for name in _EASYMOCAP:
         file = path.with_name(f"{name}{path.suffix}")
         if not file.exists():
             if name == "intri":
@@ -121,10 +149,7 @@ def _of_opencap(path: Path) -> Tables:
     Arrays intrinsicMat, distortion, imageSize (height, width), rotation (3, 3) and translation (3),
     in millimetres.
     """
-    files = [path]
-    if path.stem == "cameraIntrinsicsExtrinsics":
-        siblings = path.absolute().parent.parent.glob(f"*/{path.name}")
-        files = sorted(siblings, key=lambda file: _number_last(file.parent.name))
+    files = _files_of_opencap(path) or [path]
     tables: Tables = {}
     for file in files:
         check_regular(file, InputError, "calibration", _LARGEST)
@@ -146,6 +171,14 @@ def _of_opencap(path: Path) -> Tables:
             table |= _place(file, name, rotation, translation / _MM)
         tables[name] = table
     return tables
+
+
+def _files_of_opencap(path: Path) -> list[Path]:
+    """Return the files of all cameras of a take, one of which is given; empty if it is alone."""
+    if path.stem != "cameraIntrinsicsExtrinsics":
+        return []
+    siblings = path.absolute().parent.parent.glob(f"*/{path.name}")
+    return sorted(siblings, key=lambda file: _number_last(file.parent.name))
 
 
 def _number_last(name: str) -> tuple[str, int]:
@@ -179,10 +212,9 @@ def _in_metres(cameras: Tables) -> Tables:
             vector = np.array(table["rotation"], float).reshape(3)
         except (KeyError, ValueError, TypeError):
             continue
-        places.append(_center(vector, translation))
-    if not places or not np.isfinite(places).all():
-        return cameras
-    if np.ptp(places, axis=0).max() <= _FAR_APART:
+        if is_place(vector, translation / _MM):
+            places.append(_center(vector, translation))
+    if not places or np.ptp(places, axis=0).max() <= _FAR_APART:
         return cameras
     return {
         name: table | {"translation": (np.array(table["translation"], float) / _MM).tolist()}
@@ -190,6 +222,15 @@ def _in_metres(cameras: Tables) -> Tables:
         else table
         for name, table in cameras.items()
     }
+
+
+def is_place(rotation: Float64Array, translation: Float64Array) -> bool:
+    """Return whether a camera can be where a rotation vector (3,) and a translation (3,), in
+    metres, say.
+    """
+    # False for what is not a number.
+    turns_little = np.linalg.norm(rotation) <= _LARGEST_TURN
+    return bool(turns_little and (np.abs(translation) <= _FARTHEST_M).all())
 
 
 def _center(rotation: Float64Array, translation: Float64Array) -> Float64Array:

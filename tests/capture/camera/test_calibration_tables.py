@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
+from scope.scope_addon.command_line.outputs import files_to_read
+from scope.scope_addon.job.clip_task import CaptureSettings
+from scope.scope_addon.job.request import JobRequest
 from scope.solver.errors import InputError
 
 # A quarter turn about x: the camera looks along the world's y, its y down is the world's −z.
@@ -186,3 +189,53 @@ def test_a_pickle_runs_nothing(tmp_path):
     opencap(tmp_path, 2)
     with pytest.raises(InputError, match="the rotation of Cam1 is no rotation matrix"):
         placed_cameras(crooked, ["left", "right"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("rotation = [ 0.0, 1.57", "rotation = [ 0.0, 91.57", "turns by more than two turns"),
+        ("rotation = [ 0.0, 1.57", "rotation = [ 1e300, 1.57", "turns by more than two turns"),
+        ("[ -2500.0, 12.0", "[ -1e300, 12.0", "is no place"),
+    ],
+)
+def test_a_camera_that_is_nowhere_is_an_error(tmp_path, old, new, message):
+    (tmp_path / "takes.toml").write_text(FREEMOCAP.replace(old, new))
+    with pytest.raises(InputError, match=f"cam_1.*{message}"):
+        placed_cameras(tmp_path / "takes.toml", ["cam_0", "cam_1"])
+
+
+def test_names_of_a_files_cameras_are_shown_in_one_line_of_moderate_length(tmp_path):
+    tables = "".join(f'["camera\\n{k}"]\nmatrix = []\n' for k in range(1000))
+    (tmp_path / "takes.toml").write_text(tables)
+    for read in (read_calibration, lambda path: placed_cameras(path, ["walk", "run"])):
+        with pytest.raises(InputError) as found:
+            read(tmp_path / "takes.toml")
+        assert "\n" not in str(found.value)
+        assert len(str(found.value)) < 500 + len(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("given", "changed"),
+    [
+        ("takes.toml#cam_1", "takes.toml"),
+        ("intri.yml#01", "intri.yml"),
+        ("intri.yml", "extri.yml"),
+        ("cam1/cameraIntrinsicsExtrinsics.pickle", "cam2/cameraIntrinsicsExtrinsics.pickle"),
+        ("cam1/cameraIntrinsicsExtrinsics.pickle#cam2", "cam2/cameraIntrinsicsExtrinsics.pickle"),
+    ],
+)
+def test_a_capture_with_a_changed_calibration_is_another_one(tmp_path, given, changed):
+    """In the panel and in a batch; and none of the files may be written by the capture."""
+    footage = tmp_path / "walk.mp4"
+    footage.write_text("footage")
+    path = tmp_path / changed
+    path.parent.mkdir(exist_ok=True)
+    keys = set()
+    for content in ("one", "other"):
+        path.write_text(content)
+        request = JobRequest(str(footage), calibration=str(tmp_path / given))
+        settings = CaptureSettings({"--calibration": str(tmp_path / given)}, (".npz",))
+        keys |= {request.key("version"), settings.basis("version")}
+    assert len(keys) == 4
+    assert path in files_to_read({"calibration": tmp_path / given})
