@@ -75,19 +75,11 @@ class Weights:
 
     def row(self) -> list[float]:
         """Return the weights in the registry's order."""
-        own = {
-            "pose_prior": self.pose_prior,
-            "joint_prior": self.joint_prior,
-            "joint_limits": self.joint_limits,
-            "joint_flow": self.joint_flow,
-            "foot_contact": self.foot_contact,
-            "floor": self.floor,
-        }
-        by_name = {**own, **self.tables}
         row = [self.keypoints2d, self.keypoints3d, self.orientation_field, self.shape]
-        row += [by_name.get(name, 1.0) for name in RESIDUALS] + [1.0] * (COLUMNS - FIRST_EXTERNAL)
-        for name in self.tables:
-            row[column_of(name)] = by_name[name]
+        row += [getattr(self, name, 1.0) for name in RESIDUALS]
+        row += [1.0] * (COLUMNS - FIRST_EXTERNAL)
+        for name, weight in self.tables.items():
+            row[column_of(name)] = weight
         return row
 
 

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Literal, TypeVar
 
 from ..measurements import Measurements
@@ -17,7 +17,7 @@ from ..temporal import Temporal
 from ..tree import BodyArrays, make_tree
 from ..validation import check_count, check_list, check_type
 from .clip import fit_clip
-from .frame_solver import FrameSolver, fit_tree
+from .frame_solver import fit_tree
 from .misfit import warn_of_mirrored_clip
 
 _CHUNK = 16  # frames handed to a thread at a time: a thread changes hands in tens of microseconds
@@ -59,14 +59,10 @@ def fit_batch(
     tree = make_tree(body)
     by_default = priors is None and (init is None or isinstance(init, str))
     priors = default_priors(body) if priors is None else priors
-    own = threading.local()
 
     def some(first: int) -> list[Fit]:
-        solver = getattr(own, "solver", None)
-        if solver is None:
-            solver = own.solver = FrameSolver(tree, priors, options)
         frames = range(first, min(first + _CHUNK, len(measurements)))
-        return [solver.fit(measurements[k], starts[k]) for k in frames]
+        return [fit_tree(tree, measurements[k], starts[k], priors, options) for k in frames]
 
     chunks = _spread(some, range(0, len(measurements), _CHUNK), threads)
     fits = [fitted for chunk in chunks for fitted in chunk]
@@ -98,18 +94,15 @@ def fit_clips(
     """
     check_list(clips, "clips", "clip")
     priors = default_priors(body) if priors is None else priors
-
-    def one(clip: Sequence[Measurements] | Measurements) -> ClipFit:
-        return fit_clip(
-            body,
-            clip,
-            priors=priors,
-            options=options,
-            temporal=temporal,
-            focal=focal,
-            focal_weight=focal_weight,
-        )
-
+    one = partial(
+        fit_clip,
+        body,
+        priors=priors,
+        options=options,
+        temporal=temporal,
+        focal=focal,
+        focal_weight=focal_weight,
+    )
     return _spread(one, clips, threads)
 
 

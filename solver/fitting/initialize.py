@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gauss_newton.linearize import make_pose, place_parts
+from ..gauss_newton.linearize import make_pose, place_parts, point_at_rest
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
 from ..kernel import kernel
 from ..rotations import exp, nearest_rotation
@@ -40,13 +40,7 @@ def _moments(tree, terms, pose, points, space, directed) -> None:  # type: ignor
     place_parts(tree, pose)
     for i in range(tree.parents.shape[0]):
         for j in range(terms.starts[i], terms.starts[i + 1]):
-            x = terms.rest[j, 0]
-            y = terms.rest[j, 1]
-            z = terms.rest[j, 2]
-            for a in range(tree.shape):
-                x += terms.V[j, 0, a] * pose.beta[a]
-                y += terms.V[j, 1, a] * pose.beta[a]
-                z += terms.V[j, 2, a] * pose.beta[a]
+            x, y, z = point_at_rest(terms, pose.beta, j, tree.shape)
             flags = terms.flags[j]
             for r in range(3):
                 e = pose.R[i, r, 0] * x + pose.R[i, r, 1] * y + pose.R[i, r, 2] * z

@@ -92,8 +92,7 @@ def gauss_newton_step(
     tree, terms, stage = problem_of(body, measurements, priors, options)
     _, pose, blocks, work = _linearized(tree, terms, stage, state, options.triggs)
     decrease = step(tree, pose, blocks, float(damping), 1.0 / options.root_length, work)
-    joints = work.u[1:].ravel()
-    direction = np.concatenate([work.x[0], joints, work.dbeta[: tree.shape]])
+    direction = _direction(tree, work)
     return GaussNewtonStep(direction, float(decrease), moved(tree, state, direction))
 
 
@@ -153,10 +152,14 @@ def preconditioner(
         blocks.H_u[1:, :, GRADIENT] = b[6:end].reshape(-1, 3)
         blocks.c[: tree.shape] = b[end:]
         step(tree, pose, blocks, MIN_DAMPING, 1.0, work)
-        found: Array = np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[: tree.shape]])
-        return -found
+        return -_direction(tree, work)
 
     return solve
+
+
+def _direction(tree: Tree, work: Workspace) -> Array:
+    """Return the step (n,) that is in `work`."""
+    return np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[: tree.shape]])
 
 
 def _linearized(

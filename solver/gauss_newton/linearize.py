@@ -32,6 +32,9 @@ from ..tree import Tree
 from .rows import add_origin, add_point, place_origin
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
 
+# Of each entry of a symmetric matrix, its number in the upper triangle by rows.
+_UPPER = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
+
 
 def make_scratch(tree: Tree) -> Array:
     """Return the working memory of `linearize`: the rows (12, W) of one point or part."""
@@ -207,48 +210,18 @@ def _write_part(B, y, z, a, s, f, m):  # type: ignore[no-untyped-def]
     """Write M = [[Y, Z], [Zᵀ, A]], the force f and its moment m + s x f to a part's block B (6,
     8+W).
     """
-    B[0, 0] = y[0]
-    B[0, 1] = y[1]
-    B[0, 2] = y[2]
-    B[0, 3] = z[0]
-    B[0, 4] = z[1]
-    B[0, 5] = z[2]
-    B[1, 0] = y[1]
-    B[1, 1] = y[3]
-    B[1, 2] = y[4]
-    B[1, 3] = z[3]
-    B[1, 4] = z[4]
-    B[1, 5] = z[5]
-    B[2, 0] = y[2]
-    B[2, 1] = y[4]
-    B[2, 2] = y[5]
-    B[2, 3] = z[6]
-    B[2, 4] = z[7]
-    B[2, 5] = z[8]
-    B[3, 0] = z[0]
-    B[3, 1] = z[3]
-    B[3, 2] = z[6]
-    B[3, 3] = a[0]
-    B[3, 4] = a[1]
-    B[3, 5] = a[2]
-    B[4, 0] = z[1]
-    B[4, 1] = z[4]
-    B[4, 2] = z[7]
-    B[4, 3] = a[1]
-    B[4, 4] = a[3]
-    B[4, 5] = a[4]
-    B[5, 0] = z[2]
-    B[5, 1] = z[5]
-    B[5, 2] = z[8]
-    B[5, 3] = a[2]
-    B[5, 4] = a[4]
-    B[5, 5] = a[5]
+    for r in range(3):
+        for k in range(3):
+            B[r, k] = y[_UPPER[r][k]]
+            B[r, 3 + k] = z[3 * r + k]
+            B[3 + k, r] = z[3 * r + k]
+            B[3 + r, 3 + k] = a[_UPPER[r][k]]
     B[0, GRADIENT], B[1, GRADIENT], B[2, GRADIENT] = _add_cross(m, s, f)
     B[3, GRADIENT], B[4, GRADIENT], B[5, GRADIENT] = f
 
 
 @expanded_kernel
-def _point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
+def point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
     """Return V_j beta + v_bar_j of slot j, in its part's axes."""
     x = terms.rest[j, 0]
     y = terms.rest[j, 1]
@@ -394,7 +367,7 @@ def _add_points(  # type: ignore[no-untyped-def]
         flags = terms.flags[j]
         if flags <= HAS_SHAPE:
             continue
-        e = _rotate(r, _point_at_rest(terms, pose.beta, j, P))
+        e = _rotate(r, point_at_rest(terms, pose.beta, j, P))
         cost, w, b, f, w_all, b_all, g, h, ff, fr = _point_terms(terms, j, e, t, settings, cost)
         if fit_focal and flags & HAS_2D:
             C[P, P] += ff

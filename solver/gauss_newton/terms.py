@@ -99,6 +99,7 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
     slots = np.empty(most, np.int64)
     n = 0
     term = 0
+    bad = -1
     for kind in range(3):
         for k in range(counts[kind]):
             first = -1
@@ -110,17 +111,9 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
                 end = i_end[k]
                 i, first, last = _common_part(tree, i_start[k], end)
                 if i < 0:
-                    empty = np.zeros(0, np.int64)
-                    return (
-                        empty,
-                        empty,
-                        np.zeros((0, 3)),
-                        np.zeros((0, 3, W)),
-                        empty,
-                        empty,
-                        empty,
-                        k,
-                    )
+                    i = 0
+                    if bad < 0:
+                        bad = k
             key = end if last < 0 else n_points + last
             from_origin = kind < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
             slot = of_point[key] if from_origin else -1
@@ -170,7 +163,7 @@ def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ig
         slots[k] = place[slots[k]]
     a = counts[0]
     b = counts[0] + counts[1]
-    return starts, shaped, rest, V, slots[:a], slots[a:b], slots[b:], -1
+    return starts, shaped, rest, V, slots[:a], slots[a:b], slots[b:], bad
 
 
 @kernel

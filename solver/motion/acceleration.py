@@ -19,26 +19,15 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import Array
-from ..residuals.accumulation import geman_mcclure
-from ..rotations import left_jacobian_inverse3, log3
+from ..residuals.accumulation import geman_mcclure, relative_log
+from ..rotations import left_jacobian_inverse3
 from ..tree import Tree
 
 
 @kernel
 def _velocity(A, B, h, phi, J) -> None:  # type: ignore[no-untyped-def]
     """Write phi = log(AᵀB) / h (3,) and J = J^-1(log(AᵀB)) Aᵀ / h (3, 3)."""
-    E = (
-        A[0, 0] * B[0, 0] + A[1, 0] * B[1, 0] + A[2, 0] * B[2, 0],
-        A[0, 0] * B[0, 1] + A[1, 0] * B[1, 1] + A[2, 0] * B[2, 1],
-        A[0, 0] * B[0, 2] + A[1, 0] * B[1, 2] + A[2, 0] * B[2, 2],
-        A[0, 1] * B[0, 0] + A[1, 1] * B[1, 0] + A[2, 1] * B[2, 0],
-        A[0, 1] * B[0, 1] + A[1, 1] * B[1, 1] + A[2, 1] * B[2, 1],
-        A[0, 1] * B[0, 2] + A[1, 1] * B[1, 2] + A[2, 1] * B[2, 2],
-        A[0, 2] * B[0, 0] + A[1, 2] * B[1, 0] + A[2, 2] * B[2, 0],
-        A[0, 2] * B[0, 1] + A[1, 2] * B[1, 1] + A[2, 2] * B[2, 1],
-        A[0, 2] * B[0, 2] + A[1, 2] * B[1, 2] + A[2, 2] * B[2, 2],
-    )
-    x, y, z = log3(E[0], E[1], E[2], E[3], E[4], E[5], E[6], E[7], E[8])
+    x, y, z = relative_log(A.reshape(9), B)
     Ji = left_jacobian_inverse3(x, y, z)
     phi[0] = x / h
     phi[1] = y / h

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..gauss_newton.optimizer import MIN_DAMPING
-from ..gauss_newton.recursion import subtract_row
+from ..gauss_newton.recursion import copy_rows, subtract_row
 from ..kernel import kernel
 from ..part import Array, Pose
 from ..tree import Tree
@@ -144,23 +144,17 @@ def _invert_frame(Z, n: int, S) -> None:  # type: ignore[no-untyped-def]
 @kernel
 def _advance(n: int, S) -> None:  # type: ignore[no-untyped-def]
     """Move S by one frame: its frame becomes the first of the two after the next one."""
-    size = S.shape[0]
-    for a in range(n):
-        for b in range(n):
-            S[2 * n + a, 2 * n + b] = S[n + a, n + b]
-        for b in range(3 * n, size):
-            S[2 * n + a, b] = S[n + a, b]
-            S[b, 2 * n + a] = S[n + a, b]
-    for a in range(n):
-        for b in range(n):
-            S[n + a, 2 * n + b] = S[a, n + b]
-            S[2 * n + b, n + a] = S[a, n + b]
-        for b in range(3 * n, size):
-            S[n + a, b] = S[a, b]
-            S[b, n + a] = S[a, b]
-    for a in range(n):
-        for b in range(n):
-            S[n + a, n + b] = S[a, b]
+    first = slice(0, n)
+    second = slice(n, 2 * n)
+    third = slice(2 * n, 3 * n)
+    shared = slice(3 * n, S.shape[0])
+    for to, source in ((third, second), (second, first)):
+        copy_rows(S[source, shared], S[to, shared])
+        copy_rows(S[shared, source], S[shared, to])
+    copy_rows(S[second, second], S[third, third])
+    copy_rows(S[first, second], S[second, third])
+    copy_rows(S[second, first], S[third, second])
+    copy_rows(S[first, first], S[second, second])
 
 
 @kernel

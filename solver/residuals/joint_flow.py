@@ -33,8 +33,8 @@ from ..gauss_newton.plain_rows import LANES, STATE
 from ..gauss_newton.rows import in_lanes
 from ..kernel import allocating_kernel, kernel
 from ..part import Array
-from ..rotations import exp, exp3, log, log3, matrix_from_quaternion
-from .accumulation import add_to_joint
+from ..rotations import exp, exp3, log, matrix_from_quaternion
+from .accumulation import add_to_joint, relative_log
 
 LAYERS = 4
 HIDDEN = 4
@@ -307,34 +307,27 @@ def _gather(pose, ints, k, state):  # type: ignore[no-untyped-def]
             state[(3 * r + 2) * LANES + lane] = Om[r, 2]
 
 
-@allocating_kernel
-def _keep_off_half_turns(floats, k, state):  # type: ignore[no-untyped-def]
-    """Take the joints of row k in `state` that are nearly a half turn from their M back to pi -
+@kernel
+def _keep_off_half_turns(pose, ints, floats, k, state):  # type: ignore[no-untyped-def]
+    """Write the states of the joints of row k that are nearly a half turn from their M at pi -
     `NEAREST`.
     """
-    M = np.empty((3, 3))
-    R = np.empty((3, 3))
     for lane in range(LANES):
-        for e in range(9):
-            M[e // 3, e % 3] = floats[k, (MEAN + e) * LANES + lane]
+        M = floats[k, MEAN * LANES + lane : (MEAN + 9) * LANES : LANES]
+        R = pose.Omega[ints[k, lane]]
         trace = 0.0
         for r in range(3):
             for c in range(3):
-                R[r, c] = 0.0
-                for i in range(3):
-                    R[r, c] += M[i, r] * state[(3 * i + c) * LANES + lane]
-            trace += R[r, r]
+                trace += M[3 * r + c] * R[r, c]
         if 1.0 + trace > _MIN_TRACE:
             continue
-        x, y, z = log3(
-            R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2]
-        )
+        x, y, z = relative_log(M, R)
         scale = (math.pi - NEAREST) / math.sqrt(x * x + y * y + z * z)
         E = exp3(scale * x, scale * y, scale * z)
         for r in range(3):
             for c in range(3):
                 state[(3 * r + c) * LANES + lane] = (
-                    M[r, 0] * E[c] + M[r, 1] * E[3 + c] + M[r, 2] * E[6 + c]
+                    M[3 * r] * E[c] + M[3 * r + 1] * E[3 + c] + M[3 * r + 2] * E[6 + c]
                 )
 
 
@@ -356,7 +349,7 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
             near = near or not state[12 * LANES + lane] < _FARTHEST  # or not a number
         if near:
             _gather(pose, ints, k, state)
-            _keep_off_half_turns(floats, k, state)
+            _keep_off_half_turns(pose, ints, floats, k, state)
             _chart(parameters, 0, state)
         for number in range(LAYERS):
             _layer(parameters, (FIRST_LAYER + number * LAYER_SIZE) * LANES, state)

@@ -127,19 +127,8 @@ def pack(
     :param w, w_swing: (n,), (n,) weights of the two.
     """
     n = len(joints)
-    floats = np.hstack(
-        [
-            np.reshape(axes, (n, 3)),
-            np.c_[lower],
-            np.c_[upper],
-            np.c_[swing_limit],
-            np.c_[w],
-            np.c_[w_swing],
-        ]
-    )
-    return np.reshape(joints, (n, 1)).astype(np.int64), np.ascontiguousarray(
-        floats, dtype=np.float64
-    )
+    floats = np.column_stack([np.reshape(axes, (n, 3)), lower, upper, swing_limit, w, w_swing])
+    return np.reshape(joints, (n, 1)).astype(np.int64), floats.astype(np.float64)
 
 
 def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
