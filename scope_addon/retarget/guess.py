@@ -488,7 +488,8 @@ def _arm_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
     # Beyond the wrist there is less than an upper arm, unless twist bones were counted.
     beyond = lengths[first + 2 :].sum()
     wrist = forks[0] if forks else first + 2
-    if not forks and beyond > lengths[first : first + 2].max():
+    # A damaged rig may have an arm of a single bone, which has no length.
+    if not forks and beyond > lengths[first : first + 2].max(initial=0.0):
         wrist = len(chain) - 1
     if wrist >= len(chain):
         return collar | dict(zip(chain[first:], _ARM[1:], strict=False))

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ..capture.camera.test_calibration_tables import EXTRI, FREEMOCAP, INTRI
 from ..untrusted.conftest import dump_python2, make_tables
 from . import own_targets as own
 
@@ -88,6 +89,19 @@ def _read_calibration(path: Path) -> None:
     from scope.scope_addon.capture.camera.calibration import read_calibration
 
     read_calibration(path).intrinsics_for(640, 360)
+
+
+def _place_cameras(path: Path) -> None:
+    from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
+
+    if path.suffix == ".yml":  # lenses and places, which have files of their own, in one
+        for name in ("intri.yml", "extri.yml"):
+            path.with_name(name).write_bytes(path.read_bytes())
+        path = path.with_name("intri.yml")
+    for camera, _ in placed_cameras(path, ["cam_0", "cam_1"]):
+        calibration = read_calibration(camera)
+        width, height = calibration.size or (1920, 1080)
+        calibration.intrinsics_for(int(width), int(height))
 
 
 def _load_bone_map(path: Path) -> None:
@@ -299,6 +313,22 @@ def _calibrations(_: Path) -> list[bytes]:
     return [json.dumps(ours).encode()]
 
 
+def _camera_tables(_: Path) -> list[bytes]:
+    """Return calibrations as FreeMoCap's, EasyMocap's and OpenCap's files name their values."""
+    opencap = {
+        "intrinsicMat": np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 180.0], [0.0, 0.0, 1.0]]),
+        "distortion": np.zeros((1, 5)),
+        "imageSize": np.array([[360.0], [640.0]]),
+        "rotation": np.eye(3),
+        "translation": np.ones((3, 1)),
+    }
+    return [
+        FREEMOCAP.encode(),
+        (INTRI + EXTRI.partition("---")[2]).encode(),
+        pickle.dumps(opencap, 4),
+    ]
+
+
 def _bone_maps(_: Path) -> list[bytes]:
     from scope.scope_addon.retarget.bone_map import REQUIRED
 
@@ -355,6 +385,7 @@ TARGETS = {
     "smpl_motion": Target(_import_smpl_motion, (".npz",), _smpl_motions),
     "bvh": Target(_import_smpl_motion, (".bvh",), _skeleton_motions),
     "calibration": Target(_read_calibration, (".json",), _calibrations),
+    "camera_tables": Target(_place_cameras, (".toml", ".yml", ".pickle"), _camera_tables),
     "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
     "network": Target(_check_network, (".onnx",), _networks),
     "network_run": Target(own.run_network, (".onnx",), _networks),

@@ -119,3 +119,18 @@ def test_what_is_no_person_has_no_map() -> None:
 def test_names_are_taken_apart(name: str, core: str, side: str) -> None:
     found = parse_name(name)
     assert (found.core, found.side) == (core, side)
+
+
+def test_an_arm_of_a_single_bone_has_no_joints_but_a_shoulder():
+    """And the legs are found all the same."""
+    heads = {
+        "q0": (0.0, 0.0, 1.0),
+        **{"q1": (0.1, 0.0, 1.0), "q2": (0.1, 0.0, 0.5), "q3": (0.1, 0.0, 0.0)},
+        **{"q4": (-0.1, 0.0, 1.0), "q5": (-0.1, 0.0, 0.5), "q6": (-0.1, 0.0, 0.0)},
+        **{"q7": (0.6, 0.0, 1.5), "q8": (-0.6, 0.0, 1.5)},
+    }
+    parents = np.array([-1, 0, 1, 2, 0, 4, 5, 0, 0])
+    found = by_geometry(RestPose(list(heads), parents, np.array(list(heads.values()))))
+    assert found["q7"] == "left_shoulder"
+    assert found["q8"] == "right_shoulder"
+    assert found["q2"] == "left_knee"
