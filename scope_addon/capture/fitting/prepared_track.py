@@ -106,6 +106,7 @@ class PreparedTrack:
     head: FloatArray | None = None
     camera: Camera | None = None  # of the masks; None where the track has none
     is_stature_given: bool = False  # by the user
+    is_stature_known: bool = False  # from the user or from a floor that several people share
     # In each frame's camera; the body's last keypoints are then its contact points.
     stance: Stance | None = None
     others: tuple[OtherView, ...] = ()  # the same person in other cameras
@@ -204,7 +205,8 @@ class PreparedTrack:
         """Return the track of an adult of that stature with that standard deviation, both in
         metres.
         """
-        return replace(self, priors=with_stature(self.priors, self.body, height_m, sigma_m))
+        priors = with_stature(self.priors, self.body, height_m, sigma_m)
+        return replace(self, priors=priors, is_stature_known=True)
 
     def priors_with_shape(self, betas: FloatArray) -> Priors:
         """Return the priors for a known shape (P,)."""
@@ -258,6 +260,7 @@ def prepare_track(
         WEIGHTS,
         camera=camera,
         is_stature_given=height_m is not None,
+        is_stature_known=height_m is not None,
     )
     if track.face is not None:
         across = across_head(track.face, camera, track.zoom)

@@ -24,6 +24,12 @@ MAX_DEVIATIONS = 4.5
 # One year of age; below, growth extrapolated from that of six-year-olds makes legs too long.
 SHORTEST_CHILD_M = 0.8
 STIFFNESS = 4.0  # κ of ``with_unknown_stature``
+# The mean of people in footage, in the first coefficients of our own bodies: trunk and upper arms
+# that are longer against legs than those of the mean body, which follows surveys of bones and skin.
+# Of six people whose joints are known from markers, from several cameras or from a fitted SMPL
+# body, the trunk is 0.685 and the upper arm 0.371 of a leg, of the mean body 0.631 and 0.340, and
+# here 0.689 and 0.362. The first coefficient keeps the stature.
+_MEAN_SHAPE = (-0.27, 1.2, 0.0, 2.0)
 # The s of `stature_sigma`, about the deviation of adults (benchmarks/notebook/shape.md).
 UNKNOWN_M = 0.1
 FIXED = 1e6  # information of a coefficient that does not vary
@@ -33,18 +39,23 @@ _ROUNDS = 3
 def with_stature(priors: Priors, body: Body, height_m: float, sigma_m: float = SIGMA_M) -> Priors:
     """Return the priors for a person of known stature: the most probable shapes of this height.
 
-    This is the population's N(0, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's
-    highest vertex above its lowest: Λ = Λ₀ + g gᵀ/σ² and mean Λ₀⁻¹g (H − h₀) / (σ₀² + gᵀΛ₀⁻¹g),
-    with h(β) = h₀ + g·β as long as these two vertices stay the same, and σ₀ = `SIGMA_M`. Λ₀ = I,
-    but growth is fixed at 0 from `CHILD_BELOW_M` on.
+    This is the population's N(μ, Λ₀⁻¹) of β, conditioned on the height h(β) of the rest pose's
+    highest vertex above its lowest: Λ = Λ₀ + g gᵀ/σ² and mean
+    μ + Λ₀⁻¹g (H − h₀ − g·μ) / (σ₀² + gᵀΛ₀⁻¹g), with h(β) = h₀ + g·β as long as these two vertices
+    stay the same, and σ₀ = `SIGMA_M`. Λ₀ = I and μ is the mean of people in footage, but growth is
+    fixed at 0 from `CHILD_BELOW_M` on, and μ = 0 below.
 
     :param sigma_m: σ in Λ; the mean has this height in any case.
     """
     h0, g = _extremes_at(body, height_m)
-    population = _population(body, is_child=height_m < CHILD_BELOW_M)
-    mean = g / population * (height_m - h0) / (SIGMA_M**2 + g @ (g / population))
+    is_child = height_m < CHILD_BELOW_M
+    population = _population(body, is_child)
+    mean = np.zeros(body.P) if is_child else mean_shape(body)
+    taller = height_m - h0 - g @ mean
     return replace(
-        priors, shape_mean=mean, shape_information=np.diag(population) + np.outer(g, g) / sigma_m**2
+        priors,
+        shape_mean=mean + g / population * taller / (SIGMA_M**2 + g @ (g / population)),
+        shape_information=np.diag(population) + np.outer(g, g) / sigma_m**2,
     )
 
 
@@ -55,23 +66,26 @@ def with_unknown_stature(priors: Priors, body: Body) -> Priors:
     A single camera measures proportions, not size. Among people, short ones have relatively long
     trunks, so that under N(0, I) a long trunk makes a person short: exact keypoints of a person of
     1.75 m, with the mean's legs and a trunk 12 % longer, give 1.66 m. Λ = I + κ ĝĝᵀ, with ĝ the
-    direction of β along which the stature h(β) grows, divides that pull by 1 + κ. The person is
-    taken for an adult: growth is fixed at 0.
+    direction of β along which the stature h(β) grows, divides that pull by 1 + κ. The mean is that
+    of people in footage. The person is taken for an adult: growth is fixed at 0.
     """
     population = _population(body, is_child=False)
     _, g = _extremes_at(body, body.stature())
     along = g / population
     along /= max(float(np.linalg.norm(along)), 1e-12)
     return replace(
-        priors, shape_information=np.diag(population) + STIFFNESS * np.outer(along, along)
+        priors,
+        shape_mean=mean_shape(body),
+        shape_information=np.diag(population) + STIFFNESS * np.outer(along, along),
     )
 
 
 def with_population(priors: Priors, body: Body) -> Priors:
-    """Return the priors with the population of adults: N(0, I) of β, and no growth."""
-    if growth_of(body) is None:
-        return replace(priors, shape_information=None)
-    return replace(priors, shape_information=np.diag(_population(body, is_child=False)))
+    """Return the priors with the population of adults: N(μ, I) of β with the mean of people in
+    footage, and no growth.
+    """
+    population = np.diag(_population(body, is_child=False))
+    return replace(priors, shape_mean=mean_shape(body), shape_information=population)
 
 
 def stature_sigma(
@@ -148,6 +162,14 @@ def _most_probable_stature(body: Body, deviations: float) -> float:
     return body.stature(betas)
 
 
+def mean_shape(body: Body) -> Float64Array:
+    """Return the coefficients (P,) of the mean of people in footage; zeros for bodies of others."""
+    mean = np.zeros(body.P)
+    if not body.file:
+        mean[: len(_MEAN_SHAPE)] = _MEAN_SHAPE
+    return mean
+
+
 def _population(body: Body, is_child: bool) -> Float64Array:
     """Return the information (P,) of the coefficients among adults or among children."""
     information = np.ones(body.P)
@@ -161,13 +183,16 @@ def _extremes_at(body: Body, height_m: float) -> tuple[float, Float64Array]:
     """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this
     height.
     """
-    betas = np.zeros(body.P)
+    is_child = height_m < CHILD_BELOW_M
+    population = _population(body, is_child)
+    mean = np.zeros(body.P) if is_child else mean_shape(body)
+    betas = mean
     h0 = 0.0
     g = np.zeros(body.P)
-    population = _population(body, is_child=height_m < CHILD_BELOW_M)
     for _ in range(_ROUNDS):
         h0, g = _shape_at(body, betas)
-        betas = g / population * (height_m - h0) / max(float(g @ (g / population)), 1e-12)
+        taller = height_m - h0 - g @ mean
+        betas = mean + g / population * taller / max(float(g @ (g / population)), 1e-12)
     return h0, g
 
 

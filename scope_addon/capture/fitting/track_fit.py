@@ -129,7 +129,7 @@ def _fit_shape(prepared: PreparedTrack, root_cam: FloatArray | None = None) -> C
     options = replace(ROBUST, stages=cold_stages(weights))
     priors = prepared.priors
     # Distance determines an unknown stature, proportions do not.
-    if root_cam is not None and priors.shape_mean is None:
+    if root_cam is not None and not prepared.is_stature_known:
         priors = with_population(priors, prepared.body)
     return fit_clip(prepared.body, measurements, priors=priors, options=options)
 

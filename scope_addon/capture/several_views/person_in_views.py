@@ -20,7 +20,7 @@ from ..fitting.frame_measurements import Measurer
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.outline import fit_shape_to_outline, usable_masks
 from ..fitting.prepared_track import OtherView, PreparedTrack, lift
-from ..fitting.stature import stature_sigma
+from ..fitting.stature import mean_shape, stature_sigma
 from ..fitting.weights import ROBUST, clip_stages, motion_priors
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..stages.clock import Progress
@@ -159,9 +159,10 @@ def with_build(prepared: PreparedTrack, fit: FittedTrack) -> FittedTrack:
     Cameras together tell the lengths l(β) of the bones, outlines how stout a body is, and the shape
     β has both. The lengths become its prior,
 
-        Λ = I + Jᵀ J / σ²,   mean Λ⁻¹ Jᵀ J β_fit / σ²,   J = ∂l/∂β at β_fit,
+        Λ = I + Jᵀ J / σ²,   mean Λ⁻¹ (μ + Jᵀ J β_fit / σ²),   J = ∂l/∂β at β_fit,
 
-    and the poses of the fit the lifted points, while the shape is fitted to the outlines.
+    with μ the mean of people, and the poses of the fit the lifted points, while the shape is fitted
+    to the outlines.
     """
     masks = usable_masks(prepared)
     if not masks:
@@ -178,7 +179,7 @@ def with_build(prepared: PreparedTrack, fit: FittedTrack) -> FittedTrack:
     information = np.eye(body.P) + known
     priors = replace(
         prepared.priors,
-        shape_mean=np.linalg.solve(information, known @ betas),
+        shape_mean=np.linalg.solve(information, mean_shape(body) + known @ betas),
         shape_information=information,
     )
     lifted = replace(

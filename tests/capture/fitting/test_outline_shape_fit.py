@@ -22,6 +22,7 @@ from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.fitting import outline
 from scope.scope_addon.capture.fitting.outline import fit_shape_to_outline, usable_masks
 from scope.scope_addon.capture.fitting.prepared_track import prepare_track
+from scope.scope_addon.capture.fitting.stature import mean_shape
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver import Body
 
@@ -31,7 +32,7 @@ from ..silhouettes import K, seen_in
 GIRTH_M = {"skirt": 0.078, "coat": 0.23}
 MASS_KG = {"skirt": 5.0, "coat": 22.0}
 HEMS = (0.5, 1.0, 2.0, 3.0)  # times as far off the body as the garment's own
-SHAPES = (None, 0)  # seeds; None: the mean shape
+SHAPES = (None, 0)  # seeds; None: the mean of people
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +60,8 @@ def added_by(
 
 
 def shape_of(body: Body, seed: int | None) -> NDArray[np.float64]:
-    return (
-        np.zeros(body.P) if seed is None else np.random.default_rng(seed).uniform(-1.2, 1.2, body.P)
-    )
+    mean = mean_shape(body)
+    return mean if seed is None else mean + np.random.default_rng(seed).uniform(-1.2, 1.2, body.P)
 
 
 def garment_of(body: Body, betas: NDArray[np.float64], name: str, times: float) -> Garment:

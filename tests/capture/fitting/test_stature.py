@@ -5,7 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting.stature import STIFFNESS, with_stature, with_unknown_stature
+from scope.scope_addon.capture.fitting.stature import (
+    STIFFNESS,
+    mean_shape,
+    with_stature,
+    with_unknown_stature,
+)
 from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stages
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions, check_options
@@ -21,9 +26,10 @@ from scope.solver import (
     fit_clip,
     load_body,
 )
-from scope.solver.body_file import ASSETS
+from scope.solver.body_file import ASSETS, CHILD_BELOW_M
 from scope.solver.rotations import exp
 
+SIDES = ("left", "right")
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 
 
@@ -33,12 +39,13 @@ def test_the_mean_is_the_most_probable_shape_of_a_height(height_m):
     priors = with_stature(default_priors(body), body, height_m)
     betas = np.asarray(priors.shape_mean)
     assert np.ptp(body.rest_vertices(betas)[:, 1]) == pytest.approx(height_m, abs=0.003)
+    mean = np.zeros(body.P) if height_m < CHILD_BELOW_M else mean_shape(body)
     rng = np.random.default_rng(0)
     for step in rng.standard_normal((20, body.P)):  # any other of this height is less common
         other = betas + 0.3 * step
         for _ in range(5):
             other[0] += (height_m - np.ptp(body.rest_vertices(other)[:, 1])) / 0.0956
-        assert np.linalg.norm(other) > np.linalg.norm(betas)
+        assert np.linalg.norm(other - mean) > np.linalg.norm(betas - mean)
 
 
 def test_an_unknown_stature_depends_less_on_proportions_and_varies_among_people():
@@ -51,13 +58,72 @@ def test_an_unknown_stature_depends_less_on_proportions_and_varies_among_people(
     assert before.shape_information is None
     covariance = np.linalg.inv(np.asarray(after.shape_information))
     np.testing.assert_allclose(covariance, covariance.T)
-    heights = np.array([np.ptp(body.rest_vertices(0.01 * b)[:, 1]) for b in np.eye(body.P)])
-    taller = (heights - np.ptp(body.rest_vertices(np.zeros(body.P))[:, 1])) / 0.01
+    mean = np.asarray(after.shape_mean)
+    heights = np.array([np.ptp(body.rest_vertices(mean + 0.01 * b)[:, 1]) for b in np.eye(body.P)])
+    taller = (heights - np.ptp(body.rest_vertices(mean)[:, 1])) / 0.01
     rng = np.random.default_rng(0)
     for proportion in rng.standard_normal((10, body.P)):
         pulled = taller @ covariance @ proportion
         assert pulled == pytest.approx(taller @ proportion / (1 + STIFFNESS), rel=0.02, abs=1e-3)
     assert 0.03 < np.sqrt(taller @ covariance @ taller) < 0.08  # metres
+
+
+def test_the_mean_of_people_has_the_proportions_of_people(shared):
+    """Trunk, upper arm and forearm against the leg: means of six people whose joints are known."""
+    body = load_body("scope")
+    mean = mean_shape(body)
+    assert body.stature(mean) == pytest.approx(body.stature(), abs=0.001)
+    J = body.rest_joints(mean)
+    ours = proportions(lambda name: J[body.joint_names.index(name)])
+    people = shared / "data" / "people" / "truth"
+    truths = [
+        people / f"{name}.npz"
+        for name in (
+            "labval_squat",
+            "labval_walk_ts",
+            "opencap_squat_cam0",
+            "zju_377",
+            "shelf_c3_t1",
+        )
+    ]
+    truths.append(shared / "data" / "pose2sim" / "truth_cam1.npz")
+    found = np.mean([proportions(truth_joint(np.load(path))) for path in truths], axis=0)
+    np.testing.assert_allclose(ours, found, rtol=0.03)
+
+
+def test_bodies_of_others_are_their_own_mean():
+    body = replace(load_body("scope"), file="/somewhere/body.npz")
+    assert not mean_shape(body).any()
+
+
+def truth_joint(truth):
+    """Return a function that gives a joint's (T, 3) true places by the name of ours."""
+    kind = "_anat" if "joints_anat" in truth.files else ""
+    names = [str(name) for name in truth[f"names{kind}"]]
+    joints = truth[f"joints{kind}"].astype(float)
+
+    def joint(name):
+        side, part = name.split("_")
+        return joints[:, names.index(side[0].upper() + part.capitalize())]
+
+    return joint
+
+
+def proportions(joint):
+    """Trunk, upper arm and forearm in lengths of a leg, from a function of joints' places."""
+
+    def length(start, end):
+        return np.nanmedian(np.linalg.norm(np.atleast_2d(start - end), axis=-1))
+
+    def middle(part):
+        return (joint(f"left_{part}") + joint(f"right_{part}")) / 2
+
+    def limb(start, end):
+        return np.mean([length(joint(f"{s}_{start}"), joint(f"{s}_{end}")) for s in SIDES])
+
+    leg = limb("hip", "knee") + limb("knee", "ankle")
+    trunk = length(middle("shoulder"), middle("hip"))
+    return np.array([trunk, limb("shoulder", "elbow"), limb("elbow", "wrist")]) / leg
 
 
 def test_a_long_trunk_is_found_and_does_not_make_a_person_short():
