@@ -113,10 +113,7 @@ def allowed_share(H, S) -> float:  # type: ignore[no-untyped-def]
 @kernel
 def reset(curvature: Curvature) -> None:
     """Set S to zero, as when the weights change."""
-    for i in range(curvature.S.shape[0]):
-        for r in range(3):
-            for c in range(3):
-                curvature.S[i, r, c] = 0.0
+    curvature.S[:] = 0.0
 
 
 @kernel

@@ -35,9 +35,7 @@ def _curvature_of(curvature: Curvature, f: int) -> Curvature:
 def _set_current(tree, poses, joints, curvature, added) -> None:  # type: ignore[no-untyped-def]
     for f in range(added.shape[0]):
         set_current(tree, pose_of(poses, f), _blocks_of(joints, f), _curvature_of(curvature, f))
-        for i in range(added.shape[1]):
-            for k in range(6):
-                added[f, i, k] = 0.0
+    added[:] = 0.0
 
 
 @kernel

@@ -122,10 +122,7 @@ def linearize_frames(  # type: ignore[no-untyped-def]
         if not alone:
             place_parts(tree, pose)
             clear_blocks(total)
-            for i in range(total.A.shape[0]):
-                for r in range(6):
-                    for k in range(total.A.shape[2]):
-                        total.A[i, r, k] = 0.0
+            total.A[:] = 0.0
         while v < end:
             if not alone:
                 place_in_camera(views.R[v], views.t[v], pose, memory.seen)
@@ -141,11 +138,8 @@ def linearize_frames(  # type: ignore[no-untyped-def]
                 for k in range(3):
                     joints.H_uu[f, i, r, k] = own.H_uu[i, r, k]
         write_frame(tree, pose, own, memory.sums, system.D[f], system.N[f], memory.C, memory.c)
-        for k in range(system.B2.shape[1]):
-            for r in range(3):
-                for b in range(3):
-                    system.B1[f, k, r, b] = 0.0
-                    system.B2[f, k, r, b] = 0.0
+        system.B1[f] = 0.0
+        system.B2[f] = 0.0
     return cost
 
 
@@ -169,10 +163,8 @@ def linearize_half(  # type: ignore[no-untyped-def]
     """Write the equations of frames first..last-1, those from `coupled` on with what couples them;
     costs (3,).
     """
-    for a in range(memory.c.shape[0]):
-        memory.c[a] = 0.0
-        for b in range(memory.c.shape[0]):
-            memory.C[a, b] = 0.0
+    memory.C[:] = 0.0
+    memory.c[:] = 0.0
     for a in range(first, last, _CHUNK):
         b = min(a + _CHUNK, last)
         costs[0] += linearize_frames(

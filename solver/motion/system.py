@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
+from ..gauss_newton.recursion import copy_rows
 from ..kernel import kernel
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..tree import Tree, padded
@@ -159,12 +160,9 @@ def write_frame(  # type: ignore[no-untyped-def]
     for a in range(D.shape[0]):
         for b in range(a - a % 3, D.shape[0]):
             D[a, b] = 0.0
-        for b in range(N.shape[1]):
-            N[a, b] = 0.0
+    N[:] = 0.0
     for i in range(n_parts):
-        for r in range(6):
-            for k in range(row):
-                sums[i, r, k] = blocks.A[i, r, k]
+        copy_rows(blocks.A[i], sums[i])
     for i in range(n_parts - 1, 0, -1):
         S = sums[i]
         up = sums[tree.parents[i]]
