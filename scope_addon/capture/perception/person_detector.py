@@ -32,6 +32,15 @@ _SMALL_STEP = 0.6
 # image.
 _PART_SIDE = 0.6
 _PART_STEP = 2 / 3  # the same for these
+# Detections of one person differ by at most this much at the shoulders, in sides of the region.
+# People who stand side by side are about twice as far apart.
+SAME_SHOULDERS = 0.08
+# Of two detections whose hips are closer, in sides of the larger region, one may be a duplicate.
+_NEAR_HIPS = 0.25
+# The cosine of the largest angle between the trunks of people who stand beside each other.
+_PARALLEL = 0.5
+# How much smaller the region of somebody in a crowd is, so that it shows less of the others.
+_CROWDED_SIDE = 0.85
 
 
 @dataclass(frozen=True)
@@ -40,7 +49,7 @@ class Detection:
 
     ``score`` 0..1; ``box_px`` (4,) left, top, right, bottom of the face; ``points_px`` (4, 2), both
     in image pixels. Point 0 is the hip centre, point 1 lies on the body circle around it, above the
-    head.
+    head; point 2 is the centre of the shoulders. A detector of boxes puts it at the hips.
     """
 
     score: float
@@ -51,6 +60,37 @@ class Detection:
     def region(self) -> Region:
         """The region for the landmark network."""
         return region_from_points(self.points_px[0], self.points_px[1])
+
+    @property
+    def trunk_px(self) -> Float64Array:
+        """The vector (2,) from the shoulders to the hips."""
+        vector: Float64Array = self.points_px[0] - self.points_px[2]
+        return vector
+
+    def near(self, others: list[Detection]) -> list[Detection]:
+        """Select those of similar size with the hips well inside the body circle."""
+        return [other for other in others if self.region.resembles(other.region, _NEAR_HIPS)]
+
+    def is_beside(self, other: Detection) -> bool:
+        """Return whether the shoulders are those of two people, as upright as each other.
+
+        The network pulls the hips of people who stand close together towards each other, but not
+        their shoulders. It also detects people in a trunk, whose shoulders are further down in it,
+        and in legs, where they are upside down.
+        """
+        lengths = np.linalg.norm(self.trunk_px) * np.linalg.norm(other.trunk_px)
+        if self.trunk_px @ other.trunk_px <= _PARALLEL * lengths:
+            return False
+        dx, dy = self.points_px[2] - other.points_px[2]
+        along_x, along_y = other.trunk_px / np.linalg.norm(other.trunk_px)
+        across_px = abs(dx * along_y - dy * along_x)
+        larger_px = max(self.region.side_px, other.region.side_px)
+        return bool(across_px > SAME_SHOULDERS * larger_px)
+
+    def has_shoulders_of(self, other: Detection) -> bool:
+        """Return whether the shoulders of both are at the same place."""
+        larger_px = max(self.region.side_px, other.region.side_px)
+        return math.dist(self.points_px[2], other.points_px[2]) <= SAME_SHOULDERS * larger_px
 
     def turned_back(self, quarter_turns: int, width: int, height: int) -> Detection:
         """Convert a detection in a turned image to one in the image.
@@ -186,14 +226,32 @@ def _grid(height: int, width: int, side: int, step: float) -> list[tuple[int, in
 
 
 def unique(detections: list[Detection]) -> list[Detection]:
-    """Drop detections whose hips are well inside the body circle of a better one of similar size;
-    best first.
+    """Drop detections whose hips are well inside the body circle of a better one of similar size,
+    unless it is somebody beside it; best first.
     """
     kept: list[Detection] = []
     for detection in sorted(detections, key=lambda d: -d.score):
-        if not any(detection.region.resembles(other.region, 0.25) for other in kept):
+        if all(detection.is_beside(other) for other in detection.near(kept)):
             kept.append(detection)
     return kept
+
+
+def possible_regions(detection: Detection, detections: list[Detection]) -> list[Region]:
+    """Return the regions in which the landmark network may find a detected person: the detection's,
+    and for somebody who stands close to others one more.
+
+    There the trunk is the mean of theirs, in which the pulls from both sides cancel, below the own
+    shoulders. The region is smaller: the network would take the largest person in it.
+    """
+    near = detection.near(detections)
+    trunks = [other.trunk_px for other in near if detection.is_beside(other)]
+    if not trunks:
+        return [detection.region]
+    trunk_px = np.mean([detection.trunk_px, *trunks], axis=0)
+    hips_px = detection.points_px[2] + trunk_px
+    radius_px = _CROWDED_SIDE * math.dist(detection.points_px[0], detection.points_px[1])
+    top_px = hips_px - radius_px * trunk_px / np.linalg.norm(trunk_px)
+    return [detection.region, region_from_points(hips_px, top_px)]
 
 
 def make_anchors(

@@ -13,6 +13,7 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,8 @@ from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.crop import Crop
 from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
-from ..perception.person_detector import Detection
-from ..perception.region import Region
+from ..perception.person_detector import Detection, possible_regions
+from ..perception.region import MARGIN, Region, bounds
 from ..perception.sessions import Execution
 from .appearance import appearance
 from .frame_clock import FRAME_S, FrameClock
@@ -77,6 +78,10 @@ _REDETECTION_SCALES = (1.0, 1.35)
 _MIN_REDETECTION_PRESENCE = 0.9
 _MAX_REDETECTION_INNOVATION = 0.35
 CURLED_SPREAD = 0.25
+# A second region of a detection counts if it shows the shoulders nearer to the detected ones by so
+# much, in sides. Where there is only one person, both show the same.
+_CLEARLY_NEARER = 0.015
+_SHOULDERS = [11, 12]  # keypoints
 LEAVING_SHARE = 0.8  # a lost person with fewer of the keypoints in the image has left it
 
 
@@ -86,6 +91,14 @@ class _DetectedBody:
 
     estimate: PoseEstimate
     is_sure: bool
+    detection: Detection
+
+    def is_beside(self, other: PoseEstimate) -> bool:
+        """Return whether the shoulders were detected where this body has them, and not where the
+        other one has them.
+        """
+        is_confirmed = self.detection.has_shoulders_of(_detection_of(self.estimate))
+        return is_confirmed and self.detection.is_beside(_detection_of(other))
 
     def is_less_spread_than(self, other: _DetectedBody) -> bool:
         """Return whether the other one covers this one, and its keypoints are more spread out."""
@@ -364,9 +377,9 @@ class PeopleTracker:
         upright = self._estimate_detected(image_rgb, found, sure_score)
         for body in upright:
             if not any(body.is_less_spread_than(other) for other in turned):
-                self._add(body.estimate, body.is_sure)
+                self._add(body)
         for body in sorted(turned, key=lambda body: -body.estimate.spread):
-            self._add(body.estimate, body.is_sure)
+            self._add(body)
 
     def _estimate_detected(
         self, image_rgb: Uint8Array, found: list[Detection], sure_score: float
@@ -377,21 +390,40 @@ class PeopleTracker:
 
         :param sure_score: see `_start_detected`.
         """
-        detections = [d for d in self._ranked(found) if self._may_be_new(d.region)]
+        detections = [d for d in self._ranked(found) if self._may_be_new(d)]
         detections = detections[: 3 if self._largest_only else 2 * self._max_live]
         if not detections:
             return []
         bodies = []
-        first = self._networks.landmarks.estimate(image_rgb, [d.region for d in detections])
+        first = self._estimate_first(image_rgb, detections, found)
         likely = [k for k, e in enumerate(first) if e.presence >= PRESENCE_THRESHOLD]
         for sure in (True, False):
             chosen = [k for k in likely if (detections[k].score >= sure_score) == sure]
-            for estimate in self._estimator.estimate(
-                image_rgb, [first[k].next_region for k in chosen], sure
-            ):
+            regions = [first[k].next_region for k in chosen]
+            estimates = self._estimator.estimate(image_rgb, regions, sure)
+            for k, estimate in zip(chosen, estimates, strict=True):
                 if estimate is not None:
-                    bodies.append(_DetectedBody(estimate, sure))
+                    bodies.append(_DetectedBody(estimate, sure, detections[k]))
         return bodies
+
+    def _estimate_first(
+        self, image_rgb: Uint8Array, detections: list[Detection], found: list[Detection]
+    ) -> list[PoseEstimate]:
+        """Estimate each detection, in that of its regions which shows the detected shoulders best.
+
+        :param found: everybody who was detected, with those who are tracked.
+        """
+        regions = [possible_regions(detection, found) for detection in detections]
+        estimates = iter(self._networks.landmarks.estimate(image_rgb, list(chain(*regions))))
+        out = []
+        for detection, tried in zip(detections, regions, strict=True):
+            best = next(estimates)
+            least = _shoulders_off(detection, best) - _CLEARLY_NEARER
+            for other in islice(estimates, len(tried) - 1):
+                if _shoulders_off(detection, other) < least:
+                    best = other
+            out.append(best)
+        return out
 
     def _ranked(self, detections: list[Detection]) -> list[Detection]:
         """Sort detections: those that may be a lost person first, then by score times size."""
@@ -405,26 +437,27 @@ class PeopleTracker:
 
         return sorted(detections, key=rank, reverse=True)
 
-    def _may_be_new(self, region: Region) -> bool:
-        """Return whether nobody is tracked in the region, and its size matters.
+    def _may_be_new(self, detection: Detection) -> bool:
+        """Return whether nobody who is tracked was detected, and the region's size matters.
 
         Somebody who is lost in front of or behind another person may be in nearly the same region
         as that person.
         """
+        region = detection.region
         lost = min((region.difference(f.predicted_region) for f in self._lost), default=math.inf)
-        tracked = (f.estimate.next_region for f in self._live)
-        if any(
-            region.resembles(other, _SAME_TARGET) and region.difference(other) <= lost
-            for other in tracked
-        ):
-            return False
+        for f in self._live:
+            tracked = f.estimate.next_region
+            is_same = region.resembles(tracked, _SAME_TARGET) and region.difference(tracked) <= lost
+            if is_same and not detection.is_beside(_detection_of(f.estimate)):
+                return False
         largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
         return not self._largest_only or region.side_px >= RIVAL_SIDE * largest
 
-    def _add(self, estimate: PoseEstimate, sure: bool) -> None:
+    def _add(self, body: _DetectedBody) -> None:
         """Start a tracklet, unless the body is tracked already or enough people of at least its
         size are.
         """
+        estimate = body.estimate
         if any(is_same_body(estimate, f.estimate) for f in self._live):
             return
         if any(f.is_occluded_by(estimate) for f in self._lost):
@@ -434,8 +467,9 @@ class PeopleTracker:
         overlaps = (
             max(share_within(estimate, f.estimate), share_within(f.estimate, estimate))
             for f in self._live
+            if not body.is_beside(f.estimate)
         )
-        if not sure and any(share > MAX_SHARE_WITHIN for share in overlaps):
+        if not body.is_sure and any(share > MAX_SHARE_WITHIN for share in overlaps):
             return
         if len(self._live) >= self._max_live:
             smallest = min(self._live, key=lambda f: f.estimate.region.side_px)
@@ -514,6 +548,22 @@ class PeopleTracker:
             if e.mask is None
             else PersonMask(e.region, e.mask, (image_rgb.shape[1], image_rgb.shape[0])),
         )
+
+
+def _shoulders_off(detection: Detection, estimate: PoseEstimate) -> float:
+    """Return how far a body's shoulders are from the detected ones, in sides of the region."""
+    off_px = math.dist(detection.points_px[2], estimate.keypoints_px[_SHOULDERS].mean(axis=0))
+    return off_px / detection.region.side_px
+
+
+def _detection_of(estimate: PoseEstimate) -> Detection:
+    """Return what the detector would find of a body, with the shoulders of its keypoints."""
+    region = estimate.next_region
+    hips_px = np.array(region.center_px)
+    top_px = hips_px + region.R_image_crop @ [0.0, -region.side_px / (2 * MARGIN)]
+    shoulders_px = estimate.keypoints_px[_SHOULDERS].mean(axis=0)
+    points_px = np.stack([hips_px, top_px, shoulders_px, top_px])
+    return Detection(estimate.presence, bounds(estimate.keypoints_px), points_px)
 
 
 def redetect_rotated(

@@ -21,8 +21,10 @@ from scope.scope_addon.capture.perception.person_detector import (
     merge_overlapping,
     overlap_clusters,
     parts,
+    possible_regions,
     small_squares,
     squares,
+    unique,
 )
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import SetupError, UsageError
@@ -80,6 +82,59 @@ def test_letterbox_shows_the_whole_image_centred(height: int, width: int) -> Non
         [len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51
     )
     assert abs(offset[1] - (224 - len(rows)) / 2) <= 0.5
+
+
+def detection(score: float, shoulders: tuple[float, float], hips: tuple[float, float]) -> Detection:
+    """A person whose body circle has a radius of 100 pixels; the region's side is then 250."""
+    trunk = np.subtract(hips, shoulders)
+    length = float(np.linalg.norm(trunk))
+    up = np.array([0.0, -1.0]) if length == 0 else -trunk / length
+    top = hips + 100 * up
+    return Detection(score, np.zeros(4), np.array([hips, top, shoulders, top], float))
+
+
+@pytest.mark.parametrize(
+    ("shoulders", "hips", "is_kept"),
+    [
+        ((200, 100), (205, 150), False),  # the same person
+        ((212, 100), (225, 150), False),  # the same person, seen a little differently
+        ((240, 100), (210, 150), True),  # somebody beside, whose hips are pulled here
+        ((240, 100), (300, 150), True),  # somebody whose hips are elsewhere
+        ((205, 140), (205, 190), False),  # the same trunk, further down
+        ((200, 200), (200, 150), False),  # legs, which look like a body upside down
+        ((240, 150), (240, 150), False),  # without shoulders, nothing tells that it is another
+    ],
+)
+def test_people_with_shoulders_of_their_own_are_no_duplicates(
+    shoulders: tuple[float, float], hips: tuple[float, float], is_kept: bool
+) -> None:
+    best = detection(0.9, (200, 100), (200, 150))
+    other = detection(0.7, shoulders, hips)
+    assert unique([other, best]) == ([best, other] if is_kept else [best])
+
+
+def test_hips_that_pull_each_other_are_put_below_the_shoulders() -> None:
+    """The trunks of three people in a row are vertical; the outer ones lean to the middle one."""
+    row = [
+        detection(0.9, (200, 100), (200, 160)),
+        detection(0.8, (160, 100), (180, 160)),
+        detection(0.7, (240, 100), (220, 160)),
+    ]
+    for person, expected in zip(row, [(200, 160), (160, 160), (240, 160)], strict=True):
+        own, apart = possible_regions(person, row)
+        assert own == person.region
+        assert apart.center_px == pytest.approx(expected)
+        assert apart.rotation == pytest.approx(0)
+        assert 0.7 < apart.side_px / own.side_px < 1
+
+
+def test_somebody_who_stands_apart_has_one_region() -> None:
+    leaning = detection(0.9, (200, 100), (230, 150))
+    distant = detection(0.8, (400, 100), (380, 150))
+    small = Detection(0.7, np.zeros(4), np.array([[240, 150], [240, 130], [240, 140], [240, 130]]))
+    legs = detection(0.6, (230, 200), (225, 150))
+    for person in (leaning, distant, small):
+        assert possible_regions(person, [leaning, distant, small, legs]) == [person.region]
 
 
 def test_squares_cover_an_oblong_image() -> None:

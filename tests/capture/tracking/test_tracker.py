@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.observation import Observation
@@ -93,6 +94,46 @@ def test_two_people_are_tracked_and_nobody_twice(frames: Frames) -> None:
         observations = dict(tracker.step(image))
         assert sorted(observations) == [0, 1]
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
+
+
+def test_everybody_who_stands_close_together_in_a_photograph_is_found(shared: Path) -> None:
+    """A man with a drill stands at the shoulder of a man in green; a third one stands apart."""
+    path = shared / "data/people/inputs/shelf_c1.jpg"
+    image = np.ascontiguousarray(cv2.imread(str(path))[:, :, ::-1]).astype(np.uint8)
+    tracker = PeopleTracker("fast", threads=2, people=12)
+    shoulders_px = sorted(
+        observation.keypoints_px[[11, 12]].mean(axis=0).tolist()
+        for _, observation in tracker.step(image)
+    )
+    # Between the shoulders, read from the picture.
+    expected_px = np.array([[453, 240], [555, 237], [930, 247]])
+    assert len(shoulders_px) == 3
+    assert np.linalg.norm(shoulders_px - expected_px, axis=1).max() < 20
+
+
+@pytest.mark.parametrize("apart_px", [-70, -55, 70])
+def test_two_people_side_by_side_are_both_found(frames: Frames, apart_px: int) -> None:
+    """Of two people before black, the brighter pixel counts; shoulders touch at 50 pixels."""
+    tracker = PeopleTracker("fast", threads=2, people=12)
+    left, right = (next(frames(f"people/inputs/plumb_studio_{name}")) for name in (383, 386))
+    expected_px = []
+    for image in (left, right):
+        tracker.reset()
+        ((_, alone),) = tracker.step(image)
+        expected_px.append(alone.keypoints_px)
+    shoulders_px = [keypoints_px[[11, 12]].mean(axis=0) for keypoints_px in expected_px]
+    moved = np.round(shoulders_px[0] - shoulders_px[1] + [apart_px, 0])
+    expected_px[1] = expected_px[1] + moved
+    shift = np.array([[1, 0, moved[0]], [0, 1, moved[1]]])
+    image = np.maximum(left, cv2.warpAffine(right, shift, left.shape[1::-1]))
+    tracker.reset()
+    found = [observation.keypoints_px for _, observation in tracker.step(image)]
+    assert len(found) == 2
+    for truth_px in expected_px:
+        off_px = min(
+            np.linalg.norm(truth_px - keypoints_px, axis=1).mean() for keypoints_px in found
+        )
+        assert off_px < 20  # pixels of a person with a height of about 260
 
 
 def test_a_small_person_is_tracked_where_there_is_nobody_else(
