@@ -126,9 +126,10 @@ def figures_without_names(report: Mapping[str, Any]) -> dict[str, Any]:
 
 def _notice(record: Any) -> Any:
     """Return the code of a warning and those of its values that name nothing."""
-    if not isinstance(record, Mapping) or record.get("code") not in SENTENCES:
+    code = record.get("code") if isinstance(record, Mapping) else None
+    if not isinstance(code, str) or code not in SENTENCES:
         return LEFT_OUT
-    return {"code": record["code"], "values": _named_figures(record.get("values"))}
+    return {"code": code, "values": _named_figures(record.get("values"))}
 
 
 def _named_figures(values: Any) -> Any:

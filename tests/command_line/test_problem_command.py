@@ -95,7 +95,11 @@ def test_what_is_no_report_is_refused_in_one_sentence_and_nothing_is_written(
 
 
 @pytest.mark.parametrize(
-    "damaged", [3, "text", [1, "Ann", {"Ann": "Ann"}], {"Ann Smith": "Ann"}, None, [None]]
+    "damaged",
+    [
+        *(3, "text", [1, "Ann", {"Ann": "Ann"}], {"Ann Smith": "Ann"}, None, [None]),
+        [{"code": ["Ann"]}, {"code": {"Ann": 1}}],
+    ],
 )
 def test_an_edited_report_gives_no_traceback_and_no_name(damaged, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
