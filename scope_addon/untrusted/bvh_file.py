@@ -32,7 +32,7 @@ _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis 
 _USUAL_RATES = [n * scale for n in (24, 30, 60, 120) for scale in (1.0, 1000 / 1001)]
 _LONGEST_NAME = 200  # characters
 _MOTION = re.compile(
-    r"^\s*MOTION\s+Frames\s*:\s*(\S+)\s+Frame\s+Time\s*:\s*(\S+)", re.MULTILINE | re.IGNORECASE
+    r"^[ \t]*MOTION\s+Frames\s*:\s*(\S+)\s+Frame\s+Time\s*:\s*(\S+)", re.MULTILINE | re.IGNORECASE
 )
 
 
@@ -158,6 +158,7 @@ def _hierarchy(
     """Return the names, parents, offsets, ends and channels of the joints."""
     words = iter(text.replace("{", " { ").replace("}", " } ").split())
     names: list[str] = []
+    repetitions: dict[str, int] = {}
     parents: list[int] = []
     offsets: list[list[float]] = []
     ends: list[list[float]] = []
@@ -170,9 +171,7 @@ def _hierarchy(
         if word in ("ROOT", "JOINT") and not is_in_end:
             if (word == "ROOT") == bool(open_joints) or len(names) == MOST_JOINTS:
                 raise _DamageError(f"{word} follows where there is no place for it")
-            names.append(_text_until_brace(words))
-            while names[-1] in names[:-1]:
-                names[-1] += "_"
+            names.append(_other_name(_text_until_brace(words), repetitions))
             parents.append(open_joints[-1] if open_joints else -1)
             open_joints.append(len(names) - 1)
             offsets.append([0.0, 0.0, 0.0])
@@ -201,6 +200,19 @@ def _hierarchy(
     if open_joints or is_in_end or not names:
         raise _DamageError("its hierarchy does not end")
     return names, parents, offsets, ends, channels
+
+
+def _other_name(name: str, repetitions: dict[str, int]) -> str:
+    """Return the name, with a number if it was returned before.
+
+    :param repetitions: of every name so far, how often it came again.
+    """
+    other = name
+    while other in repetitions:
+        repetitions[name] += 1
+        other = f"{name}.{repetitions[name]}"
+    repetitions[other] = 0
+    return other
 
 
 def _text_until_brace(words: Iterator[str]) -> str:

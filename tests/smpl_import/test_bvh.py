@@ -190,6 +190,17 @@ def test_files_that_cannot_be_used_say_why(tmp_path, text, says):
     assert len(str(raised.value)) < 500
 
 
+def test_the_time_to_read_grows_with_the_size_alone(tmp_path):
+    """Each of these took longer than any test may, when it grew with the square or the cube."""
+    with pytest.raises(MotionFileError, match="no MOTION"):
+        imported(tmp_path, "HIERARCHY\n" + "\n" * 300_000)
+    joint = "JOINT a {\nOFFSET 0 1 0\nCHANNELS 0\n"
+    depth = 2000
+    chain = f"HIERARCHY\nROOT a {{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n{joint * depth}"
+    with pytest.raises(MotionFileError, match=r"they are a, a\.1, a\.2"):
+        imported(tmp_path, chain + "}" * (depth + 1) + "\nMOTION\nFrames: 1\nFrame Time: 0.1\n0\n")
+
+
 def test_a_file_that_does_not_exist(tmp_path):
     with pytest.raises(MotionFileError, match="does not exist"):
         import_motions(tmp_path / "walk.bvh")
