@@ -34,7 +34,9 @@ def vrma_bytes(motion: Motion, body: Body) -> bytes:
 
     :param body: that the motion was fitted with.
     """
-    from ....solver import rotations  # Loads numba, and the command line starts without it.
+    # They load numba, and the command line starts without it.
+    from ....solver import rotations
+    from ...kinematics.smoothing import continuous_quaternions
 
     betas = np.asarray(motion.betas, float)
     rest = body.rest_joints(betas)
@@ -56,9 +58,9 @@ def vrma_bytes(motion: Motion, body: Body) -> bytes:
     file = _Buffers()
     times = file.add(np.asarray(motion.timestamps - motion.timestamps[0]), "SCALAR", bounds=True)
     outputs = [(0, "translation", file.add(hips, "VEC3"))]
+    turns = continuous_quaternions(local)[..., [1, 2, 3, 0]]  # glTF has the real part last.
     for node_number, joint in enumerate(joints):
-        turns = _quaternions(rotations.log(local[:, joint]))
-        outputs.append((node_number, "rotation", file.add(turns, "VEC4")))
+        outputs.append((node_number, "rotation", file.add(turns[:, joint], "VEC4")))
     gltf = {
         "asset": {"version": "2.0", "generator": "Scope"},
         "extensionsUsed": [_EXTENSION],
@@ -111,16 +113,3 @@ class _Buffers:
         limits = {"min": [float(data.min())], "max": [float(data.max())]} if bounds else {}
         self.accessors.append(accessor | limits)
         return len(self.accessors) - 1
-
-
-def _quaternions(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit quaternions (T, 4) x, y, z, w of rotation vectors (T, 3), each with the sign that
-    is nearer to the one before.
-    """
-    half = np.linalg.norm(vectors, axis=-1, keepdims=True) / 2
-    # sin(a)/a is numpy's sinc(a/pi), also at 0.
-    imaginary = 0.5 * np.sinc(half / np.pi) * vectors
-    turns: NDArray[np.float64] = np.concatenate([imaginary, np.cos(half)], axis=-1)
-    flips = np.sign((turns[1:] * turns[:-1]).sum(axis=-1))
-    turns[1:] *= np.cumprod(np.where(flips < 0, -1.0, 1.0))[:, None]
-    return turns
