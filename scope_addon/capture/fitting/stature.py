@@ -48,9 +48,7 @@ def with_stature(priors: Priors, body: Body, height_m: float, sigma_m: float = S
     :param sigma_m: σ in Λ; the mean has this height in any case.
     """
     h0, g = _extremes_at(body, height_m)
-    is_child = height_m < CHILD_BELOW_M
-    population = _population(body, is_child)
-    mean = np.zeros(body.P) if is_child else mean_shape(body)
+    mean, population = _people_of_age(body, height_m)
     taller = height_m - h0 - g @ mean
     return replace(
         priors,
@@ -179,13 +177,20 @@ def _population(body: Body, is_child: bool) -> Float64Array:
     return information
 
 
+def _people_of_age(body: Body, height_m: float) -> tuple[Float64Array, Float64Array]:
+    """Return the mean (P,) and the information (P,) of the coefficients among those whom a stature
+    may belong to: children or adults.
+    """
+    is_child = height_m < CHILD_BELOW_M
+    mean = np.zeros(body.P) if is_child else mean_shape(body)
+    return mean, _population(body, is_child)
+
+
 def _extremes_at(body: Body, height_m: float) -> tuple[float, Float64Array]:
     """Return h₀ and g (P,) of the highest and the lowest vertex of the most probable shape of this
     height.
     """
-    is_child = height_m < CHILD_BELOW_M
-    population = _population(body, is_child)
-    mean = np.zeros(body.P) if is_child else mean_shape(body)
+    mean, population = _people_of_age(body, height_m)
     betas = mean
     h0 = 0.0
     g = np.zeros(body.P)
