@@ -218,7 +218,7 @@ def warn_of_mirroring(
                 least = changed
                 best = remedy
                 unflipped = change
-        # Somebody who lies in the image is fitted better once it is turned, which is no mistake.
+        # A person lying down fits better after turning the image, though nothing is wrong.
         if best and not in_space:
             turned = cost_of(lambda m: _FROM_THE_LEFT[1](unflipped(m)))[0]
             if least > turned / factor:

@@ -237,11 +237,12 @@ def unique(detections: list[Detection]) -> list[Detection]:
 
 
 def possible_regions(detection: Detection, detections: list[Detection]) -> list[Region]:
-    """Return the regions in which the landmark network may find a detected person: the detection's,
-    and for somebody who stands close to others one more.
+    """Return the regions in which the landmark network may find a detected person: the detection's
+    own, and a second one for somebody who stands close to others.
 
-    There the trunk is the mean of theirs, in which the pulls from both sides cancel, below the own
-    shoulders. The region is smaller: the network would take the largest person in it.
+    In the second one, the trunk hangs from the person's own shoulders and is the mean of all trunks
+    there, in which the pulls from both sides cancel. It is smaller, because the network would take
+    the largest person in it.
     """
     near = detection.near(detections)
     trunks = [other.trunk_px for other in near if detection.is_beside(other)]
