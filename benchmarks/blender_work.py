@@ -23,7 +23,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scope_addon.expression_names import EXPRESSIONS
+from ..scope_addon.kinematics.face import EXPRESSIONS
 from ..scope_addon.motion import Motion
 from ..scope_addon.scene.actions import Channels
 from ..scope_addon.scene.build import BuildOptions, build_scene

@@ -12,8 +12,8 @@ import os
 import signal
 from types import FrameType
 
-from .command_line.memory_limit import address_space_limit
 from .command_line.signals import stopping_signals
+from .installed import address_space_limit
 
 # bytes of address space; with less, numpy may load in part, and hang or fail later
 _MIN_BYTES = 300_000_000

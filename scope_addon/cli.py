@@ -39,7 +39,6 @@ from .command_line.cluster_arguments import (
 )
 from .command_line.import_command import add_import
 from .command_line.live_command import add_live
-from .command_line.memory_limit import check_memory_limit
 from .command_line.outputs import (
     check_blender,
     check_outputs,
@@ -70,7 +69,7 @@ from .errors import (
     system_error_message,
 )
 from .footage import display_text, is_url, json_text
-from .installed import CAPTURE, check_installed
+from .installed import CAPTURE, check_installed, check_memory_limit
 from .job.clip_task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.finished_clip import FINISHED_FILE, write_finished
 from .options.capture import OFF

@@ -1,6 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Spans of frames that should be reviewed: filled in, far from the footage, unsure, not plausible,
 or under the floor. Numpy only.
+
+Not plausible is what a person cannot do, by the joints of a finished motion, of which the footage
+itself says nothing:
+
+- swing: a hand or foot moves far along the line of sight in no time, though it hardly moves in the
+  image, as if it had been solved in front of the body and then behind it;
+- lean: the weight is held beside the feet for seconds, where anybody would fall;
+- floating: both feet are above the floor for longer than a jump takes;
+- bent knees: somebody who stands or walks does not straighten a knee once in the whole clip.
+
+It may be true: of a punch, of somebody who is held or hangs, of a crouch.
 """
 
 from __future__ import annotations
@@ -12,11 +23,36 @@ from numpy.typing import NDArray
 
 from ..solver.names import BODY_JOINTS
 from .motion import Motion
-from .plausibility import implausible
 
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 FAR_SHARE = 0.03
 LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
+SWING_S = 0.2  # within which a limb swings
+# Along the line of sight, relative to the shoulder or hip. In 23 real clips where no limb swings,
+# hands and feet move by 0.43 m at most.
+SWING_DEPTH_M = 0.5
+SWING_IMAGE_M = 0.12  # across it, at the distance of the person
+LEAN_M = 0.25  # of the mass's centre from the feet, on the floor
+LEAN_S = 2.0
+NOT_SITTING = 0.7  # height of the pelvis over two thighs, from which nobody sits
+FLOATING_M = 0.25  # of both ankles' height above that at which they stand
+FLOATING_S = 1.2  # a jump of 1.7 m
+BENT_KNEE_DEG = 155.0  # the straightest knee of somebody who stands
+STANDING = 0.85  # distance of hip and ankle over the leg's length, from which a person stands
+BENT_S = 3.0  # of standing, in which a knee is straight at some time
+
+_ANKLE_M = 0.09  # height of an ankle of somebody who stands
+_FOOT = ("ankle", "foot")
+_AT = {name: k for k, name in enumerate(BODY_JOINTS)}
+# Ends of limbs, and the joints from which they reach.
+_LIMBS = [
+    (_AT[f"{side}_{end}"], _AT[f"{side}_{root}"])
+    for side in ("left", "right")
+    for end, root in (("wrist", "shoulder"), ("ankle", "hip"))
+]
+# Shares of the body's mass, after Winter's table: trunk and head, thighs, shanks, arms.
+_MASSES = {"spine1": 0.3, "spine3": 0.2, "head": 0.08, "left_elbow": 0.05, "right_elbow": 0.05}
+_MASSES |= {"left_hip": 0.06, "right_hip": 0.06, "left_knee": 0.1, "right_knee": 0.1}
 
 
 @dataclass(frozen=True)
@@ -76,3 +112,111 @@ def _spans(
         else:
             out.append((first, end - 1))
     return out
+
+
+def implausible(motion: Motion) -> dict[str, NDArray[np.bool_]]:
+    """Return the frames (T,) of a motion that are not plausible, by the reason, a key of
+    ``notices.REASONS``.
+    """
+    never = np.zeros(len(motion), bool)
+    if len(motion) < 2 or not motion.image_size.any():  # imported: no camera has seen it
+        return {"swing": never, "lean": never, "floating": never}
+    joints = joints_in_world(motion)
+    return {
+        "swing": _swings(motion) & motion.valid,
+        "lean": _leans(motion, joints) & motion.valid,
+        "floating": _floats(motion, joints) & motion.valid,
+    }
+
+
+def joints_in_world(motion: Motion) -> NDArray[np.float64]:
+    """Return the body's joints (T, 22, 3) in the world, metres."""
+    joints = motion.joints_cam[:, : len(BODY_JOINTS)].astype(float)
+    T = motion.world_from_camera
+    turned: NDArray[np.float64] = np.einsum("tij,tkj->tki", T[:, :3, :3], joints)
+    return turned + T[:, None, :3, 3]
+
+
+def has_bent_knees(motion: Motion) -> bool:
+    """Return whether the person stands or walks for a while, and no knee is ever straight."""
+    joints = joints_in_world(motion)
+    straightest = np.zeros(len(motion))
+    stands = np.zeros(len(motion), bool)
+    for side in ("left", "right"):
+        hip, knee, ankle = (joints[:, _AT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))
+        thigh = np.linalg.norm(hip - knee, axis=1)
+        shank = np.linalg.norm(ankle - knee, axis=1)
+        reach = np.linalg.norm(hip - ankle, axis=1)
+        cosine = (thigh**2 + shank**2 - reach**2) / np.maximum(2 * thigh * shank, 1e-9)
+        straightest = np.maximum(straightest, np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+        is_upright = hip[:, 2] - ankle[:, 2] > STANDING * (thigh + shank)
+        stands |= is_upright & motion.valid
+    period = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 0.0
+    if stands.sum() * period < BENT_S or stands.mean() < 0.5:
+        return False
+    return bool(np.percentile(straightest[stands], 98) < BENT_KNEE_DEG)
+
+
+def _swings(motion: Motion) -> NDArray[np.bool_]:
+    times = motion.timestamps
+    rows = np.arange(len(motion))
+    later = np.minimum(np.searchsorted(times, times + SWING_S, side="right") - 1, len(motion) - 1)
+    found = np.zeros(len(motion), bool)
+    for end, root in _LIMBS:
+        at = (motion.joints_cam[:, end] - motion.joints_cam[:, root]).astype(float)
+        change = at[later] - at[rows]
+        swings = (
+            (np.abs(change[:, 2]) > SWING_DEPTH_M)
+            & (np.linalg.norm(change[:, :2], axis=1) < SWING_IMAGE_M)
+            & motion.valid[later]
+        )
+        for row in np.flatnonzero(swings):
+            found[row : later[row] + 1] = True
+    return found
+
+
+def _leans(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
+    weights = np.array(list(_MASSES.values()))
+    mass = np.einsum("k,tki->ti", weights, joints[:, [_AT[name] for name in _MASSES]])
+    mass /= weights.sum()
+    feet = joints[:, [_AT[f"{side}_{part}"] for side in ("left", "right") for part in _FOOT], :2]
+    # Of the nearest point between the two feet.
+    nearest = np.full(len(motion), np.inf)
+    for a in range(4):
+        for b in range(a + 1, 4):
+            nearest = np.minimum(nearest, _distance(mass[:, :2], feet[:, a], feet[:, b]))
+    stands = (motion.foot_contact > 0.5).any(axis=1)
+    lowest_ankle = joints[:, [_AT["left_ankle"], _AT["right_ankle"]], 2].min(axis=1)
+    pelvis_height = joints[:, _AT["pelvis"], 2] - lowest_ankle
+    thigh = np.linalg.norm(joints[:, _AT["left_hip"]] - joints[:, _AT["left_knee"]], axis=1)
+    stands &= pelvis_height > NOT_SITTING * 2 * thigh
+    return _held(motion, (nearest > LEAN_M) & stands, LEAN_S)
+
+
+def _floats(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
+    if motion.uneven_ground:
+        return np.zeros(len(motion), bool)
+    # The ankles of people on their feet, and hands or pelvis of others.
+    above_feet = [k for name, k in _AT.items() if not name.endswith("foot")]
+    lowest = joints[:, above_feet, 2].min(axis=1)
+    return _held(motion, lowest > _ANKLE_M + FLOATING_M, FLOATING_S)
+
+
+def _distance(
+    point: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the distances (T,) of points (T, 2) from the segments from a to b, (T, 2)."""
+    along = b - a
+    share = ((point - a) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
+    nearest = a + np.clip(share, 0, 1)[:, None] * along
+    distance: NDArray[np.float64] = np.linalg.norm(point - nearest, axis=1)
+    return distance
+
+
+def _held(motion: Motion, mask: NDArray[np.bool_], least_s: float) -> NDArray[np.bool_]:
+    """Return the runs of a mask (T,) that last long enough."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    held = np.zeros(len(mask), bool)
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        held[first:end] = motion.timestamps[end - 1] - motion.timestamps[first] >= least_s
+    return held

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
 

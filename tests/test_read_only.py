@@ -14,7 +14,8 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import resample
-from scope.scope_addon.edit.floor import refloor
+from scope.scope_addon.edit.corrections import FeetOnFloor
+from scope.scope_addon.edit.edits import refloor
 from scope.scope_addon.edit.loop import best_cycle, close_cycle
 from scope.scope_addon.edit.root_motion import (
     floor_trajectory,
@@ -79,7 +80,7 @@ def clip():
 
 EDITS = {
     "resample": lambda clip: resample(clip, 24.0),
-    "refloor": lambda clip: refloor(clip, BODY, BETAS, level=True),
+    "refloor": lambda clip: refloor(clip, BODY, BETAS, FeetOnFloor(level=True)),
     "loop": lambda clip: close_cycle(clip, best_cycle(clip, BODY, BETAS, 0.0, 2.0)),
     "relative": lambda clip: relative_to_trajectory(clip, *floor_trajectory(clip)),
     "trajectory": lambda clip: with_trajectory(clip, *frozen(floor_trajectory(clip))),

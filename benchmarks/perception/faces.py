@@ -23,7 +23,7 @@ from ...scope_addon.capture.perception.face_record import parts, record
 from ...scope_addon.capture.perception.region import Region
 from ...scope_addon.capture.tracking.expression_fit import fitted
 from ...scope_addon.capture.tracking.expression_motion import expression_motion
-from ...scope_addon.expression_names import EXPRESSIONS
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from ...tools.calibrate_face.observe import SeenFaces, seen_faces
 from ...tools.render_faces.truth import FOLDER
 from ..report import table

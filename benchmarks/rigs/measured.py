@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...scope_addon.motion import Motion
 from ...scope_addon.notices import Notice
 from ...scope_addon.scene.build import BuildOptions, build_scene
-from ...scope_addon.scene.rigs.rig_retarget import retarget, usable_guess
+from ...scope_addon.scene.rig_retarget import retarget, usable_guess
 from ...solver.body import Body
 from ...solver.rotations import exp
 from .kinds import RigKind

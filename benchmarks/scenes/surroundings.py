@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.scene.axes import blender_camera_matrix
+from ...scope_addon.scene.camera import blender_camera_matrix
 from ...solver import Body
 from ...tools.render_sample.stage import Triple, add_camera, set_up_rendering
 from .dress import dressed

@@ -58,7 +58,7 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     check_blender(outputs)
     values = values_in_range(args, Place.IMPORT)
     # Imported here, so that errors in the arguments are printed immediately.
-    from ..smpl_import.convert import import_motions
+    from ..retarget.import_motions import import_motions
 
     confine(args, outputs)
     people = import_motions(args.motion, values["body"], values["up_axis"], values["motion_rate"])

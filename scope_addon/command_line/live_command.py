@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from ...solver.errors import ScopeError
 from ..errors import NoPersonError, UsageError, system_error_message
-from ..installed import CAPTURE, check_installed, check_live
+from ..installed import CAPTURE, check_installed, check_live, check_memory_limit
 from ..notices import counted
 from ..options import Place
 from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import person_paths
 from .arguments import add_options, values_in_range
-from .memory_limit import check_memory_limit
 from .outputs import check_outputs, confine
 from .signals import interrupted
 from .terminal import ProgressLine, print_message

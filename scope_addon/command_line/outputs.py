@@ -261,7 +261,7 @@ def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -
         )
     ]
     load_blender()
-    from ..scene.rigs.rig_file import check_rig
+    from ..scene.rig_file import check_rig
     from .bounded_import import bounded_import
 
     written = [*outputs, *filter(None, (getattr(args, "overlay", None),))]
@@ -312,7 +312,7 @@ def write_outputs(
             separate=args.file_per_person, bvh_unit=args.bvh_unit, skeleton=args.skeleton
         )
         if rigs:
-            from ..scene.rigs.rig_export import RigExportOptions, export_on_rig
+            from ..scene.rig_export import RigExportOptions, export_on_rig
 
             rig_options = RigExportOptions(options, args.retarget_root, separate)
             shares = [scene_files] if len(rigs) == 1 else [[path] for path in scene_files]

@@ -36,6 +36,21 @@ class Clip:
         """Return some of the keys, by their indices, a mask (T,) or a slice."""
         return Clip(self.times[which], self.rotations[which], self.root[which])
 
+    def parts(
+        self, body: Body, betas: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the orientations (T, K+1, 3, 3) and origins (T, K+1, 3) of the body's parts,
+        metres, world frame; a part's origin is its joint.
+
+        :param betas: (P,) shape coefficients.
+        """
+        pelvis_at_rest = body.rest_joints(betas)[0]
+        return body.forward_kinematics(self.rotations, self.root - pelvis_at_rest, betas)
+
+    def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return the joints (T, K+1, 3), as of `parts`."""
+        return self.parts(body, betas)[1]
+
     def soles(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return the contact points of the feet.
 
@@ -43,23 +58,9 @@ class Clip:
         :return: (T, 4, 3) left heel, left toe, right heel, right toe on the sole, metres, world
             frame.
         """
-        R, t = body.forward_kinematics(
-            self.rotations, self.root - body.rest_joints(betas)[0], betas
-        )
-        points: NDArray[np.float64] = contact_point_positions(
-            with_contact_points(body, betas), R, t
-        )[:, : len(SOLES)]
-        return points
-
-    def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
-        """Return the joint positions.
-
-        :param betas: (P,) shape coefficients.
-        :return: (T, K+1, 3) metres, world frame.
-        """
-        return body.forward_kinematics(
-            self.rotations, self.root - body.rest_joints(betas)[0], betas
-        )[1]
+        points = contact_point_positions(with_contact_points(body, betas), *self.parts(body, betas))
+        soles: NDArray[np.float64] = points[:, : len(SOLES)]
+        return soles
 
 
 def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:

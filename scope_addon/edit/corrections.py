@@ -147,7 +147,7 @@ class Interpolation:
 @dataclass(frozen=True)
 class FeetOnFloor:
     """Feet in contact are put on the floor of the world that the upright line has turned; see
-    `edit.floor.refloor`.
+    `edit.edits.refloor`.
     """
 
     # Whether the soles in contact are levelled too, by turning the motion without the camera.

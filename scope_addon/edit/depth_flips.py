@@ -132,9 +132,7 @@ def _mirrored_limb(
     :param upper: whether to mirror the first bone too.
     """
     first, second, end = limb
-    R, joints = body.forward_kinematics(
-        clip.rotations, clip.root - body.rest_joints(betas)[0], betas
-    )
+    R, joints = clip.parts(body, betas)
     start, middle, last = (joints[:, joint] - centers for joint in limb)
     side = body.joint_names[first].partition("_")[0]
     is_leg = body.joint_names[first].endswith("hip")

@@ -4,7 +4,8 @@
 They change what was captured, in whatever smoothing. Feet that stand and pins are measurements and
 are applied to the result, so that they hold.
 
-A correction of the world moves everything, the camera too, by a rigid transform.
+A correction of the world moves everything, the camera too, by a rigid transform. One of them is
+the height of the floor under a foot of which the user says that it rests there.
 """
 
 from __future__ import annotations
@@ -17,9 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ...solver.rotations import exp, log
+from ...solver.rotations import exp, log, shortest_turn
+from ..errors import UsageError
+from ..kinematics.axes import UP
+from ..kinematics.foot_skin import FootSkin
+from ..kinematics.smoothing import gaussian_smooth
+from ..kinematics.standing import standing_probability
 from ..motion import Motion
-from .clip import Clip
+from .clip import Clip, sample
 from .corrections import (
     Correction,
     FeetOnFloor,
@@ -28,9 +34,14 @@ from .corrections import (
     floor_height,
     world_of,
 )
-from .floor import refloor
 from .solve_pins import Shot, keys_of_span
 from .spans import interpolate
+
+_MAX_TILT = np.radians(20.0)  # A steeper plane through the soles is not the floor.
+_MIN_SPREAD_M = 0.3  # Soles closer together do not show the slope of the floor.
+_LIFT_CUTOFF_HZ = 3.0
+LOWER = "lower"
+_PARTS = {LOWER: slice(0, 4), "left": slice(0, 2), "right": slice(2, 4)}
 
 
 def edited(
@@ -53,10 +64,9 @@ def edited(
         return out
     height = floor_above(corrections, feet)
     if world is None:
-        return on_floor(out, body, betas, feet, height)
-    return moved_clip(
-        on_floor(moved_clip(out, world), body, betas, feet, height), np.linalg.inv(world)
-    )
+        return refloor(out, body, betas, feet, height)
+    placed = refloor(moved_clip(out, world), body, betas, feet, height)
+    return moved_clip(placed, np.linalg.inv(world))
 
 
 def interpolated(
@@ -90,16 +100,6 @@ def floor_above(corrections: Iterable[Correction], feet: FeetOnFloor) -> float:
     have moved.
     """
     return feet.height - floor_height(corrections)
-
-
-def on_floor(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], feet: FeetOnFloor, height: float
-) -> Clip:
-    """Put the feet on a floor at a ``height`` z, metres, in the clip's world.
-
-    :param betas: (P,) shape coefficients.
-    """
-    return refloor(clip, body, betas, level=feet.level, lift=feet.lift, height=height)
 
 
 def moved_motion(motion: Motion, body: Body, transform: NDArray[np.float64]) -> Motion:
@@ -136,3 +136,85 @@ def _moved(
     new[:, :3] = log(transform[:3, :3] @ exp(poses[:, :3].astype(float)))
     pelvis = (rest + trans) @ transform[:3, :3].T + transform[:3, 3]
     return new, (pelvis - rest).astype(trans.dtype)
+
+
+def refloor(
+    clip: Clip,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    feet: FeetOnFloor,
+    height: float = 0.0,
+) -> Clip:
+    """Move the motion so that the feet in contact are on the floor.
+
+    With ``feet.level``, the whole motion is rotated about the mean contact point so that the soles
+    in contact lie in a horizontal plane, if they are spread widely enough to determine one. With
+    ``feet.lift``, frames whose feet penetrate the floor are raised, smoothly.
+
+    :param betas: (P,) shape coefficients.
+    :param height: z of the floor in the clip's world, metres.
+    """
+    soles = clip.soles(body, betas)
+    weight = standing_probability(soles, UP, clip.times)
+    out = clip.copy()
+    if feet.level:
+        turn, middle = _levelling(soles, weight)
+        out.rotations[:, 0] = turn @ out.rotations[:, 0]
+        out.root = (out.root - middle) @ turn.T + middle
+        soles = (soles - middle) @ turn.T + middle
+    standing = weight > 0.5
+    heights = soles[..., 2]
+    floor = (
+        float(np.median(heights[standing]))
+        if standing.any()
+        else float(np.median(heights.min(axis=1)))
+    )
+    out.root[:, 2] -= floor - height
+    if feet.lift:
+        below = np.maximum(0.0, floor - heights.min(axis=1))
+        smooth = gaussian_smooth(below, clip.times, _LIFT_CUTOFF_HZ)
+        out.root[:, 2] += np.maximum(smooth, below)
+    return out
+
+
+def _levelling(
+    soles: NDArray[np.float64], weight: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fit a plane to the soles in contact and return the rotation that levels it.
+
+    :param soles: (T, 4, 3) metres, world frame.
+    :param weight: (T, 4) standing probabilities.
+    :return: rotation (3, 3), and the point (3,) about which it rotates.
+    """
+    points = soles[weight > 0.5]
+    w = weight[weight > 0.5]
+    if len(points) < 3:
+        return np.eye(3), np.zeros(3)
+    middle = (w[:, None] * points).sum(0) / w.sum()
+    values, vectors = np.linalg.eigh(
+        (w[:, None] * (points - middle)).T @ (points - middle) / w.sum()
+    )
+    if np.sqrt(max(values[1], 0.0)) < _MIN_SPREAD_M / 2:
+        return np.eye(3), middle
+    normal = vectors[:, 0] * (1.0 if vectors[2, 0] > 0 else -1.0)
+    if np.arccos(np.clip(normal @ UP, -1.0, 1.0)) > _MAX_TILT:
+        return np.eye(3), middle
+    return shortest_turn(normal, UP), middle
+
+
+def foot_height(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: float, foot: str
+) -> float:
+    """Return the height in metres of the lowest skin of a foot at a time.
+
+    :param betas: (P,) shape coefficients.
+    :param time: seconds, on the clip's clock.
+    :param foot: "left", "right" or "lower", which is the lower one of the two.
+    :raises UsageError: the foot is none of these.
+    """
+    if foot not in _PARTS:
+        raise UsageError(f"the foot must be left, right or lower, not {foot!r}")
+    betas = np.asarray(betas, float)
+    at = sample(clip, np.array([time]))
+    heights = FootSkin(body, betas).heights(*at.parts(body, betas), UP)[0]
+    return float(heights[_PARTS[foot]].min())

@@ -32,7 +32,6 @@ from ..kinematics.contact_points import FOOT_PARTS
 from ..kinematics.standing import standing_probability
 from .clip import Clip, sample
 from .corrections import FEET, Contact, Pin
-from .fade import faded
 from .pose_refit import (
     FLOOR_M,
     HELD,
@@ -46,6 +45,7 @@ from .pose_refit import (
     pixel_of,
     within_reach,
 )
+from .spans import faded
 
 _CONTACT_REACH_S = 0.25
 _FLOOR_M = 0.12  # A foot that stands within this height of z = 0 is put on it.
@@ -524,7 +524,6 @@ def lowest_skin(
             if names[int(body.parents[part])] in found:
                 found.add(names[part])
     own = np.isin(body.strongest_joints, [names.index(name) for name in found])
-    pelvis_at_rest = body.rest_joints(betas)[0]
-    R, t = body.forward_kinematics(clip.rotations, clip.root - pelvis_at_rest, betas)
-    heights = [body.skin(*pose, betas)[own, 2].min() for pose in zip(R, t, strict=True)]
+    poses = zip(*clip.parts(body, betas), strict=True)
+    heights = [body.skin(*pose, betas)[own, 2].min() for pose in poses]
     return np.array(heights)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The axis conventions of SMPL, OpenCV, OpenSim and the world, in one place; those of Blender and
-glTF are in ``scene/axes.py``.
+"""The axis conventions of SMPL, glTF, OpenCV, OpenSim and the world, in one place; those of
+Blender's cameras are in ``scene/camera.py``.
 
 | frame  | right-handed axes                                   | used by                         |
 |--------|-----------------------------------------------------|---------------------------------|
 | camera | OpenCV: x right, y down, z forward                  | solver, joints_cam, intrinsics  |
 | world  | x right, z up, floor at z = 0                       | motion file, Blender scenes     |
-| model  | SMPL: y up, x to the person's left, person faces +z | rest pose of a body             |
+| model  | SMPL: y up, x to the person's left, person faces +z | rest pose of a body, .glb, .bvh |
 | opensim| x forward, y up, z to the right                      | .trc and .mot files             |
 
 ``R_a_b`` takes coordinates in frame b to coordinates in frame a: ``p_a = R_a_b @ p_b``.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face of the built-in bodies: expressions, teeth and tongue.
+"""The names of facial expressions, and the face of the built-in bodies: expressions, teeth and
+tongue.
 
 An expression moves vertices of the mesh at rest. Displacements add to the shape, v̄ + Σ_p β_p
 shapedirs_p + Σ_k w_k e_k: neither depends on the other.
@@ -27,10 +28,23 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.body_file import BUILT_IN
 from ...solver.errors import ModelFileError
-from ..expression_names import EXPRESSIONS
-from ..untrusted.body_arrays import Form, check_arrays, check_finite_array, check_index
+from ..untrusted.body_file import Form, check_arrays, check_finite_array, check_index
 from ..untrusted.files import read_npz
 
+# By the names of Apple's ARKit, which game engines know; left and right are the person's.
+EXPRESSIONS = (
+    "browDownLeft", "browDownRight", "browInnerUp", "browOuterUpLeft", "browOuterUpRight",
+    "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "eyeBlinkLeft", "eyeBlinkRight",
+    "eyeLookDownLeft", "eyeLookDownRight", "eyeLookInLeft", "eyeLookInRight", "eyeLookOutLeft",
+    "eyeLookOutRight", "eyeLookUpLeft", "eyeLookUpRight", "eyeSquintLeft", "eyeSquintRight",
+    "eyeWideLeft", "eyeWideRight", "jawForward", "jawLeft", "jawOpen", "jawRight", "mouthClose",
+    "mouthDimpleLeft", "mouthDimpleRight", "mouthFrownLeft", "mouthFrownRight", "mouthFunnel",
+    "mouthLeft", "mouthLowerDownLeft", "mouthLowerDownRight", "mouthPressLeft", "mouthPressRight",
+    "mouthPucker", "mouthRight", "mouthRollLower", "mouthRollUpper", "mouthShrugLower",
+    "mouthShrugUpper", "mouthSmileLeft", "mouthSmileRight", "mouthStretchLeft",
+    "mouthStretchRight", "mouthUpperUpLeft", "mouthUpperUpRight", "noseSneerLeft",
+    "noseSneerRight", "tongueOut",
+)  # fmt: skip
 FILE = Path(BUILT_IN["scope"]).with_name("expressions.npz")
 _FORMS: dict[str, Form] = {
     "names": ("text", (None,)),
@@ -71,7 +85,7 @@ class Expression:
 
 
 def expressions_of(body: Body) -> tuple[Expression, ...]:
-    """Return the body's expressions in the order of `expression_names.EXPRESSIONS`; none of a
+    """Return the body's expressions in the order of `EXPRESSIONS`; none of a
     user's own body.
 
     :raises ModelFileError: the file of the expressions is damaged.
@@ -146,9 +160,7 @@ class Mouth:
     face_material: NDArray[np.uint8]  # (F,) indices into material_names
     material_names: tuple[str, ...]
     material_colors: NDArray[np.float64]  # (C, 4) linear RGBA
-    moves: tuple[
-        Moves, ...
-    ]  # One for each expression, in the order of `expression_names.EXPRESSIONS`.
+    moves: tuple[Moves, ...]  # One for each expression, in the order of `EXPRESSIONS`.
 
 
 def with_teeth_and_tongue(body: Body) -> Body:
@@ -236,7 +248,7 @@ def read_face_file(path: Path, what: str, forms: Mapping[str, Form]) -> dict[str
 
 
 def moves_of(data: Mapping[str, NDArray[Any]], count: int, path: Path) -> tuple[Moves, ...]:
-    """Return what each expression moves, in the order of `expression_names.EXPRESSIONS`.
+    """Return what each expression moves, in the order of `EXPRESSIONS`.
 
     :param data: starts (53,), vertices (n,), moves (n, 3) and step_m, see `read_face_file`.
     :param count: number of vertices that it may move.

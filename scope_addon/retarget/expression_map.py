@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
-from ..expression_names import EXPRESSIONS
 from ..json_file import load_map, save_map
+from ..kinematics.face import EXPRESSIONS
 from .bone_map import is_name
 
 LARGEST_FACTOR = 10.0

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ...solver.rotations import exp
-from ..expression_names import EXPRESSIONS
+from ..kinematics.face import EXPRESSIONS
 from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "face" / "controls"

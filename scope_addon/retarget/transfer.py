@@ -105,12 +105,8 @@ class Transfer:
 
     def pose(self, clip: Clip) -> Pose:
         """Compute the rig's motion."""
-        body = self._body
-        betas = self._betas
         rig = self._rig
-        R, joints = body.forward_kinematics(
-            clip.rotations, clip.root - body.rest_joints(betas)[0], betas
-        )
+        R, joints = clip.parts(self._body, self._betas)
         turns = self._turns(R @ R_WORLD_MODEL.T)
         world = turns @ self._rested
         heads = head_positions(rig, world)

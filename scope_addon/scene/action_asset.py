@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..motion import Motion
 from ..review_spans import find_review_spans
-from .character.bone_display import SIDES, side_of
+from .character.armature import SIDES, side_of
 
 TAGS = ("mocap", "scope")
 CATALOGS_FILE = "blender_assets.cats.txt"

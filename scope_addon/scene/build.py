@@ -24,8 +24,8 @@ from ..notices import Notice, notice
 from . import camera, timing
 from .actions import Channels
 from .budget import check_content, check_last_frame
-from .character import animation, armature, body_mesh, bone_display, expression_keys, other_curves
-from .character.bone_display import remove_if_unused
+from .character import animation, armature, body_mesh, expression_keys, other_curves
+from .character.armature import remove_unused_ring
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
 from .character.root_object import ROOT_TAG
@@ -218,7 +218,7 @@ def _build_person(
     frames = timing.key_frames(motion.timestamps, rate, options.start_frame)
     check_last_frame(frames[-1])
     shaped = body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
-    bone_display.show_bones(rig, body, rest, shaped)
+    armature.show_bones(rig, body, rest, shaped)
     action = bpy.data.actions.new(label)
     # kept in the file when the armature gets another action or NLA strips
     action.use_fake_user = True
@@ -349,7 +349,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     while unused := [block for block in used if block.users == int(block.use_fake_user)]:
         used = [block for block in used if block not in unused]
         bpy.data.batch_remove(unused)
-    remove_if_unused()
+    remove_unused_ring()
 
 
 def _is_ours(obj: bpy.types.Object) -> bool:

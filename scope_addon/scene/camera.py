@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender camera with the view of the footage's camera, and the footage in the background.
 
+Blender's cameras have the axes x right, y up, and look along −z; see ``kinematics/axes.py`` for
+other conventions.
+
 OpenCV's pinhole ``u = fx x/z + cx, v = fy y/z + cy`` in a W × H picture is, with the horizontal
 sensor fit,
 
@@ -31,7 +34,6 @@ from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
 from ..notices import Notice, notice
 from .actions import Channels, fcurves_of
-from .axes import blender_brown_distortion, blender_camera_matrix
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
 from .stored_values import stored_numbers
 
@@ -43,6 +45,8 @@ _MAX_DURATION = 1_000_000  # frames; after this duration Blender would show the 
 _PICTURE = "scope_picture"
 _VIEW = "scope_view"  # custom property of a capture's further cameras: their number, from 0
 SENSOR_WIDTH = 36.0  # millimetres; only its ratio to the focal length matters
+# OpenCV camera axes in those of a Blender camera (which looks along its −z with y up).
+R_CAMERA_BLENDCAM = np.diag([1.0, -1.0, -1.0])
 
 
 def pixel_aspect(motion: Motion) -> tuple[float, float]:
@@ -443,3 +447,44 @@ def _set_lens_distortion(
     lens.brown_p1 = p1
     lens.brown_p2 = p2
     background.clip_user.use_render_undistorted = True
+
+
+def blender_camera_matrix(world_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert the pose of an OpenCV camera to that of a Blender camera object with the same view.
+
+    ``world_from_blendcam = world_from_camera · diag(R_camera_blendcam, 1)``.
+
+    :param world_from_camera: (..., 4, 4) OpenCV camera to world.
+    :return: (..., 4, 4) Blender camera to world.
+    """
+    camera_from_blendcam = np.eye(4)
+    camera_from_blendcam[:3, :3] = R_CAMERA_BLENDCAM
+    return np.asarray(world_from_camera) @ camera_from_blendcam
+
+
+def camera_pose(world_from_blendcam: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert the pose of a Blender camera object to that of the OpenCV camera with the same view.
+
+    :param world_from_blendcam: (..., 4, 4) Blender camera to world.
+    :return: (..., 4, 4) OpenCV camera to world.
+    """
+    # Half a turn about x is its own inverse.
+    return blender_camera_matrix(world_from_blendcam)
+
+
+def blender_brown_distortion(dist: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
+    """Convert OpenCV's (k1, k2, p1, p2, k3) to the coefficients k1, k2, k3, p1, p2 of Blender's
+    Brown model.
+
+    Both add a tangential term to (x, y)(1 + k1 r² + k2 r⁴ + k3 r⁶), in units of the focal length:
+
+        OpenCV, y down:    (2 p1 xy + p2 (r² + 2x²),  p1 (r² + 2y²) + 2 p2 xy)
+        Blender, y up:     (p1 (r² + 2x²) + 2 p2 xy,  p2 (r² + 2y²) + 2 p1 xy)
+
+    Therefore p1 and p2 are swapped, and the one that belongs to y changes its sign.
+    Source: OpenCV's camera calibration, libmv's ApplyBrownDistortionModel.
+
+    :param dist: (5,) of the footage's camera.
+    """
+    k1, k2, p1, p2, k3 = (float(c) for c in dist)
+    return k1, k2, k3, p2, -p1

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import matrix_from_quaternion
 from ..kinematics.axes import R_WORLD_MODEL
-from .character import armature, body_mesh, bone_display
+from .character import armature, body_mesh
 from .character.animation import quaternion_from_matrix, quaternion_product
 from .datablocks import KINDS, NewDatablocks, found, remove, scene_of
 
@@ -115,7 +115,7 @@ class LiveBody:
         """Remove everything that was created, also what redo has brought back."""
         remove(self._blocks)
         self._blocks = set()
-        bone_display.remove_if_unused()
+        armature.remove_unused_ring()
 
     def _create(self, betas: NDArray[np.float64]) -> tuple[bpy.types.Object, bpy.types.Object]:
         """Create the objects, in place of what is left of former ones.
@@ -135,13 +135,11 @@ class LiveBody:
         layer.objects.active = active or rig
         vertices = body_mesh.rest_vertices_world(body, rest.lift)
         mesh = body_mesh.build_mesh(f"{self._name}_body", body, vertices, collection)
-        bone_display.show_bones(
-            rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas)
-        )
+        armature.show_bones(rig, body, rest, body_mesh.rest_vertices_world(body, rest.lift, betas))
         if body.P:
             body_mesh.add_shape_keys(mesh, body, betas)
         body_mesh.skin_to_armature(mesh, rig, body)
-        ring = bpy.data.objects[bone_display.RING]  # which all captures share
+        ring = bpy.data.objects[armature.RING]  # which all captures share
         shared = {("objects", ring.session_uid), ("meshes", ring.data.session_uid)}
         # Former ones stay in it, since redo may bring them back.
         self._blocks |= {(kind, block.session_uid) for kind, block in new.all()} - shared

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The user's rig, posed as poses come: the retargeting of ``rigs/rig_retarget.py`` for one frame,
+"""The user's rig, posed as poses come: the retargeting of ``rig_retarget.py`` for one frame,
 without keys.
 
 What does not depend on the pose is measured once, by posing the rig at rest. IK controls of a
@@ -24,9 +24,9 @@ from ..retarget.skeleton import basis
 from ..retarget.transfer import Transfer
 from .character.root_object import parent_transform, topmost
 from .datablocks import found
-from .rigs.rig_action import root_locations
-from .rigs.rig_probe import SWITCHES, at_rest, probe
-from .rigs.rig_retarget import RetargetOptions, usable_map
+from .rig_action import root_locations
+from .rig_probe import SWITCHES, at_rest, probe
+from .rig_retarget import RetargetOptions, usable_map
 
 # The proportions are compared again for such a change of a shape coefficient, but not at every pose
 # while these settle.

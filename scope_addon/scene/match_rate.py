@@ -27,7 +27,7 @@ from .character.expression_keys import has_expression_keys
 from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
 from .datablocks import holds
-from .rigs.rig_action import is_retargeted, retime_written_keys, source_of
+from .rig_action import is_retargeted, retime_written_keys, source_of
 from .stored_values import FrameSpan, parse_spans, start_frame
 from .timing import Retiming, action_strips, retime_keys, retime_strip
 

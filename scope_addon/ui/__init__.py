@@ -8,6 +8,7 @@ are loaded at the first use, so that Blender starts as fast as without them.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import ExitStack
 
@@ -15,15 +16,17 @@ import bpy
 
 from . import (
     action_operators,
-    command,
+    capture_operators,
+    capture_panel,
+    captures,
     correction_operators,
     correction_panel,
     edit_panel,
     export_operators,
     file_field,
+    frame_rate_operators,
     handlers,
     import_operators,
-    keymap,
     live_operators,
     live_panel,
     live_properties,
@@ -37,8 +40,8 @@ from . import (
     view_operators,
     warm_up,
 )
-from .capture import capture_operators, capture_panel, captures, frame_rate_operators
 
+_command: object | None = None
 # Panels come last: they are drawn in this order, and those within another after it.
 _MODULES = (
     preferences,
@@ -90,18 +93,41 @@ def unregister() -> None:
             bpy.utils.unregister_class(cls)
 
 
+def run_command(argv: list[str]) -> int:
+    """Run the shell's command line inside Blender, with the arguments after ``blender --background
+    --command scope``; return the exit status. Blender calls this.
+    """
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(preferences.cache().kernels))
+    from ..cli import main
+
+    # A batch starts one Blender process per clip, because exports need Blender.
+    return int(main(argv, program=(bpy.app.binary_path, "--background", "--command", "scope")))
+
+
+def _add_command() -> None:
+    global _command
+    _command = bpy.utils.register_cli_command("scope", run_command)
+
+
+def _remove_command() -> None:
+    global _command
+    if _command is not None:
+        bpy.utils.unregister_cli_command(_command)
+    _command = None
+
+
 def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
     """Return what attaches things other than classes to Blender, and what detaches them."""
     return [
         (capture_panel.attach, capture_panel.detach),
         (retarget_panel.attach, retarget_panel.detach),
         (live_properties.attach, live_properties.detach),
-        (command.register, command.unregister),
+        (_add_command, _remove_command),
         (correction_panel.attach, correction_panel.detach),
         (handlers.attach, handlers.detach),
         (import_operators.attach, import_operators.detach),
         (menus.attach, menus.detach),
-        (keymap.attach, keymap.detach),
+        (preferences.attach, preferences.detach),
         (warm_up.attach, warm_up.detach),
         (translations.register, translations.unregister),
     ]

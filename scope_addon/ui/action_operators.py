@@ -13,8 +13,8 @@ from ..errors import UsageError
 from ..scene.datablocks import short_name
 from ..scene.stored_values import start_frame, stored_text
 from . import comparison
-from .capture.captures import show_again, shown_capture
 from .captured_person import PERSON, captured_armature, motion_of
+from .captures import show_again, shown_capture
 from .reporting import ReportingOperator, refuse, rpt_, tip_
 
 
@@ -161,7 +161,7 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     """Rename a capture, and its objects, their data and actions whose names begin with the
     capture's.
     """
-    from ..scene.rigs.rig_action import follow_renaming
+    from ..scene.rig_action import follow_renaming
 
     former = collection.name
     armatures = {

@@ -27,8 +27,8 @@ from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
 from ..scene.datablocks import holds
-from .capture.captures import captures_of
 from .captured_person import body_of, captured_armature
+from .captures import captures_of
 from .sidebar import viewport_at, viewports
 
 if TYPE_CHECKING:

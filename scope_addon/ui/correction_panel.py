@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.character.correction_list import listed_corrections
-from .capture.capture_panel import Tab
+from .capture_panel import Tab
 from .captured_person import captured_armature, has_captured_person
 from .pin_tool import is_running
 

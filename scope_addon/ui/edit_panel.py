@@ -20,8 +20,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 from ...solver.errors import ScopeError
 from ..scene.datablocks import holds
 from ..scene.stored_values import start_frame
-from .capture.capture_panel import Tab
-from .capture.captures import captures_of, people_of, shown_capture
+from .capture_panel import Tab
 from .captured_person import (
     EditOperator,
     SpanOperator,
@@ -34,6 +33,7 @@ from .captured_person import (
     motion_of,
     set_motion_of,
 )
+from .captures import captures_of, people_of, shown_capture
 from .correction_operators import (
     CorrectionOperator,
     CorrectSpanOperator,

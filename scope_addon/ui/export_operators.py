@@ -14,8 +14,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..errors import UsageError
 from ..options import Place
 from ..scene.datablocks import holds
-from .capture.captures import captures_of, people_of, shown_capture
 from .captured_person import PERSON, body_of, motion_of
+from .captures import captures_of, people_of, shown_capture
 from .comparison import cameras_of
 from .declared_properties import with_options
 from .file_field import SavingOperator, output_file
@@ -233,7 +233,7 @@ class SCOPE_OT_export(SavingOperator):
         :raises UsageError: no rig is chosen, or the format has none.
         """
         from ..scene.export.export import captures
-        from ..scene.rigs.rig_export import export_rig
+        from ..scene.rig_export import export_rig
 
         rig = scene.scope_retarget.rig
         if self.format in _OF_MOTION:

@@ -69,6 +69,6 @@ def _leave() -> None:
 
 @persistent
 def _unlink_rings(*_: object) -> None:
-    from ..scene.character.bone_display import unlink_rings
+    from ..scene.character.armature import unlink_rings
 
     unlink_rings()

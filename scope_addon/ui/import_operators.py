@@ -13,16 +13,16 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from ..errors import UsageError
 from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
-from .capture.captures import captures_of, hide_others
-from .capture.frame_rate_operators import rate_warnings
+from .captures import captures_of, hide_others
 from .declared_properties import blender_property
+from .frame_rate_operators import rate_warnings
 from .preferences import preferences
 from .reporting import ReportingOperator, iface_, rpt_, sentence
 from .view_operators import show_new_capture
 
 if TYPE_CHECKING:
+    from ..retarget.import_motions import Imported
     from ..scene.build import BuildOptions
-    from ..smpl_import.convert import Imported
 
 
 class SCOPE_OT_import_motion(ReportingOperator):
@@ -66,8 +66,8 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
         :raises UsageError: no file was chosen.
         """
+        from ..retarget.import_motions import import_motions
         from ..scene.transaction import all_or_nothing
-        from ..smpl_import.convert import import_motions
 
         body = self._body(context)
         paths = self._paths()
@@ -120,7 +120,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
     def _build_options(self, scene: bpy.types.Scene) -> BuildOptions:
         """Return the scene's options, but change the frame rate only on request."""
-        from .capture.capture_job import build_options
+        from .capture_job import build_options
 
         options = build_options(scene)
         rate = "resample" if scene.scope.frame_rate == "RESAMPLE" else "keep"
@@ -132,7 +132,7 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     from ..capture_report import Report
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
-    from .capture.result import show_result
+    from .capture_job import show_result
 
     motion = imported.motion
     footage = None

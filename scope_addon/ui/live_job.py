@@ -34,11 +34,11 @@ from ..options.body_choice import chosen_body
 from ..scene.datablocks import check_local, is_in_layer, scene_of
 from ..scene.live_body import LiveBody
 from ..scene.live_rig import LiveRig
-from ..scene.rigs.rig_retarget import usable_guess
+from ..scene.rig_retarget import usable_guess
 from ..scene.visibility import SceneBefore, hide, select_only
 from ..temporary import remove
 from ..untrusted.body_file import load_body
-from .capture.capture_job import build_capture, build_options, chosen_values, window_shows
+from .capture_job import build_capture, build_options, chosen_values, window_shows
 from .live_properties import with_login
 from .preferences import cache
 from .retarget_maps import listed_map

@@ -16,9 +16,9 @@ import bpy
 from ...solver.errors import ScopeError
 from ..errors import UsageError
 from . import live_properties, warm_up
-from .capture.capture_operators import nothing_runs
-from .capture.capture_panel import draw_text
-from .capture.job_operator import JobOperator
+from .capture_operators import nothing_runs
+from .capture_panel import draw_text
+from .job_operator import JobOperator
 from .live_properties import state, stop_job
 from .preferences import cache
 from .reporting import iface_, refuse, restore_libraries, sentence, tip_, warning_text

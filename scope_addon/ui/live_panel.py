@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from . import live_operators
-from .capture.capture_panel import Tab, draw_text
+from .capture_panel import Tab, draw_text
 from .file_field import draw_file
 from .live_properties import state
 from .preferences import cache

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The extension's preferences, and the folder of its files."""
+"""The extension's preferences, the folder of its files, and the keyboard shortcut of Compare with
+Footage in the 3D viewport, which the user can change in the preferences.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,6 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..options import Place
-from . import keymap
 from .declared_properties import with_options
 from .file_field import draw_file, path_text
 from .reporting import iface_, rpt_
@@ -29,6 +30,8 @@ _BODY_FILE = {
     "their own",
 }
 _measured: dict[Path, tuple[int, float]] = {}  # cache folder: bytes, and time of the measurement
+_SHORTCUT_OPERATOR = "scope.look_through"  # of the shortcut
+_shortcuts: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 @with_options(Place.PREFERENCES)
@@ -68,7 +71,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         draw_file(layout, self, "body_file")
         layout.prop(self, "cache_folder")
         layout.prop(self, "cache_limit_gb", text="Keep at Most (GB)")
-        keymap.draw(layout, context)
+        _draw_shortcut(layout, context)
         row = layout.row()
         row.alignment = "RIGHT"
         row.operator("scope.documentation", icon="HELP")
@@ -179,6 +182,35 @@ def _size_text(size: float) -> str:
             return f"{size:.0f} {unit}"
         size /= 1000
     return f"{size:.1f} GB"
+
+
+def attach() -> None:
+    """Add the shortcut; Blender without a window has no keymaps."""
+    keymaps = bpy.context.window_manager.keyconfigs.addon
+    if keymaps is None:
+        return
+    keymap = keymaps.keymaps.new(name="3D View", space_type="VIEW_3D")
+    item = keymap.keymap_items.new(_SHORTCUT_OPERATOR, "V", "PRESS", shift=True, alt=True)
+    _shortcuts.append((keymap, item))
+
+
+def detach() -> None:
+    """Remove the shortcut."""
+    for keymap, item in _shortcuts:
+        keymap.keymap_items.remove(item)
+    _shortcuts.clear()
+
+
+def _draw_shortcut(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the shortcut as the preferences' keymap editor does, where it can be changed."""
+    import rna_keymap_ui
+
+    keymaps = context.window_manager.keyconfigs.user
+    for keymap in [keymaps.keymaps.get(own.name) for own, _ in _shortcuts] if keymaps else ():
+        item = keymap.keymap_items.find_from_operator(_SHORTCUT_OPERATOR) if keymap else None
+        if item is not None:
+            layout.context_pointer_set("keymap", keymap)
+            rna_keymap_ui.draw_kmi([], keymaps, keymap, item, layout, 0)
 
 
 CLASSES = (SCOPE_OT_clear_cache, SCOPE_OT_documentation, SCOPE_AP_preferences)

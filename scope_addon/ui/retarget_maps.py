@@ -133,7 +133,7 @@ def guess_into_list(settings: bpy.types.PropertyGroup) -> None:
 
     :param settings: of retargeting, with a rig.
     """
-    from ..scene.rigs.rig_retarget import guess_bone_map
+    from ..scene.rig_retarget import guess_bone_map
 
     settings.pairs.clear()
     try:
@@ -175,7 +175,7 @@ def common_prefix(bones: list[str]) -> str:
 
 def bones_move(face: bpy.types.Object | None) -> bool:
     """Return whether a face is a rig whose bones move it, and Scope knows which."""
-    from ..scene.rigs.face_retarget import has_bone_face
+    from ..scene.face_retarget import has_bone_face
 
     return face is not None and "scope_source" not in face and has_bone_face(face)
 
@@ -198,8 +198,8 @@ def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
     """Return the rig if its bones move its face, and no shape keys of its meshes with names that
     are known.
     """
-    from ..scene.rigs.face_retarget import faces_of, only_bones_move
-    from ..scene.rigs.rig_file import with_meshes
+    from ..scene.face_retarget import faces_of, only_bones_move
+    from ..scene.rig_file import with_meshes
 
     if not bones_move(rig):
         return None
@@ -211,7 +211,7 @@ def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:
 def guessed_map(face: bpy.types.Object) -> ExpressionMap:
     """Return the map that the names of a face's shape keys or bones suggest."""
     from ..retarget.expression_map import guess_expression_map
-    from ..scene.rigs.face_retarget import guess_face_bones, key_names
+    from ..scene.face_retarget import guess_face_bones, key_names
 
     return guess_face_bones(face) if bones_move(face) else guess_expression_map(key_names([face]))
 

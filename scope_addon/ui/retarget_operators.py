@@ -30,7 +30,7 @@ from .retarget_maps import (
 
 if TYPE_CHECKING:
     from ..retarget.expression_map import ExpressionMap
-    from ..scene.rigs.rig_retarget import RetargetOptions, RetargetResult
+    from ..scene.rig_retarget import RetargetOptions, RetargetResult
 
 _SIDE_OFFSET_M = (1.5, 0.0, 0.0)  # to the left of a person who faces the front view
 
@@ -55,7 +55,7 @@ class SCOPE_OT_guess_bones(_RigOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Fill the list."""
-        from ..scene.rigs.rig_retarget import guess_bone_map, map_notices
+        from ..scene.rig_retarget import guess_bone_map, map_notices
 
         settings = context.scene.scope_retarget
         found = guess_bone_map(settings.rig)
@@ -136,7 +136,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
 
     :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
     """
-    from ..scene.rigs.rig_retarget import retarget, usable_guess
+    from ..scene.rig_retarget import retarget, usable_guess
     from ..scene.timing import scene_rate
     from ..scene.visibility import hide, show
 
@@ -182,7 +182,7 @@ def retarget_options(
 
     :param face: the expression map of the bones that move the rig's face, if any.
     """
-    from ..scene.rigs.rig_retarget import RetargetOptions
+    from ..scene.rig_retarget import RetargetOptions
 
     offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
     travel = settings.travel or None
@@ -330,7 +330,7 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         :raises UsageError: the person's face was not captured, or no shape key or control is
             mapped.
         """
-        from ..scene.rigs.face_retarget import (
+        from ..scene.face_retarget import (
             captured_expressions,
             retarget_expressions,
             retarget_face_bones,

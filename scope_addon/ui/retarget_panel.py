@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from .capture.capture_panel import Tab
+from .capture_panel import Tab
 from .captured_person import draw_active_person, has_captured_person
 from .retarget_maps import (
     SHAPE_KEY,
@@ -114,7 +114,7 @@ class SCOPE_UL_expression_pairs(bpy.types.UIList):
         """Draw one entry: expression, and shape key or control with its channel; see
         `SCOPE_UL_bone_pairs`.
         """
-        from ..expression_names import EXPRESSIONS
+        from ..kinematics.face import EXPRESSIONS
 
         known = _is_known(settings.face, item)
         split = layout.split(factor=0.5, align=True)
@@ -232,7 +232,7 @@ def offered_expressions(
     _pair: bpy.types.PropertyGroup | None, _context: bpy.types.Context, typed: str
 ) -> list[str]:
     """Return the expressions whose names contain what was typed so far, for Blender to suggest."""
-    from ..expression_names import EXPRESSIONS
+    from ..kinematics.face import EXPRESSIONS
 
     return [name for name in EXPRESSIONS if typed.lower() in name.lower()]
 

@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sample a clip between its keys and resample it to another rate.
 
-Remove keys within a bound on the error.
-
 Separate the root trajectory from a motion and combine them again.
 """
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit import reduce, root_motion
+from scope.scope_addon.edit import root_motion
 from scope.scope_addon.edit.clip import interpolate_rotations, resample, sample
 from scope.scope_addon.errors import UsageError
-from scope.solver.rotations import exp, matrix_from_quaternion, quaternion_from_matrix
+from scope.solver.rotations import exp
 
-from .walking import NAMES, angle, walk
+from .walking import angle, walk
 
 
 def test_sampling_meets_the_keys_and_goes_along_the_arc_between_them():
@@ -40,31 +38,6 @@ def test_baking_to_another_rate_keeps_the_motion_and_drops_what_the_rate_cannot_
     assert angle(resample(shaking, 24.0).rotations[2:-2, 3], np.eye(3)).max() < 0.06  # of 0.3
     with pytest.raises(UsageError, match="above zero"):
         resample(clip, 0.0)
-
-
-@pytest.mark.parametrize("degrees", [0.2, 1.0, 4.0])
-def test_reduced_keys_stay_within_the_bound(degrees):
-    clip = walk(4.0)
-    q = quaternion_from_matrix(clip.rotations[:, NAMES.index("left_hip")])
-    q *= np.where((q[:, :1] < 0), -1, 1)
-    keep = reduce.select_quaternion_keys(clip.times, q, np.radians(degrees))
-    assert len(keep) < len(q)
-    # Blender's interpolation, written again: every number linear, then normalized
-    rebuilt = np.stack(
-        [np.interp(clip.times, clip.times[keep], q[keep, k]) for k in range(4)], axis=1
-    )
-    rebuilt /= np.linalg.norm(rebuilt, axis=1, keepdims=True)
-    off = angle(matrix_from_quaternion(rebuilt), matrix_from_quaternion(q))
-    assert off.max() <= np.radians(degrees) * (1 + 1e-6)
-    still = np.tile([1.0, 0, 0, 0], (50, 1))
-    assert len(reduce.select_quaternion_keys(np.arange(50.0), still, 0.01)) == 2
-    keep = reduce.select_position_keys(clip.times, clip.root, 0.005)
-    rebuilt = np.stack(
-        [np.interp(clip.times, clip.times[keep], clip.root[keep, k]) for k in range(3)], axis=1
-    )
-    assert np.linalg.norm(rebuilt - clip.root, axis=1).max() <= 0.005
-    with pytest.raises(UsageError, match="above zero"):
-        reduce.select_position_keys(clip.times, clip.root, 0.0)
 
 
 def test_the_path_and_what_is_left_make_the_motion_again():

@@ -2,8 +2,9 @@
 """Place feet on the floor and level a tilted world."""
 
 import numpy as np
-from scope.scope_addon.edit import floor
 from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.edit.corrections import FeetOnFloor
+from scope.scope_addon.edit.edits import refloor
 from scope.solver.rotations import exp
 
 from .walking import ARMS_DOWN, BETAS, BODY, NAMES, walk
@@ -15,10 +16,11 @@ def test_feet_come_back_to_the_floor():
     stand.root[:, 2] = 0.95
     stand.root[:, 2] -= stand.soles(BODY, BETAS)[0, :, 2].min()
     floating = Clip(stand.times, stand.rotations, stand.root + [0, 0, 0.17])
-    np.testing.assert_allclose(floor.refloor(floating, BODY, BETAS).root, stand.root, atol=1e-3)
+    lowered = refloor(floating, BODY, BETAS, FeetOnFloor())
+    np.testing.assert_allclose(lowered.root, stand.root, atol=1e-3)
     sunk = Clip(stand.times, stand.rotations, stand.root.copy())
     sunk.root[25:32, 2] -= 0.08
-    mended = floor.refloor(sunk, BODY, BETAS)
+    mended = refloor(sunk, BODY, BETAS, FeetOnFloor())
     assert mended.soles(BODY, BETAS)[..., 2].min() > -1e-6
     assert np.abs(np.diff(mended.root[:, 2], 2)).max() < 0.08
 
@@ -30,10 +32,10 @@ def test_a_sloping_world_is_levelled():
     tilt = exp([0.1, 0.05, 0.0])
     tilted = Clip(clip.times, clip.rotations.copy(), clip.root @ tilt.T)
     tilted.rotations[:, 0] = tilt @ tilted.rotations[:, 0]
-    level = floor.refloor(tilted, BODY, BETAS, level=True)
+    level = refloor(tilted, BODY, BETAS, FeetOnFloor(level=True))
     up = level.rotations[:, 0] @ np.swapaxes(clip.rotations[:, 0], 1, 2)
     assert np.degrees(np.arccos(np.clip(up[:, 2, 2], -1, 1))).max() < 1.5
     spot = walk(2.0, speed=0.0)  # standing on one spot says nothing of the floor's slope: no turn
     np.testing.assert_array_equal(
-        floor.refloor(spot, BODY, BETAS, level=True).rotations, spot.rotations
+        refloor(spot, BODY, BETAS, FeetOnFloor(level=True)).rotations, spot.rotations
     )

@@ -10,8 +10,7 @@ from scope.scope_addon.edit.corrected_motion import (
     with_corrections,
 )
 from scope.scope_addon.edit.corrections import Contact, Floor, Pin, Upright, added, world_of
-from scope.scope_addon.edit.edits import moved_clip, moved_motion
-from scope.scope_addon.edit.floor import LOWER, foot_height
+from scope.scope_addon.edit.edits import LOWER, foot_height, moved_clip, moved_motion
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.kinematics.foot_skin import foot_heights

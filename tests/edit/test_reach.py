@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit.fade import faded
 from scope.scope_addon.edit.pose_refit import (
     SLACK_M,
     PoseRefit,
@@ -19,6 +18,7 @@ from scope.scope_addon.edit.pose_refit import (
     point_at_depth,
     within_reach,
 )
+from scope.scope_addon.edit.spans import faded
 
 from ..made_motion import level_camera
 from .walking import BETAS, BODY, NAMES, walk

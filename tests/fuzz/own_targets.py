@@ -15,7 +15,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 
 BATCH_NAME = "walk"
 KEY = "key"

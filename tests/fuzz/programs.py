@@ -105,8 +105,7 @@ def _register() -> None:
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     scope.register()
-    from scope.scope_addon.ui import live_job
-    from scope.scope_addon.ui.capture import capture_job
+    from scope.scope_addon.ui import capture_job, live_job
 
     def compiled(kind: Any, request: Any, folder: Path, _: object, *rest: Any) -> Any:
         return kind(request, folder, None, *rest)

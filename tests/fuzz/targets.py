@@ -80,7 +80,7 @@ def _load_motion(path: Path) -> None:
 
 
 def _import_smpl_motion(path: Path) -> None:
-    from scope.scope_addon.smpl_import.convert import import_motions
+    from scope.scope_addon.retarget.import_motions import import_motions
 
     import_motions(path)
 

@@ -26,7 +26,7 @@ REMOVES = {
 }
 WRITES = {
     # in the folder that Blender removes with its session
-    "scope_addon/ui/capture/scene_camera.py",
+    "scope_addon/ui/scene_camera.py",
     # folders
     "scope_addon/temporary.py",
     "scope_addon/machine_code/code_cache.py",

@@ -36,7 +36,7 @@ from scope.scope_addon.edit.corrections import (
     Pin,
     Upright,
 )
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, VIEW_KEYS, Motion
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.scene.export.output_paths import check_output

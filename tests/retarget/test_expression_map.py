@@ -10,7 +10,7 @@ import json
 import numpy as np
 import pytest
 from scope.scope_addon.errors import OutputError
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import (
     ExpressionMap,
     guess_expression_map,

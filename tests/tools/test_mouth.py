@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.solver.body_file import BUILT_IN
 from scope.tools.build_body.geometry.mouth import build_mouth
 from scope.tools.build_body.source import fetch_wheel

@@ -19,8 +19,14 @@ from scope.scope_addon import ui
 from scope.scope_addon.job.process import WorkerProcess
 from scope.scope_addon.machine_code import code_folders
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.ui import live_operators, pin_tool, preferences, translations
-from scope.scope_addon.ui.capture import capture_job, capture_operators
+from scope.scope_addon.ui import (
+    capture_job,
+    capture_operators,
+    live_operators,
+    pin_tool,
+    preferences,
+    translations,
+)
 from scope.solver import body_file
 from scope.solver.body import Body
 from scope.solver.body_file import load_body
@@ -124,7 +130,7 @@ def fake_worker(tmp_path, monkeypatch, standing):
     The script may use ``folder``, ``request``, ``send(event, **values)`` and ``finish()``, which
     sends ``standing``.
     """
-    from scope.scope_addon.ui.capture import capture_job
+    from scope.scope_addon.ui import capture_job
 
     standing.save(tmp_path / "standing.npz")
 

@@ -17,8 +17,8 @@ from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.match_rate import retimed_spans
 from scope.scope_addon.scene.stored_values import parse_spans, spans_text
 from scope.scope_addon.scene.timing import keyed_rate
-from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for
 from scope.scope_addon.ui.captured_person import captured_armature
+from scope.scope_addon.ui.frame_rate_operators import keyed_for
 
 from ..edit.walking import NAMES, motion_of, walk
 from ..scene import made_rigs

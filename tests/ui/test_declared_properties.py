@@ -15,8 +15,8 @@ from scope.scope_addon import options as declarations
 from scope.scope_addon.options import OPTIONS, Option, Place, Property, Section, option, options_at
 from scope.scope_addon.scene.character.body_mesh import MODES
 from scope.scope_addon.scene.timing import RATE_POLICIES
-from scope.scope_addon.ui.capture import capture_panel
-from scope.scope_addon.ui.capture.capture_job import capture_request
+from scope.scope_addon.ui import capture_panel
+from scope.scope_addon.ui.capture_job import capture_request
 from scope.scope_addon.ui.declared_properties import (
     choices_of,
     draw_section,

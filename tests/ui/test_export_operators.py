@@ -12,7 +12,7 @@ from scope.scope_addon.capture_report import Report
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.build import BuildOptions
 from scope.scope_addon.scene.visibility import hide
-from scope.scope_addon.ui.capture.capture_job import build_capture
+from scope.scope_addon.ui.capture_job import build_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
 from scope.scope_addon.ui.live_job import live_rig
 from scope.solver.body_file import load_body

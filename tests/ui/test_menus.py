@@ -11,9 +11,8 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 import scope
-from scope.scope_addon.ui import export_operators, keymap, menus, preferences
-from scope.scope_addon.ui.capture import capture_panel
-from scope.scope_addon.ui.capture.capture_panel import SCOPE_OT_add_capture_preset
+from scope.scope_addon.ui import capture_panel, export_operators, menus, preferences
+from scope.scope_addon.ui.capture_panel import SCOPE_OT_add_capture_preset
 
 ROOT = Path(scope.__file__).resolve().parent
 
@@ -61,7 +60,7 @@ def test_the_shortcut_exists_only_while_enabled():
     scope.unregister()
     try:
         assert own() == []
-        assert keymap._added == []
+        assert preferences._shortcuts == []
     finally:
         scope.register()
 
@@ -87,8 +86,9 @@ def test_the_documentation_is_a_file_that_comes_with_scope(monkeypatch, tmp_path
     monkeypatch.setattr(preferences, "__file__", str(module))
     assert preferences.guide() == tmp_path / "docs" / "guide.html"
     opened = MagicMock()
-    monkeypatch.setattr(preferences, "bpy", SimpleNamespace(ops=SimpleNamespace(wm=opened)))
-    assert preferences.SCOPE_OT_documentation.execute(None, None) == {"FINISHED"}
+    with monkeypatch.context() as patch:
+        patch.setattr(preferences, "bpy", SimpleNamespace(ops=SimpleNamespace(wm=opened)))
+        assert preferences.SCOPE_OT_documentation.execute(None, None) == {"FINISHED"}
     opened.url_open.assert_called_once_with(url=(tmp_path / "docs" / "guide.html").as_uri())
 
 

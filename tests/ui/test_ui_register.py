@@ -124,10 +124,10 @@ def test_every_operator_and_setting_has_a_tooltip():
 
 
 def test_the_command_runs_the_command_line(monkeypatch, capsys):
-    from scope.scope_addon.ui import command
+    from scope.scope_addon import ui
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
     # the command sets it for its process; restored after the test
     monkeypatch.delenv("NUMBA_CACHE_DIR")
-    assert command.run(["capture", "/nowhere/at/all.mp4", "-o", "/nowhere/a.npz"]) != 0
+    assert ui.run_command(["capture", "/nowhere/at/all.mp4", "-o", "/nowhere/a.npz"]) != 0
     assert "nowhere" in capsys.readouterr().err

@@ -19,7 +19,7 @@ from ...scope_addon.capture.tracking.expression_fit import (
     error_size,
     view_terms,
 )
-from ...scope_addon.expression_names import EXPRESSIONS
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from .observe import SeenFaces
 
 TOGETHER = (  # what both eyes do, as people's do and as the network sees it

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.expression_names import EXPRESSIONS
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, TURNED, ExpressionMap, load_expression_map
 
 Channel = tuple[str, str]  # control, and how it moves

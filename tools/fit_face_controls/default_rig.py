@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.expression_names import EXPRESSIONS
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, TURNED
 from ...scope_addon.retarget.face_controls import RestBone, measure_face
 from ...solver.rotations import exp

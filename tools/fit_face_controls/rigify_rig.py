@@ -13,7 +13,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...scope_addon.errors import SetupError
-from ...scope_addon.expression_names import EXPRESSIONS
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from ...scope_addon.retarget.expression_map import MOVED, ExpressionMap
 from ...scope_addon.retarget.face_controls import FaceFrame, RestBone, control_motions, measure_face
 from .amounts import Amounts, Problem, eye_amounts, free_of, jacobian, share_shown

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.errors import SetupError
-from ...scope_addon.expression_names import EXPRESSIONS
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from ..build_body.geometry.expressions import FOLDER
 from ..build_body.source import DATA, parse_target, read_obj
 

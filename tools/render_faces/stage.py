@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.scene.axes import blender_camera_matrix
+from ...scope_addon.scene.camera import blender_camera_matrix
 from ...solver.body import Body
 from ..render_sample.stage import render_to, set_up_rendering
 from .looks import Look

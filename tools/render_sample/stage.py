@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.scene.axes import blender_camera_matrix
+from ...scope_addon.scene.camera import blender_camera_matrix
 from ...solver.body import Body
 
 LAMPS = {  # name: position (metres, world), power in watts, side in metres

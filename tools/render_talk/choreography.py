@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.expression_names import EXPRESSIONS
 from ...scope_addon.kinematics.axes import R_WORLD_MODEL
+from ...scope_addon.kinematics.face import EXPRESSIONS
 from ...solver.body import Body
 from ...solver.rotations import exp
 from ..render_faces.sequences import GRIMACES, INDEX, VISEMES, add_pose, with_gaze

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Float64Array, FloatArray
+from ...arrays import Float64Array, FloatArray, round_number
 from ...errors import UsageError
 from ...footage_view import AS_IN_FILE, FootageView
-from ...rounding import round_number
 from .calibration import Calibration, read_calibration
 from .given_path import read_camera_path
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from ....solver import Body, Keypoints2D, Keypoints3D, Measurements, OrientationField, PosePriors
 from ....solver.measurements import SIGMA_3D
-from ...arrays import Float64Array, FloatArray
-from ...rounding import round_array
+from ...arrays import Float64Array, FloatArray, round_array
 from ..perception.landmark_network import KEYPOINT_NAMES
 from .weights import WEIGHTS
 

@@ -11,10 +11,9 @@ import numpy as np
 
 from ....solver import Body, Floor, Measurements, Priors, View, Weights, default_priors
 from ....solver.body_file import CHILD_BELOW_M
-from ...arrays import Float64Array, FloatArray, IndexArray
+from ...arrays import Float64Array, FloatArray, IndexArray, round_array
 from ...kinematics.body_surface import with_arm_points
 from ...kinematics.contact_points import CONTACT_POINTS, with_contact_points
-from ...rounding import round_array
 from ..camera.intrinsics import Camera
 from ..perception.lifter import Lifted, default_lifter, windows_around
 from ..tracking.expression_fit import across_head, certainty

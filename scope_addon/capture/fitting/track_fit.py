@@ -18,8 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....solver import ClipFit, Fit, State, fit_clip
-from ...arrays import FloatArray, IndexArray
-from ...rounding import round_array
+from ...arrays import FloatArray, IndexArray, round_array
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
 from .outline import fit_shape_to_outline, usable_masks
 from .prepared_track import PreparedTrack, Stance

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from ...arrays import Float64Array, FloatArray, Uint8Array
-from ...expression_names import EXPRESSIONS
+from ...kinematics.face import EXPRESSIONS
 from .landmark_network import KEYPOINT_NAMES
 from .region import Region, box_along
 from .sessions import Execution, network_path, open_session

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Float64Array, FloatArray
-from ...expression_names import EXPRESSIONS
+from ...kinematics.face import EXPRESSIONS
 from .face_landmarks import EXPRESSION_POINTS, FACE_POINTS, FaceEstimate
 
 # Landmarks that are kept: the outline of the face, brows, eyes, irises, nose and lips.

@@ -28,10 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.errors import ModelFileError, ShapeError
-from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray
+from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray, round_array
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
-from ...rounding import round_array
 from .sessions import open_session
 
 LIFTER_FILE = Path(__file__).resolve().parents[3] / "assets" / "lifter" / "lifter.onnx"

@@ -16,8 +16,7 @@ from typing import cast
 import cv2
 import numpy as np
 
-from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array
-from ...rounding import round_number
+from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array, round_number
 from .letterbox import halved
 
 MARGIN = 1.25  # side of the square over the body circle's diameter

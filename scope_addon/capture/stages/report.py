@@ -19,7 +19,7 @@ from ...kinematics.sequences import runs
 from ...motion import Motion
 from ...notices import Notice, Value, notice
 from ...options.capture import ON
-from ...plausibility import has_bent_knees, implausible
+from ...review_spans import has_bent_knees, implausible
 from ..media.video import Video
 from ..options import CaptureOptions
 from ..world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
@@ -113,7 +113,7 @@ def capture_warnings(
 
 
 def _plausibility_warnings(name: str, person: int, motion: Motion) -> list[Notice]:
-    """List when a person does what nobody can do; see `plausibility`."""
+    """List when a person does what nobody can do; see `review_spans`."""
     warnings = []
     for reason, frames in implausible(motion).items():
         begins = np.flatnonzero(np.diff(np.concatenate([[0], frames.astype(int)])) == 1)

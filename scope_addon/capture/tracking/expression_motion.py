@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import BoolArray, Float64Array, FloatArray
-from ...expression_names import EXPRESSIONS
+from ...kinematics.face import EXPRESSIONS
 from ...kinematics.smoothing import gaussian_smooth
 from ...motion import FACE_KEYS
 from ..perception.face_record import CONTOURS, eye_light_of, parts

@@ -25,8 +25,7 @@ from ....solver.body import Body
 from ...edit.clip import Clip, sample
 from ...edit.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
 from ...edit.corrections import Correction, FeetOnFloor, Interpolation, Pin, feet_on_floor, world_of
-from ...edit.edits import edited, floor_above, interpolated, moved_clip, on_floor
-from ...edit.floor import foot_height
+from ...edit.edits import edited, floor_above, foot_height, interpolated, moved_clip, refloor
 from ...edit.root_motion import relative_to_trajectory, with_trajectory
 from ...edit.smooth import smoothed
 from ...edit.solve_pins import Shot, missed, resolve
@@ -448,7 +447,7 @@ def floored(
     clip, frames = keys
     positions, angles = removed_root_motion(armature, frames)
     path = positions * [1.0, 1.0, 0.0], angles
-    placed = on_floor(with_trajectory(clip, *path), body, betas, feet, height)
+    placed = refloor(with_trajectory(clip, *path), body, betas, feet, height)
     return relative_to_trajectory(placed, *path)
 
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ...expression_names import EXPRESSIONS
 from ...kinematics.axes import R_WORLD_MODEL
-from ...kinematics.face import expressions_of, mouth_faces_of
+from ...kinematics.face import EXPRESSIONS, expressions_of, mouth_faces_of
 from ...motion import Motion
 from ..actions import Channels, fcurves, read_keys, shape_key_path
 from ..timing import whole_frames_of

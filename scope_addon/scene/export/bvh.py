@@ -15,10 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..axes import R_GLTF_WORLD
+from ...kinematics.axes import R_WORLD_MODEL
 
 # the format states no unit; most tools expect centimetres
 UNITS_PER_METRE = {"cm": 100.0, "m": 1.0}
+# The axes of the file are those of glTF and SMPL: y up, the model faces +z.
+R_FILE_WORLD = R_WORLD_MODEL.T
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ def _joint_lines(children: list[list[int]], pose: SampledPose, i: int, depth: in
     """Return the lines of a joint and its descendants."""
     pad = "\t" * depth
     parent = pose.parents[i]
-    offset = np.zeros(3) if parent < 0 else R_GLTF_WORLD @ (pose.heads[i] - pose.heads[parent])
+    offset = np.zeros(3) if parent < 0 else R_FILE_WORLD @ (pose.heads[i] - pose.heads[parent])
     position = "6 Xposition Yposition Zposition" if parent < 0 else "3"
     lines = [f"{pad}{'ROOT' if parent < 0 else 'JOINT'} {pose.names[i]}", f"{pad}{{"]
     lines += [
@@ -93,7 +95,7 @@ def _joint_lines(children: list[list[int]], pose: SampledPose, i: int, depth: in
     for child in children[i]:
         lines += _joint_lines(children, pose, child, depth + 1)
     if not children[i]:
-        end = R_GLTF_WORLD @ (pose.tails[i] - pose.heads[i])
+        end = R_FILE_WORLD @ (pose.tails[i] - pose.heads[i])
         lines += [f"{pad}\tEnd Site", f"{pad}\t{{", f"{pad}\t\tOFFSET {_triple(end)}", f"{pad}\t}}"]
     return [*lines, f"{pad}}}"]
 
@@ -106,13 +108,13 @@ def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
     """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles
     in degrees.
     """
-    turned = R_GLTF_WORLD @ pose.rotations @ R_GLTF_WORLD.T
+    turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
     parents = np.array(pose.parents)
     local = turned.copy()
     child = parents >= 0
     local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
     angles = euler_zyx_degrees(local)
-    positions = pose.joints @ R_GLTF_WORLD.T
+    positions = pose.joints @ R_FILE_WORLD.T
     columns = [
         part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))
     ]

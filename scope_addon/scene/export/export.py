@@ -29,7 +29,7 @@ from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
 from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, build_scene
-from ..character.bone_display import remove_if_unused
+from ..character.armature import remove_unused_ring
 from ..packed_motion import motion_texts, pack_motion
 from . import formats
 from .bone_names import OWN, SKELETONS, bone_names
@@ -246,7 +246,7 @@ def _remove(result: BuildResult) -> None:
     texts = motion_texts(objects)
     bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials, *texts])
     bpy.data.batch_remove([footage for footage in shown if footage.users == 0])
-    remove_if_unused()
+    remove_unused_ring()
 
 
 def _write(path: Path, writer: Callable[[Path], None]) -> None:

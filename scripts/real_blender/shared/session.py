@@ -89,7 +89,7 @@ def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[floa
 
 def addon():
     """Return the extension's module of operators, to inspect the job."""
-    module = ".scope_addon.ui.capture.capture_operators"
+    module = ".scope_addon.ui.capture_operators"
     name = next(n for n in sys.modules if n.endswith(module))
     return sys.modules[name]
 

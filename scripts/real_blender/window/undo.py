@@ -213,7 +213,7 @@ def failing() -> Iterator[float]:
     """Let a correction fail after it has changed keys, and then undo what came before, which must
     not crash.
     """
-    package = addon().__name__.removesuffix(".ui.capture.capture_operators")
+    package = addon().__name__.removesuffix(".ui.capture_operators")
     names = "scene.character.corrected_keys", "errors"
     keys, errors = (import_module(f"{package}.{name}") for name in names)
 

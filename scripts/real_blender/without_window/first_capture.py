@@ -31,7 +31,7 @@ def capture() -> tuple[float, dict[str, float]]:
     """Capture the sample as the panel does; return how many seconds it took, in all and by
     stage.
     """
-    job_class = import_module(f"{NAME}.scope_addon.ui.capture.capture_job").CaptureJob
+    job_class = import_module(f"{NAME}.scope_addon.ui.capture_job").CaptureJob
     bpy.ops.scope.use_sample()
     since = last = time.monotonic()
     stages: dict[str, float] = {}

@@ -47,7 +47,7 @@ bpy.ops.wm.save_userpref()
 CAPTURE = """
 bpy.ops.scope.use_sample()
 bpy.context.scene.scope.quality = "FAST"
-job = import_module(name + ".scope_addon.ui.capture.capture_job").CaptureJob(bpy.context.scene)
+job = import_module(name + ".scope_addon.ui.capture_job").CaptureJob(bpy.context.scene)
 while job.step():
     time.sleep(0.05)
 assert any(item.type == "ARMATURE" for item in bpy.data.objects)

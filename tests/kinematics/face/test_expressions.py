@@ -9,8 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.expression_names import EXPRESSIONS
-from scope.scope_addon.kinematics.face import Expression, expressions_of, mouth_faces_of
+from scope.scope_addon.kinematics.face import (
+    EXPRESSIONS,
+    Expression,
+    expressions_of,
+    mouth_faces_of,
+)
 from scope.solver.body_file import load_body
 
 MIRROR = np.array([-1.0, 1.0, 1.0])

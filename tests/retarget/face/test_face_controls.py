@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.retarget.face_controls import (
     RestBone,

@@ -13,8 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.expression_names import EXPRESSIONS
-from scope.scope_addon.kinematics.face import expressions_of
+from scope.scope_addon.kinematics.face import EXPRESSIONS, expressions_of
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.scope_addon.scene.character.body_mesh import mixed_vertices

@@ -3,11 +3,11 @@
 
 import bpy
 import numpy as np
+from scope.scope_addon.retarget.import_motions import import_motions
 from scope.scope_addon.scene.export.export import export_motions
-from scope.scope_addon.smpl_import.convert import import_motions
 from scope.solver.rotations import exp
 
-from ...smpl_import.made_bvh import FRAMES, TOOLS, assert_is_the_motion, bvh, joints_of
+from ...retarget.made_bvh import FRAMES, TOOLS, assert_is_the_motion, bvh, joints_of
 
 
 def test_blenders_own_exporter(tmp_path):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
-from scope.scope_addon.scene.rigs.rig_export import export_rig
+from scope.scope_addon.scene.rig_export import export_rig
 
 from ...required import package
 from ..exported import glb_json, read_back

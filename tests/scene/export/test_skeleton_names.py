@@ -10,7 +10,7 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, export
-from scope.scope_addon.scene.rigs.rig_retarget import guess_bone_map
+from scope.scope_addon.scene.rig_retarget import guess_bone_map
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
 from ..made_rigs import seen, truth

@@ -12,7 +12,7 @@ from mathutils import Matrix
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene import live_rig
 from scope.scope_addon.scene.live_rig import LiveRig
-from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.scope_addon.scene.visibility import SceneBefore
 from scope.solver.rotations import exp, quaternion_from_matrix
 

@@ -18,9 +18,9 @@ from scope.benchmarks.rigs.measured import measured
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
-from scope.scope_addon.scene.rigs.rig_file import load_rig, rig_bone_map
-from scope.scope_addon.scene.rigs.rig_retarget import retarget, usable_guess
+from scope.scope_addon.scene.rig_export import RigExportOptions, export_on_rig
+from scope.scope_addon.scene.rig_file import load_rig, rig_bone_map
+from scope.scope_addon.scene.rig_retarget import retarget, usable_guess
 from scope.solver.errors import InputError
 
 from ...edit.walking import BETAS, BODY, NAMES, RATE, motion_of, walk

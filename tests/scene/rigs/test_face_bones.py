@@ -11,11 +11,10 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
-from scope.scope_addon.scene import actions
-from scope.scope_addon.scene.rigs import face_retarget
-from scope.scope_addon.scene.rigs.face_retarget import (
+from scope.scope_addon.scene import actions, face_retarget
+from scope.scope_addon.scene.face_retarget import (
     CapturedExpressions,
     guess_face_bones,
     has_bone_face,

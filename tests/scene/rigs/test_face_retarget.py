@@ -9,19 +9,18 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.retarget.rig_source import RigSource
-from scope.scope_addon.scene import actions
+from scope.scope_addon.scene import actions, face_retarget
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rigs import face_retarget
-from scope.scope_addon.scene.rigs.face_retarget import (
+from scope.scope_addon.scene.face_retarget import (
     captured_expressions,
     faces_of,
     retarget_expressions,
 )
-from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig
+from scope.scope_addon.scene.rig_export import RigExportOptions, export_on_rig
 
 from ...edit.walking import motion_of, walk
 from ...made_motion import made_face

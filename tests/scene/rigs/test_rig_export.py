@@ -19,9 +19,9 @@ from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions
-from scope.scope_addon.scene.rigs.rig_export import RigExportOptions, export_on_rig, export_rig
-from scope.scope_addon.scene.rigs.rig_file import check_rig
-from scope.scope_addon.scene.rigs.rig_retarget import guess_bone_map, retarget
+from scope.scope_addon.scene.rig_export import RigExportOptions, export_on_rig, export_rig
+from scope.scope_addon.scene.rig_file import check_rig
+from scope.scope_addon.scene.rig_retarget import guess_bone_map, retarget
 from scope.solver.errors import InputError
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk

@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.rigs.rig_probe import at_rest, probe
+from scope.scope_addon.scene.rig_probe import at_rest, probe
 from scope.solver.errors import InputError
 
 HEADS = {  # of bones that point up by 0.2 m

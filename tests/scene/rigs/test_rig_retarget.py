@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.bone_map import BoneMap
-from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.solver.errors import InputError
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
@@ -256,7 +256,7 @@ def test_a_failure_leaves_the_rig_unchanged(source, monkeypatch, step):
     def fail(*args, **keywords):
         raise MemoryError
 
-    monkeypatch.setattr(f"scope.scope_addon.scene.rigs.{step}", fail)
+    monkeypatch.setattr(f"scope.scope_addon.scene.{step}", fail)
     with pytest.raises(MemoryError):
         run(source, rig)
     assert bone["IK_FK"] == 0.25

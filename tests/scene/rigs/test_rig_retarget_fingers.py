@@ -8,7 +8,7 @@ from mathutils import Matrix, Vector
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.scene.actions import bone_path, fcurves
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 

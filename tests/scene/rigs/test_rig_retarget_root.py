@@ -14,7 +14,7 @@ from scope.scope_addon.scene.character.root_object import (
     move_root_motion_to_object,
     root_object,
 )
-from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
 from ...edit.walking import BODY, RATE, motion_of, walk
 from ..made_rigs import FBX, build_rig, captured, seen

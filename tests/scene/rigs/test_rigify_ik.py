@@ -6,7 +6,7 @@ by Blender.
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.rigs.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ..made_rigs import captured

@@ -17,11 +17,9 @@ from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.packed_motion import stored_motion
-from scope.scope_addon.ui.capture import capture_job
-from scope.scope_addon.ui.capture.capture_job import CaptureJob, capture_request
-from scope.scope_addon.ui.capture.capture_operators import (
-    state,
-)
+from scope.scope_addon.ui import capture_job
+from scope.scope_addon.ui.capture_job import CaptureJob, capture_request
+from scope.scope_addon.ui.capture_operators import state
 from scope.scope_addon.ui.comparison import cameras_of
 from scope.scope_addon.ui.preferences import cache
 from scope.solver.body_file import load_body

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from scope.scope_addon.ui.capture import capture_operators
-from scope.scope_addon.ui.capture.capture_job import CaptureJob
-from scope.scope_addon.ui.capture.capture_operators import (
+from scope.scope_addon.ui import capture_operators
+from scope.scope_addon.ui.capture_job import CaptureJob
+from scope.scope_addon.ui.capture_operators import (
     SAMPLE,
     SCOPE_OT_cancel,
     SCOPE_OT_capture,
@@ -20,8 +20,8 @@ from scope.scope_addon.ui.capture.capture_operators import (
     end_capture,
     state,
 )
-from scope.scope_addon.ui.capture.captures import captures_of
-from scope.scope_addon.ui.capture.job_operator import JobOperator
+from scope.scope_addon.ui.captures import captures_of
+from scope.scope_addon.ui.job_operator import JobOperator
 
 
 def window_with_sidebar(category="Scope", width=200):

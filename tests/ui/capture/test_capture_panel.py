@@ -10,8 +10,8 @@ from scope.scope_addon.job.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.footage_strip import start_of, strips_of
 from scope.scope_addon.scene.stored_values import parse_spans
-from scope.scope_addon.ui.capture import capture_job
-from scope.scope_addon.ui.capture.capture_operators import end_capture, state
+from scope.scope_addon.ui import capture_job
+from scope.scope_addon.ui.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
 
 from ...job.processes import wait_for
@@ -338,8 +338,8 @@ def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):
 
 
 def test_the_preview_is_shown_during_a_capture(fake_worker, footage):
-    from scope.scope_addon.ui.capture import preview_picture
-    from scope.scope_addon.ui.capture.capture_job import CaptureJob
+    from scope.scope_addon.ui import preview_picture
+    from scope.scope_addon.ui.capture_job import CaptureJob
 
     fake_worker(
         "open(folder + '/preview.rgba', 'wb').write(bytes(range(24)))\n"

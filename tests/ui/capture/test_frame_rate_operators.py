@@ -12,8 +12,8 @@ from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import pack_motion
-from scope.scope_addon.ui.capture.frame_rate_operators import keyed_for, rate_warnings
-from scope.scope_addon.ui.capture.result import show_result
+from scope.scope_addon.ui.capture_job import show_result
+from scope.scope_addon.ui.frame_rate_operators import keyed_for, rate_warnings
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
 from ...scene.made_rigs import build_rig

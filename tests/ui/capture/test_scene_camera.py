@@ -10,7 +10,7 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.capture.camera.given_path import read_camera_path
-from scope.scope_addon.ui.capture.capture_job import capture_request
+from scope.scope_addon.ui.capture_job import capture_request
 
 POINTS = [(0.3, 5.0, 1.0), (-1.2, 7.0, 2.5), (0.0, 4.0, -0.5)]
 LAST = 12

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.character.root_object import root_object
-from scope.scope_addon.scene.rigs.face_retarget import captured_expressions
+from scope.scope_addon.scene.face_retarget import captured_expressions
 
 from ...edit.walking import NAMES, motion_of, walk
 from ...made_motion import made_face

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from scope.scope_addon.ui.capture.capture_operators import SAMPLE
+from scope.scope_addon.ui.capture_operators import SAMPLE
 from scope.scope_addon.ui.file_field import FOOTAGE, SCOPE_OT_choose_file, draw_file, present
 
 SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from scope.scope_addon.ui.capture.capture_operators import state as capture_state
+from scope.scope_addon.ui.capture_operators import state as capture_state
 from scope.scope_addon.ui.live_operators import end_live
 from scope.scope_addon.ui.live_panel import SCOPE_PT_live, _speed
 from scope.scope_addon.ui.live_properties import state

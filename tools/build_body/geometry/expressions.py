@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....scope_addon.errors import SetupError
-from ....scope_addon.expression_names import EXPRESSIONS
+from ....scope_addon.kinematics.face import EXPRESSIONS
 from ..source import parse_target
 from .mesh import Mesh, split_quads
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ....scope_addon.expression_names import EXPRESSIONS
+from ....scope_addon.kinematics.face import EXPRESSIONS
 from ..build import ShapedMesh, rest_joints
 from ..joints import make_skeleton
 from ..source import SourceMesh, parse_target

@@ -27,7 +27,7 @@ from scope.scope_addon.capture.perception.face_landmarks import (
 )
 from scope.scope_addon.capture.perception.face_record import gaze, head_axes
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.solver.rotations import exp
 
 

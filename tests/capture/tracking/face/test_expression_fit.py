@@ -30,7 +30,7 @@ from scope.scope_addon.capture.tracking.expression_fit import (
     view_terms,
     with_expressions,
 )
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.solver.body_file import load_body
 from scope.solver.errors import ModelFileError
 from scope.solver.rotations import exp

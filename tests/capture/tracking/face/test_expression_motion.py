@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.face_record import RECORD
 from scope.scope_addon.capture.tracking.expression_motion import RELEASE_S, expression_motion
-from scope.scope_addon.expression_names import EXPRESSIONS
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 
 JAW = EXPRESSIONS.index("jawOpen")
 BLINK = EXPRESSIONS.index("eyeBlinkLeft")

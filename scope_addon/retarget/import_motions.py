@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a motion of another tool in its file's axes to one of our bodies in the world, z up. Of an
+SMPL-style motion,
+
+R_world_root = R_world_file R_file_root,   pelvis_world = R_world_file (J_0(β) + trans)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.body_file import BUILT_IN
+from ...solver.rotations import exp, log
+from ..edit.clip import Clip
+from ..errors import MotionFileError, UsageError
+from ..kinematics.axes import R_WORLD_LEVELCAMERA, R_WORLD_MODEL, UP, transform_points
+from ..kinematics.contact_points import SOLES
+from ..kinematics.frame_blocks import by_blocks
+from ..kinematics.standing import standing_probability
+from ..motion import REQUIRED_KEYS, SIGMA_KEYS, Motion
+from ..notices import Notice, notice
+from ..untrusted.body_file import load_body
+from ..untrusted.bvh_file import read_bvh
+from ..untrusted.files import npz_keys
+from .performer import find_performers
+from .smpl_motion import HAND_JOINTS, SmplMotion, read_smpl_motions
+
+DEFAULT_RATE = 30.0  # frames per second
+# by the axis that points up
+R_WORLD_FILE = {"z": np.eye(3), "y": R_WORLD_MODEL, "camera": R_WORLD_LEVELCAMERA}
+_AXIS_TEXT = {"z": "z", "y": "y", "camera": "minus y, as in a camera's axes,"}
+_UPRIGHT = 0.5  # mean cosine of the trunk with an axis, above which people stand or sit along it
+_CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
+
+
+@dataclass(frozen=True)
+class Imported:
+    """An imported motion, the body that it is for, and what had to be assumed, in sentences."""
+
+    motion: Motion
+    body: Body
+    notes: list[Notice] = field(default_factory=list)
+
+
+def import_motions(
+    path: Path, body: str = "scope", up: str = "auto", rate: float = 0.0
+) -> list[Imported]:
+    """Read a motion file: our own, a BVH file, or an SMPL-style one of another tool, which may be
+    of several people, each on the same body.
+
+    :param body: ``scope``, the built-in body, with fingers if the motion has them; ``scope_h``; or
+        a body's file.
+    :param up: the axis that points up in the file: ``z``, ``y``, ``camera`` (minus y) or ``auto``.
+        Ours have z up.
+    :param rate: frames per second, for a file that does not say; 0 for ``DEFAULT_RATE``.
+    :raises MotionFileError: the file cannot be used.
+    :raises ModelFileError: the body's file cannot be used.
+    :raises UsageError: ``up`` or ``rate`` is invalid.
+    """
+    if up not in (*R_WORLD_FILE, "auto"):
+        raise UsageError(f"the up axis must be one of auto, {', '.join(R_WORLD_FILE)}, not '{up}'")
+    if not (np.isfinite(rate) and rate >= 0):
+        raise UsageError(f"the frame rate must be above zero, not {rate}")
+    if npz_keys(path) >= REQUIRED_KEYS:
+        own = Motion.load(path)
+        chosen = own.body_model if body == "scope" else body
+        if body != "scope" or chosen in BUILT_IN:
+            return [_own(own, load_body(chosen), path)]
+    if path.suffix.lower() == ".bvh":
+        return _from_bvh(path, body, up)
+    sources = read_smpl_motions(path)
+    built_in = (
+        sources[0].body_model
+        if sources[0].body_model in BUILT_IN
+        else "scope_h"
+        if any(source.has_fingers for source in sources)
+        else "scope"
+    )
+    loaded = load_body(built_in if body == "scope" else body)
+    return [convert(source, loaded, path, up, rate) for source in sources]
+
+
+def _own(motion: Motion, body: Body, path: Path) -> Imported:
+    motion.check_body(body, str(path))
+    for each in fields(motion):
+        value = getattr(motion, each.name)
+        if (
+            each.name not in SIGMA_KEYS
+            and isinstance(value, np.ndarray)
+            and value.dtype.kind == "f"
+            and not np.isfinite(value).all()
+        ):
+            raise MotionFileError(
+                f"{path}: {each.name} contains NaN or infinity; choose another file"
+            )
+    if not 0 < motion.mocap_framerate <= 10_000 or (np.diff(motion.timestamps) <= 0).any():
+        raise MotionFileError(
+            f"{path}: its frame rate or timestamps cannot be used; choose another file"
+        )
+    return Imported(motion, body)
+
+
+def _from_bvh(path: Path, body: str, up: str) -> list[Imported]:
+    """Put the people of a BVH file on a body; each stands on the floor."""
+    performers = find_performers(read_bvh(path, MotionFileError), path, up)
+    fingers = {*HAND_JOINTS["left"], *HAND_JOINTS["right"]}
+    has_fingers = any(fingers.intersection(each.parts.values()) for each in performers)
+    built_in = "scope_h" if has_fingers else "scope"
+    loaded = load_body(built_in if body == "scope" else body)
+    betas = np.zeros(loaded.P)
+    found = []
+    for performer in performers:
+        poses, root, notes = performer.on_body(loaded, path)
+        rate = performer.file.rate
+        contact, floor = _standing(loaded, betas, poses, root, np.arange(len(root)) / rate)
+        trans = root - [0.0, 0.0, floor] - loaded.rest_joints(betas)[0]
+        motion = _motion(loaded, betas, poses, trans, contact, rate)
+        motion.source = path.name
+        found.append(Imported(motion, loaded, notes))
+    return found
+
+
+def convert(
+    source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: float = 0.0
+) -> Imported:
+    """Convert an SMPL-style motion to a motion of a body.
+
+    :param path: names the motion.
+    """
+    exact = body.name in ("smpl", "smplh", "smplx", "star") or source.body_model == body.name
+    notes: list[Notice] = []
+    betas = np.zeros(body.P)
+    if exact:
+        count = min(body.P, source.betas.size)
+        betas[:count] = source.betas[:count]
+        if source.gender != body.gender:
+            notes.append(
+                notice(
+                    "other_gender",
+                    gender=source.gender,
+                    body=body.name,
+                    body_gender=body.gender,
+                )
+            )
+    else:
+        notes.append(notice("other_body"))
+    poses, missing = _for_body(source, body)
+    if missing:
+        notes.append(notice("parts_left_out", body=body.name, parts=missing))
+    frames_per_second = source.rate or rate or DEFAULT_RATE
+    if source.rate is None and not rate:
+        notes.append(notice("rate_not_stated", rate=DEFAULT_RATE))
+    if source.trans is None:
+        notes.append(notice("no_translation"))
+    trans = np.zeros((len(source), 3)) if source.trans is None else source.trans
+    axis, sure = (up, True) if up != "auto" else _up_axis(poses, body, source.usual_up)
+    if not sure:
+        notes.append(notice("unsure_up", axis=_AXIS_TEXT[axis]))
+    R = R_WORLD_FILE[axis]
+    J0 = body.rest_joints(betas)[0]
+    poses[:, 0] = log(R @ exp(poses[:, 0]))
+    root = (J0 + trans) @ R.T
+    times = np.arange(len(poses)) / frames_per_second
+    contact, floor = _standing(body, betas, poses, root, times)
+    if not exact or axis != "z":
+        root[:, 2] -= floor
+    if axis != "z":
+        notes.append(notice("other_up", axis=_AXIS_TEXT[axis]))
+    motion = _motion(body, betas, poses, root - J0, contact, frames_per_second)
+    motion.gender = source.gender
+    motion.source = path.name
+    return Imported(motion, body, notes)
+
+
+def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]:
+    """Return the axis-angle vectors of the body's joints, (T, K+1, 3), and what the body lacks of
+    the source.
+    """
+    poses = np.zeros((len(source), body.K + 1, 3))
+    names: Sequence[str] = body.joint_names
+    for i, name in enumerate(source.joint_names):
+        if name in names:
+            poses[:, names.index(name)] = source.poses[:, i]
+    lacks = [
+        ("fingers", source.has_fingers and "left_index1" not in names),
+        ("face", source.has_face and "jaw" not in names),
+    ]
+    return poses, " or ".join(what for what, is_lacking in lacks if is_lacking)
+
+
+def _up_axis(poses: NDArray[np.float64], body: Body, usual: str) -> tuple[str, bool]:
+    """Return the axis along which the trunk points on average and True; the usual axis and False if
+    there is none.
+    """
+    J = body.rest_joints()
+    trunk = J[body.joint_names.index("neck")] - J[0]
+    trunk_file = (exp(poses[:, 0]) @ (trunk / np.linalg.norm(trunk))).mean(axis=0)
+    along = {axis: float((R @ trunk_file)[2]) for axis, R in R_WORLD_FILE.items()}
+    best = max(along, key=lambda axis: along[axis])
+    return (best, True) if along[best] > _UPRIGHT else (usual, False)
+
+
+def _standing(
+    body: Body,
+    betas: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    root: NDArray[np.float64],
+    times: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], float]:
+    """Return the (T, 4) probability that each sole point is in contact, and the height of the floor
+    that follows.
+    """
+    (soles,) = by_blocks(
+        lambda p, r: (Clip(np.zeros(len(p)), exp(p), r).soles(body, betas),), poses, root
+    )
+    weight = standing_probability(soles, UP, times)
+    heights = soles[..., 2]
+    standing = weight > 0.5
+    return weight, float(np.median(heights[standing] if standing.any() else heights.min(axis=1)))
+
+
+def _motion(
+    body: Body,
+    betas: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    trans: NDArray[np.float64],
+    contact: NDArray[np.float64],
+    rate: float,
+) -> Motion:
+    """Fill a motion. It was not seen by a camera: there are no keypoints, and the image has no
+    size.
+    """
+    count = len(poses)
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, :3] = R_WORLD_LEVELCAMERA
+    world_from_camera[1, 3] = trans[:, 1].min() - _CAMERA_DISTANCE_M
+    camera_from_world = np.linalg.inv(world_from_camera)
+
+    def joints(p: NDArray[Any], t: NDArray[Any]) -> tuple[NDArray[Any]]:
+        world = body.forward_kinematics(exp(p), t, betas)[1]
+        return (transform_points(camera_from_world, world).astype(np.float32),)
+
+    flat = poses.reshape(count, -1)
+    return Motion(
+        poses=flat,
+        trans=trans,
+        poses_raw=flat,
+        trans_raw=trans,
+        betas=betas,
+        body_model=body.name,
+        gender=body.gender,
+        mocap_framerate=rate,
+        frames=np.arange(count),
+        timestamps=np.arange(count) / rate,
+        valid=np.ones(count, bool),
+        joints_cam=by_blocks(joints, poses, trans)[0],
+        keypoints2d=np.zeros((count, 0, 3)),
+        keypoints2d_names=np.zeros(0, "<U1"),
+        intrinsics=np.eye(3),
+        dist=np.zeros(5),
+        joint_confidence=np.ones((count, body.K + 1)),
+        world_from_camera=np.tile(world_from_camera, (count, 1, 1)),
+        foot_contact=contact[:, : len(SOLES)],
+        residual_px=np.zeros(count),
+        image_size=np.zeros(2, int),
+    )

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The action of a retargeted rig: writing its keys, and retiring the action that it replaces."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ...solver.rotations import quaternion_from_matrix
+from ..retarget.skeleton import Skeleton
+from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
+from .character.animation import on_one_hemisphere
+from .stored_values import stored_text
+from .timing import Retiming, retime_keys
+
+# Custom properties of an action: the checksum of its keys when they were written, and the captured
+# armature's name.
+_CHECKSUM = "scope_keys"
+_SOURCE = "scope_keys_of"
+# channels of a bone beside its rotation, and their values at rest
+_OFFSETS = {"location": 0.0, "scale": 1.0}
+
+
+@dataclass(frozen=True)
+class BoneKeys:
+    """The channels of one bone, T frames."""
+
+    bone: str
+    rotations: NDArray[np.float64]  # (T, 3, 3) relative to parent and rest pose
+    # (T, 3) in the axes of the location channel; None: not keyed
+    locations: NDArray[np.float64] | None = None
+
+    def basis(self, t: int) -> Matrix:
+        """Return the bone's ``matrix_basis`` of one frame."""
+        matrix = Matrix(self.rotations[t].tolist()).to_4x4()
+        if self.locations is not None:
+            matrix.translation = self.locations[t].tolist()
+        return matrix
+
+
+def root_locations(
+    rig: bpy.types.Object,
+    place: NDArray[np.float64],
+    skeleton: Skeleton,
+    root: int,
+    heads: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the location channel (T, 3) of the root bone.
+
+    :param place: (4, 4) the rig's object to world at rest.
+    :param root: index of the root bone.
+    :param heads: (T, 3) positions of the root bone's head, metres, in the world at rest.
+    """
+    world = place[:3, :3]
+    moved: NDArray[np.float64] = (heads - skeleton.heads[root]) @ np.linalg.inv(world).T
+    bone = rig.pose.bones[skeleton.names[root]].bone
+    # not by the bone's axes in the world, which a scale of three factors shears
+    if bone.use_local_location:
+        moved = moved @ np.array(bone.matrix_local.to_3x3(), float)
+    return moved
+
+
+def write_action(
+    rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64], source: str
+) -> bpy.types.Action:
+    """Create a new action with the keys, in the rotation mode of each bone.
+
+    Where the NLA moves or scales one of the bones, a key keeps it in place and in size.
+
+    :param frames: (T,) scene frames.
+    :param source: name of the captured armature.
+    """
+    action = bpy.data.actions.new(rig.name)
+    channels = Channels(rig, action)
+    for key in keys:
+        path, values = channel_of_rotation(rig.pose.bones[key.bone].rotation_mode, key.rotations)
+        channels.write(bone_path(key.bone, path), frames, values, group=key.bone)
+    for key in keys:
+        if key.locations is not None:
+            channels.write(bone_path(key.bone, "location"), frames, key.locations, group=key.bone)
+    below = {
+        curve.data_path
+        for strip in nla_strips(rig)
+        if strip.action
+        for curve in fcurves_of(strip.action)
+    }
+    for key in keys:
+        for channel, value in _OFFSETS.items():
+            if (path := bone_path(key.bone, channel)) in below and (
+                channel != "location" or key.locations is None
+            ):
+                channels.write(path, frames[:1], np.full((1, 3), value), "CONSTANT", group=key.bone)
+    mark_written(action, source)
+    return action
+
+
+def mark_written(action: bpy.types.Action, source: str = "") -> None:
+    """Remember the keys that retargeting has written, to tell later whether they were edited.
+
+    :param source: name of the captured armature whose motion they are; empty: as before.
+    """
+    action[_CHECKSUM] = _checksum(action)
+    if source:
+        action[_SOURCE] = source
+
+
+def follow_renaming(names: dict[str, str]) -> None:
+    """Remember the new names of captured armatures, by their former ones, with the actions that
+    have their motion.
+    """
+    for action in bpy.data.actions:
+        if action.library is None and (name := names.get(source_of(action))):
+            action[_SOURCE] = name
+
+
+def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
+    """Undo what the pose moves and scales bones by; retargeting only turns them, and measured them
+    without it.
+
+    Cannot fail.
+    """
+    for name in bones:
+        for channel, value in _OFFSETS.items():
+            setattr(rig.pose.bones[name], channel, (value,) * 3)
+
+
+def leave_tweak_mode(animated: bpy.types.ID) -> None:
+    """Leave the NLA's Tweak Mode, in which no action can be assigned."""
+    if animated.animation_data and animated.animation_data.use_tweak_mode:
+        animated.animation_data.use_tweak_mode = False
+
+
+def override_nla(animation: bpy.types.AnimData) -> None:
+    """Make the active action replace the NLA tracks below it for its bones, whatever the former
+    action's blending.
+    """
+    animation.action_blend_type = "REPLACE"
+    animation.action_influence = 1.0
+    for track in animation.nla_tracks:
+        track.is_solo = False  # a solo track would silence the action
+
+
+def retire(former: bpy.types.Action | None, source: str) -> None:
+    """Keep the rig's former action in the file, unless it is an earlier retargeting that was not
+    edited.
+
+    :param source: name of the captured armature whose motion the rig has now; that of another one
+        is kept.
+    """
+    if former is None:
+        return
+    is_same = former.get(_SOURCE, source) == source
+    if is_same and former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
+        bpy.data.actions.remove(former)
+    else:
+        former.use_fake_user = True
+
+
+def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
+    """Move the keys of a retargeted action; it counts as edited only if it was."""
+    unedited = action.get(_CHECKSUM) == _checksum(action)
+    retime_keys(action, retiming)
+    if unedited:
+        mark_written(action)
+
+
+def is_retargeted(action: bpy.types.Action) -> bool:
+    """Return whether retargeting has written the action."""
+    return _CHECKSUM in action
+
+
+def source_of(action: bpy.types.Action) -> str:
+    """Return the name of the captured armature whose motion retargeting has written to the action;
+    empty if unknown.
+    """
+    return stored_text(action, _SOURCE)
+
+
+def _checksum(action: bpy.types.Action) -> str:
+    """Return a checksum of the keys, to detect edits."""
+    found = hashlib.sha256()
+    for curve in fcurves_of(action):
+        found.update(f"{curve.data_path}[{curve.array_index}] {len(curve.modifiers)}".encode())
+        found.update(read_keys(curve).tobytes())
+    return found.hexdigest()
+
+
+def channel_of_rotation(mode: str, R: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
+    """Return the data path and the values (T, n) of rotations (T, 3, 3) in a bone's rotation
+    mode.
+    """
+    if mode == "QUATERNION":
+        return "rotation_quaternion", on_one_hemisphere(quaternion_from_matrix(R))
+    if mode == "AXIS_ANGLE":
+        q = on_one_hemisphere(quaternion_from_matrix(R))
+        size = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+        axis = np.where(size > 1e-9, q[:, 1:] / np.maximum(size, 1e-9), [0.0, 1.0, 0.0])
+        return "rotation_axis_angle", np.concatenate([2 * np.arctan2(size, q[:, :1]), axis], axis=1)
+    values = np.empty((len(R), 3))
+    before = None
+    for t, matrix in enumerate(R):
+        euler = (
+            Matrix(matrix.tolist()).to_euler(mode, before)
+            if before
+            else Matrix(matrix.tolist()).to_euler(mode)
+        )
+        values[t] = euler
+        before = euler
+    return "rotation_euler", values

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Loading the user's rig from a .blend, .fbx or glTF file: one armature and the meshes that it
+deforms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+from mathutils import Matrix
+
+from ...solver.errors import InputError
+from ..errors import UsageError
+from ..retarget.bone_map import PHALANGES, BoneMap, check_bone_count
+from ..retarget.guess import from_humanoid
+from ..retarget.rig_source import RigSource
+from .datablocks import NewDatablocks
+from .export import formats
+from .export.export_states import temporary_scene
+from .rig_probe import at_rest, probe
+from .rig_retarget import usable_guess
+
+# Kinds of datablock that a file or a capture may contain, users before the datablocks that they
+# use. Scenes are removed by ``temporary_scene``.
+_KINDS = (
+    "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs",
+    "lattices", "actions",
+    "materials", "node_groups", "textures", "images", "movieclips", "texts", "worlds", "libraries",
+)  # fmt: skip
+
+
+def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
+    """Load the rig into ``collection`` of the active scene, without animation; return its armature.
+
+    :raises InputError: when the file cannot be read, has no armature, or one of too many bones.
+    :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
+    """
+    path = source.path
+    unit = 1.0  # Importers convert to metres.
+    if path.suffix.lower() == ".blend":
+        loaded, unit = _append(path)
+    else:
+        loaded = _import(path)
+    rig = _choose(path, [obj for obj in loaded if obj.type == "ARMATURE"], source.armature)
+    check_bone_count(str(path), len(rig.data.bones))
+    _check_finite(path, rig)
+    keep = with_meshes(rig, loaded)
+    for obj in loaded:
+        for other in obj.users_collection:
+            other.objects.unlink(obj)
+    rig.data.pose_position = "POSE"
+    for obj in keep:
+        if obj.parent is None:
+            obj.matrix_basis = Matrix.Scale(unit, 4) @ obj.matrix_basis
+        collection.objects.link(obj)
+        obj.hide_viewport = obj.hide_render = False
+        _remove_animation(obj)
+    bpy.context.view_layer.update()
+    return rig
+
+
+def _check_finite(path: Path, rig: bpy.types.Object) -> None:
+    matrices = [rig.matrix_world, *(bone.matrix_local for bone in rig.data.bones)]
+    if not all(math.isfinite(value) for matrix in matrices for row in matrix for value in row):
+        raise InputError(
+            f"{path}: bones of '{rig.name}' have positions that are not numbers; "
+            "export the rig again"
+        )
+
+
+def with_meshes(
+    rig: bpy.types.Object, objects: Iterable[bpy.types.Object]
+) -> list[bpy.types.Object]:
+    """Return the rig, those of the objects that are meshes deformed by it, and the parents of
+    these.
+    """
+    widgets = {bone.custom_shape for bone in rig.pose.bones}
+    keep = [
+        rig,
+        *(
+            obj
+            for obj in objects
+            if obj.type == "MESH" and obj not in widgets and _moved_by(obj, rig)
+        ),
+    ]
+    for obj in keep:
+        while obj.parent is not None and obj.parent not in keep:
+            keep.append(obj.parent)
+            obj = obj.parent
+    return keep
+
+
+def check_rig(source: RigSource, *, fingers: bool = True) -> list[Path]:
+    """Check, before a capture, that a motion can be retargeted to the rig.
+
+    :param fingers: whether the motion will include fingers; otherwise, those of the rig are not
+        checked.
+    :return: the existing files that the rig's file refers to, such as its textures.
+    :raises InputError: when the rig cannot be loaded, or its bones cannot be mapped or rotated.
+    :raises UsageError: when the choice of armature is ambiguous, or none has the given name.
+    """
+    with temporary_datablocks(), temporary_scene("Checking a rig") as scene:
+        rig = load_rig(source, scene.collection)
+        bones = rig_bone_map(source, rig)
+        moved = {
+            b: part
+            for b, part in bones.parts.items()
+            if fingers or part.partition("_")[2] not in PHALANGES
+        }
+        with at_rest(rig):
+            probe(rig, moved)
+        return _files_referred_to()
+
+
+def _files_referred_to() -> list[Path]:
+    """Return the existing files of the session's images and libraries."""
+    files = []
+    for block in (*bpy.data.images, *bpy.data.libraries):
+        path = Path(bpy.path.abspath(block.filepath, library=block.library))
+        if path.is_file():
+            files.append(path)
+    return files
+
+
+def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
+    """Return the given bone map, or else guess one.
+
+    :raises InputError: when it does not match the rig, or a required part could not be guessed.
+    """
+    found = source.bone_map
+    if found is None and source.humanoid:
+        found = from_humanoid(source.humanoid, [bone.name for bone in rig.data.bones])
+    try:
+        if found is None or source.bone_map is None and not found.parts:
+            found = usable_guess(rig)
+        missing = [name for name in found.parts if name not in rig.data.bones]
+        if missing:
+            raise InputError(
+                f"the bone map's '{missing[0]}' is not a bone of '{rig.name}'; correct the map"
+            )
+        found.check()
+    except InputError as error:
+        advice = "" if source.bone_map else "; give a map with --bone-map"
+        raise InputError(f"{source.path}: {error}{advice}") from error
+    return found
+
+
+@contextmanager
+def temporary_datablocks() -> Iterator[None]:
+    """Remove all datablocks that the block has added to the file."""
+    new = NewDatablocks(_KINDS)
+    try:
+        yield
+    finally:
+        new.remove()
+
+
+def _append(path: Path) -> tuple[list[bpy.types.Object], float]:
+    """Return the objects of a .blend file, and the metres that a length of 1 stands for in it.
+
+    :raises InputError: when Blender cannot read the file.
+    """
+    try:
+        with formats.quiet(), bpy.data.libraries.load(str(path), link=False) as (there, here):
+            here.objects = list(there.objects)
+            here.scenes = list(there.scenes)
+    except (OSError, RuntimeError) as error:
+        raise InputError(
+            f"{path}: Blender cannot read this file; save it again or choose another"
+        ) from error
+    scenes = [scene for scene in here.scenes if scene is not None]
+    # A file has one unit as a rule; of several, none is known to be the rig's.
+    units = {scene.unit_settings.scale_length for scene in scenes}
+    for scene in scenes:
+        bpy.data.scenes.remove(scene)
+    unit = units.pop() if len(units) == 1 else 1.0
+    return [obj for obj in here.objects if obj is not None], unit
+
+
+def _import(path: Path) -> list[bpy.types.Object]:
+    before = {obj.session_uid for obj in bpy.data.objects}
+    try:
+        with formats.quiet():
+            if path.suffix.lower() == ".fbx":
+                formats.enable_addon("io_scene_fbx")
+                formats.call_operator(
+                    bpy.ops.import_scene.fbx,
+                    filepath=str(path),
+                    use_anim=False,
+                    ignore_leaf_bones=False,
+                )
+            else:
+                formats.enable_addon("io_scene_gltf2")
+                formats.call_operator(
+                    bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True
+                )
+    except Exception as error:  # importers written in Python raise any exception on a damaged file
+        raise InputError(
+            f"{path}: Blender cannot import this file; export it again or choose another"
+        ) from error
+    return [obj for obj in bpy.data.objects if obj.session_uid not in before]
+
+
+def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Object:
+    """Choose the armature of a file.
+
+    :param name: may be empty if there is only one.
+    :raises InputError: when there is none.
+    :raises UsageError: when there are several, or none has that name.
+    """
+    if not rigs:
+        raise InputError(
+            f"{path}: there is no armature in this file; choose the file that holds your rig"
+        )
+    rigs = sorted(rigs, key=lambda rig: rig.name)
+    names = ", ".join(f"'{rig.name}'" for rig in rigs)
+    if name:
+        for rig in rigs:
+            if rig.name == name:
+                return rig
+        raise UsageError(
+            f"{path} has no armature '{name}', only {names}; give one of them with --rig-object"
+        )
+    if len(rigs) > 1:
+        raise UsageError(
+            f"{path} has {len(rigs)} armatures, {names}; choose one with --rig-object NAME"
+        )
+    return rigs[0]
+
+
+def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
+    if any(m.type == "ARMATURE" and m.object == rig for m in obj.modifiers):
+        return True
+    while obj is not None and obj != rig:
+        obj = obj.parent
+    return obj is not None
+
+
+def _remove_animation(obj: bpy.types.Object) -> None:
+    """Remove action and NLA; drivers are kept."""
+    if obj.animation_data is None:
+        return
+    obj.animation_data.action = None
+    for track in list(obj.animation_data.nla_tracks):
+        obj.animation_data.nla_tracks.remove(track)

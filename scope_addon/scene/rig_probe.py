@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measuring how the bones of a rig move together, by posing the rig itself.
+
+Each mapped bone is rotated once, and the other bones are observed. Constraints, such as those of
+Rigify's controls, therefore need no special treatment, and no frame of an animation has to be
+evaluated.
+
+Its rest pose is read as well: its bones, and the skin that each of them moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Quaternion
+from numpy.typing import NDArray
+
+from ...solver.errors import InputError
+from ..notices import Notice, notice
+from ..retarget.bone_map import PHALANGES, check_bone_count
+from ..retarget.fingers import bone_ends
+from ..retarget.rest_pose import RestPose
+from ..retarget.skeleton import Skeleton
+from .character.root_object import root_object, topmost
+
+# Rigify's properties: limbs by FK, neck and head with the chest.
+SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+# of a head's position relative to its carrier, as a share of their distance
+_CARRIER_TOLERANCE = 0.02
+# change of a rotation matrix's entries; the probe changes them by more than 0.3
+_MIN_RESPONSE = 0.1
+_CHECKED_FRAMES = 5
+_MAX_DEVIATION = np.radians(20)
+# The part that carries each part of a limb; hips and shoulders move with the pelvis.
+_CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}
+# Of the lowest bone from the rig's origin, as a share of the rig's size.
+_MAX_LIFT = 0.17
+
+
+def probe(rig: bpy.types.Object, parts: dict[str, str]) -> Skeleton:
+    """Measure the mapped bones at rest and their dependencies; the rig must be ``at_rest``.
+
+    :param parts: bone name -> body part.
+    :raises InputError: when a bone does not rotate, the pelvis does not move, or the rig's scale is
+        0.
+    """
+    names = list(parts)
+    whole = rest_pose(rig, with_skin=True)
+    rest = _matrices(rig, names)
+    if min(map(abs, rig.matrix_world.to_scale())) < 1e-9:
+        raise InputError(
+            f"'{rig.name}' is scaled to 0; give it a size (S, or Scale in the sidebar)"
+        )
+    follows, carried = _dependencies(rig, parts, rest)
+    _check_root_moves(
+        rig, next((bone for bone, part in parts.items() if part == "pelvis"), names[0])
+    )
+    order: list[int] = []
+    while rows := [b for b in range(len(names)) if b not in order]:
+        above = {
+            b: sum(a not in order for a in np.flatnonzero(follows[b] | carried[b])) for b in rows
+        }
+        order.append(min(rows, key=above.__getitem__))
+    parents, carriers = (_nearest(above[np.ix_(order, order)]) for above in (follows, carried))
+    carriers = np.where(carriers < 0, parents, carriers)
+    ordered = [names[b] for b in order]
+    _check_carried(rig, ordered, carriers, parts)
+    matrices = rest[order]
+    return Skeleton(
+        ordered,
+        parents,
+        carriers,
+        matrices[:, :3, 3],
+        bone_ends(whole, ordered, parts),
+        _rotations(matrices),
+        _floor(rig, whole, parts),
+    )
+
+
+def _check_carried(
+    rig: bpy.types.Object, names: list[str], carriers: NDArray[np.intp], parts: dict[str, str]
+) -> None:
+    """Check that every limb moves as one piece with the pelvis; goals of IK, for example, do not.
+
+    :param carriers: (B,) the bone that each bone's head moves with, -1 for none.
+    :raises InputError: when a bone does not move with the one that should carry it.
+    """
+    bone_of = {parts[name]: index for index, name in enumerate(names)}
+    for part, bone in bone_of.items():
+        side, _, kind = part.partition("_")
+        above = f"{side}_{_CARRIED_BY[kind]}" if kind in _CARRIED_BY else "pelvis"
+        if kind not in (*_CARRIED_BY, "hip", "shoulder") or above not in bone_of:
+            continue
+        # Under a scale of three factors, what the probe sees is sheared.
+        ancestors = rig.data.bones[names[bone]].parent_recursive
+        if rig.data.bones[names[bone_of[above]]] in ancestors:
+            continue
+        carrying = bone
+        while carrying >= 0 and carrying != bone_of[above]:
+            carrying = int(carriers[carrying])
+        if carrying < 0:
+            raise InputError(
+                f"'{names[bone]}' of '{rig.name}' does not move with '{names[bone_of[above]]}', so "
+                f"they cannot be {part.replace('_', ' ')} and {above.replace('_', ' ')}; choose "
+                "other bones in the bone map"
+            )
+
+
+def _dependencies(
+    rig: bpy.types.Object, parts: dict[str, str], rest: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Rotate each bone and observe the others.
+
+    :param rest: (B, 4, 4) bones to world at rest.
+    :return: (B, B) whether the row's bone rotates with the column's, and whether its head moves
+        with it.
+    """
+    names = list(parts)
+    follows = np.zeros((len(names), len(names)), bool)
+    carried = follows.copy()
+    heads = rest[:, :3, 3]
+    for group in _independent(parts):
+        # with different angles, to distinguish which bone another one follows
+        for k, a in enumerate(group):
+            turn = Quaternion((0.6, 0.48, 0.64), 0.5 + 0.15 * k)
+            rig.pose.bones[names[a]].matrix_basis = turn.to_matrix().to_4x4()
+        posed = _matrices(rig, names)
+        turned = _rotations(posed) @ np.swapaxes(_rotations(rest), 1, 2)
+        _check_rotated(rig, [names[a] for a in group], turned[group])
+        for a in group:
+            rig.pose.bones[names[a]].matrix_basis = Matrix()
+            follows[:, a] = np.abs(turned - turned[a]).max(axis=(1, 2)) < 0.02
+            away = heads - heads[a]
+            expected = away @ turned[a].T
+            off, moved = (
+                np.linalg.norm(expected - now, axis=1) for now in (posed[:, :3, 3] - heads[a], away)
+            )
+            carried[:, a] = (off < _CARRIER_TOLERANCE * np.linalg.norm(away, axis=1)) & (
+                off < moved
+            )
+            follows[a, a] = carried[a, a] = False
+    return follows, carried
+
+
+def _independent(parts: dict[str, str]) -> list[list[int]]:
+    """Group bones that do not move each other, such as those of both sides, to save evaluations."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row, (bone, part) in enumerate(parts.items()):
+        kind = part.partition("_")[2]
+        # Bones of the trunk move each other, whatever their names.
+        key = ("bone", bone)
+        if kind:
+            key = ("part", "phalanx" + kind[-1] if kind in PHALANGES else kind)
+        groups.setdefault(key, []).append(row)
+    return list(groups.values())
+
+
+def _nearest(above: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the last preceding bone that each bone depends on (B,), -1 for none.
+
+    :param above: (B, B) whether the row's bone depends on the column's.
+    """
+    return np.array([max(np.flatnonzero(row[:b]), default=-1) for b, row in enumerate(above)], int)
+
+
+def _floor(rig: bpy.types.Object, rest: RestPose, parts: dict[str, str]) -> float:
+    """Return the height of the floor: below the soles of the feet; without skin, the rig's origin
+    if the rig rests near it, otherwise the lowest point where one of its bones begins or ends.
+    """
+    feet = [
+        rest.names.index(name) for name, part in parts.items() if part.endswith(("ankle", "foot"))
+    ]
+    soles = rest.lowest_skin(feet)
+    if soles is not None:
+        return soles
+    deforming = [index for index, bone in enumerate(rig.data.bones) if bone.use_deform]
+    bones = deforming or range(len(rest.names))
+    lowest = min(min(rest.heads[bone][2], rest.end(bone)[2]) for bone in bones)
+    origin = rig.matrix_world.translation.z
+    return float(origin if abs(lowest - origin) < _MAX_LIFT * rest.size else lowest)
+
+
+def _check_rotated(rig: bpy.types.Object, names: list[str], turned: NDArray[np.float64]) -> None:
+    """Check that the probe rotated these bones; other bones at rest would seem to follow one that
+    did not.
+
+    :param turned: (B, 3, 3) the rotation of each of these bones.
+    :raises InputError: when one did not rotate.
+    """
+    blocked = [
+        name
+        for name, R in zip(names, turned, strict=True)
+        if np.abs(R - np.eye(3)).max() < _MIN_RESPONSE
+    ]
+    if blocked:
+        raise InputError(
+            f"'{blocked[0]}' of '{rig.name}' does not move when it is rotated: show the rig in the "
+            "viewport, mute the "
+            "constraint or driver that controls the bone, or remove it from the list"
+        )
+
+
+def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
+    """Check that the pelvis, whose location is the root motion, can be moved. Leaves it at rest.
+
+    :raises InputError: when it cannot.
+    """
+    bone = rig.pose.bones[name]
+    rest = _matrices(rig, [name])
+    bone.matrix_basis = Matrix.Translation((bone.length,) * 3)
+    moved = np.linalg.norm(
+        np.linalg.solve(np.array(rig.matrix_world), _matrices(rig, [name]) - rest)[0, :3, 3]
+    )
+    bone.matrix_basis = Matrix()
+    if moved > 0.1 * bone.length:
+        return
+    if bone.bone.use_connect:
+        raise InputError(
+            f"'{name}' of '{rig.name}' is connected to '{bone.parent.name}' and cannot move away "
+            "from it: in Edit "
+            "Mode, disconnect the bone (Alt P)"
+        )
+    raise InputError(
+        f"'{name}' of '{rig.name}' does not move when its location changes: mute the constraint or "
+        "driver that "
+        "controls the bone, or choose another one for the pelvis in the list"
+    )
+
+
+def blocked_bones(
+    rig: bpy.types.Object, names: list[str], turns: NDArray[np.float64], wanted: NDArray[np.float64]
+) -> list[Notice]:
+    """Return warnings about bones that deviate from the motion although they can be rotated, such
+    as a leg with IK.
+
+    :param names: of the B bones.
+    :param turns: (T, B, 3, 3) rotations of the channels.
+    :param wanted: (T, B, 3, 3) bone to world.
+    """
+    off = np.zeros(len(names))
+    for t in np.unique(np.linspace(0, len(turns) - 1, _CHECKED_FRAMES).astype(int)):
+        for name, turn in zip(names, turns[t], strict=True):
+            rig.pose.bones[name].matrix_basis = Matrix(turn.tolist()).to_4x4()
+        seen = _rotations(_matrices(rig, names))
+        cosine = (np.einsum("bij,bij->b", seen, wanted[t]) - 1) / 2
+        off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
+    blocked = [name for name, angle in zip(names, off, strict=True) if angle > _MAX_DEVIATION]
+    return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
+
+
+def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:
+    """Return the evaluated bones to world (B, 4, 4)."""
+    bpy.context.view_layer.update()
+    posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return np.array([posed.matrix_world @ posed.pose.bones[name].matrix for name in names], float)
+
+
+def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotations (B, 3, 3) of matrices (B, 4, 4), without scale."""
+    U, _, Vt = np.linalg.svd(matrices[:, :3, :3])
+    rotations: NDArray[np.float64] = U @ Vt
+    return rotations
+
+
+@contextmanager
+def at_rest(rig: bpy.types.Object) -> Iterator[None]:
+    """Evaluate the rig without animation, pose and root object, with limbs switched to FK, inside
+    the block.
+
+    Everything is restored except the switches and Edit Mode.
+    """
+    if rig.mode == "EDIT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    state = _RigState(rig)
+    try:
+        state.clear()
+        yield
+    finally:
+        state.restore()
+
+
+class _RigState:
+    """A rig's visibility, animation, pose and root object."""
+
+    def __init__(self, rig: bpy.types.Object) -> None:
+        self._rig = rig
+        # this collection cannot be hidden or excluded
+        self._shown = bpy.context.scene.collection.objects
+        self._hidden, self._linked = rig.hide_viewport, rig in self._shown.values()
+        self._position = rig.data.pose_position
+        self._animation = rig.animation_data
+        self._action = self._animation.action if self._animation else None
+        self._slot = getattr(self._animation, "action_slot", None)
+        self._nla = self._animation.use_nla if self._animation else False
+        self._bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
+        self._top = topmost(rig)
+        self._empty = root_object(rig)
+
+    def clear(self) -> None:
+        """Show the rig without animation, pose and root object, and switch limbs to FK."""
+        rig = self._rig
+        if not self._linked:
+            self._shown.link(rig)
+        rig.hide_viewport = False
+        rig.data.pose_position = "POSE"
+        self._top.parent = None
+        if self._animation:
+            self._animation.action = None
+            self._animation.use_nla = False
+        for bone, _ in self._bases:
+            bone.matrix_basis = Matrix()
+            for switch in SWITCHES:
+                if switch in bone:
+                    bone[switch] = 1.0
+        rig.update_tag()
+
+    def restore(self) -> None:
+        """Restore everything except the switches."""
+        rig = self._rig
+        for bone, matrix in self._bases:
+            bone.matrix_basis = matrix
+        self._top.parent = self._empty
+        rig.hide_viewport = self._hidden
+        rig.data.pose_position = self._position
+        if not self._linked:
+            self._shown.unlink(rig)
+        if self._animation:
+            self._animation.use_nla = self._nla
+            if self._action is not None:
+                self._animation.action = self._action
+                if self._slot is not None:
+                    self._animation.action_slot = self._slot
+
+
+def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
+    """Return all bones of a rig at rest, in the world.
+
+    :param with_skin: read the meshes that the rig deforms, too; the rig must be ``at_rest``.
+    :raises InputError: when the rig has no bones, or too many.
+    """
+    bones = list(rig.data.bones)
+    if not bones:
+        raise InputError(f"'{rig.name}' has no bones; choose another armature as the rig")
+    check_bone_count(f"'{rig.name}'", len(bones))
+    names = [bone.name for bone in bones]
+    row = {name: index for index, name in enumerate(names)}
+    parents = np.array([row[bone.parent.name] if bone.parent else -1 for bone in bones], int)
+    matrix = np.array(rig.matrix_world, float)
+    heads = _placed(np.array([bone.head_local for bone in bones], float), matrix)
+    tails = _placed(np.array([bone.tail_local for bone in bones], float), matrix)
+    if not with_skin:
+        return RestPose(names, parents, heads, tails)
+    bpy.context.view_layer.update()  # Rigid parts follow bones that were just posed.
+    points = [np.empty((0, 3))]
+    owners = [np.empty(0, int)]
+    for mesh in bpy.context.scene.objects:
+        if mesh.type == "MESH" and (owned := _owners(mesh, rig, row)) is not None:
+            of_mesh = np.empty(3 * len(mesh.data.vertices), np.float32)
+            mesh.data.vertices.foreach_get("co", of_mesh)
+            # Mesh and rig may move with a common parent: what counts is how one lies in the other.
+            here = matrix @ np.array(rig.matrix_world.inverted_safe() @ mesh.matrix_world, float)
+            points.append(_placed(of_mesh.reshape(-1, 3).astype(float), here)[owned >= 0])
+            owners.append(owned[owned >= 0])
+    return RestPose(names, parents, heads, tails, np.concatenate(points), np.concatenate(owners))
+
+
+def _placed(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (n, 3) under a matrix (4, 4)."""
+    placed: NDArray[np.float64] = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return placed
+
+
+def _owners(
+    mesh: bpy.types.Object, rig: bpy.types.Object, row: dict[str, int]
+) -> NDArray[np.intp] | None:
+    """Return the bone that moves each vertex most (V,), -1 for none; None if the rig does not move
+    the mesh.
+    """
+    vertices = mesh.data.vertices
+    if mesh.parent == rig and mesh.parent_type == "BONE":
+        return np.full(len(vertices), row.get(mesh.parent_bone, -1), int)
+    if not any(m.type == "ARMATURE" and m.object == rig for m in mesh.modifiers):
+        return None
+    bone_of = [row.get(group.name, -1) for group in mesh.vertex_groups]
+    owners = np.full(len(vertices), -1, int)
+    for index, vertex in enumerate(vertices):
+        most = 0.0
+        for element in vertex.groups:
+            if element.weight > most and bone_of[element.group] >= 0:
+                most = element.weight
+                owners[index] = bone_of[element.group]
+    return owners

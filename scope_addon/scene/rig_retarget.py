@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Retargeting a captured motion to the user's own rig, as a new action."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...solver.body import Body
+from ...solver.errors import InputError
+from ..edit.clip import Clip
+from ..edit.root_motion import about_z, floor_trajectory
+from ..errors import UsageError
+from ..notices import PHRASES, Notice, notice
+from ..retarget.bone_map import SPINE, BoneMap
+from ..retarget.expression_map import ExpressionMap
+from ..retarget.guess import SHAPED, guess
+from ..retarget.rest_pose import rest_faults
+from ..retarget.rig_source import ROOTS
+from ..retarget.skeleton import Pose, Skeleton, basis
+from ..retarget.transfer import Transfer, leg_ratio
+from .character.keys import read_clip
+from .character.root_object import (
+    clip_as_displayed,
+    parent_to_root_object,
+    parent_transform,
+    remove_root_object,
+    root_object,
+    topmost,
+)
+from .face_retarget import captured_expressions, face_keys, key_face, rest_face
+from .rig_action import (
+    BoneKeys,
+    clear_offsets,
+    leave_tweak_mode,
+    override_nla,
+    retire,
+    root_locations,
+    write_action,
+)
+from .rig_probe import at_rest, blocked_bones, probe, rest_pose
+from .rigify_ik import ik_keys
+from .transaction import all_or_nothing
+
+# Whose motion is missed where a rig has no bones for them.
+_EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elbow")
+
+
+@dataclass(frozen=True)
+class RetargetOptions:
+    """The user's choices for retargeting."""
+
+    feet: bool = True  # place the feet where the body's are
+    root: str = "bone"  # where the root motion goes: one of ``ROOTS``
+    # metres, of the rig from the captured person
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    # of the bones that move the rig's face; None: it keeps its pose
+    face: ExpressionMap | None = None
+    travel: float | None = None  # scale of positions on the floor; None: the ratio of leg lengths
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: when ``root`` is unknown or ``travel`` is not positive.
+        """
+        if self.travel is not None and not self.travel > 0.0:
+            raise UsageError(f"travel must be above 0, but is {self.travel:g}")
+        if self.root not in ROOTS:
+            raise UsageError(f"root must be one of {', '.join(ROOTS)}, but is '{self.root}'")
+
+
+@dataclass(frozen=True)
+class RetargetResult:
+    """The result of ``retarget``: the rig's new action, warnings for the user, and the scale of
+    positions.
+    """
+
+    action: bpy.types.Action
+    warnings: list[Notice]
+    travel: float
+
+
+@dataclass(frozen=True)
+class _PlacedMotion:
+    """The rig's motion in the world, with root motion as the user chose."""
+
+    rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world, or to the root object
+    heads: NDArray[np.float64]  # (T, 3) of the root bone, metres
+    # Positions (T, 3), metres, and angles (T,) about the vertical, radians, of the root object.
+    trajectory: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+
+def guess_bone_map(rig: bpy.types.Object) -> BoneMap:
+    """Guess the bone map from the rig's names and rest pose.
+
+    :raises InputError: when the rig has no bones.
+    """
+    return guess(rest_pose(rig), is_mirrored=rig.matrix_world.determinant() < 0.0)
+
+
+def usable_guess(rig: bpy.types.Object) -> BoneMap:
+    """Guess the bone map, to be used without anybody looking at it.
+
+    :raises InputError: when the rig has no bones, or its rest pose contradicts the guess.
+    """
+    found = guess_bone_map(rig)
+    for fault in rest_faults(_heads_at_rest(rig, found)):
+        bones = ", ".join(f"'{found.bone(part)}'" for part in fault.parts)
+        raise InputError(
+            f"the bone map of '{rig.name}' could not be guessed, because {bones} "
+            f"{PHRASES[fault.reason]}; choose the bones yourself, or put the armature upright"
+        )
+    return found
+
+
+def map_notices(rig: bpy.types.Object, bone_map: BoneMap) -> list[Notice]:
+    """Return what a user should know about a bone map: guesses, parts without bones, and bones that
+    do not look like their parts.
+    """
+    notices: list[Notice] = []
+    unsure = [bone for bone, sure in bone_map.confidence.items() if sure <= SHAPED]
+    if unsure:
+        notices.append(notice("guessed_bones", rig=rig.name, bones=unsure))
+    parts = set(bone_map.parts.values())
+    still = [] if parts & set(SPINE) else ["spine"]
+    still += [part for part in _EXPECTED if part not in parts]
+    if still:
+        notices.append(notice("still_parts", rig=rig.name, parts=still))
+    for fault in rest_faults(_heads_at_rest(rig, bone_map)):
+        bones = [bone_map.bone(part) or part for part in fault.parts]
+        notices.append(notice("odd_bones", rig=rig.name, bones=bones, reason=fault.reason))
+    return notices
+
+
+def _heads_at_rest(rig: bpy.types.Object, bone_map: BoneMap) -> dict[str, NDArray[np.float64]]:
+    """Return the head (3,) of the first bone of each part at rest, in the world, metres."""
+    heads: dict[str, NDArray[np.float64]] = {}
+    for bone, part in bone_map.parts.items():
+        if bone in rig.data.bones and part not in heads:
+            heads[part] = np.array(rig.matrix_world @ rig.data.bones[bone].head_local)
+    return heads
+
+
+def retarget(
+    source: bpy.types.Object,
+    body: Body,
+    betas: NDArray[np.floating[Any]],
+    rig: bpy.types.Object,
+    bone_map: BoneMap,
+    rate: float,
+    options: RetargetOptions | None = None,
+) -> RetargetResult:
+    """Key the mapped bones of ``rig`` in a new action so that it moves like the captured
+    ``source``.
+
+    The rig's former action is kept in the file, unless it is an earlier retargeting of the same
+    capture that was not edited. Fingers and face keep their pose if they were not captured. The rig
+    leaves Edit Mode, Rest Position and its NLA's Tweak Mode, in which it would not move. Its NLA
+    tracks are kept, below the new action, and its mapped bones lose what the pose moves or scales
+    them by.
+
+    :param betas: (P,) shape coefficients of the captured person.
+    :param rate: scene frames per second.
+    :raises UsageError: when the rig is the source, or lacks a mapped bone or all controls of the
+        face.
+    :raises InputError: when a map cannot be used, or a mapped bone does not move.
+    """
+    options = options or RetargetOptions()
+    bone_map = usable_map(source, body, rig, bone_map)
+    clip, frames = read_clip(source, body, rate)
+    clip = clip_as_displayed(source, clip, frames)
+    captured = captured_expressions(source) if options.face is not None else None
+    face = (
+        face_keys(captured, rig, options.face)
+        if captured is not None and options.face is not None
+        else None
+    )
+    leave_tweak_mode(rig)
+    with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
+        with at_rest(rig):
+            skeleton = probe(rig, bone_map.parts)
+            place = np.array(rig.matrix_world, float)
+            root = skeleton.names.index(bone_map.bone("pelvis") or "")
+            one_floor = not source.get("scope_uneven_ground", False)
+            travel = options.travel or leg_ratio(body, betas, skeleton, bone_map)
+            pose = Transfer(
+                body,
+                betas,
+                skeleton,
+                bone_map,
+                feet=options.feet,
+                one_floor=one_floor,
+                travel=travel,
+            ).pose(clip)
+            motion = _placed(source, clip, skeleton, place, pose, root, options)
+            turns = basis(skeleton, motion.rotations)
+            warnings = map_notices(rig, bone_map)
+            warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)
+            keys = [BoneKeys(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
+            keys[root] = replace(
+                keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads)
+            )
+            keys += ik_keys(rig, keys)
+        former = rig.animation_data.action if rig.animation_data else None
+        action = write_action(rig, keys, frames, source.name)
+        if face is not None:
+            key_face(rig, face, source.name)
+        _set_parent(rig, frames, motion)
+        rig.data.pose_position = "POSE"
+        override_nla(rig.animation_data)
+        retire(former, source.name)
+        action.name = f"{rig.name}_{source.name}"
+    clear_offsets(rig, [key.bone for key in keys])
+    if face is not None:
+        rest_face(rig, face)
+    return RetargetResult(action, warnings, travel)
+
+
+def common_travel(
+    body: Body,
+    people_betas: Sequence[NDArray[np.floating[Any]]],
+    rig: bpy.types.Object,
+    bone_map: BoneMap,
+) -> float:
+    """Return the scale of positions for several people on copies of one rig: by their mean leg
+    length.
+
+    With a scale of their own each, people who stand side by side would move apart or into each
+    other.
+
+    :param people_betas: (P,) shape coefficients of each person.
+    :raises UsageError: when the rig lacks a mapped bone.
+    :raises InputError: when the map cannot be used.
+    """
+    bone_map = usable_map(None, body, rig, bone_map)
+    with at_rest(rig):
+        skeleton = probe(rig, bone_map.parts)
+    ratios = [leg_ratio(body, betas, skeleton, bone_map) for betas in people_betas]
+    return len(ratios) / sum(1.0 / ratio for ratio in ratios)
+
+
+def usable_map(
+    source: bpy.types.Object | None, body: Body, rig: bpy.types.Object, bone_map: BoneMap
+) -> BoneMap:
+    """Return the bone map without the parts that the body lacks.
+
+    :param source: the captured armature, if there is one.
+    :raises UsageError: when the rig is the source, or lacks a mapped bone.
+    :raises InputError: when the map cannot be used.
+    """
+    bone_map.check()
+    if rig == source or rig.type != "ARMATURE":
+        raise UsageError(
+            "the rig must be an armature, and not the captured one; choose another armature"
+        )
+    missing = [name for name in bone_map.parts if name not in rig.pose.bones]
+    if missing:
+        raise UsageError(
+            f"'{rig.name}' has no bone '{missing[0]}'; guess the bones again or correct the list"
+        )
+    parts = {bone: part for bone, part in bone_map.parts.items() if part in body.joint_names}
+    confidence = {bone: sure for bone, sure in bone_map.confidence.items() if bone in parts}
+    return BoneMap(parts, confidence)
+
+
+def _placed(
+    source: bpy.types.Object,
+    clip: Clip,
+    skeleton: Skeleton,
+    place: NDArray[np.float64],
+    pose: Pose,
+    root: int,
+    options: RetargetOptions,
+) -> _PlacedMotion:
+    """Apply the transform of the captured armature, the user's offset and the choice of root
+    motion.
+
+    :param place: (4, 4) the rig's object to world at rest.
+    :param root: index of the root bone.
+    """
+    rotations, heads, yaw = _with_source_transform(source, pose.rotations, pose.heads[:, root])
+    heads = heads + options.offset
+    if options.root == "in-place":
+        heads[:, :2] = skeleton.heads[root, :2]
+    elif options.root == "object":
+        positions = heads * [1.0, 1.0, 0.0]
+        angles = floor_trajectory(clip)[1] + yaw + pose.facing
+        turn = about_z(angles)
+        origin = place[:3, 3] * [1.0, 1.0, 0.0]
+        rotations = np.swapaxes(turn, 1, 2)[:, None] @ rotations
+        heads = np.einsum("tji,tj->ti", turn, heads - positions) + origin
+        return _PlacedMotion(rotations, heads, (positions - turn @ origin, angles))
+    return _PlacedMotion(rotations, heads)
+
+
+def _with_source_transform(
+    source: bpy.types.Object, rotations: NDArray[np.float64], heads: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Apply the position and rotation of the captured armature in the scene.
+
+    The trajectory of a root object is included in the motion already, but not the transform of its
+    parent. The scale of the armature does not affect the rig.
+
+    :param rotations: (T, B, 3, 3) bone to world.
+    :param heads: (T, 3) metres.
+    :return: the new rotations and heads, and the armature's rotation about the vertical, radians.
+    """
+    bpy.context.view_layer.update()
+    empty = root_object(source)
+    place, turn, _ = (source.matrix_world if empty is None else parent_transform(empty)).decompose()
+    R = np.array(turn.to_matrix())
+    return R @ rotations, heads @ R.T + np.array(place), float(turn.to_euler("ZYX").z)
+
+
+def _set_parent(rig: bpy.types.Object, frames: NDArray[np.float64], motion: _PlacedMotion) -> None:
+    """Parent the rig to a root object that follows the trajectory, or remove a former root
+    object.
+    """
+    top = topmost(rig)
+    if motion.trajectory is None:
+        remove_root_object(rig)
+    else:
+        top = parent_to_root_object(rig, frames, *motion.trajectory)
+    # the keys are in world coordinates, so the parent's transform is cancelled
+    if top.parent is not None:
+        top.matrix_parent_inverse = (
+            top.matrix_parent_inverse @ parent_transform(top).inverted_safe()
+        )

@@ -1,0 +1,364 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A capture, from the button to the finished scene and the result that the panel shows. ``step``
+advances it and never waits for the worker.
+
+The modal operator calls ``step`` on a timer; scripts and tests call it in a loop.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..capture_report import Report
+from ..errors import UsageError, VideoError
+from ..job.cache import Cache, CachedCapture
+from ..job.job_progress import BUILDING, JobProgress, kind_of, load_stage_times, save_stage_times
+from ..job.process import ROOT, START_SCRIPT, WorkerProcess
+from ..job.request import JobRequest, code_version
+from ..motion import Motion
+from ..notices import notice
+from ..options import Place
+from ..options.body_choice import chosen_body
+from ..options.capture import AUTO
+from ..review_spans import Span, find_review_spans
+from ..scene.build import BuildOptions, BuildResult, build_scene
+from ..scene.camera import pixel_aspect
+from ..scene.datablocks import check_local
+from ..scene.packed_motion import pack_motion
+from ..scene.stored_values import FrameSpan, in_scene
+from ..untrusted.body_file import load_body
+from . import preview_picture
+from .captures import hide_others
+from .declared_properties import option_values
+from .frame_rate_operators import rate_warnings
+from .preferences import cache, preferences
+from .reporting import add_warning
+from .scene_camera import scene_camera_path
+
+_ENDING_S = 5.0  # after which a worker that has sent its result is killed
+_MAX_SPANS = 12  # buttons of one warning in the panel
+
+
+class CaptureJob:
+    """A capture for one scene, with the current settings of the scene."""
+
+    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
+        """Start the worker, or find the finished capture in the cache.
+
+        :param python: interpreter of the worker and its arguments; if empty, Blender's own.
+        :raises ScopeError: a setting is invalid, or the worker cannot be started.
+        """
+        self._cache: Cache = cache()
+        self.cancelled = False
+        self.messages = 0  # of the worker so far
+        self._scene_uid = scene.session_uid
+        self._options = build_options(scene)
+        self._request = capture_request(scene)
+        self._kind = kind_of(self._request.values)
+        self.progress = JobProgress(earlier=load_stage_times(self._cache.root, self._kind))
+        self._key = self._request.key(code_version(ROOT))
+        self._captured: CachedCapture | None = self._cache.find(self._key)
+        self._worker: WorkerProcess | None = None
+        self._result: dict[str, Any] | None = None  # of a worker that may still be ending
+        self._result_s = 0.0
+        self._building = False
+        if self._captured is None:
+            # Blender 4.2 has no such attribute; its Python is isolated as well.
+            python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+            folder = self._cache.new_job_folder()
+            self._worker = WorkerProcess(
+                self._request, folder, self._cache.kernels, python, START_SCRIPT
+            )
+
+    @property
+    def worker(self) -> WorkerProcess | None:
+        """Worker process; None if the result was cached."""
+        return self._worker
+
+    def step(self) -> bool:
+        """Continue as far as possible without waiting; return False once the scene is built.
+
+        :raises ScopeError: the capture failed; the scene is unchanged and no file is left on disk.
+        """
+        try:
+            return self._step()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stop in any state, without leaving a process or an unfinished file behind."""
+        if self._worker is not None:
+            self._worker.close()
+
+    def _step(self) -> bool:
+        if self._captured is None:
+            self._listen()
+            return True
+        # built in the next step, so that the panel can show this stage first
+        if not self._building:
+            self._building = True
+            self.progress.update(BUILDING, 0, 0)
+            return True
+        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
+        if scene is None:
+            raise UsageError("the scene was removed during the capture; capture in another scene")
+        self._build(scene, self._captured)
+        return False
+
+    def _listen(self) -> None:
+        assert self._worker is not None
+        for message in self._worker.poll():
+            self.messages += 1
+            if message["event"] == "progress":
+                self.progress.update(message["stage"], message["done"], message["total"])
+            elif message["event"] == "preview":
+                self._show_preview(message)
+            elif message["event"] == "result":
+                self._result = message
+                self._result_s = time.monotonic()
+        if self._result is None or (
+            self._worker.alive and time.monotonic() - self._result_s < _ENDING_S
+        ):
+            return  # its files are moved once they are closed
+        self._worker.wait(0.0)
+        self._captured = self._cache.keep(
+            self._worker.job_folder, self._key, self._result["motions"], self._result["report"]
+        )
+        self.progress.update(BUILDING, 0, 0)
+        save_stage_times(self._cache.root, self._kind, self.progress.seconds, self.progress.frames)
+        limit = preferences()
+        self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
+        self._worker.close()
+
+    def _show_preview(self, message: dict[str, Any]) -> None:
+        assert self._worker is not None
+        try:
+            pixels = (self._worker.job_folder / Path(message["file"]).name).read_bytes()
+        except OSError:
+            return  # on Windows, while the worker replaces the file
+        preview_picture.show(pixels, message["width"], message["height"])
+
+    def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
+        report = Report.from_json(captured.report)
+        views = report.placed_videos(self._request.views)
+        view_footage = [path if path.is_file() else None for path in views]
+        build_capture(
+            scene,
+            [(path, path.read_bytes()) for path in captured.motions],
+            self._request.values["body"],
+            self._request.footage,
+            report,
+            replace(self._options, view_footage=view_footage),
+        )
+
+
+def build_capture(
+    scene: bpy.types.Scene,
+    contents: Sequence[tuple[Path, bytes]],
+    body: str,
+    footage: str,
+    report: Report,
+    options: BuildOptions,
+) -> BuildResult:
+    """Build a capture in a scene, show its result, and store its motions.
+
+    :param contents: path and bytes of each person's motion file.
+    :param body: name or file of the body.
+    :param footage: path of the video or picture; empty if there is none.
+    :param report: of the capture.
+    :raises ScopeError: the motions cannot be built; the scene is unchanged.
+    """
+    motions = [Motion.load(path, content) for path, content in contents]
+    warnings = list(report.warnings)
+    shows_footage = bool(footage) and Path(footage).is_file()
+    if footage and not shows_footage:
+        warnings.append(notice("missing_footage", footage=footage))
+    with window_shows(scene):
+        result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
+    store_motions(result, [content for _, content in contents], body)
+    if options.frame_rate == "keep" and len(motions[0]) > 1:
+        warnings += rate_warnings(result.frame_rate, float(motions[0].mocap_framerate))
+    report = replace(report, warnings=warnings + result.warnings)
+    show_result(result.collection.scope_result, footage, report, result)
+    scene.scope.capture = result.collection
+    hide_others(scene, [result.collection])
+    return result
+
+
+def capture_request(scene: bpy.types.Scene) -> JobRequest:
+    """Make the request to the worker from the scene's settings and the preferences.
+
+    :raises UsageError: the scene is linked, no footage, calibration, camera or body file is chosen,
+        the captured part is empty, or the camera cannot have filmed the footage.
+    :raises VideoError: the footage does not exist.
+    """
+    settings = scene.scope
+    check_local(scene)
+    if not settings.footage:
+        raise UsageError("no footage is chosen; choose a video or image first")
+    footage, *views = [Path(bpy.path.abspath(each.footage)) for each in (settings, *settings.views)]
+    for path in (footage, *views):
+        if not path.is_file():
+            what = "is not a file" if path.exists() else "does not exist"
+            raise VideoError(f"{path} {what}; choose the video or image again")
+    if settings.use_range and settings.range_end <= settings.range_start:
+        raise UsageError("the part of the video ends before it starts; change From or To")
+    if settings.lens == "FILE" and not settings.calibration_file:
+        raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
+    values = chosen_values(scene)
+    values["body"] = chosen_body(values)
+    if any(view.use_offset for view in settings.views):
+        values["offset"] = ",".join(
+            f"{view.offset_s:.6f}" if view.use_offset else AUTO for view in settings.views
+        )
+    if settings.lens == "CAMERA":
+        values["camera_path"] = str(scene_camera_path(scene))
+    return JobRequest(str(footage), [str(view) for view in views], **values)
+
+
+def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
+    """Return the values of a worker's options from the scene's settings and the preferences.
+
+    :raises UsageError: no body file is chosen.
+    """
+    settings = scene.scope
+    chosen = preferences()
+    values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
+    if values["body"] == "file":
+        path = settings.body_file or (chosen.body_file if chosen else "")
+        if not path:
+            raise UsageError(
+                "no body file is chosen; choose one here or in the preferences, or "
+                "use the built-in body"
+            )
+        values["body"] = bpy.path.abspath(path)
+    return values
+
+
+def build_options(scene: bpy.types.Scene) -> BuildOptions:
+    """Make the options of building the scene from its settings."""
+    settings = scene.scope
+    frame_rate = settings.frame_rate.lower()
+    if frame_rate == "auto":
+        frame_rate = "keep" if _is_animated(scene) else "set"
+    return BuildOptions(
+        name=settings.take.strip(),
+        frame_rate=frame_rate,
+        set_frame_range=settings.set_frame_range,
+        start_frame=float(settings.start_frame),
+        shape=settings.shape.lower(),
+        with_camera=settings.with_camera,
+        with_markers=settings.with_markers,
+    )
+
+
+def store_motions(result: BuildResult, contents: Sequence[bytes], body: str) -> None:
+    """Store with each armature the bytes of its motion file, and the body."""
+    for person, content in zip(result.people, contents, strict=True):
+        pack_motion(person.armature, content)
+        person.armature["scope_body_file"] = body
+
+
+def _is_animated(scene: bpy.types.Scene) -> bool:
+    """Return whether another frame rate would change the speed of an animation in the scene."""
+    owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]
+    data = [owner.animation_data for owner in owners if owner.animation_data]
+    return any(animation.action or animation.nla_tracks for animation in data)
+
+
+@contextmanager
+def window_shows(scene: bpy.types.Scene) -> Iterator[None]:
+    """Show the scene in the window while it is built: the user may have switched to another one."""
+    if bpy.context.scene == scene:
+        yield
+        return
+    window = bpy.context.window or bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        previous = window.scene
+        window.scene = scene
+        try:
+            yield
+        finally:
+            window.scene = previous
+
+
+def show_result(
+    shown: bpy.types.PropertyGroup, footage: str, report: Report, result: BuildResult
+) -> None:
+    """Fill the properties that the result panel shows.
+
+    :param shown: the properties, which are overwritten.
+    """
+    shown.footage = footage
+    shown.people = len(result.people)
+    shown.frames = max(len(p.motion) for p in result.people)
+    shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
+    residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
+    shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
+    sigmas = np.concatenate(
+        [np.ravel(np.asarray(p.motion.joint_sigma_m, float)) for p in result.people]
+    )
+    sigmas = sigmas[np.isfinite(sigmas)]
+    shown.sigma_cm = 100.0 * float(np.median(sigmas)) if sigmas.size else 0.0
+    shown.heights = ", ".join(
+        _height(person) for person in report.per_person if "height_m" in person
+    )
+    shown.frames_per_second = float(report.fps.get("total", 0.0))
+    first = result.people[0].motion
+    shown.footage_rate = first.mocap_framerate if len(first) > 1 else 0.0
+    shown.camera = str(report.camera)
+    shown.execution = str(report.execution)
+    shown.resolution = [int(n) for n in first.image_size]
+    shown.pixel_aspect = pixel_aspect(first)
+    shown.warnings.clear()
+    for warning in report.warnings:
+        # The frames of the first are among the spans; the panel itself says the second.
+        if warning.code not in ("implausible", "scene_unit"):
+            add_warning(shown, warning)
+    for index, person in enumerate(result.people, 1):
+        number = 0 if len(result.people) == 1 else index
+        spans = review_spans(person.motion, person.frames, person.under_floor)
+        for reason, of_reason in spans.items():
+            add_warning(shown, notice("review", person=number, reason=reason), of_reason)
+
+
+def review_spans(
+    motion: Motion, frames: NDArray[np.float64], under_floor: NDArray[np.bool_]
+) -> dict[str, list[FrameSpan]]:
+    """Return the review spans of a motion in scene frames, by reason; at most the longest
+    ``_MAX_SPANS`` of each.
+
+    :param frames: (T,) scene frame of each pose.
+    :param under_floor: (T,) poses with a foot under the floor.
+    :return: reason, a key of ``REASONS``, to spans.
+    """
+    by_reason: dict[str, list[Span]] = {}
+    for span in find_review_spans(motion, under_floor=under_floor):
+        by_reason.setdefault(span.reason, []).append(span)
+    found = {}
+    for reason, spans in by_reason.items():
+        longest = sorted(spans, key=lambda span: span.first - span.last)[:_MAX_SPANS]
+        in_order = sorted(longest, key=lambda span: span.first)
+        found[reason] = [in_scene(span, frames) for span in in_order]
+    return found
+
+
+def _height(person: Mapping[str, Any]) -> str:
+    """Return a stature with its standard deviation, where that is known, from the report about a
+    person.
+    """
+    sigma_m = person.get("height_sigma_m")
+    if sigma_m is None:
+        return f"{person['height_m']:.2f} m"
+    return f"{person['height_m']:.2f} m ± {sigma_m:.{2 if sigma_m >= 0.01 else 3}f}"

@@ -1,0 +1,530 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that choose footage, capture it in the background and cancel, and the state of the
+running job. The menu File > Import chooses the footage and captures it in one step.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import bpy
+from bpy.props import IntProperty
+
+from ...solver.errors import ScopeError
+from . import preview_picture, warm_up
+from .captures import unit_text
+from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
+from .job_operator import JobOperator, clear_status_bar
+from .live_properties import state as live_state
+from .reporting import iface_, refuse, restore_libraries, rpt_, sentence, tip_
+from .sidebar import redraw_sidebars, show_tab
+from .view_operators import show_new_capture
+
+if TYPE_CHECKING:
+    from .capture_job import CaptureJob
+
+SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample" / "sample.mp4"
+MOST_FURTHER_VIEWS = 7
+DRAWN_EVERY_S = 0.3  # between two drawings of a stage's progress; previews come as often
+ASK_AFTER_S = 10.0  # a capture that has run longer is cancelled only after a question
+# States of a clip of the queue.
+WAITING = "WAITING"
+CAPTURING = "CAPTURING"
+DONE = "DONE"
+FAILED = "FAILED"
+
+
+class _State:
+    """The running capture, and the error message of the last one. Never saved."""
+
+    job: CaptureJob | None = None
+    scene_uid = 0  # of the scene that the job or the message belongs to
+    message = ""  # why the last capture failed
+    started = 0.0  # when the job was started, in seconds of the monotonic clock
+
+
+state = _State()
+
+
+def nothing_runs(cls: type[bpy.types.Operator]) -> bool:
+    """Return whether no capture is running, live or not; if one is, say so as the reason why the
+    operator cannot be used.
+    """
+    if state.job is None and live_state.job is None:
+        return True
+    return refuse(cls, tip_("A capture is running; wait for it or cancel it"))
+
+
+def end_capture() -> None:
+    """End a running capture: the extension is being disabled, or a test begins."""
+    stop_job()
+    clear_status_bar()
+    state.message = ""
+
+
+class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
+    """Choose a video or image of a person, or several that are captured one after the other"""
+
+    bl_idname = "scope.choose_footage"
+    bl_label = "Choose Footage"  # short: the button of the file browser shows it, too
+    bl_options = {"UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the footage to the file, and queue the files if there are several."""
+        paths = chosen_files(self)
+        if not paths:
+            return {"CANCELLED"}
+        settings = context.scene.scope
+        settings.footage = stored_path(context, paths[0])
+        settings.queue.clear()
+        if len(paths) > 1:
+            for path in paths:
+                settings.queue.add().footage = stored_path(context, path)
+        show_tab(context)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
+    """Add a video of the same moment by another camera. All cameras must stand still"""
+
+    bl_idname = "scope.add_view"
+    bl_label = "Add View"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require footage, and that there may be another view."""
+        settings = context.scene.scope
+        if not settings.footage:
+            return refuse(cls, tip_("Choose a video or image first"))
+        if len(settings.views) >= MOST_FURTHER_VIEWS:
+            return refuse(cls, tip_("There are at most eight cameras"))
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add the chosen files."""
+        settings = context.scene.scope
+        paths = chosen_files(self)
+        if not paths:
+            return {"CANCELLED"}
+        if len(settings.views) + len(paths) > MOST_FURTHER_VIEWS:
+            self.report({"ERROR"}, rpt_("There are at most eight cameras"))
+            return {"CANCELLED"}
+        for path in paths:
+            settings.views.add().footage = stored_path(context, path)
+        show_tab(context)
+        return {"FINISHED"}
+
+
+class _RemoveFromList:
+    """An operator that removes an entry of one of the footage's lists. Not registered."""
+
+    bl_options = {"UNDO"}
+    listed: ClassVar[str]  # the list, of the settings
+
+    index: IntProperty(min=0, options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Remove the entry."""
+        entries = getattr(context.scene.scope, self.listed)
+        if self.index >= len(entries):
+            return {"CANCELLED"}
+        entries.remove(self.index)
+        return {"FINISHED"}
+
+
+class SCOPE_OT_remove_view(_RemoveFromList, bpy.types.Operator):
+    """Remove this video from the list; the file stays"""
+
+    bl_idname = "scope.remove_view"
+    bl_label = "Remove View"
+    listed = "views"
+
+
+class SCOPE_OT_use_sample(bpy.types.Operator):
+    """Use the short clip that is included with Scope"""
+
+    bl_idname = "scope.use_sample"
+    bl_label = "Try the Sample Clip"
+    bl_options = {"UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the footage to the sample clip."""
+        context.scene.scope.footage = str(SAMPLE)
+        return {"FINISHED"}
+
+
+class CapturingOperator(JobOperator):
+    """An operator that captures footage. Not registered."""
+
+    timer_s = 0.1
+    job_state = state
+    _shown = ("", "", 0)  # the stage, progress and messages that were drawn last
+    _drawn_s = 0.0  # when that was
+    _pause_s = 0.0  # after it, until the next drawing
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require that footage is chosen and nothing is running."""
+        if not nothing_runs(cls):
+            return False
+        if not context.scene.scope.footage:
+            return refuse(cls, tip_("Choose a video or image first"))
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Capture from a script, and wait for the result."""
+        if not self.start(context):
+            return {"CANCELLED"}
+        try:
+            while not (outcome := self._advance()):
+                time.sleep(0.02)
+            return outcome
+        finally:
+            stop_job()
+
+    def start(self, context: bpy.types.Context) -> bool:
+        """Start the job; return whether that worked."""
+        return self.begin(context.scene)
+
+    def begin(self, scene: bpy.types.Scene) -> bool:
+        """Start the job for a scene with its settings; return whether that worked."""
+        state.message = ""
+        state.scene_uid = scene.session_uid
+        state.started = time.monotonic()
+
+        # Imported here: it loads numba and numpy, which would slow down the start of Blender.
+        try:
+            restore_libraries()
+            from .capture_job import CaptureJob
+        except (ScopeError, ImportError) as error:
+            return self.fail(error)
+
+        warm_up.detach()  # the capture compiles what is left; what it has compiled is kept
+        try:
+            state.job = CaptureJob(scene)
+        except (ScopeError, OSError) as error:
+            return self.fail(error)
+        return True
+
+    def step(self, context: bpy.types.Context) -> set[str] | None:
+        """Advance the job, and show its progress; return None while it is running, and then the
+        outcome.
+        """
+        job = state.job
+        assert job is not None
+        outcome = self._advance()
+        progress = ", ".join(job.progress.lines(iface_))
+        shown = (job.progress.stage, progress, job.messages)
+        now_s = time.monotonic()
+        if not self._pause_s:  # the first step after a drawing: its delay is the drawing's
+            delay_s = now_s - self._drawn_s
+            self._pause_s = 5.0 * delay_s if delay_s > 1.5 * self.timer_s else DRAWN_EVERY_S
+        is_due = shown[0] != self._shown[0] or now_s - self._drawn_s >= self._pause_s
+        # Drawing costs time in which Blender does not react: without a graphics card 0.1 s, and
+        # more on a busy machine.
+        if shown != self._shown and is_due:
+            self._shown = shown
+            self._drawn_s = now_s
+            self._pause_s = 0.0
+            context.workspace.status_text_set(
+                iface_(
+                    "Scope: {progress}   (Esc over the Scope panel to cancel)", progress=progress
+                )
+            )
+            redraw_sidebars()
+        return outcome
+
+    def _advance(self) -> set[str] | None:
+        """Advance the job; return None while it is running, and then the operator's outcome."""
+        assert state.job is not None
+        try:
+            if state.job.step():
+                return None
+        except (ScopeError, OSError, MemoryError) as error:
+            self.fail(error)
+            return {"CANCELLED"}
+        self.report({"INFO"}, "Capture finished")
+        self._report_unit()
+        return {"FINISHED"}
+
+    def _report_unit(self) -> None:
+        """Warn at once of a scene in whose unit the person is not life-size."""
+        scene = _scene_of_job()
+        if scene is not None and (text := unit_text(scene)):
+            self.report({"WARNING"}, text)
+
+    def ask_to_cancel(self) -> None:
+        """Ask, if the capture has run for long, and cancel it."""
+        bpy.ops.scope.cancel("INVOKE_DEFAULT")
+
+    def say_cancelled(self) -> None:
+        """Say that nothing has changed."""
+        self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
+
+    def stop_job(self) -> None:
+        """End the job in any state."""
+        stop_job()
+
+    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        """Stop the job and the timer, show what was built, and return the outcome."""
+        if "FINISHED" in outcome:
+            show_new_capture(context)
+        return super().end(context, outcome)
+
+
+class SCOPE_OT_capture(CapturingOperator):
+    """Capture the person in the footage as an animated body, while Blender stays usable"""
+
+    bl_idname = "scope.capture"
+    bl_label = "Capture"
+    bl_options = {"UNDO"}
+
+
+class SCOPE_OT_capture_queue(CapturingOperator):
+    """Capture all clips of the list that wait, one after the other, with the same options"""
+
+    bl_idname = "scope.capture_queue"
+    bl_label = "Capture All"
+
+    _finished = 0  # clips so far
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a clip that waits, of one camera, and that nothing is running."""
+        if not super().poll(context):
+            return False
+        settings = context.scene.scope
+        if settings.views:
+            return refuse(cls, tip_("Remove the other cameras' videos first"))
+        if not any(_waits(clip) for clip in settings.queue):
+            return refuse(cls, tip_("All clips of the list have been captured; choose others"))
+        return True
+
+    def begin(self, scene: bpy.types.Scene) -> bool:
+        """Start the first clip that waits and can be started; return whether there is one."""
+        for clip in scene.scope.queue:
+            if _waits(clip):
+                clip.status = CAPTURING
+                scene.scope.footage = clip.footage
+                if super().begin(scene):
+                    return True
+        return False
+
+    def fail(self, error: Exception | str) -> bool:
+        """Note why the clip cannot be captured, and go on; return False."""
+        clip = _clip_of_job()
+        if clip is not None:
+            clip.status = FAILED
+            clip.message = sentence(error)
+        stop_job()
+        self.report({"WARNING"}, sentence(error))
+        return False
+
+    def _advance(self) -> set[str] | None:
+        """Advance the clip's job, and begin the next clip when it has ended."""
+        outcome = super()._advance()
+        if outcome is None:
+            return None
+        scene = _scene_of_job()
+        if "FINISHED" in outcome:
+            self._finished += 1
+            clip = _clip_of_job()
+            if clip is not None:
+                clip.status = DONE
+            stop_job()
+            if not bpy.app.background:  # so that each capture can be undone alone
+                bpy.ops.ed.undo_push(message="Capture")
+        if scene is not None and self.begin(scene):
+            return None
+        return {"FINISHED"} if self._finished else {"CANCELLED"}
+
+    def step(self, context: bpy.types.Context) -> set[str] | None:
+        """Advance, and show the progress of the clip that is captured."""
+        outcome = super().step(context)
+        redraw_sidebars()
+        return outcome
+
+    def say_cancelled(self) -> None:
+        """Say what the scene keeps."""
+        if not self._finished:
+            super().say_cancelled()
+            return
+        self.report({"INFO"}, "Capture cancelled; the clips captured before stay in the scene")
+
+    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        """Let a cancelled clip wait again, and end as a single capture does."""
+        clip = _clip_of_job()
+        if clip is not None:
+            clip.status = WAITING
+        return super().end(context, outcome)
+
+
+class SCOPE_OT_remove_clip(_RemoveFromList, bpy.types.Operator):
+    """Remove this clip from the list; the file and its capture stay"""
+
+    bl_idname = "scope.remove_clip"
+    bl_label = "Remove Clip"
+    listed = "queue"
+
+
+def _waits(clip: Any) -> bool:
+    """Whether a clip of the list is still to be captured; a file that was saved while it was being
+    captured holds it as such.
+    """
+    return clip.status in (WAITING, CAPTURING)
+
+
+def _clip_of_job() -> Any | None:
+    """Return the clip of the list that is being captured; None if it was removed from the list."""
+    scene = _scene_of_job()
+    if scene is None:
+        return None
+    return next((clip for clip in scene.scope.queue if clip.status == CAPTURING), None)
+
+
+def _scene_of_job() -> bpy.types.Scene | None:
+    """Return the scene that the running job belongs to; None if it was removed."""
+    return next((s for s in bpy.data.scenes if s.session_uid == state.scene_uid), None)
+
+
+class SCOPE_OT_cancel(bpy.types.Operator):
+    """Cancel the capture; the scene stays unchanged"""
+
+    bl_idname = "scope.cancel"
+    bl_label = "Cancel Capture"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require that a capture is running."""
+        return state.job is not None
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask first if the capture has run for a while."""
+        if time.monotonic() - state.started <= ASK_AFTER_S or bpy.app.background:
+            return self.execute(context)
+        ask_to_stop()
+        return {"INTERFACE"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """End the worker, and ask the modal operator to end."""
+        assert state.job is not None
+        state.job.cancelled = True
+        state.job.close()
+        return {"FINISHED"}
+
+
+class SCOPE_OT_keep_capturing(bpy.types.Operator):
+    """Continue the capture"""
+
+    bl_idname = "scope.keep_capturing"
+    bl_label = "Keep Capturing"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Do nothing: the question closes."""
+        return {"FINISHED"}
+
+
+class SCOPE_PT_stop_capture(bpy.types.Panel):
+    """The question before a capture that has run for a while is stopped. Escape closes it, and the
+    capture goes on.
+    """
+
+    bl_idname = "SCOPE_PT_stop_capture"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"  # for a popover: in no sidebar
+    bl_label = "Stop the Capture?"
+    bl_ui_units_x = 16
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw both answers; Return gives the one that was asked for."""
+        from ..job.job_progress import duration
+
+        column = self.layout.column()
+        column.operator_context = "EXEC_DEFAULT"  # or it would ask again
+        column.label(text="Stop the Capture?", icon="QUESTION")
+        seconds = time.monotonic() - state.started
+        text = iface_("It has run for {time}. The scene stays unchanged", time=duration(seconds))
+        column.label(text=text, translate=False, icon="BLANK1")
+        row = column.row()
+        row.scale_y = 1.3
+        row.operator("scope.keep_capturing", icon="PLAY")
+        cell = row.row()
+        cell.active_default = True
+        cell.operator("scope.cancel", text="Stop Capture", icon="CANCEL")
+
+
+def ask_to_stop() -> None:
+    """Open the question. In Blender's own, its Cancel beside our answer would leave open what is
+    cancelled.
+    """
+    bpy.ops.wm.call_panel(name=SCOPE_PT_stop_capture.bl_idname, keep_open=False)
+
+
+def stop_job() -> None:
+    """End the job in any state."""
+    if state.job is not None:
+        state.job.close()
+    state.job = None
+    preview_picture.clear()
+
+
+class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
+    """Motion capture: animate a body with the motion of the person in a video or image"""
+
+    bl_idname = "scope.import_video"
+    bl_label = "Motion from Video"  # short: the button of the file browser shows it, too
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require that no capture is running."""
+        return nothing_runs(cls)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the file."""
+        return self.ask(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings of the capture in the sidebar of the file browser."""
+        layout = self.layout
+        settings = context.scene.scope
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("quality", "people", "hands", "face", "height_cm", "take"):
+            layout.prop(settings, name)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the footage to the file, and start the capture."""
+        path = Path(bpy.path.abspath(self.filepath))
+        if not os.path.isfile(path):  # Path.is_file raises where a name is too long
+            self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
+            return {"CANCELLED"}
+        context.scene.scope.footage = stored_path(context, str(path))
+        context.scene.scope.views.clear()  # which are of other footage
+        show_tab(context)
+        try:
+            bpy.ops.scope.capture("INVOKE_DEFAULT")
+        except RuntimeError as error:  # it has said why nothing can be captured here
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+CLASSES = (
+    SCOPE_OT_choose_footage,
+    SCOPE_OT_add_view,
+    SCOPE_OT_remove_view,
+    SCOPE_OT_use_sample,
+    SCOPE_OT_capture,
+    SCOPE_OT_capture_queue,
+    SCOPE_OT_remove_clip,
+    SCOPE_OT_cancel,
+    SCOPE_OT_keep_capturing,
+    SCOPE_PT_stop_capture,
+    SCOPE_OT_import_video,
+)

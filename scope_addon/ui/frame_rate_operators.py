@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The operator that gives the scene the frame rate of the footage after a capture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ...solver.errors import ScopeError
+from ..notices import Notice, notice
+from ..scene.datablocks import holds
+from ..scene.stored_values import parse_spans, spans_text, stored_rate
+from .captured_person import PERSON, body_of, captured_people, library_of, motion_of
+from .captures import people_of, shown_capture
+from .reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning, tip_
+
+if TYPE_CHECKING:
+    from ..motion import Motion
+
+_SAME = 0.01  # frames per second
+_WHOLE = 1e-5  # how far the keys' distance may be from whole frames, of which thousands add up
+# Warnings that another frame rate settles.
+_OF_RATE = ("scene_rate", "scene_rate_multiple", "footage_drifts")
+
+
+def rate_warnings(scene_rate: float, rate: float, what: str = "footage") -> list[Notice]:
+    """Return the warning that a scene keeps another frame rate than a motion has, and where its
+    keys lie, if so.
+
+    :param scene_rate: frames per second of the scene.
+    :param rate: frames per second of the motion; 0 for a still image.
+    :param what: has the other rate: a key of ``notices.PHRASES``.
+    """
+    if not rate > 0 or abs(rate - scene_rate) <= _SAME:
+        return []
+    apart = scene_rate / rate
+    if apart > 1.5 and abs(apart - round(apart)) < _WHOLE:
+        return [
+            notice(
+                "scene_rate_multiple",
+                scene_rate=scene_rate,
+                what=what,
+                rate=rate,
+                apart=round(apart),
+            )
+        ]
+    return [notice("scene_rate", scene_rate=scene_rate, what=what, rate=rate)]
+
+
+def differs(scene: bpy.types.Scene) -> bool:
+    """Return whether the shown capture's footage has another frame rate than the scene"""
+    rate = scene.scope.result.footage_rate
+    return bool(rate > 0 and abs(rate - scene.render.fps / scene.render.fps_base) > _SAME)
+
+
+def keyed_for(scene: bpy.types.Scene) -> float:
+    """Return the frame rate that the shown capture was keyed for, if the scene has another one
+    since; otherwise 0.
+
+    Blender's importer of FBX files, for example, sets the scene's frame rate, which changes the
+    speed of all keys.
+    """
+    now = scene.render.fps / scene.render.fps_base
+    capture = shown_capture(scene)
+    rates = [stored_rate(person, now) for person in people_of(capture)] if capture else []
+    return next((rate for rate in rates if abs(rate - now) > _SAME), 0.0)
+
+
+class SCOPE_OT_match_frame_rate(ReportingOperator):
+    """Set the scene to the motion's frame rate"""
+
+    bl_description = (
+        "Set the scene to the motion's frame rate. Captures keep their speed, other animation "
+        "keeps its frames"
+    )
+    bl_idname = "scope.match_frame_rate"
+    bl_label = "Match Frame Rate"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a capture with a frame rate, and that everything to move is stored in this
+        file.
+        """
+        scene = context.scene
+        if scene.scope.result.footage_rate <= 0:
+            return refuse(cls, tip_("The scene contains no captured video or imported motion"))
+        linked = next(
+            (block for block in [scene, *captured_people(context)] if _library(block)), None
+        )
+        library = _library(linked) if linked is not None else None
+        if linked is not None and library is not None:
+            name = linked.name
+            file = library.filepath
+            return refuse(
+                cls, tip_("'{name}' is linked from {file}: make it local", name=name, file=file)
+            )
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        """Change the rate and move the captures in time."""
+        from ..scene.character.keys import bake_whole_frames, read_clip
+        from ..scene.match_rate import change_rate, other_animation
+        from ..scene.timing import keyed_rate, scene_rate
+        from ..scene.transaction import all_or_nothing
+
+        scene = context.scene
+        people = captured_people(context)
+        former = scene_rate(scene)
+        rate = _exact(scene.scope.result.footage_rate)
+        bodies = {person: body_of(person) for person in people if person.get("scope_resampled")}
+        for person, body in bodies.items():  # which fails without keys, before anything is changed
+            read_clip(person, body, former)
+        keyed = {person: keyed_rate(person, scene) for person in people}
+        motions = {person: _motion(person) for person in people}
+        rigs = [(obj, obj[PERSON]) for obj in scene.objects if obj.get(PERSON) in people]
+        cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
+        with all_or_nothing(scene, *people, *(rig for rig, _ in rigs), *cameras):
+            warnings = change_rate(scene, rate, motions, rigs)
+            for person, body in bodies.items():
+                bake_whole_frames(person, body, rate)
+        _update_results(scene, rate, keyed, warnings)
+        if other_animation(scene, people, rigs):
+            return rpt_(
+                "The scene has {rate:.5g} frames/s; animation that was not captured plays "
+                "{factor:.3g} times as fast",
+                rate=rate,
+                factor=rate / former,
+            )
+        return rpt_("The scene has {rate:.5g} frames/s, like the motion", rate=rate)
+
+
+def _library(block: bpy.types.ID) -> bpy.types.Library | None:
+    return library_of(block) if isinstance(block, bpy.types.Object) else block.library
+
+
+def _exact(rate: float) -> float:
+    """Return the rate that Blender will store, which single precision has rounded"""
+    from ..scene.timing import blender_rate
+
+    fps, base = blender_rate(rate)
+    return fps / base
+
+
+def _motion(person: bpy.types.Object) -> Motion | None:
+    """Return the person's motion; None if it is lost, without which keys can be moved too"""
+    try:
+        return motion_of(person)
+    except ScopeError:
+        return None
+
+
+def _update_results(
+    scene: bpy.types.Scene,
+    rate: float,
+    keyed: dict[bpy.types.Object, float],
+    warnings: list[Notice],
+) -> None:
+    """Move the frames that results name, and replace the warnings about the frame rate"""
+    from ..scene.match_rate import retimed_spans
+
+    for collection in scene.collection.children_recursive:
+        result = collection.scope_result
+        person = next((p for p in keyed if holds(collection, p)), None)
+        if person is None:
+            continue
+        shown = result.warnings
+        for index in reversed(range(len(shown))):
+            if stored_warning(shown[index]).code in _OF_RATE:
+                shown.remove(index)
+            elif shown[index].spans:
+                spans = parse_spans(shown[index].spans)
+                moved = retimed_spans(spans, person, rate, keyed[person])
+                shown[index].spans = spans_text(moved)
+        if not person.get("scope_resampled"):  # which has keys on every frame
+            what = "footage" if result.footage else "motion"
+            for warning in rate_warnings(rate, result.footage_rate, what):
+                add_warning(result, warning)
+    for warning in dict.fromkeys(warnings):
+        add_warning(scene.scope.result, warning)
+
+
+CLASSES = (SCOPE_OT_match_frame_rate,)

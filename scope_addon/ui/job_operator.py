@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What captures of footage and live captures share in Blender's window: a job that a timer
+advances, until it ends.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import bpy
+
+from .reporting import sentence
+from .sidebar import is_over_tab, redraw_sidebars_twice
+
+
+class JobOperator(bpy.types.Operator):
+    """An operator that starts a job, and continues on a timer while Blender stays usable. Not
+    registered.
+    """
+
+    timer_s: float  # between two steps
+    # with the running ``job``, whose ``cancelled`` is set by the operator that cancels, and
+    # ``message``
+    job_state: Any
+
+    if TYPE_CHECKING:  # implemented by each operator
+
+        def start(self, context: bpy.types.Context) -> bool:
+            """Start the job; return whether that worked."""
+
+        def step(self, context: bpy.types.Context) -> set[str] | None:
+            """Advance the job, and show its state; return None while it runs, and then the
+            operator's outcome.
+            """
+
+        def ask_to_cancel(self) -> None:
+            """Call the operator that cancels."""
+
+        def say_cancelled(self) -> None:
+            """Report that the job was cancelled."""
+
+        def stop_job(self) -> None:
+            """End the job in any state."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Start from the panel, and continue on a timer."""
+        if bpy.app.background:
+            outcome: set[str] = self.execute(context)
+            return outcome
+        if not self.start(context):
+            return {"CANCELLED"}
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(self.timer_s, window=context.window)
+        manager.modal_handler_add(self)
+        redraw_sidebars_twice()
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Step on timer events, cancel on Escape over the panel, pass the others to Blender.
+
+        Elsewhere, Escape belongs to what is under the mouse, such as the playback of the timeline.
+        """
+        job = self.job_state.job
+        if job is None:  # stopped by something else
+            return self.end(context, {"CANCELLED"})
+        if event.type == "ESC" and event.value == "PRESS" and is_over_tab(context.window, event):
+            self.ask_to_cancel()
+            return {"RUNNING_MODAL"}
+        if job.cancelled:
+            self.say_cancelled()
+            return self.end(context, {"CANCELLED"})
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            outcome = self.step(context)
+        except Exception:  # Blender drops the operator without calling ``cancel``
+            self.end(context, {"CANCELLED"})
+            raise
+        return self.end(context, outcome) if outcome else {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop when Blender opens another file or quits."""
+        self.end(context, {"CANCELLED"})
+
+    def fail(self, error: Exception | str) -> bool:
+        """Stop, and say why; return False."""
+        self.job_state.message = sentence(error)
+        self.stop_job()  # before the report, which raises in a script
+        redraw_sidebars_twice()
+        self.report({"ERROR"}, self.job_state.message)
+        return False
+
+    def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
+        """Stop the job and the timer, and return the outcome."""
+        self.stop_job()
+        if (timer := getattr(self, "_timer", None)) is not None:
+            context.window_manager.event_timer_remove(timer)
+            self._timer = None
+        clear_status_bar()
+        redraw_sidebars_twice()
+        return outcome
+
+
+def clear_status_bar() -> None:
+    """Clear the status bar in every workspace, because each has its own text and the user may have
+    switched.
+    """
+    for workspace in bpy.data.workspaces:
+        with bpy.context.temp_override(workspace=workspace):  # Blender sets only the context's text
+            workspace.status_text_set(None)

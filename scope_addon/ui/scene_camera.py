@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The lens and the motion of a camera in the scene, as the file of a camera's path that the worker
+reads.
+
+Blender's camera looks along its −z with y up. With the resolution W × H, the pixel aspect a =
+aspect_y / aspect_x and the sensor's side S that the fit chooses, which covers the side w of the
+picture (W, or a H),
+
+    fx = w lens / S,   fy = fx / a,   cx = W/2 − w shift_x,   cy = H/2 + w shift_y fy / fx.
+
+Source: Blender's BKE_camera_params_compute_viewplane.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..arrays import Float64Array
+from ..errors import UsageError
+from ..scene.camera import camera_pose
+
+_SAME_LENS = 1e-3  # of a focal length that does not change, relative
+_MAX_SCALE = 1e-3  # by which an object's axes may be longer or shorter than 1
+
+
+def scene_camera_path(scene: bpy.types.Scene) -> Path:
+    """Write the path of the scene's chosen camera to a file of this session, and return it.
+
+    The camera is read in all frames of the scene's range. *First Frame* shows the footage's first
+    one. The same camera has the same file, with the same time, so that a finished capture is found
+    again.
+
+    :raises UsageError: no camera is chosen, it is not in the scene, or it is none that can have
+        filmed the footage.
+    """
+    camera = scene.scope.scene_camera
+    if camera is None or camera.type != "CAMERA":
+        raise UsageError("no camera of the scene is chosen; choose one, or another kind of lens")
+    if camera.name not in scene.objects:
+        raise UsageError(f"the camera {camera.name!r} is not in this scene; choose another one")
+    content = _content(scene, camera)
+    if not content["times_s"]:
+        raise UsageError(
+            f"the camera {camera.name!r} is solved in no frame of the scene's range; solve its "
+            "clip, or set the scene's range to the footage"
+        )
+    text = json.dumps(content)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    path = Path(bpy.app.tempdir) / f"scope_camera_{digest}.json"
+    path.write_text(text, encoding="utf-8")
+    os.utime(path, (0, 0))
+    return path
+
+
+def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]:
+    """Return the content of the file: lens, times and poses."""
+    render = scene.render
+    rate = render.fps / render.fps_base
+    shown = scene.frame_current, scene.frame_subframe
+    times_s = []
+    poses = []
+    lenses = []
+    try:
+        for frame in range(scene.frame_start, scene.frame_end + 1):
+            if not _is_solved(scene, camera, frame):
+                continue
+            scene.frame_set(frame)
+            evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            lenses.append(_intrinsics(scene, evaluated))
+            poses.append(_pose(scene, evaluated, frame))
+            times_s.append((frame - scene.scope.start_frame) / rate)
+    finally:
+        scene.frame_set(shown[0], subframe=shown[1])
+    if lenses:
+        focal = np.array(lenses)[:, 0, 0]
+        if np.ptp(focal) > _SAME_LENS * focal.max():
+            raise UsageError(
+                f"the lens of the camera {camera.name!r} zooms by a factor of "
+                f"{focal.max() / focal.min():.2f}; only a focal length that does not change can be "
+                "used"
+            )
+    return {
+        "intrinsics": lenses[0].tolist() if lenses else [],
+        "size": [render.resolution_x, render.resolution_y],
+        "times_s": times_s,
+        "world_from_camera": [pose[:3].tolist() for pose in poses],
+    }
+
+
+def _is_solved(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> bool:
+    """Return whether Blender's tracker has solved the camera in a frame, if it follows a track."""
+    for constraint in camera.constraints:
+        if constraint.type != "CAMERA_SOLVER" or constraint.mute:
+            continue
+        clip = scene.active_clip if constraint.use_active_clip else constraint.clip
+        if clip is None:
+            return False
+        solved = clip.tracking.reconstruction
+        number = frame - clip.frame_start + 1
+        if not solved.is_valid or solved.cameras.find_frame(frame=number) is None:
+            return False
+    return True
+
+
+def _intrinsics(scene: bpy.types.Scene, camera: bpy.types.Object) -> Float64Array:
+    """Return OpenCV's camera matrix (3, 3) of an evaluated camera, in pixels of the resolution.
+
+    :raises UsageError: it is an orthographic or panoramic camera.
+    """
+    data = camera.data
+    if data.type != "PERSP":
+        raise UsageError(
+            f"the camera {camera.name!r} is {data.type.lower()}; footage is filmed by one whose "
+            "type is Perspective"
+        )
+    render = scene.render
+    width, height = render.resolution_x, render.resolution_y
+    aspect = render.pixel_aspect_y / render.pixel_aspect_x
+    is_wide = width >= aspect * height
+    if data.sensor_fit == "VERTICAL" or (data.sensor_fit == "AUTO" and not is_wide):
+        side = aspect * height
+    else:
+        side = float(width)
+    sensor = data.sensor_height if data.sensor_fit == "VERTICAL" else data.sensor_width
+    fx = side * data.lens / sensor
+    cx = 0.5 * width - side * data.shift_x
+    cy = 0.5 * height + side * data.shift_y / aspect
+    return np.array([[fx, 0.0, cx], [0.0, fx / aspect, cy], [0.0, 0.0, 1.0]])
+
+
+def _pose(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> Float64Array:
+    """Return the pose (4, 4) of an evaluated camera in metres, with OpenCV's axes.
+
+    :raises UsageError: it has a scale, or a value that is no finite number.
+    """
+    matrix = np.array(camera.matrix_world, float)
+    if not np.isfinite(matrix).all():
+        raise UsageError(f"the camera {camera.name!r} has no finite place in frame {frame}")
+    axes = matrix[:3, :3]
+    off = np.abs(axes.T @ axes - np.eye(3)).max()
+    if off > 2.0 * _MAX_SCALE or np.linalg.det(axes) < 0:
+        raise UsageError(
+            f"the camera {camera.name!r}, or a parent of it, is scaled or sheared in frame {frame}"
+            "; apply its scale"
+        )
+    pose = camera_pose(matrix)
+    pose[:3, 3] *= scene.unit_settings.scale_length
+    return pose

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""BVH files of other tools against the motion that they were made from: names, rest poses, axes,
+units, orders of channels, and files that are damaged.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import MotionFileError
+from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.scope_addon.retarget.import_motions import import_motions
+from scope.solver.rotations import exp, shortest_turn
+
+from ..edit.walking import NAMES
+from .made_bvh import (
+    AT_REST,
+    FRAMES,
+    JOINTS,
+    PARENTS,
+    TOOLS,
+    D,
+    assert_is_the_motion,
+    bvh,
+    imported,
+    joints_of,
+)
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_joints_are_recognized_by_the_names_of_common_tools(tmp_path, tool):
+    found = imported(tmp_path, bvh(TOOLS[tool]))
+    assert_is_the_motion(found)
+    assert [note.code for note in found.notes] == ["other_skeleton"]
+
+
+@pytest.mark.parametrize(
+    ("order", "unit", "up"),
+    [
+        ("XYZ", 1.0, [1, 0, 0]),
+        ("ZXY", 100.0, [2, 0, 0]),
+        ("YZX", 1 / 0.0254, [-1, 0, 0]),
+        ("YXZ", 1000.0, [0, 0, 1]),
+        ("ZYX", 17.7, [0, 2, 0]),
+    ],
+)
+def test_any_order_of_channels_unit_and_axis(tmp_path, order, unit, up):
+    R_file = np.round(exp(np.pi / 2 * np.array(up, float)))
+    found = imported(tmp_path, bvh(TOOLS["cmu"], order=order, unit=unit, R_file=R_file))
+    assert_is_the_motion(found)
+
+
+def rest_of(arms: float, bent: float = 0.0, spread: float = 0.0) -> np.ndarray:
+    """Rotations from the T-pose: arms lowered, elbows and knees bent, legs spread."""
+    S = np.tile(np.eye(3), (len(NAMES), 1, 1))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        lowered = exp(np.array([0.0, 0.0, -sign * arms]))
+        elbow = lowered @ exp(np.array([0.0, -sign * bent, 0.0]))
+        thigh = exp(np.array([0.0, 0.0, sign * spread]))
+        parts = {"shoulder": lowered, "elbow": elbow, "wrist": elbow, "hand": elbow}
+        parts |= {"hip": thigh, "knee": thigh}
+        for part, turn in parts.items():
+            S[NAMES.index(f"{side}_{part}")] = turn
+    return S
+
+
+@pytest.mark.parametrize("rest", [rest_of(0.8), rest_of(1.4, 0.3, 0.2), rest_of(0.2, 0.6, 0.15)])
+def test_limbs_keep_their_directions_whatever_the_rest_pose(tmp_path, rest):
+    assert_is_the_motion(imported(tmp_path, bvh(TOOLS["mixamo"], rest)))
+
+
+def test_a_rest_pose_that_is_no_person(tmp_path):
+    """Every chain lies along x, as in files that keep the bones' axes."""
+    S = np.tile(np.eye(3), (len(NAMES), 1, 1))
+    for joint, name in enumerate(NAMES):
+        children = [k for k, parent in enumerate(PARENTS) if parent == joint]
+        if children and name not in ("pelvis", "spine3"):
+            S[joint] = shortest_turn(AT_REST[children[0]] - AT_REST[joint], np.array([1.0, 0, 0]))
+        elif joint:
+            S[joint] = S[PARENTS[joint]]
+    S[0] = exp(np.array([0.0, 0.0, -np.pi / 2]))
+    found = imported(tmp_path, bvh(TOOLS["cmu"], S))
+    assert_is_the_motion(found)
+    assert [note.code for note in found.notes] == ["no_rest_pose", "other_skeleton"]
+
+
+def test_somebody_who_lies_is_not_raised(tmp_path):
+    """The rest pose says what is up; that the motion contradicts is said."""
+    stands = JOINTS[0] @ R_WORLD_MODEL.T
+    lying = exp(np.array([np.pi / 2, 0.0, 0.0]))
+    original, places = D.copy(), JOINTS.copy()
+    try:
+        D[:] = lying @ original
+        JOINTS[:] = places @ lying.T
+        text = bvh(TOOLS["cmu"])
+    finally:
+        D[:] = original
+        JOINTS[:] = places
+    found = imported(tmp_path, text)
+    assert np.ptp(joints_of(found)[0, :, 2]) < 0.5 < np.ptp(stands[:, 2])
+    assert [note.code for note in found.notes] == ["unsure_up", "other_skeleton"]
+    assert_is_the_motion(imported(tmp_path, text, up="z"))
+
+
+def test_position_channels_of_all_joints_and_a_root_above_the_pelvis(tmp_path):
+    assert_is_the_motion(imported(tmp_path, bvh(TOOLS["neuron"], all_positions=True)))
+    assert_is_the_motion(imported(tmp_path, bvh(TOOLS["mixamo"], root="Reference")))
+
+
+@pytest.mark.parametrize(
+    ("step", "rate"),
+    [
+        ("0.033333", 30.0),
+        ("0.0333667", 30000 / 1001),
+        (".0083333", 120.0),
+        ("0.016667", 60.0),
+        ("0.04", 25.0),
+        ("0.0417083", 24000 / 1001),
+        ("0.03456", 1 / 0.03456),
+    ],
+)
+def test_frame_times_are_rounded_rates(tmp_path, step, rate):
+    found = imported(tmp_path, bvh(TOOLS["cmu"], step=step))
+    assert found.motion.mocap_framerate == pytest.approx(rate, rel=1e-9)
+
+
+def test_joints_that_are_missing_are_named(tmp_path):
+    names = [
+        f"cap{k}" if name.startswith(("Head", "LeftWrist", "LeftFinger")) else name
+        for k, name in enumerate(TOOLS["xsens"])
+    ]
+    skeleton, _, _ = bvh(names).partition("MOTION")
+    assert "cap20" in skeleton
+    found = imported(tmp_path, bvh(names))
+    assert_is_the_motion(found)
+    # Chains whose last joints are taken away.
+    short = bvh(TOOLS["xsens"], without=("left_wrist", "right_wrist", "head"))
+    found = imported(tmp_path, short)
+    notes = {note.code: note.values for note in found.notes}
+    assert notes["missing_joints"]["parts"] == ["head", "left wrist", "right wrist"]
+
+
+def test_everybody_of_a_file_is_imported_but_no_props(tmp_path):
+    """Two people with the same names, and a sword."""
+    first, motion, rows = bvh(TOOLS["mixamo"]).partition("MOTION")
+    sword = "ROOT sword { OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition }\n"
+    second = first.removeprefix("HIERARCHY\n")
+    head, step, frames = rows.partition("Frame Time: 0.033333\n")
+    frames = "".join(f"{row} 1 2 3 {row}\n" for row in frames.splitlines())
+    path = tmp_path / "walk.bvh"
+    path.write_text(first + sword + second + motion + head + step + frames)
+    people = import_motions(path)
+    assert len(people) == 2
+    for found in people:
+        assert_is_the_motion(found)
+
+
+WHOLE = bvh(TOOLS["cmu"])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "no MOTION"),
+        ("HIERARCHY\nMOTION\nFrames: 1\nFrame Time: 0.1\n", "does not end"),
+        (WHOLE[:-500], "numbers can be read"),
+        (WHOLE.replace("Frame Time: 0.033333", "Frame Time: 0"), "frame time is 0"),
+        (WHOLE.replace("Frame Time: 0.033333", "Frame Time: 0,033"), "'0,033'"),
+        (WHOLE.replace(f"Frames: {FRAMES}", "Frames: 0"), "0 frames"),
+        (WHOLE.replace(f"Frames: {FRAMES}", "Frames: 1e999"), "'1e999'"),
+        (WHOLE.replace("CHANNELS 6", "CHANNELS 99", 1), "99 channels"),
+        (WHOLE.replace("Xposition", "Wposition", 1), "'Wposition'"),
+        (WHOLE.replace("OFFSET", "OFFSET nan", 1), "'nan'"),
+        (WHOLE.replace("}", "", 1), "not expected|does not end"),
+        (WHOLE.replace("JOINT LeftUpLeg", "JONIT LeftUpLeg"), "'JONIT'"),
+        (WHOLE + " nan", "numbers can be read"),
+        (WHOLE.rstrip().rpartition(" ")[0] + " inf\n", "infinity"),
+        ("HIERARCHY\n" + "ROOT a {\n" * 5000 + "MOTION\nFrames: 1\nFrame Time: 0.1\n", "no place"),
+        (
+            "HIERARCHY\nROOT box {\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n}\n"
+            "MOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n",
+            "recognized as pelvis; they are box",
+        ),
+    ],
+)
+def test_files_that_cannot_be_used_say_why(tmp_path, text, says):
+    with pytest.raises(MotionFileError, match=says) as raised:
+        imported(tmp_path, text)
+    assert str(raised.value).count("walk.bvh") == 1
+    assert len(str(raised.value)) < 500
+
+
+def test_the_time_to_read_grows_with_the_size_alone(tmp_path):
+    """Each of these took longer than any test may, when it grew with the square or the cube."""
+    with pytest.raises(MotionFileError, match="no MOTION"):
+        imported(tmp_path, "HIERARCHY\n" + "\n" * 300_000)
+    joint = "JOINT a {\nOFFSET 0 1 0\nCHANNELS 0\n"
+    depth = 2000
+    chain = f"HIERARCHY\nROOT a {{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n{joint * depth}"
+    with pytest.raises(MotionFileError, match=r"they are a, a\.1, a\.2"):
+        imported(tmp_path, chain + "}" * (depth + 1) + "\nMOTION\nFrames: 1\nFrame Time: 0.1\n0\n")
+
+
+def test_a_file_that_does_not_exist(tmp_path):
+    with pytest.raises(MotionFileError, match="does not exist"):
+        import_motions(tmp_path / "walk.bvh")

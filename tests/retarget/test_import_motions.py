@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Imported motions against the motion that the file was made from: positions in the world, on the
+floor, z up.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import MotionFileError, UsageError
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.retarget.import_motions import (
+    DEFAULT_RATE,
+    Imported,
+    convert,
+    import_motions,
+)
+from scope.scope_addon.retarget.smpl_motion import smpl_motion
+from scope.solver.rotations import exp, log
+
+from ..edit.walking import BODY, RATE, motion_of, walk
+
+FILE = Path("walk.npz")
+CLIP = walk(2.0, bent=0.1)  # as people walk: no leg is locked straight
+MOTION = motion_of(CLIP)
+# Axes written out: what z up in the world is in a file with y up, and with y down.
+R_FILE_WORLD = {
+    "z": np.eye(3),
+    "y": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "camera": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+}
+
+
+def import_motion(path: Path, **arguments: Any) -> Imported:
+    """The only person of a file."""
+    (imported,) = import_motions(path, **arguments)
+    return imported
+
+
+def in_file(axis: str, height: float = 0.0) -> dict[str, np.ndarray]:
+    """The walk as SMPL-style arrays whose world has this axis up, and the floor at another
+    height.
+    """
+    R = R_FILE_WORLD[axis]
+    poses = MOTION.poses.reshape(len(MOTION), -1, 3).astype(float)
+    poses[:, 0] = log(R @ exp(poses[:, 0]))
+    pelvis = (BODY.rest_joints()[0] + MOTION.trans + [0, 0, height]) @ R.T
+    return {
+        "poses": poses.reshape(len(poses), -1),
+        "trans": pelvis - BODY.rest_joints()[0],
+        "mocap_framerate": np.array(RATE),
+    }
+
+
+def joints(motion: Motion) -> np.ndarray:
+    rotations = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
+    return BODY.forward_kinematics(rotations, motion.trans, motion.betas)[1]
+
+
+def skinned(motion: Motion, t: int) -> np.ndarray:
+    R, at = BODY.forward_kinematics(
+        exp(motion.poses[t].reshape(-1, 3).astype(float)), motion.trans[t], motion.betas
+    )
+    return BODY.skin(R, at, motion.betas)
+
+
+@pytest.mark.parametrize("axis", R_FILE_WORLD)
+@pytest.mark.parametrize("said", ["auto", "given"])
+def test_the_motion_stands_upright_on_the_floor(tmp_path, axis, said):
+    np.savez(tmp_path / "walk.npz", **in_file(axis, height=1.3))
+    found = import_motion(tmp_path / "walk.npz", up="auto" if said == "auto" else axis)
+    raised = joints(found.motion) - joints(MOTION)
+    np.testing.assert_allclose(raised, np.broadcast_to(raised[0, 0], raised.shape), atol=1e-3)
+    np.testing.assert_allclose(raised[0, 0, :2], 0, atol=1e-3)
+    lowest = [skinned(found.motion, t)[:, 2].min() for t in range(0, len(MOTION), 6)]
+    assert abs(np.median(lowest)) < 0.02
+    np.testing.assert_allclose(found.motion.timestamps, np.arange(len(MOTION)) / RATE)
+    assert any("Scope's own body" in note for note in map(str, found.notes))
+    assert found.motion.foot_contact.max() > 0.5
+    world = found.motion.world_from_camera[0]
+    shown = found.motion.joints_cam @ world[:3, :3].T + world[:3, 3]
+    np.testing.assert_allclose(shown, joints(found.motion), atol=1e-4)
+
+
+def test_a_motion_of_our_body_is_not_changed(tmp_path):
+    np.savez(
+        tmp_path / "walk.npz",
+        body_model=np.array("scope"),
+        betas=np.zeros(BODY.P),
+        **in_file("z", height=1.3),
+    )
+    found = import_motion(tmp_path / "walk.npz")
+    np.testing.assert_allclose(joints(found.motion), joints(MOTION) + [0, 0, 1.3], atol=1e-4)
+    assert found.notes == []
+
+
+def test_our_own_files_are_read_as_they_are(tmp_path):
+    MOTION.save(tmp_path / "own.npz")
+    found = import_motion(tmp_path / "own.npz")
+    assert found.body.name == "scope"
+    assert found.notes == []
+    for name, value in vars(MOTION).items():
+        np.testing.assert_array_equal(getattr(found.motion, name), value, err_msg=name)
+
+
+def test_an_own_file_of_another_body_is_applied_to_ours(tmp_path):
+    own = motion_of(CLIP)
+    own.body_model = "smpl"
+    own.betas = np.ones(10)
+    own.save(tmp_path / "own.npz")
+    found = import_motion(tmp_path / "own.npz")
+    assert found.body.name == "scope"
+    assert any("Scope's own body" in note for note in map(str, found.notes))
+    np.testing.assert_array_equal(found.motion.betas, 0)
+
+
+@pytest.mark.parametrize("key", ["poses", "timestamps", "mocap_framerate"])
+def test_a_damaged_file_of_our_own_is_an_error(tmp_path, key):
+    own = motion_of(CLIP)
+    setattr(own, key, getattr(own, key) * np.nan)
+    own.save(tmp_path / "own.npz")
+    with pytest.raises(MotionFileError, match="NaN|frame rate"):
+        import_motion(tmp_path / "own.npz")
+
+
+def test_fingers_choose_the_body_with_fingers(tmp_path):
+    arrays = in_file("z")
+    body_joints = arrays["poses"][:, : 3 * 22]
+    np.savez(tmp_path / "still.npz", **arrays | {"poses": np.pad(body_joints, ((0, 0), (0, 90)))})
+    moving = np.pad(body_joints, ((0, 0), (0, 90)), constant_values=0.2)
+    np.savez(tmp_path / "moving.npz", **arrays | {"poses": moving})
+    assert import_motion(tmp_path / "still.npz").body.name == "scope"
+    found = import_motion(tmp_path / "moving.npz")
+    assert found.body.name == "scope_h"
+    at = found.body.joint_names.index("left_index1")
+    np.testing.assert_allclose(
+        found.motion.poses.reshape(len(MOTION), -1, 3)[:, at], 0.2, atol=1e-6
+    )
+
+
+def test_what_is_missing_is_assumed_and_said(tmp_path):
+    arrays = in_file("z")
+    np.savez(tmp_path / "walk.npz", poses=arrays["poses"])
+    found = import_motion(tmp_path / "walk.npz")
+    assert found.motion.mocap_framerate == DEFAULT_RATE
+    said = " ".join(map(str, found.notes))
+    assert "frame rate" in said
+    assert "translation" in said
+    assert import_motion(tmp_path / "walk.npz", rate=50.0).motion.mocap_framerate == 50.0
+    np.testing.assert_allclose(np.ptp(found.motion.trans, axis=0), 0, atol=1e-6)
+
+
+def test_an_unclear_up_axis_is_said(tmp_path):
+    arrays = in_file("z")
+    lying = arrays["poses"].copy()
+    lying[:, :3] = [0.0, 0.0, np.pi / 2]  # along x
+    np.savez(tmp_path / "lying.npz", **arrays | {"poses": lying})
+    unsure = import_motion(tmp_path / "lying.npz").notes
+    told = import_motion(tmp_path / "lying.npz", up="z").notes
+    assert any("up axis is not clear" in note for note in map(str, unsure))
+    assert not any("not clear" in note for note in map(str, told))
+
+
+def test_one_frame_is_enough(tmp_path):
+    np.savez(tmp_path / "pose.npz", poses=in_file("z")["poses"][:1])
+    found = import_motion(tmp_path / "pose.npz")
+    assert len(found.motion) == 1
+    assert np.isfinite(found.motion.joints_cam).all()
+
+
+@pytest.mark.parametrize("arguments", [{"up": "x"}, {"rate": -1.0}, {"rate": np.nan}])
+def test_invalid_arguments(tmp_path, arguments):
+    np.savez(tmp_path / "walk.npz", **in_file("z"))
+    with pytest.raises(UsageError):
+        import_motion(tmp_path / "walk.npz", **arguments)
+
+
+@pytest.mark.parametrize("axis", R_FILE_WORLD)
+def test_on_the_users_own_smpl_body_shape_and_pelvis_are_exact(axis):
+    """Its rest pelvis is not at the model's origin, unlike ours; SMPL adds it in the file's
+    axes.
+    """
+    smpl = replace(
+        BODY, name="smpl", J_template=BODY.J_template + [0.01, -0.2, 0.03], gender="female"
+    )
+    betas = np.array([0.5, -1.0, 0.3])
+    R = R_FILE_WORLD[axis]
+    rotations = exp(MOTION.poses.reshape(len(MOTION), -1, 3).astype(float))
+    rotations[:, 0] = R @ rotations[:, 0]
+    trans = MOTION.trans @ R.T
+    source = smpl_motion(
+        {"poses": log(rotations).reshape(len(MOTION), -1), "trans": trans, "betas": betas}, FILE
+    )
+    full = np.pad(betas, (0, BODY.P - 3))
+    expected = smpl.forward_kinematics(rotations, trans, full)[1] @ R  # in the world
+    found = convert(source, smpl, FILE)
+    np.testing.assert_allclose(found.motion.betas, full, atol=1e-6)
+    got = smpl.forward_kinematics(
+        exp(found.motion.poses.reshape(rotations.shape[:2] + (3,)).astype(float)),
+        found.motion.trans,
+        full,
+    )[1]
+    raised = got - expected
+    np.testing.assert_allclose(raised, np.broadcast_to(raised[0, 0], raised.shape), atol=1e-4)
+    np.testing.assert_allclose(raised[0, 0, :2], 0, atol=1e-4)
+    if axis == "z":  # the floor of such a file is known
+        np.testing.assert_allclose(raised, 0, atol=1e-4)
+    assert any("neutral body" in note for note in map(str, found.notes))
+    assert not any("Scope's own body" in note for note in map(str, found.notes))

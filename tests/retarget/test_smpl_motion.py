@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays of other tools' files: names, shapes, rotation matrices, and everything that may be wrong
+with them.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scope.scope_addon.errors import MotionFileError
+from scope.scope_addon.retarget.smpl_motion import (
+    HAND_JOINTS,
+    SmplMotion,
+    read_smpl_motions,
+    smpl_motion,
+)
+from scope.solver.names import BODY_JOINTS
+from scope.solver.rotations import exp
+
+T = 5
+FILE = Path("walk.npz")
+RANDOM = np.random.default_rng(0).uniform(-0.6, 0.6, (T, 55, 3)).astype(np.float32)
+
+
+def read_one(path: Path) -> SmplMotion:
+    """The only motion of a file."""
+    (motion,) = read_smpl_motions(path)
+    return motion
+
+
+def flat(first: int, last: int) -> np.ndarray:
+    return RANDOM[:, first:last].reshape(T, -1)
+
+
+LAYOUTS = {
+    "SMPL": ({"poses": flat(0, 24)}, 24),
+    "SMPL+H": ({"poses": flat(0, 52)}, 52),
+    "SMPL-X": ({"poses": flat(0, 55)}, 55),
+    "body only": ({"poses": flat(0, 22)}, 22),
+    "joints apart": ({"thetas": RANDOM[:, :24]}, 24),
+    "AIST++": (
+        {"smpl_poses": flat(0, 24), "smpl_trans": np.ones((T, 3)), "smpl_scaling": np.array([2.0])},
+        24,
+    ),
+    "AMASS parts": (
+        {"root_orient": flat(0, 1), "pose_body": flat(1, 22), "pose_hand": flat(22, 52)},
+        52,
+    ),
+    "SMPL parameters": ({"global_orient": flat(0, 1), "body_pose": flat(1, 24)}, 24),
+    "hands apart": (
+        {
+            "global_orient": flat(0, 1),
+            "body_pose": flat(1, 22),
+            "left_hand_pose": flat(22, 37),
+            "right_hand_pose": flat(37, 52),
+        },
+        52,
+    ),
+    "hand components": (
+        {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "left_hand_pose": np.zeros((T, 6))},
+        22,
+    ),
+    "matrices": ({"global_orient": exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])}, 24),
+    "one root matrix": (
+        {"global_orient": exp(RANDOM[:, 0]), "body_pose": exp(RANDOM[:, 1:22])},
+        22,
+    ),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_every_layout_gives_the_same_rotations(tmp_path, layout):
+    arrays, joints = LAYOUTS[layout]
+    np.savez(tmp_path / "walk.npz", **arrays)
+    motion = read_one(tmp_path / "walk.npz")
+    assert motion.joint_names[:22] == BODY_JOINTS
+    assert len(motion.joint_names) == joints
+    np.testing.assert_allclose(exp(motion.poses), exp(RANDOM[:, :joints]), atol=1e-5)
+    if layout == "AIST++":
+        np.testing.assert_allclose(motion.trans, 0.5)
+    if joints == 52:
+        assert motion.joint_names[22:] == HAND_JOINTS["left"] + HAND_JOINTS["right"]
+    assert motion.has_fingers == (joints >= 52)
+
+
+@pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
+def test_frame_rate_gender_and_shape_are_read(key):
+    betas = np.arange(T * 10.0).reshape(T, 10)
+    arrays = {
+        "poses": flat(0, 24),
+        key: np.array(120),
+        "gender": np.array(b"female"),
+        "betas": betas,
+    }
+    motion = smpl_motion(arrays, FILE)
+    assert (motion.rate, motion.gender) == (120.0, "female")
+    np.testing.assert_allclose(motion.betas, betas.mean(0))
+    bare = smpl_motion({"poses": flat(0, 24)}, FILE)
+    assert (bare.rate, bare.trans, bare.betas.size, bare.gender) == (None, None, 0, "neutral")
+
+
+def test_other_arrays_may_hold_anything(tmp_path):
+    np.savez(tmp_path / "walk.npz", poses=flat(0, 24), meta=np.array([{"a": 1}], object))
+    assert len(read_one(tmp_path / "walk.npz")) == T
+
+
+def with_nan() -> np.ndarray:
+    poses = flat(0, 24).copy()
+    poses[3, 7] = np.nan
+    return poses
+
+
+GOOD = {"poses": flat(0, 24)}
+PARTS = {"global_orient": flat(0, 1), "body_pose": flat(1, 24)}
+BROKEN = {
+    "nothing": ({}, "no SMPL-style motion"),
+    "root alone": ({"global_orient": flat(0, 1)}, "no SMPL-style motion"),
+    "scalar": ({"poses": np.array(1.0)}, "no frames"),
+    "no frames": ({"poses": np.zeros((0, 72))}, "no frames"),
+    "no joints": ({"poses": np.zeros((T, 0))}, "shape"),
+    "another skeleton": ({"poses": np.zeros((T, 75))}, "75 numbers per frame"),
+    "not in threes": ({"poses": np.zeros((T, 71))}, "shape"),
+    "several people": ({"poses": np.zeros((2, T, 24, 3, 3))}, "shape"),
+    "quaternions": ({"poses": np.zeros((T, 24, 4))}, "quaternions that are not of length 1"),
+    "text": ({"poses": np.full((T, 72), "x")}, "must hold numbers"),
+    "complex": ({"poses": np.zeros((T, 72), complex)}, "must hold numbers"),
+    "NaN": ({"poses": with_nan()}, "NaN or infinity, first in frame 3"),
+    "too long": ({"poses": np.broadcast_to(np.float32(0), (10_000_000, 72))}, "at most 500000"),
+    "not rotations": (
+        {"global_orient": 2 * exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])},
+        "not rotations",
+    ),
+    "reflections": (
+        {"global_orient": -exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])},
+        "not rotations",
+    ),
+    "short body": (PARTS | {"body_pose": flat(1, 24)[:2]}, "as many frames"),
+    "wrong body": (PARTS | {"body_pose": flat(1, 20)}, "21 or 23"),
+    "wrong hand": (
+        PARTS | {"body_pose": flat(1, 22), "left_hand_pose": flat(22, 30)},
+        "must have 15 joints",
+    ),
+    "short trans": (GOOD | {"trans": np.zeros((2, 3))}, "trans must have shape"),
+    "scalar trans": (GOOD | {"trans": np.array(1.0)}, "trans must have shape"),
+    "empty trans": (GOOD | {"trans": np.zeros((0, 3))}, "trans must have shape"),
+    "infinite trans": (GOOD | {"trans": np.full((T, 3), np.inf)}, "NaN or infinity"),
+    "far away": (GOOD | {"trans": np.full((T, 3), 1e30)}, "metres"),
+    "rate of text": (GOOD | {"mocap_framerate": np.array("fast")}, "frames per second"),
+    "rate of zero": (GOOD | {"mocap_framerate": np.array(0)}, "frames per second"),
+    "rate of NaN": (GOOD | {"mocap_framerate": np.array(np.nan)}, "frames per second"),
+    "rates": (GOOD | {"mocap_framerate": np.ones(2)}, "frames per second"),
+    "wrong betas": (GOOD | {"betas": np.zeros((3, 4, 5))}, "betas has shape"),
+    "betas of text": (GOOD | {"betas": np.array(["a"])}, "must hold numbers"),
+    "scaling of zero": (
+        GOOD | {"trans": np.zeros((T, 3)), "smpl_scaling": np.array([0.0])},
+        "smpl_scaling",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_arrays_are_an_error_in_one_sentence(name):
+    arrays, says = BROKEN[name]
+    with pytest.raises(MotionFileError, match=says) as caught:
+        smpl_motion(arrays, FILE)
+    assert str(caught.value).startswith("walk.npz")
+    assert "\n" not in str(caught.value)
+
+
+def test_pickled_objects_are_no_poses(tmp_path):
+    np.savez(tmp_path / "walk.npz", poses=np.array([{}], object))
+    with pytest.raises(MotionFileError, match="holds no SMPL-style motion.*it holds poses"):
+        read_one(tmp_path / "walk.npz")
+
+
+def test_a_truncated_file_is_an_error(tmp_path):
+    np.savez(tmp_path / "walk.npz", **GOOD)
+    content = (tmp_path / "walk.npz").read_bytes()
+    for size in (0, 10, len(content) // 2, len(content) - 4):
+        (tmp_path / "walk.npz").write_bytes(content[:size])
+        with pytest.raises(MotionFileError, match="not a readable motion file"):
+            read_one(tmp_path / "walk.npz")

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What nobody can do, put into the motion of somebody who walks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.review_spans import (
+    find_review_spans,
+    has_bent_knees,
+    implausible,
+    joints_in_world,
+)
+from scope.solver.names import BODY_JOINTS
+
+from .edit.walking import motion_of, walk
+
+WALK = motion_of(walk(6.0))
+WALK = replace(WALK, image_size=np.array([1280, 720]))
+AT = {name: k for k, name in enumerate(BODY_JOINTS)}
+
+
+def moved(change: dict[str, np.ndarray]) -> Motion:
+    """The walk with joints moved by these vectors (T, 3) or (3,) in the world."""
+    joints = WALK.joints_cam.astype(float).copy()
+    for name, vector in change.items():
+        R = WALK.world_from_camera[:, :3, :3]
+        joints[:, AT[name]] += np.einsum("tji,tj->ti", R, np.broadcast_to(vector, (len(WALK), 3)))
+    return replace(WALK, joints_cam=joints.astype(np.float32))
+
+
+def test_a_walk_is_plausible() -> None:
+    assert not any(frames.any() for frames in implausible(WALK).values())
+    assert not has_bent_knees(WALK)
+
+
+@pytest.mark.parametrize("limb", [("left_ankle", "left_hip"), ("right_wrist", "right_shoulder")])
+def test_a_limb_that_passes_to_the_other_side_in_depth_alone_is_found(
+    limb: tuple[str, str],
+) -> None:
+    end, root = limb
+    joints = WALK.joints_cam.copy()
+    joints[:, AT[end]] = joints[:, AT[root]] + np.array([0.05, 0.4, -0.35], np.float32)
+    joints[61:, AT[end], 2] += 0.7
+    found = implausible(replace(WALK, joints_cam=joints))
+    rows = np.flatnonzero(found["swing"])
+    assert 50 <= rows[0] <= 60
+    assert rows[-1] - rows[0] < 20
+    assert not found["lean"].any()
+    spans = find_review_spans(replace(WALK, joints_cam=joints))
+    assert "swing" in [span.reason for span in spans]
+    # The same in half a second is a movement.
+    slow = WALK.joints_cam.copy()
+    depth = np.interp(WALK.timestamps, [2.0, 2.6], [-0.35, 0.35])
+    slow[:, AT[end]] = slow[:, AT[root]] + np.array([0.05, 0.4, 0.0], np.float32)
+    slow[:, AT[end], 2] += depth.astype(np.float32)
+    assert not implausible(replace(WALK, joints_cam=slow))["swing"].any()
+
+
+def leaning(degrees: float, rows: slice) -> Motion:
+    """The walk with everything above the ankles turned about them."""
+    joints = joints_in_world(WALK)
+    angle = np.zeros(len(WALK))
+    angle[rows] = np.radians(degrees)
+    feet = joints[:, [AT["left_ankle"], AT["right_ankle"]]].mean(axis=1)
+    height = joints[..., 2] - feet[:, None, 2]
+    # Only sideways, so that no joint leaves the image's depth.
+    shift = np.zeros_like(joints)
+    shift[..., 0] = np.tan(angle)[:, None] * np.maximum(height, 0)
+    leans = moved({name: shift[:, k] for name, k in AT.items()})
+    return replace(leans, foot_contact=np.ones((len(leans), 4)))
+
+
+def test_a_lean_that_is_held_is_found_and_a_short_one_is_a_step() -> None:
+    held = implausible(leaning(35.0, slice(30, 150)))["lean"]
+    assert held[40:140].all()
+    assert not held[:30].any()
+    assert not implausible(leaning(35.0, slice(30, 60)))["lean"].any()
+    assert not implausible(leaning(8.0, slice(30, 150)))["lean"].any()
+
+
+def test_a_person_who_floats_is_found_but_not_one_who_jumps() -> None:
+    def lifted(rows: slice) -> Motion:
+        height = np.zeros((len(WALK), 3))
+        height[rows, 2] = 0.8
+        return moved(dict.fromkeys(AT, height))
+
+    floats = implausible(lifted(slice(40, 120)))["floating"]
+    assert floats[40:120].all()
+    assert floats.sum() == 80
+    assert not implausible(lifted(slice(40, 60)))["floating"].any()
+    # On the hands, somebody is not in the air.
+    wrists = [AT["left_wrist"], AT["right_wrist"]]
+    on_hands = lifted(slice(40, 120))
+    joints = on_hands.joints_cam.copy()
+    joints[:, wrists] = WALK.joints_cam[:, [AT["left_foot"], AT["right_foot"]]]
+    assert not implausible(replace(on_hands, joints_cam=joints))["floating"].any()
+    uneven = replace(lifted(slice(40, 120)), uneven_ground=True)
+    assert not implausible(uneven)["floating"].any()
+
+
+def test_knees_that_are_never_straight_are_said_of_who_stands() -> None:
+    bent = motion_of(walk(6.0, bent=0.5))
+    bent = replace(bent, image_size=np.array([1280, 720]))
+    assert has_bent_knees(bent)
+    assert not has_bent_knees(motion_of(walk(1.0, bent=0.5)))
+
+
+def test_an_imported_motion_which_no_camera_has_seen_is_not_judged() -> None:
+    imported = replace(WALK, image_size=np.zeros(2, int))
+    assert not any(frames.any() for frames in implausible(imported).values())

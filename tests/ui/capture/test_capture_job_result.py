@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Review spans as the panel lists them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from scope.scope_addon.capture_report import Report
+from scope.scope_addon.notices import OTHER, notice
+from scope.scope_addon.scene.build import build_scene
+from scope.scope_addon.scene.stored_values import FrameSpan
+from scope.scope_addon.ui import capture_panel
+from scope.scope_addon.ui.capture_job import review_spans, show_result
+from scope.scope_addon.ui.reporting import add_warning, sentence, stored_warning
+
+from ...made_motion import made_motion
+
+
+def test_spans_are_listed_by_reason_in_scene_frames(body):
+    motion = made_motion(body, np.zeros((30, body.K + 1, 3)), np.zeros((30, 3)))
+    motion.valid[[0, 20]] = False
+    under = np.zeros(30, bool)
+    under[3:6] = True
+    assert review_spans(motion, np.arange(30) + 10.0, under) == {
+        "unseen": [(10, 10), (30, 30)],
+        "floor": [(13, 15)],
+    }
+
+
+def test_heights_and_joints_with_their_deviations(body):
+    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion.joint_sigma_m[1:4] = 0.052
+    result = build_scene([motion], body)
+    shown = result.collection.scope_result
+    heights = (
+        {"height_m": 1.741, "height_sigma_m": 0.0913},
+        {"height_m": 1.5, "height_sigma_m": 0.005},
+    )
+    unsure = {"height_m": 1.62, "height_sigma_m": None}
+    show_result(shown, "", Report(per_person=[*heights, unsure]), result)
+    assert shown.heights == "1.74 m ± 0.09, 1.50 m ± 0.005, 1.62 m"
+    assert np.isclose(shown.sigma_cm, 5.2, atol=1e-5)
+    show_result(shown, "", Report(), result)
+    assert shown.heights == ""
+
+
+def test_a_warning_keeps_the_name_of_the_footage(body):
+    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion.source = "my walk.mp4"
+    result = build_scene([motion], body)
+    shown = result.collection.scope_result
+    unseen = notice("unseen_legs", footage="my walk.mp4", person=0)
+    show_result(shown, "", Report(warnings=[unseen, notice("pixel_aspect")]), result)
+    texts = [stored.text for stored in shown.warnings]
+    assert texts[0].startswith("my walk.mp4: the legs of the person were not seen")
+    assert texts[1].startswith("The footage's pixels are not square")
+
+
+def test_a_stored_warning_is_known_by_its_record_and_else_by_its_text(body):
+    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    shown = build_scene([motion], body).collection.scope_result
+    drifts = notice("footage_drifts", frames=3.0)
+    add_warning(shown, drifts, [FrameSpan(3, 5), FrameSpan(8, 8)])
+    stored = shown.warnings[0]
+    assert stored_warning(stored) == drifts
+    assert stored.spans == "3-5,8"
+    for record in ("", "[" * 100_000, "3", '{"code": "footage_drifts", "values": {"frames": 4.0}}'):
+        stored.record = record
+        assert str(stored_warning(stored)) == stored.text
+        assert stored_warning(stored).code == OTHER
+
+
+def test_a_sentence_begins_with_a_capital_but_not_a_file_name():
+    assert sentence("walk_side.mp4 contains no person") == "walk_side.mp4 contains no person"
+    assert sentence("the file is empty.") == "The file is empty."
+    assert sentence("stop. Then go on") == "Stop. Then go on"
+
+
+def test_figures_are_wrapped_to_the_width_of_the_sidebar(body):
+    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion.joint_sigma_m[:] = 0.041
+    result = build_scene([motion], body)
+    shown = result.collection.scope_result
+    drawn = []
+    heights = [{"height_m": 1.7, "height_sigma_m": 0.1}] * 4
+    show_result(shown, "", Report(camera="estimated, 52 degrees", per_person=heights), result)
+    layout = SimpleNamespace(label=lambda text="", icon="NONE": drawn.append(text))
+    layout.column = lambda align=False: layout
+    region = SimpleNamespace(width=260)
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    capture_panel._draw_figures(
+        SimpleNamespace(region=region, preferences=preferences), layout, shown
+    )
+    assert "standard deviation, median" in " ".join(drawn)
+    assert max(map(len, drawn)) <= 28  # as wide as the panel's other sentences
