@@ -36,7 +36,7 @@ def check_live() -> None:
 
     :raises SetupError: it is Blender's extension, which contains nothing that sends to the network.
     """
-    _check_has("live.outputs.json_lines", "captures live in its panel alone", "live")
+    _check_has("live.json_lines", "captures live in its panel alone", "live")
 
 
 def check_cluster() -> None:

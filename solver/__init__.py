@@ -37,9 +37,9 @@ if TYPE_CHECKING:  # the public names and their modules, in the only place that 
     from .fitting.frame_solver import fit_tree as fit_tree
     from .fitting.normal_equations import GaussNewtonStep as GaussNewtonStep
     from .fitting.normal_equations import NormalEquations as NormalEquations
+    from .fitting.normal_equations import check_residual as check_residual
     from .fitting.normal_equations import gauss_newton_step as gauss_newton_step
     from .fitting.normal_equations import linearize as linearize
-    from .fitting.residual_check import check_residual as check_residual
     from .learned_prior import JointPrior as JointPrior
     from .learned_prior import load_joint_prior as load_joint_prior
     from .measurements import Floor as Floor

@@ -36,7 +36,7 @@ from scope.scope_addon.errors import ChangedFootageError, OutputError, UsageErro
 from scope.scope_addon.job.cache import Cache
 from scope.scope_addon.job.unfinished import UnfinishedCapture, unfinished_capture
 from scope.scope_addon.job.watched_footage import WatchedFootage
-from scope.scope_addon.live.outputs.journal import Journal, read_about, read_records
+from scope.scope_addon.live.journal import Journal, read_about, read_records
 from scope.scope_addon.machine_code.code_cache import read_code, write_code
 from scope.scope_addon.private_folder import is_private
 from scope.solver.body import Body
@@ -183,7 +183,7 @@ def test_a_recording_grows_where_it_was_begun(tmp_path: Path, body: Body, disk: 
 def test_recordings_are_synced_while_they_grow(
     tmp_path: Path, body: Body, monkeypatch: Patch
 ) -> None:
-    from scope.scope_addon.live.outputs import journal as module
+    from scope.scope_addon.live import journal as module
 
     monkeypatch.setattr(module, "_SYNC_S", 0.0)
     no_syncing(errno.EINVAL)(monkeypatch)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.cli import SAMPLE
-from ...scope_addon.live.sources import Picture
-from ...scope_addon.live.sources.source import Clock
+from ...scope_addon.live.source import Clock, Picture
 from ..frames import CACHE
 from .observed import there_and_back
 

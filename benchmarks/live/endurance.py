@@ -26,7 +26,7 @@ from ...scope_addon.capture.media.frame import Frame
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
 from ...scope_addon.cli import SAMPLE
-from ...scope_addon.live.outputs.json_lines import JsonServer
+from ...scope_addon.live.json_lines import JsonServer
 from ...scope_addon.live.people import LivePeople
 from ...scope_addon.live.pose import LivePose, Presence
 from ...scope_addon.live.run import Listeners, LiveOptions, LiveProgress, run_live

@@ -23,11 +23,11 @@ from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
-from ...scope_addon.live.outputs.recording import Recording
+from ...scope_addon.live.newest_frame import Pace
 from ...scope_addon.live.people import LivePeople
+from ...scope_addon.live.recording import Recording
 from ...scope_addon.live.run import Listeners, LiveOptions, run_live
-from ...scope_addon.live.sources.newest_frame import Pace
-from ...scope_addon.live.sources.source import FileSource
+from ...scope_addon.live.source import FileSource
 from ...scope_addon.motion import Motion
 from ...solver import Body
 from ..gate import clips

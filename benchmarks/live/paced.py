@@ -26,11 +26,11 @@ from ...scope_addon.capture.perception.landmark_network import LandmarkNetwork, 
 from ...scope_addon.capture.perception.observation import Observation
 from ...scope_addon.capture.perception.region import Region
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
-from ...scope_addon.live.outputs.recording import Recording
+from ...scope_addon.live.newest_frame import Pace
 from ...scope_addon.live.people import LivePeople
+from ...scope_addon.live.recording import Recording
 from ...scope_addon.live.run import Statistics
-from ...scope_addon.live.sources.newest_frame import Pace
-from ...scope_addon.live.sources.source import FileSource
+from ...scope_addon.live.source import FileSource
 from ...scope_addon.motion import Motion
 from ...solver import Body
 

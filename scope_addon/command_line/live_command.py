@@ -24,9 +24,9 @@ from .terminal import ProgressLine, print_message
 
 if TYPE_CHECKING:
     from ...solver.body import Body
-    from ..live.outputs.footage import Footage
-    from ..live.outputs.people_recording import PeopleRecording
-    from ..live.outputs.preview_page import PreviewPage
+    from ..live.footage_recording import Footage
+    from ..live.preview_page import PreviewPage
+    from ..live.recording import PeopleRecording
     from ..live.run import LiveOptions, Output
 
 
@@ -58,8 +58,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     options = _checked(values)
     check_outputs(_paths(values), vars(args), overlay=values["keep_footage"])
     # Imported here, so that errors in the arguments are printed immediately.
-    from ..live.outputs.unfinished import is_recording
-    from ..live.sources import is_stream
+    from ..live.open_source import is_stream
+    from ..live.unfinished import is_recording
 
     to_finish = [Path(args.source)] if is_recording(args.source) else []
     is_served = values["json_port"] is not None or values["preview"]
@@ -83,11 +83,11 @@ def _capture(
     :raises ScopeError: the source cannot be read, or an output failed.
     :raises KeyboardInterrupt: a second signal came; says what is written.
     """
-    from ..live.outputs.footage import Footage
-    from ..live.outputs.people_recording import Keep, PeopleRecording
-    from ..live.outputs.unfinished import SUFFIX, is_unfinished, unfinished_video
+    from ..live.footage_recording import Footage
+    from ..live.open_source import open_source
+    from ..live.recording import Keep, PeopleRecording
     from ..live.run import Listeners, run_live
-    from ..live.sources import open_source
+    from ..live.unfinished import SUFFIX, is_unfinished, unfinished_video
     from ..untrusted.body_file import load_body
 
     source = open_source(args.source)
@@ -179,8 +179,8 @@ def _finish_recording(journal: Path, record: Path | None) -> dict[str, Any]:
     :param record: as the option gives it; None: beside the recording.
     :raises ScopeError: it cannot be read, or a file cannot be written.
     """
-    from ..live.outputs.people_recording import unfinished_recording
-    from ..live.outputs.unfinished import remove_recording
+    from ..live.recording import unfinished_recording
+    from ..live.unfinished import remove_recording
 
     def paths(people: int) -> list[Path]:
         chosen = person_paths(record or journal.with_suffix(".npz"), people, separate=True)
@@ -275,7 +275,7 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
     """
     outputs: list[Output] = []
     if values["json_port"] is not None:
-        from ..live.outputs.json_lines import JsonServer
+        from ..live.json_lines import JsonServer
 
         server = stack.enter_context(
             JsonServer(body, values["listen"], values["json_port"], values["live_people"])
@@ -283,7 +283,7 @@ def _outputs(values: Mapping[str, Any], body: Body, stack: ExitStack) -> list[Ou
         print_message(f"lines of JSON on {values['listen']} port {server.port}")
         outputs.append(server)
     if values["vmc"] is not None:
-        from ..live.outputs.vmc import VmcSender, parse_address
+        from ..live.vmc import VmcSender, parse_address
 
         host, port = parse_address(values["vmc"], values["live_people"])
         for person in range(values["live_people"]):
@@ -296,7 +296,7 @@ def _preview(body: Body, stack: ExitStack) -> PreviewPage:
 
     :raises OutputError: it cannot be served.
     """
-    from ..live.outputs.preview_page import PreviewPage
+    from ..live.preview_page import PreviewPage
 
     page = stack.enter_context(PreviewPage(body))
     print_message(f"preview: open {page.address} in a browser")

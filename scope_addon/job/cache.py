@@ -98,7 +98,7 @@ class Cache:
         """Return the growing files of recordings here and in the user's own folder, where they are
         written if the disk of this one is full; the newest first in each.
         """
-        from ..live.outputs.unfinished import recordings_in
+        from ..live.unfinished import recordings_in
         from ..private_folder import lasting_folder
 
         folders = dict.fromkeys([self.root, lasting_folder() or self.root])
@@ -106,7 +106,7 @@ class Cache:
 
     def unfinished_recordings(self) -> list[Path]:
         """Return those of `recordings` whose process has ended."""
-        from ..live.outputs.unfinished import is_unfinished
+        from ..live.unfinished import is_unfinished
 
         return [path for path in self.recordings() if is_unfinished(path)]
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError, VideoError
-from ..live.sources.system_cameras import camera_names, camera_with_modes, described
+from ..live.system_cameras import camera_names, camera_with_modes, described
 from ..temporary import temporary_folder
 from .process import START_SCRIPT, WARM_UP_FIELDS, Fields, WorkerFailedError, WorkerProcess
 from .request import FormatsRequest

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 from ...solver.errors import ScopeError
 from ..capture_report import warnings_as_json
 from ..errors import system_error_message
-from ..live.outputs.footage import Footage
-from ..live.outputs.people_recording import Keep, PeopleRecording, unfinished_recording
-from ..live.outputs.unfinished import SUFFIX, is_recording
+from ..live.footage_recording import Footage
+from ..live.open_source import open_source
 from ..live.pose import values
+from ..live.recording import Keep, PeopleRecording, unfinished_recording
 from ..live.run import Listeners, LiveOptions, LiveProgress, run_live
-from ..live.sources import Picture, Source, open_source
+from ..live.source import Picture, Source
+from ..live.unfinished import SUFFIX, is_recording
 from ..notices import OTHER, Notice, notice
 from .cache import recordings_of
 from .request import Commands, LiveRequest
@@ -38,7 +39,7 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
     :raises ScopeError: an option is invalid, the source cannot be read, or nobody was seen in the
         recording.
     """
-    from ..live.sources.source import Clock
+    from ..live.source import Clock
     from ..untrusted.body_file import load_body
 
     chosen = request.values

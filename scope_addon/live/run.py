@@ -26,11 +26,11 @@ from ..capture.media.video import opencv_in_one_thread
 from ..capture.perception.sessions import Execution
 from ..capture.stages.observe import network_threads
 from ..capture.tracking.tracker import PeopleTracker
+from .camera import CAMERA_SIZE
+from .newest_frame import NewestFrame
 from .people import LivePeople
 from .pose import LivePose, Presence
-from .sources import CAMERA_SIZE, Picture, Source
-from .sources.newest_frame import NewestFrame
-from .sources.source import Clock
+from .source import Clock, Picture, Source
 
 PROGRESS_S = 0.5  # between two lines of progress
 RECENT_S = 2.0  # over which the rate is shown

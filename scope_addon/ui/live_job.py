@@ -26,8 +26,8 @@ from ..job.live_cameras import camera_source
 from ..job.live_process import PRESENCES, LiveProcess, ShownPose
 from ..job.process import START_SCRIPT
 from ..job.request import LiveRequest
-from ..live.outputs.journal import read_about
-from ..live.outputs.unfinished import remove_recording, unfinished_video
+from ..live.journal import read_about
+from ..live.unfinished import remove_recording, unfinished_video
 from ..notices import OTHER, Notice, notice
 from ..options import Place, options_at
 from ..options.body_choice import chosen_body

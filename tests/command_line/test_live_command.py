@@ -20,13 +20,13 @@ from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import signals
 from scope.scope_addon.job import live_cameras
 from scope.scope_addon.job.live_cameras import Camera
-from scope.scope_addon.live.outputs.vmc import BONES
 from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.smoothing import DELAY_S
+from scope.scope_addon.live.vmc import BONES
 from scope.scope_addon.motion import Motion
 
 from ..live.mjpeg_server import mjpeg_server
-from ..live.outputs.test_vmc import parsed
+from ..live.test_vmc import parsed
 
 
 @pytest.mark.parametrize(

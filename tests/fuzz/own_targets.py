@@ -49,7 +49,7 @@ def read_reply(path: Path) -> None:
 
 
 def read_recording(path: Path) -> None:
-    from scope.scope_addon.live.outputs.journal import fingerprint, read_about, read_records
+    from scope.scope_addon.live.journal import fingerprint, read_about, read_records
     from scope.scope_addon.untrusted.body_file import load_body
 
     about = read_about(path)
@@ -231,10 +231,10 @@ def live_replies(_: Path) -> list[bytes]:
 
 def recordings(folder: Path) -> list[bytes]:
     from scope.scope_addon.capture.camera.intrinsics import Camera
-    from scope.scope_addon.live.outputs.journal import About, Journal, fingerprint
+    from scope.scope_addon.live.journal import About, Journal, fingerprint
     from scope.scope_addon.untrusted.body_file import load_body
 
-    from ..live.outputs.test_vmc import pose_of
+    from ..live.test_vmc import pose_of
 
     body = load_body("scope")
     about = About("scope", fingerprint(body), "fake", "30", (64, 48), (3, 0.5), 1)

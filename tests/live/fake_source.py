@@ -5,8 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.live.sources import Picture
-from scope.scope_addon.live.sources.source import Clock
+from scope.scope_addon.live.source import Clock, Picture
 
 
 class FakeClock(Clock):

@@ -19,12 +19,12 @@ from scope.scope_addon.capture.tracking.appearance import SIZE
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.live import people as module
-from scope.scope_addon.live.outputs.people_recording import PeopleRecording
 from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.pose import Presence
+from scope.scope_addon.live.recording import PeopleRecording
 from scope.scope_addon.motion import Motion
 
-from .outputs.test_vmc import pose_of
+from .test_vmc import pose_of
 
 FRAMES = 14
 GREY = np.full((8, 8, 3), 128, np.uint8)

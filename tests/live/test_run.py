@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.scope_addon.live.outputs.people_recording import PeopleRecording
 from scope.scope_addon.live.pose import Presence
+from scope.scope_addon.live.recording import PeopleRecording
 from scope.scope_addon.live.run import Listeners, LiveOptions, Statistics, run_live
 
 from .fake_source import FakeClock, FakeSource

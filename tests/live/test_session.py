@@ -17,9 +17,9 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE
-from scope.scope_addon.live.outputs.recording import Recording
 from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.pose import Presence
+from scope.scope_addon.live.recording import Recording
 from scope.scope_addon.live.session import HOLD_S
 from scope.scope_addon.motion import Motion
 

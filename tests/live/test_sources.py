@@ -10,10 +10,11 @@ import pytest
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, VideoError
-from scope.scope_addon.live.sources import is_stream, newest_frame, open_source, stream
-from scope.scope_addon.live.sources.newest_frame import NewestFrame
-from scope.scope_addon.live.sources.source import Clock
-from scope.scope_addon.live.sources.stream import DAMAGED_S
+from scope.scope_addon.live import newest_frame, stream
+from scope.scope_addon.live.newest_frame import NewestFrame
+from scope.scope_addon.live.open_source import is_stream, open_source
+from scope.scope_addon.live.source import Clock
+from scope.scope_addon.live.stream import DAMAGED_S
 
 from ..capture.media.corner_picture import corner_image, corners
 from ..capture.media.made_video import patch_track_header, write_video

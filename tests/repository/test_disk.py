@@ -43,7 +43,7 @@ WRITES = {
     "scope_addon/cluster/worker.py",
     "scope_addon/ui/warm_up.py",
     # a recording that grows
-    "scope_addon/live/outputs/journal.py",
+    "scope_addon/live/journal.py",
     # the content of temporary files
     "scope_addon/atomic_write.py",
     "scope_addon/capture/media/guards.py",

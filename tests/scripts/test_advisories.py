@@ -98,4 +98,4 @@ def test_opencv_is_given_no_file_no_address_and_no_network() -> None:
         for path in (ROOT / "scope_addon").rglob("*.py")
         for name in opens.findall(path.read_text("utf-8"))
     }
-    assert found == {("scope_addon/live/sources/camera.py", "VideoCapture")}
+    assert found == {("scope_addon/live/camera.py", "VideoCapture")}

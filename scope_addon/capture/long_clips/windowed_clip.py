@@ -43,10 +43,9 @@ from ..stages.observe import (
     observe_in_one_pass,
     open_trackers,
 )
-from .joined_windows import JoinedWindows
 from .kept_estimates import KeptEstimates
 from .window_file import KeptWindows, load_window, save_window
-from .windows import Window, WindowRecord, WindowRun, plan_windows
+from .windows import JoinedWindows, Window, WindowRecord, WindowRun, plan_windows
 
 # Called when a window has ended, with its run and that of the next window; returns the run to go on
 # with.

@@ -36,7 +36,7 @@ from ..perception.adapters.description import description_path
 from ..perception.landmark_network import EstimateMemory
 from ..perception.observation import Observation
 from ..perception.sessions import Execution
-from ..tracking.chosen_person import ChosenPerson, find_chosen, place_of
+from ..tracking.chosen_person import ChosenPerson, find_chosen, needed_turn, place_of
 from ..tracking.face_tracker import FaceTracker
 from ..tracking.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from ..tracking.people import people_of
@@ -44,7 +44,6 @@ from ..tracking.scene_cuts import SCENE_GAP_S, SceneCuts
 from ..tracking.search_schedule import MaskSchedule
 from ..tracking.track import Track, Tracklet, make_track
 from ..tracking.tracker import MAX_PEOPLE, PeopleTracker
-from ..tracking.turned_footage import needed_turn
 from .clock import COMPILING, FINDING, Progress, StageClock
 
 LENGTH_TOLERANCE_S = 1.0  # by which a container may say that footage is too long

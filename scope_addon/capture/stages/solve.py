@@ -26,8 +26,7 @@ from ..world.clip_fit import fit_clip
 from ..world.placement import PlacedTrack, RawMotion, place_track
 from ..world.relative_sizes import relative_sizes, stander
 from ..world.stance import stance_on_ground
-from ..world.strides import belt_travel, contradicting_strides
-from ..world.travel_scale import scaled_travel
+from ..world.travel_scale import belt_travel, contradicting_strides, scaled_travel
 from ..world.world_frame import SharedWorld, find_world
 from .clock import Progress
 
@@ -49,7 +48,7 @@ class Solved:
     path: CameraPath
     iterations: float
     up_source: str
-    contradictions: list[BoolArray | None]  # of each person, frames (T,); see `strides`
+    contradictions: list[BoolArray | None]  # of each person, frames (T,); see `travel_scale`
     has_scale: bool  # whether it is known how far the camera travels, where it does
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.long_clips import joined_windows
+from scope.scope_addon.capture.long_clips import windows
 from scope.scope_addon.capture.long_clips.windowed_clip import count_windows, observe_windows
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.perception.observation import Observation
@@ -49,7 +49,7 @@ def test_the_same_person_is_followed_across_a_seam_where_somebody_larger_stands(
     assert track.seen.all()
     assert track.acquired.sum() == 1
     assert np.abs(places(track) - truth).max() < 5
-    monkeypatch.setattr(joined_windows, "missed_people", lambda before, after: False)
+    monkeypatch.setattr(windows, "missed_people", lambda before, after: False)
     (track,) = windows_of(options())
     assert not track.seen[61:74].any()  # what the rule prevents
 

@@ -6,10 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.options import parse_person
-from scope.scope_addon.capture.tracking.chosen_person import ChosenPerson, find_chosen, place_of
+from scope.scope_addon.capture.tracking.chosen_person import (
+    ChosenPerson,
+    find_chosen,
+    needed_turn,
+    place_of,
+)
 from scope.scope_addon.capture.tracking.people import people_of
 from scope.scope_addon.capture.tracking.track import Track, Tracklet, make_track
-from scope.scope_addon.capture.tracking.turned_footage import needed_turn
 from scope.scope_addon.errors import UsageError
 
 TIMES = (np.arange(90) / 30).tolist()

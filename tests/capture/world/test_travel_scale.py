@@ -6,8 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.odometry import Odometry
-from scope.scope_addon.capture.world.strides import contradicting_strides
-from scope.scope_addon.capture.world.travel_scale import find_floor, scaled_travel
+from scope.scope_addon.capture.world.travel_scale import (
+    contradicting_strides,
+    find_floor,
+    scaled_travel,
+)
 from scope.solver.rotations import exp
 
 UP = np.array([0.0, -1.0, 0.0])

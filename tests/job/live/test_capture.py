@@ -18,7 +18,7 @@ from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
 
 from ...live.fake_source import FakeSource
-from ...live.outputs.test_vmc import pose_of
+from ...live.test_vmc import pose_of
 from ..long_clip import played_again_and_again
 from ..processes import wait_for
 

@@ -31,14 +31,7 @@ from scope.solver import (
     rotations,
 )
 from scope.solver.part import Part
-from scope.solver.residuals import (
-    external,
-    floor,
-    foot_contact,
-    joint_prior,
-    numeric,
-    pose_prior,
-)
+from scope.solver.residuals import external, floor, foot_contact, joint_prior, pose_prior
 
 from .. import own_residual
 from ..synthetic import forward, random_body, random_state
@@ -201,7 +194,7 @@ def test_derivatives_by_differences_are_those_of_the_equation():
         rng.standard_normal(3),
         rng.standard_normal(P),
     )
-    found = numeric.differentiate(
+    found = external.differentiate(
         lambda p: np.concatenate([p.t, p.beta, rotations.log(p.Omega @ part.Omega.T)]), part
     )
     e = part.t - part.origin

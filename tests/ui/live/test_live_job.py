@@ -230,7 +230,7 @@ RECORDS = """
     sys.path.insert(0, {root!r})
     from pathlib import Path
     from scope.scope_addon.job.cache import recordings_of
-    from scope.scope_addon.live.outputs.unfinished import SUFFIX, lock_of
+    from scope.scope_addon.live.unfinished import SUFFIX, lock_of
     from scope.scope_addon.temporary import hold
     path = recordings_of(Path(folder)) / (os.path.basename(folder) + SUFFIX)
     path.parent.mkdir(exist_ok=True)

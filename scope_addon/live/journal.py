@@ -1,0 +1,358 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A recording on the disk while it runs, so that what ends a live capture does not end what was
+recorded.
+
+The file begins with a line of JSON, about the recording, and goes on with records of the same size:
+a checksum of four bytes, and a pose with its camera as numbers. It only grows, so a process that is
+killed leaves whole records and at most one that is not. A thread writes it, because a disk may let
+a capture wait. If the disk refuses, as a full one does, the file is written anew in another place.
+
+Blender's window loads this module, so that what reads footage is imported where it is used.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import queue
+import threading
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...solver import Body
+from ...solver.errors import InputError
+from ..atomic_write import create_new, reason, sync_open_file
+from ..errors import OutputError, UsageError
+from ..options.live import MAX_PEOPLE
+from ..private_folder import lasting_folder
+from ..temporary import hold, release, remove, system_folder
+from ..untrusted.files import in_one_line
+from .pose import LivePose, Presence
+from .unfinished import lock_of
+
+if TYPE_CHECKING:
+    from ..capture.camera.intrinsics import Camera
+
+_SYNC_S = 2.0  # what a power cut can cost
+_LONGEST_LINE = 1 << 16
+_CHECKSUM_BYTES = 4
+_SOURCE_BYTES = 120
+Record = tuple[LivePose, "Camera"]
+
+
+@dataclass(frozen=True)
+class About:
+    """What a recording is of: the same for all of its poses.
+
+    :param body: name of a built-in body, or file of a user's own.
+    :param fingerprint: of that body, see `fingerprint`.
+    :param source: name of the camera, stream or file.
+    :param fps: frames per second of the source, as a fraction.
+    :param size: width and height of its images, pixels.
+    :param origin: the frame number and time that become 0 in the motions; None: they stay.
+    :param people: number of people who were followed.
+    :param footage: file of the images, without an end; empty: they are not kept.
+    """
+
+    body: str
+    fingerprint: int
+    source: str
+    fps: str
+    size: tuple[int, int]
+    origin: tuple[int, float] | None
+    people: int
+    footage: str = ""
+
+
+def fingerprint(body: Body) -> int:
+    """Return a number that differs where bodies do."""
+    return zlib.crc32(body.rest_joints(np.zeros(body.P)).tobytes(), body.P)
+
+
+class Journal:
+    """The growing file. `add` never waits, and never fails.
+
+    :param path: a file of another name is made where this one exists.
+    :param say: called with a sentence when the file cannot be written there, from another thread.
+    """
+
+    def __init__(self, path: Path, about: About, body: Body, say: Callable[[str], None]) -> None:
+        self._about = about
+        self._record = _record_type(body)
+        self._say = say
+        self._records: list[Record] = []
+        self._waiting: queue.SimpleQueue[Record | None] = queue.SimpleQueue()
+        self._places = [path, *(folder / path.name for folder in other_places(path))]
+        self._file: IO[bytes] | None = None
+        # Where the recording is, or at least its beginning; None if it is in memory alone.
+        self.path: Path | None = None
+        self._begin()
+        self._thread = threading.Thread(target=self._run, name="scope-recording", daemon=True)
+        self._thread.start()
+
+    def add(self, pose: LivePose, camera: Camera) -> None:
+        """Have a pose written."""
+        self._waiting.put((pose, camera))
+
+    def close(self) -> None:
+        """Write what is waiting, and close the file."""
+        if self._thread.is_alive():
+            self._waiting.put(None)
+            self._thread.join()
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            self._file = None
+
+    def remove(self) -> None:
+        """Remove the file: what was recorded is somewhere else, or not wanted."""
+        self.close()
+        if self.path is not None:
+            _remove_held(self.path)
+            self.path = None
+
+    def _run(self) -> None:
+        synced_s = time.monotonic()
+        while (record := self._waiting.get()) is not None:
+            self._records.append(record)
+            if self._file is None:
+                continue
+            try:
+                self._file.write(self._packed(record))
+                if time.monotonic() - synced_s > _SYNC_S:
+                    sync_open_file(self._file.fileno())
+                    synced_s = time.monotonic()
+            except OSError as error:
+                self._go_on_elsewhere(error)
+
+    def _go_on_elsewhere(self, error: OSError) -> None:
+        """Write all records to the next place that takes them, and remove the file that failed."""
+        former = self.path
+        assert self._file is not None
+        with contextlib.suppress(OSError):
+            self._file.close()
+        self._file = self.path = None
+        self._begin()
+        if self.path is None:
+            self.path = former
+            where = f"begins in {former}, goes on in memory, and ends there if it is killed"
+        else:
+            where = f"is kept in {self.path} while it runs"
+            if former is not None:
+                _remove_held(former)
+        self._say(f"the recording {where}: {former} cannot be written ({reason(error)})")
+
+    def _begin(self) -> None:
+        """Open a file in the next place that takes one, with the records so far."""
+        while self._places and self._file is None:
+            wanted = self._places.pop(0)
+            try:
+                wanted.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                path = create_new(wanted)
+            except OSError:
+                continue
+            with contextlib.suppress(OSError):  # where there are no locks, it is not held
+                hold(lock_of(path))
+            try:
+                file = path.open("wb", buffering=0)  # what is written is the system's at once
+                file.write(json.dumps(asdict(self._about)).encode() + b"\n")
+                for record in self._records:
+                    file.write(self._packed(record))
+                self._file = file
+                self.path = path
+            except OSError:
+                _remove_held(path)
+
+    def _packed(self, record: Record) -> bytes:
+        pose, camera = record
+        row = np.zeros((), self._record)
+        for name in _POSE_ARRAYS:
+            row[name] = getattr(pose, name)
+        row["index"] = pose.index
+        row["timestamp_s"] = pose.timestamp_s
+        row["person"] = pose.person
+        row["is_settled"] = pose.is_settled
+        row["intrinsics"] = camera.intrinsics
+        row["dist"] = camera.dist
+        row["focal_deviation"] = camera.focal_deviation
+        row["camera"] = camera.source.encode()[:_SOURCE_BYTES]
+        content = row.tobytes()
+        return zlib.crc32(content).to_bytes(_CHECKSUM_BYTES, "little") + content
+
+
+def _remove_held(path: Path) -> None:
+    remove(path)
+    release(lock_of(path))
+
+
+def other_places(path: Path) -> list[Path]:
+    """Return folders for what cannot be written to a file's own: of the user, and for temporary
+    files.
+    """
+    lasting = lasting_folder()
+    folders = [*([lasting / "recordings"] if lasting else []), system_folder()]
+    return [folder for folder in folders if folder != path.parent]
+
+
+def read_about(path: Path) -> About:
+    """Read what a recording is of.
+
+    :raises InputError: the file is no recording of ours.
+    """
+    try:
+        with path.open("rb") as file:
+            line = file.readline(_LONGEST_LINE)
+        values = json.loads(line)
+        about = About(**values)
+        width, height = (int(side) for side in values["size"])
+        texts = (about.body, about.source, about.fps, about.footage)
+        is_sound = (
+            line.endswith(b"\n")
+            and all(isinstance(text, str) for text in texts)
+            and isinstance(about.fingerprint, int)
+            and Fraction(about.fps) > 0
+            and isinstance(about.people, int)
+            and 0 < about.people <= MAX_PEOPLE
+            and 0 < width < 1 << 16
+            and 0 < height < 1 << 16
+        )
+        origin = about.origin
+        if origin is not None:
+            origin = (int(origin[0]), float(origin[1]))
+            is_sound = is_sound and bool(np.isfinite(origin[1]))
+        if not is_sound:
+            raise ValueError("its first line")
+    except (OSError, ArithmeticError, ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(
+            f"{path} is not the recording of a live capture, or damaged ({in_one_line(error)})"
+        ) from error
+    return About(**{**asdict(about), "size": (width, height), "origin": origin})
+
+
+def read_records(path: Path, about: About, body: Body) -> list[Record]:
+    """Read the poses and cameras of a recording, up to the first record that is not whole.
+
+    :param body: that of the recording.
+    :raises InputError: the file cannot be read.
+    :raises UsageError: the body is another one.
+    """
+    if fingerprint(body) != about.fingerprint:
+        raise UsageError(
+            f"{path} was recorded with another body than {about.body} is now; put back that file"
+        )
+    record = _record_type(body)
+    found: list[Record] = []
+    last_s = np.full(about.people, -np.inf)
+    last_index = np.full(about.people, -1)
+    try:
+        with path.open("rb") as file:
+            file.readline(_LONGEST_LINE)
+            while len(piece := file.read(_CHECKSUM_BYTES + record.itemsize)) > record.itemsize:
+                content = piece[_CHECKSUM_BYTES:]
+                if zlib.crc32(content) != int.from_bytes(piece[:_CHECKSUM_BYTES], "little"):
+                    break
+                row = np.frombuffer(content, record)[0]
+                person = int(row["person"])
+                is_sound = (
+                    0 <= person < about.people
+                    and row["index"] > last_index[person]
+                    and row["timestamp_s"] > last_s[person]
+                    and all(np.isfinite(row[name]).all() for name in _FLOATS)
+                )
+                if not is_sound:
+                    break
+                last_s[person] = row["timestamp_s"]
+                last_index[person] = row["index"]
+                found.append(_unpacked(row))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({reason(error)})") from error
+    return found
+
+
+_POSE_ARRAYS = (
+    "betas",
+    "rotations",
+    "root_cam",
+    "T_world_camera",
+    "joints",
+    "contact",
+    "raw_rotations",
+    "raw_root_cam",
+    "keypoints",
+    "joint_confidence",
+)
+_FLOATS = (*_POSE_ARRAYS, "timestamp_s", "intrinsics", "dist", "focal_deviation")
+
+
+def _record_type(body: Body) -> np.dtype[Any]:
+    from ..capture.perception.landmark_network import KEYPOINT_COUNT
+
+    joints = body.K + 1
+    shapes: dict[str, tuple[int, ...]] = {
+        "betas": (body.P,),
+        "rotations": (joints, 3, 3),
+        "root_cam": (3,),
+        "T_world_camera": (4, 4),
+        "joints": (joints, 3),
+        "contact": (4,),
+        "raw_rotations": (joints, 3, 3),
+        "raw_root_cam": (3,),
+        "keypoints": (KEYPOINT_COUNT, 3),
+        "joint_confidence": (joints,),
+        "timestamp_s": (),
+        "intrinsics": (3, 3),
+        "dist": (5,),
+        "focal_deviation": (),
+    }
+    numbers = [(name, "<f8", shape) for name, shape in shapes.items()]
+    others = [("index", "<i8"), ("person", "<i4"), ("is_settled", "?")]
+    return np.dtype([*numbers, *others, ("camera", f"S{_SOURCE_BYTES}")])
+
+
+def _unpacked(row: np.void) -> Record:
+    from ..capture.camera.intrinsics import Camera
+
+    arrays: dict[str, Any] = {name: row[name].copy() for name in _POSE_ARRAYS}
+    pose = LivePose(
+        index=int(row["index"]),
+        timestamp_s=float(row["timestamp_s"]),
+        presence=Presence.SEEN,
+        is_settled=bool(row["is_settled"]),
+        person=int(row["person"]),
+        **arrays,
+    )
+    source = bytes(row["camera"]).decode("utf-8", "replace")
+    camera = Camera(
+        row["intrinsics"].copy(), row["dist"].copy(), source, float(row["focal_deviation"])
+    )
+    return pose, camera
+
+
+def saved_elsewhere(path: Path, save: Callable[[Path], object]) -> Path:
+    """Save a result in the first of the other places that takes it, and return its path there.
+
+    :param path: of the result, where it could not be saved.
+    :raises OutputError: no place takes it.
+    """
+    problem: Exception = OutputError(f"there is no other place for {path}")
+    for folder in other_places(path):
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            other = create_new(folder / path.name)
+        except OSError as error:
+            problem = error
+            continue
+        try:
+            save(other)
+            return other
+        except (OSError, OutputError) as error:
+            remove(other)
+            problem = error
+    raise OutputError(str(problem)) from problem

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A stream from the network, read by FFmpeg."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..capture.media.frame_readers import orientation, rgb, upright
+from ..capture.media.guards import check_size
+from ..errors import VideoError
+from ..footage import display_address
+from .damage import Damage
+from .source import DEFAULT_FPS, Clock, Picture
+
+if TYPE_CHECKING:
+    import av
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+SCHEMES = ("http", "https", "rtsp", "rtsps", "rtmp", "rtmps", "srt", "udp", "rtp", "tcp")
+# What a stream may open in turn, such as the segments of a playlist: never a file of this computer.
+_PROTOCOLS = "http,https,httpproxy,tcp,tls,udp,rtp,rtmp,rtmps,rtsp,rtsps,srt,srtp,crypto"
+_FORMATS = (
+    "rtsp,rtp,sdp,mpjpeg,mjpeg,jpeg_pipe,hls,dash,flv,live_flv,mpegts,mpeg,mov,matroska,webm,"
+    "avi,h264,hevc,m4v,ogg,asf,"
+    "nut"
+)
+STALLED_S = 5.0  # without data, after which a stream counts as interrupted
+# for which a stream that is joined in the middle is left out until its next key frame
+KEY_FRAME_S = 10.0
+# for which damaged pictures are left out, as key frames of most cameras are not farther apart
+DAMAGED_S = 4.0
+# without a picture, after which a stream counts as interrupted
+UNREADABLE_S = KEY_FRAME_S + STALLED_S
+
+
+class StreamSource:
+    """A stream from the network."""
+
+    ends = False
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+        self.name = display_address(url)
+        self.fps = DEFAULT_FPS
+        self.focal_35mm: float | None = None
+
+    def pictures(self, clock: Clock) -> Iterator[Picture | None]:
+        """See `Source`.
+
+        :raises VideoError: it cannot be opened, carries no video, or was interrupted.
+        """
+        import av
+
+        container = self._open()
+        with container:
+            stream = next(iter(container.streams.video), None)
+            if stream is None:
+                raise VideoError(f"{self.name} carries no video; check the address")
+            stream.thread_type = "SLICE"  # decoding in several frames' threads delays each of them
+            if stream.codec_context.name == "h264":  # in several threads, it does not notice damage
+                stream.codec_context.thread_count = 1
+            if stream.average_rate and 1 <= stream.average_rate <= 240:
+                self.fps = Fraction(stream.average_rate)
+            try:
+                index = 0
+                for frame in self._frames(container, stream, clock):
+                    if frame is None:
+                        yield None
+                        continue
+                    now_s = clock.now()
+                    yield Picture(
+                        index,
+                        now_s,
+                        now_s,
+                        self._image(frame, float(stream.sample_aspect_ratio or 1)),
+                    )
+                    index += 1
+            except (av.error.FFmpegError, OSError, ValueError) as error:
+                raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error
+
+    def _frames(
+        self, container: InputContainer, stream: VideoStream, clock: Clock
+    ) -> Iterator[av.VideoFrame | None]:
+        """Yield what can be decoded, from the first key frame on; None for a frame that is damaged
+        and left out.
+
+        Frames before it continue pictures that never came, and some decoders show them on grey.
+
+        :raises VideoError: nothing could be decoded for a while.
+        """
+        import av
+
+        has_begun = False
+        began_s = clock.now()
+        seen_s = began_s
+        damaged_s: float | None = None  # since when pictures have been damaged
+        damage = Damage(stream.codec_context.name, stream.codec_context.extradata)
+        held: list[av.VideoFrame] = []  # until it is known whether they are damaged
+        for packet in container.demux(stream):
+            now_s = clock.now()
+            # streams may have none
+            has_begun = has_begun or packet.is_keyframe or now_s - began_s > KEY_FRAME_S
+            frames: list[av.VideoFrame] = []
+            if has_begun:
+                damage.observe(packet)
+                yield from [None if damage.is_broken else frame for frame in held]
+                held = []
+                try:
+                    frames = packet.decode()
+                    is_missing = damage.is_hidden(frames) and packet.dts is not None
+                except av.error.InvalidDataError:
+                    is_missing = damage.fail(packet)
+                if is_missing:
+                    yield None
+            if frames:
+                seen_s = now_s
+            elif now_s - seen_s > UNREADABLE_S:
+                raise VideoError(
+                    f"{self.name} was interrupted (no image could be decoded for "
+                    f"{UNREADABLE_S:g} s)"
+                )
+            for frame in frames:
+                is_intact = not damage.is_in(frame)
+                damaged_s = None if is_intact else now_s if damaged_s is None else damaged_s
+                if is_intact and damage.is_doubtful:
+                    held.append(frame)
+                else:
+                    yield frame if damaged_s is None or now_s - damaged_s > DAMAGED_S else None
+
+    def _open(self) -> InputContainer:
+        import av
+
+        options = {"protocol_whitelist": _PROTOCOLS, "format_whitelist": _FORMATS}
+        # Without FFmpeg's "nobuffer", which throws away packets that define the format: the first
+        # key frame, too.
+        options |= {"flags": "low_delay", "probesize": "500000", "analyzeduration": "1000000"}
+        if self._url.startswith("rtsp"):
+            options["rtsp_transport"] = "tcp"
+        try:
+            return av.open(
+                self._url,
+                options=options,
+                container_options=options,
+                timeout=(STALLED_S, STALLED_S),
+                mode="r",
+            )
+        except (av.error.FFmpegError, OSError, ValueError) as error:
+            raise VideoError(
+                f"{self.name} cannot be opened ({_reason(error)}); check the address, and whether "
+                "its server runs"
+            ) from error
+
+    def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
+        """Return the frame as it is to be shown; phones send what they film upright as rotated, and
+        may mirror it.
+        """
+        check_size(Path(self.name), frame.width, frame.height)
+        return upright(Path(self.name), rgb(frame), aspect, *orientation(frame))
+
+
+def _reason(error: Exception) -> str:
+    text = str(getattr(error, "strerror", None) or error).lower()
+    # as FFmpeg calls a timeout
+    return f"nothing came for {STALLED_S:g} s" if "immediate exit" in text else text

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The names of what a live capture writes while it runs, and whether its process has ended.
+
+Beside a growing recording lies a lock of its process, so that what a kill has left is known. It is
+removed when it is finished, or when the user cancels, and never by itself. Blender's panel draws by
+this, so that it needs the standard library alone.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from ..temporary import is_abandoned, remove
+
+SUFFIX = ".recording"
+
+
+def lock_of(recording: Path) -> Path:
+    """Return the lock that the process of a recording holds."""
+    return recording.with_name(f".{recording.name}.lock")
+
+
+def is_recording(source: str) -> bool:
+    """Return whether a source is the file of a recording that was not finished."""
+    return source.endswith(SUFFIX) and os.path.isfile(source)
+
+
+def is_unfinished(recording: Path) -> bool:
+    """Return whether the process of a recording has ended, and not finished it."""
+    return recording.is_file() and is_abandoned(lock_of(recording))
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Return the recordings in a folder, the newest first."""
+    times: dict[Path, float] = {}
+    with suppress(OSError):
+        for path in folder.iterdir():
+            with suppress(OSError):
+                times[path] = path.stat().st_mtime
+    newest = sorted(times, key=times.__getitem__, reverse=True)
+    return [path for path in newest if path.suffix == SUFFIX]
+
+
+def remove_recording(recording: Path) -> None:
+    """Remove the growing file of a recording that is finished or not wanted."""
+    remove(recording)
+    remove(lock_of(recording))
+
+
+def unfinished_video(path: Path) -> Path:
+    """Return the name of a recording's video while it grows."""
+    return path.with_stem(f"{path.stem}.unfinished")

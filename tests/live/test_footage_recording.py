@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures of a live capture as a video that other readers understand."""
+
+import subprocess
+import sys
+import time
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.overlay.video_writer import VideoWriter
+from scope.scope_addon.errors import OutputError
+from scope.scope_addon.live.footage_recording import Footage
+from scope.scope_addon.live.source import Picture
+
+TIMES = [7.0, 7.033, 7.2, 7.233, 7.3]  # frames were dropped on the way
+
+
+def picture(k, shape=(49, 64, 3)):
+    return Picture(20 + k, TIMES[k], 0.0, np.full(shape, 40 * k, np.uint8))
+
+
+def test_pictures_keep_their_times_and_order(tmp_path):
+    path = tmp_path / "take.mp4"
+    footage = Footage(path, Fraction(30))
+    for k in range(len(TIMES)):
+        footage.add(picture(k))
+    assert footage.save() == path
+    assert (footage.origin, footage.lost) == ((20, 7.0), 0)
+    with av.open(str(path)) as video:
+        frames = list(video.decode(video=0))
+    assert [frame.time for frame in frames] == pytest.approx([t - 7.0 for t in TIMES], abs=1e-3)
+    brightness = [frame.to_ndarray(format="gray").mean() for frame in frames]
+    assert brightness == sorted(brightness)
+    assert (frames[0].width, frames[0].height) == (64, 48)
+    assert b"moof" not in path.read_bytes()  # an ordinary file, without parts
+    assert [entry.name for entry in tmp_path.iterdir()] == ["take.mp4"]
+
+
+KILLED = """
+import os, signal, sys, time
+from fractions import Fraction
+from pathlib import Path
+import numpy as np
+from scope.scope_addon.live.footage_recording import Footage
+from scope.scope_addon.live.source import Picture
+footage = Footage(Path(sys.argv[1]), Fraction(30))
+for k in range(150):
+    footage.add(Picture(k, k / 30, 0.0, np.full((48, 64, 3), k, np.uint8)))
+    while footage._waiting.qsize():
+        time.sleep(0.001)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_capture_leaves_can_be_read_and_is_not_replaced(tmp_path):
+    path = tmp_path / "take.mp4"
+    path.write_bytes(b"an earlier take")
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    left = sorted(entry.name for entry in tmp_path.iterdir())
+    assert left == ["take.mp4", "take.unfinished 2.mp4", "take.unfinished.mp4"]
+    assert path.read_bytes() == b"an earlier take"
+    with open_video(tmp_path / "take.unfinished.mp4") as video:
+        frames = list(video)
+    assert len(frames) > 60  # of 5 s, some are in the encoder, and some in the last part
+    brightness = [frame.image_rgb.mean() for frame in frames]
+    np.testing.assert_allclose(brightness, np.arange(len(frames)), atol=4)
+
+
+def test_without_pictures_nothing_is_written(tmp_path):
+    assert Footage(tmp_path / "take.mp4", Fraction(30)).save() is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_cannot_be_written_is_said(tmp_path):
+    footage = Footage(tmp_path / "none" / "take.mp4", Fraction(30))
+    for k in range(len(TIMES)):
+        footage.add(picture(k))
+    with pytest.raises(OutputError, match="its folder does not exist"):
+        footage.save()
+
+
+def test_a_full_disk_keeps_the_pictures_until_then_and_the_earlier_take(tmp_path, monkeypatch):
+    path = tmp_path / "take.mp4"
+    path.write_bytes(b"an earlier take")
+    write = VideoWriter.write
+
+    def full(writer, image, time_s=None):
+        if time_s > 2.0:
+            raise OutputError(f"could not finish writing {path}")
+        write(writer, image, time_s)
+
+    monkeypatch.setattr(VideoWriter, "write", full)
+    footage = Footage(path, Fraction(30))
+    for k in range(90):
+        footage.add(Picture(k, k / 30, 0.0, np.full((48, 64, 3), k, np.uint8)))
+        while footage._waiting.qsize() and footage._thread.is_alive():
+            time.sleep(0.001)
+    kept = tmp_path / "take.unfinished.mp4"
+    with pytest.raises(OutputError, match=f"could not.*; the images until then are in {kept}"):
+        footage.save()
+    assert path.read_bytes() == b"an earlier take"
+    with open_video(kept) as video:
+        assert sum(1 for _ in video) >= 40  # some were in the encoder
+
+
+def test_pictures_of_another_size_are_left_out_and_counted(tmp_path):
+    footage = Footage(tmp_path / "take.mp4", Fraction(30))
+    footage.add(picture(0))
+    footage.add(picture(1, (60, 80, 3)))
+    footage.save()
+    assert footage.lost == 1

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses that smoothing has delayed, at the times of their frames."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scope.scope_addon.kinematics.axes import world_from_level_camera
+from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
+from scope.scope_addon.live.pose import LivePose, Presence
+from scope.scope_addon.live.recording import at_frames, in_last_shape
+from scope.solver import rotations
+
+
+def pose_given(body, index, time_s, delay_s, betas=None):
+    """A body that turns by 2 rad/s and moves by 1 m/s, as it was ``delay_s`` before its frame."""
+    then = time_s - delay_s
+    R = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    R[0] = rotations.exp([0.0, 0.0, 2.0 * then])
+    nothing = np.zeros((body.K + 1, 3))
+    betas = np.zeros(body.P) if betas is None else betas
+    T = world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.0)
+    return LivePose(
+        index,
+        time_s,
+        Presence.SEEN,
+        True,
+        betas,
+        R,
+        np.array([then, 0.0, 4.0]),
+        T,
+        nothing,
+        np.zeros(4),
+        R,
+        np.zeros(3),
+        np.full((33, 3), index),
+        np.ones(body.K + 1),
+    )
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 24.0, 12.0])
+def test_each_frame_gets_the_pose_of_its_own_time(body, rate):
+    poses = at_frames([pose_given(body, k, k / rate, 1 / 30) for k in range(20)], 1 / 30)
+    assert 17 <= len(poses) < 20
+    for k, pose in enumerate(poses):
+        assert (pose.index, pose.keypoints[0, 0]) == (k, k)
+        assert pose.root_cam[0] == pytest.approx(k / rate, abs=1e-6)
+        assert np.allclose(pose.rotations[0], rotations.exp([0.0, 0.0, 2.0 * k / rate]), atol=1e-6)
+
+
+def test_a_single_pose_stays(body):
+    (only,) = at_frames([pose_given(body, 7, 1.0, 1 / 30)], 1 / 30)
+    assert only.index == 7
+
+
+def test_soles_stay_at_their_height_in_the_last_shape(body):
+    tall = np.zeros(body.P)
+    tall[0] = 1.5
+    poses = in_last_shape(
+        [pose_given(body, 0, 0.0, 0.0), pose_given(body, 1, 0.1, 0.0, tall)], body
+    )
+    assert all(np.array_equal(pose.betas, tall) for pose in poses)
+
+    def height(pose, betas):
+        model = with_contact_points(body, betas)
+        R, t = model.forward_kinematics(
+            pose.rotations, pose.root_cam - model.rest_joints(betas)[0], betas
+        )
+        return (contact_point_positions(model, R, t)[:4] @ pose.T_world_camera[2, :3]).min()
+
+    before = height(pose_given(body, 0, 0.0, 0.0), np.zeros(body.P))
+    assert height(poses[0], tall) == pytest.approx(before, abs=1e-6)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbers of H.264 pictures, as x264 encodes them in several ways: complete streams have no gaps,
+others do.
+"""
+
+import io
+import re
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+from scope.scope_addon.live.damage import FrameNumbers
+
+WAYS = {
+    "baseline": ("mpegts", {"profile": "baseline"}, "yuv420p"),
+    "high": ("mpegts", {"profile": "high"}, "yuv420p"),
+    "in mp4": ("mp4", {"profile": "high"}, "yuv420p"),
+    "of all colours": ("mpegts", {"profile": "high444"}, "yuv444p"),
+    "scaling lists": ("mpegts", {"profile": "high", "x264-params": "cqm=jvt"}, "yuv420p"),
+    "in fields": ("mpegts", {"x264-params": "interlaced=1:fake-interlaced=0"}, "yuv420p"),
+    "slices": ("mpegts", {"x264-params": "slices=4"}, "yuv420p"),
+    "intra refresh": ("mpegts", {"x264-params": "intra-refresh=1:keyint=50"}, "yuv420p"),
+    "two-way": ("mpegts", {"x264-params": "bframes=2:b-adapt=0:keyint=50:open-gop=1"}, "yuv420p"),
+}
+
+
+def packets_of(way, count=300):
+    """The packets of a stream, and its extradata."""
+    kind, options, pixels = WAYS[way]
+    random = np.random.default_rng(0)
+    target = io.BytesIO()
+    with av.open(target, "w", format=kind) as container:
+        stream = container.add_stream(
+            "libx264", rate=30, options={"preset": "ultrafast", "bf": "0"} | options
+        )
+        stream.height = 64
+        stream.width = 64
+        stream.pix_fmt = pixels
+        for k in range(count):
+            picture = random.integers(0, 255, (64, 64, 3), np.uint8)
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            frame.time_base = Fraction(1, 30)
+            frame.pts = k
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    with av.open(io.BytesIO(target.getvalue())) as container:
+        stream = container.streams.video[0]
+        packets = [packet for packet in container.demux(stream) if packet.dts is not None]
+        return [bytes(packet) for packet in packets], stream.codec_context.extradata
+
+
+def is_built_on(packet):
+    """Whether other pictures build on one: the two bits before the type of its slices."""
+    slices = re.findall(rb"\x00\x00\x01([\x01\x21\x41\x61\x65])", packet)
+    return any(each[0] & 0x60 for each in slices)
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_complete_stream_has_no_gaps_and_losses_are_found(way):
+    packets, extradata = packets_of(way)
+    numbers = FrameNumbers(extradata)
+    assert not any(numbers.has_gap(packet) for packet in packets)
+    assert all(numbers.has_picture(packet) for packet in packets)
+    for lost in (20, 21, 22, 23, 120, 215):
+        numbers = FrameNumbers(extradata)
+        left = [(k, numbers.has_gap(packet)) for k, packet in enumerate(packets) if k != lost]
+        expected = [lost + 1] if way == "in mp4" or is_built_on(packets[lost]) else []
+        assert [k for k, is_gap in left if is_gap] == expected
+
+
+def test_numbers_that_always_have_gaps_tell_nothing():
+    """As if an encoder counted by two."""
+    packets, extradata = packets_of("baseline")
+    numbers = FrameNumbers(extradata)
+    gaps = [numbers.has_gap(packet) for packet in packets[::2]]
+    assert all(gaps[1:16])
+    assert not any(gaps[17:])
+
+
+def test_losses_are_found_again_after_many_in_a_row():
+    packets, extradata = packets_of("baseline")
+    numbers = FrameNumbers(extradata)
+    for packet in packets[:40:2]:
+        numbers.has_gap(packet)
+    left = [numbers.has_gap(packet) for k, packet in enumerate(packets[40:]) if k != 100]
+    assert [k for k, is_gap in enumerate(left) if is_gap] == [100]
+
+
+def test_an_empty_unit_is_no_error():
+    assert not FrameNumbers().has_gap(b"\0\0\1\0\0\1")
+    assert not FrameNumbers(b"\0\0\1\0\0\1").has_picture(b"\0\0\1\0\0\1\x09")
+
+
+def test_parameters_alone_are_no_picture():
+    packets, extradata = packets_of("baseline", 3)
+    numbers = FrameNumbers(extradata)
+    assert b"\x00\x00\x01\x67" in extradata
+    assert not numbers.has_picture(extradata)
+    assert not numbers.has_gap(extradata)
+    assert numbers.has_picture(packets[0])
+
+
+@pytest.mark.parametrize("way", ["high", "in mp4", "scaling lists"])
+def test_damaged_data_is_no_error(way):
+    packets, extradata = packets_of(way, 30)
+    random = np.random.default_rng(2)
+    for _ in range(300):
+        broken = []
+        for data in (extradata, *packets[:3]):
+            values = np.frombuffer(data[: random.integers(0, len(data) + 1)], np.uint8).copy()
+            where = random.integers(0, max(len(values), 1), 4)
+            values[where[where < len(values)]] = random.choice([0, 1, 3, 255, 0x67, 0x65])
+            broken.append(values.tobytes())
+        numbers = FrameNumbers(broken[0])
+        for data in broken[1:]:
+            numbers.has_gap(data)
+            numbers.has_picture(data)

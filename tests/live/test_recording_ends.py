@@ -1,0 +1,384 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whatever ends a live capture, its recording is there, whole, and where the command says."""
+
+import errno
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scope.scope_addon import private_folder
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.command_line import live_command
+from scope.scope_addon.errors import NoPersonError, OutputError, UsageError, VideoError
+from scope.scope_addon.live import journal, run
+from scope.scope_addon.live.journal import read_about, read_records
+from scope.scope_addon.live.recording import Keep, PeopleRecording, unfinished_recording
+from scope.scope_addon.motion import Motion
+from scope.solver.body_file import load_body
+from scope.solver.errors import InputError
+from scope.solver.rotations import exp
+
+from .test_vmc import pose_of
+
+POSES = 40
+CAMERA = Camera(pinhole(640, 480, 600.0), np.zeros(5), "given")
+SOURCE = SimpleNamespace(name="fake", fps=Fraction(30))
+SIZE = (640, 480)
+EARLIER = b"an earlier take"
+
+
+@pytest.fixture(autouse=True)
+def other_places(tmp_path, monkeypatch):
+    """Keep the user's own folders out of this."""
+    monkeypatch.setattr(journal, "lasting_folder", lambda: tmp_path / "user")
+    monkeypatch.setattr(journal, "system_folder", lambda: tmp_path / "tmp")
+    (tmp_path / "tmp").mkdir()
+    private_folder.private_folder.cache_clear()
+
+
+def poses(body, people=1):
+    """People who nod and walk, in every other frame."""
+    rng = np.random.default_rng(0)
+    for k in range(POSES):
+        for person in range(people):
+            R = exp(rng.normal(0, 0.1, (body.K + 1, 3)))
+            pelvis = (0.02 * k + person, 0.0, 0.95)
+            pose = pose_of(body, R, R[0], pelvis)
+            yield replace(pose, index=2 * k, timestamp_s=k / 15, person=person)
+
+
+def people_of(number=1):
+    return SimpleNamespace(sessions=[SimpleNamespace(camera=CAMERA)] * number)
+
+
+def recorded(folder, body, people=1, say=lambda _: None, **options):
+    """A recording with all poses, in the middle of its capture."""
+    folder.mkdir(exist_ok=True)
+    paths = [folder / f"take{number}.npz" for number in range(people)]
+    keep = Keep(folder / "take.recording", "scope", say)
+    recording = PeopleRecording(paths, body, SOURCE, keep=keep, **options)
+    recording.begin(people_of(people), SIZE)
+    for pose in poses(body, people):
+        recording.send(pose, 0.0)
+    return recording, paths
+
+
+def assert_same(path, other):
+    motion = Motion.load(path)
+    truth = Motion.load(other)
+    for name, value in truth._arrays().items():
+        np.testing.assert_array_equal(motion._arrays()[name], value, err_msg=name)
+    assert len(motion) > POSES
+
+
+@pytest.mark.parametrize("people", [1, 2])
+@pytest.mark.parametrize("from_zero", [False, True])
+def test_what_a_kill_leaves_is_finished_as_if_there_had_been_none(
+    tmp_path, body, people, from_zero
+):
+    recording, paths = recorded(tmp_path / "a", body, people, from_zero=from_zero)
+    recording._journal.close()
+    left = tmp_path / "left.recording"
+    left.write_bytes(recording._journal.path.read_bytes())
+    assert recording.save() == paths
+    assert not list((tmp_path / "a").glob("*.recording"))
+    again, about = unfinished_recording(
+        left, lambda number: [tmp_path / f"again{k}.npz" for k in range(number)]
+    )
+    for path, other in zip(again.save(), paths, strict=True):
+        assert_same(path, other)
+    assert (about.people, about.source, about.size) == (people, "fake", SIZE)
+
+
+def test_a_cut_or_damaged_file_gives_what_came_before(tmp_path, body):
+    recording, _ = recorded(tmp_path / "a", body)
+    recording._journal.close()
+    content = recording._journal.path.read_bytes()
+    line = content.index(b"\n") + 1
+    size = (len(content) - line) // POSES
+    file = tmp_path / "damaged.recording"
+    about = read_about(recording._journal.path)
+    expected = {
+        content: POSES,
+        content[:-1]: POSES - 1,
+        content[: line + 3 * size + 7]: 3,
+        content[: line + 5 * size] + bytes(2 * size): 5,  # as a power cut leaves it
+        content[: line + 5 * size + 99] + b"x" + content[line + 5 * size + 100 :]: 5,
+        content[: line + size] + content[line : line + size]: 1,  # the same pose again
+        content[:line]: 0,
+    }
+    for damaged, count in expected.items():
+        file.write_bytes(damaged)
+        assert len(read_records(file, about, body)) == count
+    with pytest.raises(NoPersonError, match="ends before its first pose"):
+        unfinished_recording(file, lambda _: [tmp_path / "x.npz"])
+    for damaged in (content[: line - 5], b"", b"[]\n", b"\xff\n", b"{" * 70000):
+        file.write_bytes(damaged)
+        with pytest.raises(InputError, match="is not the recording of a live capture, or damaged"):
+            read_about(file)
+
+
+def test_a_recording_with_another_body_is_not_finished(tmp_path, body):
+    recording, _ = recorded(tmp_path / "a", body)
+    recording._journal.close()
+    about = replace(read_about(recording._journal.path), fingerprint=1)
+    with pytest.raises(UsageError, match="was recorded with another body than scope is now"):
+        read_records(recording._journal.path, about, body)
+
+
+on_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits sizes of files as Linux does")
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+from scope.scope_addon.live import journal
+from scope.scope_addon.errors import OutputError
+from scope.scope_addon.untrusted.body_file import load_body
+from scope.tests.live.test_recording_ends import recorded
+folder = Path(sys.argv[1])
+journal.lasting_folder = lambda: Path(sys.argv[2])
+journal.system_folder = lambda: Path(sys.argv[3])
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+real = journal._record_type(load_body("scope")).itemsize
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(float(sys.argv[4]) * real), -1))
+recording, paths = recorded(folder, load_body("scope"), say=lambda text: print("said", text))
+recording._journal.close()
+print("at", recording._journal.path, flush=True)
+resource.setrlimit(resource.RLIMIT_FSIZE, (-1, -1))
+if sys.argv[5] == "save":
+    print("saved", *recording.save())
+"""
+
+
+@on_linux
+def test_a_disk_that_refuses_what_is_written_loses_no_pose(tmp_path, body):
+    """The size of files is limited, so that no place takes the recording; memory does."""
+    command = [sys.executable, "-c", FULL, *(str(tmp_path / name) for name in "abc")]
+    done = subprocess.run([*command, "20.5", "save"], capture_output=True, text=True, check=True)
+    begun = tmp_path / "a" / "take.recording"
+    assert f"said the recording begins in {begun}, goes on in memory" in done.stdout
+    assert f"at {begun}" in done.stdout
+    recording, paths = recorded(tmp_path / "truth", body)
+    recording.save()
+    assert_same(tmp_path / "a" / "take0.npz", paths[0])
+    assert not list(tmp_path.rglob("*.recording"))
+
+
+def test_a_disk_that_fills_meanwhile_moves_the_growing_file_to_a_second_place(tmp_path, body):
+    said = []
+    recording, (path,) = recorded(tmp_path / "full", body, say=said.append)
+    growing = recording._journal
+    while growing._waiting.qsize() or len(growing._records) < POSES:
+        pass
+
+    def refuse(_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    growing._file.close()
+    growing._file = SimpleNamespace(write=refuse, close=lambda: None)
+    later = replace(pose_of(body), index=2 * POSES, timestamp_s=POSES / 15)
+    recording.send(later, 0.0)
+    growing.close()
+    other = tmp_path / "user" / "recordings" / "take.recording"
+    assert said == [
+        f"the recording is kept in {other} while it runs: {tmp_path / 'full' / 'take.recording'}"
+        " cannot be written (No space left on device; free some space or choose another folder)"
+    ]
+    assert len(read_records(other, read_about(other), body)) == POSES + 1
+    assert list((tmp_path / "full").iterdir()) == []
+    assert recording.save() == [path]
+    assert [file for file in tmp_path.rglob("*") if file.is_file()] == [path]
+
+
+def refusing(monkeypatch, *folders):
+    """Let files of motions below some folders be refused."""
+    save = Motion.save
+
+    def full(motion, path):
+        if any(str(path).startswith(str(folder)) for folder in folders):
+            raise journal.OutputError(f"cannot write {path}: No space left on device")
+        save(motion, path)
+
+    monkeypatch.setattr(Motion, "save", full)
+
+
+def test_a_full_disk_at_the_end_leaves_the_recording_in_a_second_place(tmp_path, body, monkeypatch):
+    recording, _ = recorded(tmp_path / "truth", body)
+    (truth,) = recording.save()
+    recording, (path,) = recorded(tmp_path / "full", body)
+    path.write_bytes(EARLIER)
+    refusing(monkeypatch, tmp_path / "full")
+    other = tmp_path / "user" / "recordings" / path.name
+    with pytest.raises(journal.OutputError, match=f"No space.*; the recording is in {other}"):
+        recording.save()
+    assert_same(other, truth)
+    assert path.read_bytes() == EARLIER
+    assert not list(tmp_path.rglob("*.recording"))
+
+
+def test_when_the_room_of_the_growing_file_is_needed_the_recording_is_where_it_should_be(
+    tmp_path, body, monkeypatch
+):
+    recording, (path,) = recorded(tmp_path / "full", body)
+    save = Motion.save
+
+    def full(motion, place):
+        if place == path and list(path.parent.glob("*.recording")):
+            raise journal.OutputError(f"cannot write {path}: No space left on device")
+        save(motion, place)
+
+    monkeypatch.setattr(Motion, "save", full)
+    assert recording.save() == [path]
+    assert len(Motion.load(path)) > POSES
+    assert [file for file in tmp_path.rglob("*") if file.is_file()] == [path]
+
+
+def test_when_every_place_refuses_the_growing_file_stays_and_is_named(tmp_path, body, monkeypatch):
+    recording, (path,) = recorded(tmp_path / "full", body)
+    with monkeypatch.context() as patch:
+        refusing(patch, tmp_path)
+        file = tmp_path / "full" / "take.recording"
+        with pytest.raises(journal.OutputError, match=f"finish it with scope live {file}"):
+            recording.save()
+    assert main(["live", str(file), "--record", str(path), "--quiet"]) == 0
+    assert len(Motion.load(path)) > POSES
+
+
+def fake_run(monkeypatch, end):
+    """Let a live capture give all poses, and then end in some way."""
+
+    def run_live(source, body, options, outputs, listeners, clock=None):
+        listeners.camera(people_of(), SIZE)
+        for pose in poses(body):
+            for output in outputs:
+                output.send(pose, 0.0)
+        end()
+        return {
+            "frames": POSES,
+            "dropped": 0,
+            "damaged": 0,
+            "poses": POSES,
+            "poses_per_second": 1.0,
+            "latency_ms": {"median": 1.0, "p95": 1.0},
+            "stopped": False,
+        }
+
+    monkeypatch.setattr(run, "run_live", run_live)
+
+
+def raising(error):
+    def end():
+        raise error
+
+    return end
+
+
+ENDS = {
+    "source ends": (lambda: None, 0, "wrote"),
+    "source fails": (raising(VideoError("fake is gone")), 1, "fake is gone"),
+    "disk full": (raising(OSError(errno.ENOSPC, "No space left on device")), 1, "No space left"),
+    "memory": (raising(MemoryError()), 1, "memory"),
+    "defect": (raising(RuntimeError("a defect")), 1, "a defect"),
+    "signal": (lambda: signal.raise_signal(signal.SIGTERM), 130, "stopped"),
+}
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_the_command_finishes_the_recording_however_its_capture_ends(
+    tmp_path, monkeypatch, capfd, body, end
+):
+    how, status, said = ENDS[end]
+    fake_run(monkeypatch, how)
+    path = tmp_path / "out" / "take.npz"
+    path.parent.mkdir()
+    path.write_bytes(EARLIER)
+    assert main(["live", str(SAMPLE), "--record", str(path)]) == status
+    error = capfd.readouterr().err
+    assert said in error
+    assert f"wrote {path}" in error
+    assert "nothing was written" not in error
+    recording, paths = recorded(tmp_path / "truth", body)
+    recording.save()
+    np.testing.assert_array_equal(Motion.load(path).trans, Motion.load(paths[0]).trans)
+    assert [file.name for file in path.parent.iterdir()] == ["take.npz"]
+
+
+def test_where_motion_and_images_are_is_said_if_neither_can_be_saved(
+    tmp_path, monkeypatch, capfd, body
+):
+    class Images:
+        def save(self):
+            raise OutputError("the images until then are in take.unfinished.mp4")
+
+    recording, (path,) = recorded(tmp_path / "full", body)
+    refusing(monkeypatch, tmp_path / "full")
+    with pytest.raises(OutputError, match="the images until then"):
+        live_command._save(recording, Images())
+    other = tmp_path / "user" / "recordings" / path.name
+    assert f"the recording is in {other}" in capfd.readouterr().err
+    assert other.is_file()
+
+
+def is_whole(path):
+    """Whether all poses are in a recording on the disk."""
+    about = read_about(path)
+    return len(read_records(path, about, load_body(about.body))) == POSES
+
+
+KILLED = """
+import os, signal, sys, time
+import pytest
+from scope.scope_addon.cli import SAMPLE, main
+from scope.scope_addon.command_line import live_command
+from scope.tests.live import test_recording_ends as tests
+def end():
+    left = tests.Path(sys.argv[2]).with_suffix(".recording")
+    for _ in range(6000):
+        if tests.is_whole(left):
+            break
+        time.sleep(0.01)
+    os.kill(os.getpid(), signal.SIGKILL)
+with pytest.MonkeyPatch.context() as patch:
+    tests.fake_run(patch, end)
+    main(["live", sys.argv[1], "--record", sys.argv[2]])
+"""
+
+
+@on_linux
+def test_a_killed_command_leaves_what_the_next_one_names_and_finishes(tmp_path, capfd, monkeypatch):
+    path = tmp_path / "take.npz"
+    path.write_bytes(EARLIER)
+    command = [sys.executable, "-c", KILLED, str(SAMPLE), str(path)]
+    assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
+    left = tmp_path / "take.recording"
+    assert path.read_bytes() == EARLIER
+    capfd.readouterr()
+    with monkeypatch.context() as patch:
+        fake_run(patch, lambda: None)
+        assert main(["live", str(SAMPLE), "--record", str(path)]) == 0
+    assert f"{left} has a recording that is not finished" in capfd.readouterr().err
+    second = Motion.load(path)
+    assert main(["live", str(left)]) == 2
+    assert f"{path} exists; give another name with --record" in capfd.readouterr().err
+    assert main(["live", str(left), "--record", str(tmp_path / "first.npz")]) == 0
+    assert "2.6 s of sample.mp4" in capfd.readouterr().err
+    np.testing.assert_array_equal(Motion.load(tmp_path / "first.npz").trans[:60], second.trans[:60])
+    assert not left.exists()
+    assert main(["live", str(left)]) == 1
+    assert "does not exist" in capfd.readouterr().err
+
+
+def test_nobody_seen_leaves_nothing(tmp_path, body):
+    (tmp_path / "a").mkdir()
+    keep = Keep(tmp_path / "a" / "take.recording", "scope")
+    recording = PeopleRecording([tmp_path / "a" / "take.npz"], body, SOURCE, keep=keep)
+    recording.begin(people_of(), SIZE)
+    with pytest.raises(NoPersonError):
+        recording.save()
+    assert list(Path(tmp_path / "a").iterdir()) == []

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Windows over a clip: every frame is kept once, from a window in which it has neighbours."""
+
+import numpy as np
+import pytest
+from scope.solver.motion.fit import overlapping, tiles
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    ("span", "length", "overlap"), [(10.0, 3.0, 1.0), (60.0, 8.0, 2.0), (8.1, 8.0, 2.0)]
+)
+def test_every_frame_is_kept_once_and_has_neighbours(
+    seed: int, span: float, length: float, overlap: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(0.2, 1.8, round(60 * span))
+    times = span * np.cumsum(steps) / steps.sum() + rng.uniform(-100, 100)
+    windows = overlapping(times, length, overlap)
+    kept = np.concatenate([np.arange(len(times))[w.kept] for w in windows])
+    np.testing.assert_array_equal(kept, np.arange(len(times)))
+    for w in windows:
+        frames = times[w.frames]
+        own = times[w.kept]
+        assert frames[-1] - frames[0] <= length + 1e-9
+        assert w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop
+        least = 0.4 * overlap  # half of it, but for the unevenness of the frames
+        assert own[0] == times[0] or own[0] - frames[0] > least
+        assert own[-1] == times[-1] or frames[-1] - own[-1] > least
+
+
+def test_a_short_clip_is_one_window() -> None:
+    (window,) = overlapping(np.arange(5) / 30, 8.0, 2.0)
+    assert (window.frames, window.kept) == (slice(0, 5), slice(0, 5))
+    (window,) = overlapping(np.array([3.0]), 8.0, 2.0)
+    assert window.kept == slice(0, 1)
+
+
+def test_a_gap_longer_than_a_window_leaves_none_empty() -> None:
+    """`fit_motion` failed on a window without frames."""
+    times = np.concatenate([np.arange(90) / 30, 40.0 + np.arange(90) / 30, [70.0, 100.0]])
+    windows = overlapping(times, 8.0, 2.0)
+    kept = np.concatenate([np.arange(len(times))[w.kept] for w in windows])
+    np.testing.assert_array_equal(kept, np.arange(len(times)))
+    assert all(w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows)
+
+
+@pytest.mark.parametrize(("rate", "length"), [(5.0, 0.6), (10.0, 0.1)])
+def test_windows_without_overlap_lose_no_frame_to_rounding(rate: float, length: float) -> None:
+    """The end of one and the start of the next are one time, computed in two ways: a frame may lie
+    between them.
+    """
+    for count in range(20, 300):
+        times = np.arange(count) / rate
+        windows = overlapping(times, length, 0.0)
+        kept = np.concatenate([np.arange(count)[w.kept] for w in windows])
+        np.testing.assert_array_equal(kept, np.arange(count))
+        assert all(
+            w.frames.start <= w.kept.start < w.kept.stop <= w.frames.stop for w in windows
+        ), count
+
+
+def test_tiles_are_what_is_kept() -> None:
+    windows = overlapping(np.arange(900) / 30, 8.0, 2.0)
+    assert [(t.frames, t.kept) for t in tiles(windows)] == [(w.kept, w.kept) for w in windows]
