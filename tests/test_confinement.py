@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.capture.perception.adapters import network_process
-from scope.scope_addon.capture.perception.adapters.network_process import SERVER, NetworkProcess
+from scope.scope_addon.capture.perception.adapters import graph
+from scope.scope_addon.capture.perception.adapters.graph import SERVER, NetworkProcess
 from scope.scope_addon.confinement import limits_files
 from scope.scope_addon.job.process import START_SCRIPT, WorkerFailedError, WorkerProcess
 from scope.scope_addon.job.request import JobRequest
@@ -205,7 +205,7 @@ def test_the_process_of_a_network_reads_nothing_else(
         "network_server.main(int(sys.argv[1]), sys.argv[2])\n",
         "utf-8",
     )
-    monkeypatch.setattr(network_process, "SERVER", script)
+    monkeypatch.setattr(graph, "SERVER", script)
     (tmp_path / "networks").mkdir()
     path = simcc(tmp_path / "networks" / "m.onnx", 17, 32, 32)
     with pytest.raises(RuntimeError, match=r"^done: \[\]$"):

@@ -15,7 +15,7 @@ import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.adapters import graph
-from scope.scope_addon.capture.perception.adapters.network_process import NetworkProcess
+from scope.scope_addon.capture.perception.adapters.graph import NetworkProcess
 from scope.scope_addon.capture.pipeline import Capture, capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.cli import SAMPLE

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
-from scope.scope_addon.capture.perception.adapters.keypoint_sets import COCO_17
+from scope.scope_addon.capture.perception.adapters.description import COCO_17
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.person_detector import make_anchors
 from scope.scope_addon.capture.perception.sessions import network_path

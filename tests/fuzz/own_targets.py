@@ -83,10 +83,10 @@ def run_network(path: Path) -> None:
     """Open a user's network in its process, and run it on white; it may take 15 s to open and 2 s
     to run.
     """
-    from scope.scope_addon.capture.perception.adapters import graph, network_process
+    from scope.scope_addon.capture.perception.adapters import graph
     from scope.scope_addon.capture.perception.adapters.description import Description
 
-    with patch.multiple(network_process, DEFAULT_OPENING_S=15.0, RUN_S=2.0):
+    with patch.multiple(graph, DEFAULT_OPENING_S=15.0, RUN_S=2.0):
         opened = graph.Graph(path, Description(), threads=1)
         opened.run(
             np.full((opened.height, opened.width, 3), 255, np.uint8),

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scope.scope_addon import cli
-from scope.scope_addon.capture.perception.adapters import network_process
+from scope.scope_addon.capture.perception.adapters import graph
 from scope.scope_addon.cli import SAMPLE, main
 
 from ..capture.perception.adapters.made_networks import huge, looping
@@ -183,7 +183,7 @@ def test_f4_rigs_that_ask_for_everything(tmp_path: Path) -> None:
 
 def test_f7_an_endless_loop(tmp_path: Path, refused: Said, monkeypatch: pytest.MonkeyPatch) -> None:
     """The capture never ended."""
-    monkeypatch.setattr(network_process, "DEFAULT_OPENING_S", 1.5)
+    monkeypatch.setattr(graph, "DEFAULT_OPENING_S", 1.5)
     looping(tmp_path / "loop.onnx")
     said = refused("capture", str(SAMPLE), "--keypoints", "loop.onnx", "-o", "a.npz")
     assert "loop.onnx was stopped because it gave no result within 1.5 s; choose" in said

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 
 from ...arrays import Float32Array, Float64Array, IndexArray, Uint8Array
-from .letterbox import fit_in
-from .region import Region, region_from_points
+from .region import Region, fit_in, region_from_points
 from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 224

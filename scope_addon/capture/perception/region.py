@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rotated square of the image that a landmark network looks at.
+"""What a network looks at: a whole picture, fitted into its input (letterboxing), or a rotated
+square of it, for landmarks.
 
 Image coordinates are OpenCV's: the centre of the top left pixel is (0, 0), y runs down. Crop
 coordinates s run from (0, 0) at the top left corner of the square to (1, 1) at its bottom right

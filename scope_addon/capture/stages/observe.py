@@ -26,8 +26,7 @@ from ..camera.given_path import GivenPath, read_camera_path
 from ..camera.intrinsics import Camera, choose_camera
 from ..camera.line_segments import Lines
 from ..camera.zoom import Zoom
-from ..fitting.background_estimators import BackgroundEstimators
-from ..fitting.focal_length import FocalFits
+from ..fitting.focal_length import BackgroundEstimators, FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.frame import AutoExposure, Frame
 from ..media.video import Video, opencv_in_one_thread

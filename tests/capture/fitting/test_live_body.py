@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.fitting import background_estimators
+from scope.scope_addon.capture.fitting import focal_length
 from scope.scope_addon.capture.fitting.live_body import LiveBody
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
@@ -69,14 +69,14 @@ def test_the_result_does_not_depend_on_the_speed_of_the_threads(watched, body, m
             time.sleep(0.5)
             super().load()
 
-    focal = background_estimators.camera_by_edges
+    focal = focal_length.camera_by_edges
 
     def slow_focal(*arguments):
         time.sleep(0.5)
         return focal(*arguments)
 
     monkeypatch.setattr("scope.scope_addon.capture.stages.observe.LiveBody", Slow)
-    monkeypatch.setattr(background_estimators, "camera_by_edges", slow_focal)
+    monkeypatch.setattr(focal_length, "camera_by_edges", slow_focal)
     slowly = capture(SAMPLE, body, WANTED).motions[0]
     for name in ("poses", "trans", "betas", "joints_cam", "intrinsics"):
         np.testing.assert_array_equal(getattr(slowly, name), getattr(watched[0].motions[0], name))
@@ -86,7 +86,7 @@ def test_an_error_in_a_parallel_thread_is_raised(body, monkeypatch):
     def broken(*_):
         raise ValueError("no edges today")
 
-    monkeypatch.setattr(background_estimators, "camera_by_edges", broken)
+    monkeypatch.setattr(focal_length, "camera_by_edges", broken)
     with pytest.raises(ValueError, match="no edges today"):
         capture(SAMPLE, body, WANTED)
 

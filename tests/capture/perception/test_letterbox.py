@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.letterbox import fit_in, halved
+from scope.scope_addon.capture.perception.region import fit_in, halved
 
 
 @pytest.mark.parametrize("shape", [(120, 60), (60, 120), (40, 40), (333, 500)])

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.capture.perception.letterbox import fit_in
 from scope.scope_addon.capture.perception.person_detector import (
     Detection,
     PersonDetector,
@@ -26,6 +25,7 @@ from scope.scope_addon.capture.perception.person_detector import (
     squares,
     unique,
 )
+from scope.scope_addon.capture.perception.region import fit_in
 from scope.scope_addon.capture.perception.sessions import network_path, open_session
 from scope.scope_addon.errors import SetupError, UsageError
 from scope.solver.errors import ModelFileError

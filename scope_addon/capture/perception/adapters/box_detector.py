@@ -17,8 +17,8 @@ import numpy as np
 
 from .....solver.errors import ModelFileError
 from ....arrays import Float64Array, Uint8Array
-from ..letterbox import fit_in
 from ..person_detector import Detection, overlap_clusters
+from ..region import fit_in
 from ..sessions import Execution
 from .description import Description, description_path, read_description
 from .graph import PIXELS_BGR, UNIT, Graph, Normalization, Outputs, finite

@@ -35,9 +35,15 @@ from ....arrays import BoolArray, Float64Array, Uint8Array
 from ..landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..region import Region, box_along
 from ..sessions import Execution
-from .description import Description, description_path, read_description
+from .description import (
+    COCO_17,
+    KEYPOINT_SETS,
+    Description,
+    KeypointSet,
+    description_path,
+    read_description,
+)
 from .graph import IMAGENET, Graph, Outputs, finite
-from .keypoint_sets import COCO_17, KEYPOINT_SETS, KeypointSet
 
 SCORE_THRESHOLD = 0.3  # from which a keypoint counts as seen
 UNSURE = 0.25  # share of this threshold from which a keypoint widens the next region

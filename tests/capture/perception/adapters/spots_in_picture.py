@@ -9,8 +9,8 @@ import json
 from pathlib import Path
 
 import numpy as np
+from scope.scope_addon.capture.perception.adapters.description import COCO_17
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
-from scope.scope_addon.capture.perception.adapters.keypoint_sets import COCO_17
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.region import Region
 

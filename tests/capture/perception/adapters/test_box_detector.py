@@ -25,7 +25,7 @@ from scope.scope_addon.capture.perception.adapters.box_detector import (
     Boxes,
     suppress,
 )
-from scope.scope_addon.capture.perception.letterbox import fit_in
+from scope.scope_addon.capture.perception.region import fit_in
 from scope.solver.errors import ModelFileError
 
 from ...small_graphs import fixed

@@ -17,8 +17,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture.perception.adapters.description import COCO_17, KEYPOINT_SETS
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
-from scope.scope_addon.capture.perception.adapters.keypoint_sets import COCO_17, KEYPOINT_SETS
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.region import Region
 from scope.solver.errors import ModelFileError

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.adapters import network_process, network_server
+from scope.scope_addon.capture.perception.adapters import graph, network_server
+from scope.scope_addon.capture.perception.adapters.graph import SERVER, NetworkProcess
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
-from scope.scope_addon.capture.perception.adapters.network_process import SERVER, NetworkProcess
 from scope.scope_addon.capture.perception.adapters.network_server import (
     OUT_OF_MEMORY,
     Server,
@@ -41,7 +41,7 @@ def grey(network: NetworkProcess) -> list[np.ndarray]:
 def test_a_loop_that_only_some_images_start_ends_as_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(network_process, "RUN_S", 0.5)
+    monkeypatch.setattr(graph, "RUN_S", 0.5)
     network = NetworkProcess("cpu", looping(tmp_path / "m.onnx", while_bright=True), 1)
     grey(network)
     with pytest.raises(ModelFileError, match=r"no result within 0\.5 s"):
@@ -111,7 +111,7 @@ def test_a_process_that_ends_or_answers_nonsense(
 ) -> None:
     script = tmp_path / "server.py"
     script.write_text(code)
-    monkeypatch.setattr(network_process, "SERVER", script)
+    monkeypatch.setattr(graph, "SERVER", script)
     with pytest.raises(ModelFileError, match=says) as caught:
         KeypointNetwork(simcc(tmp_path / "m.onnx", 17, 32, 32), threads=1)
     assert "\n" not in str(caught.value)
@@ -140,7 +140,7 @@ def test_the_process_ends_when_the_capture_is_killed(tmp_path: Path) -> None:
     path = simcc(tmp_path / "m.onnx", 17, 32, 32)
     code = (
         "import os, pathlib, sys\n"
-        "from scope.scope_addon.capture.perception.adapters.network_process import NetworkProcess\n"
+        "from scope.scope_addon.capture.perception.adapters.graph import NetworkProcess\n"
         f"network = NetworkProcess('cpu', pathlib.Path({str(path)!r}), 1)\n"
         "print(network._process.pid, flush=True)\n"
         "os._exit(9)\n"

@@ -12,9 +12,12 @@ import pytest
 from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.intrinsics import assumed_camera
 from scope.scope_addon.capture.camera.line_segments import Segments
-from scope.scope_addon.capture.fitting import background_estimators
-from scope.scope_addon.capture.fitting.background_estimators import BackgroundEstimators
-from scope.scope_addon.capture.fitting.focal_length import LOG_RATIOS, FocalFits
+from scope.scope_addon.capture.fitting import focal_length
+from scope.scope_addon.capture.fitting.focal_length import (
+    LOG_RATIOS,
+    BackgroundEstimators,
+    FocalFits,
+)
 
 
 class SlowBody:
@@ -41,8 +44,8 @@ def test_only_compiling_is_reported(monkeypatch, compiled):
             live.may_end.set()
         return compiled
 
-    monkeypatch.setattr(background_estimators, "compiled_kernels", count)
-    monkeypatch.setattr(background_estimators, "_POLLING_INTERVAL_S", 0.01)
+    monkeypatch.setattr(focal_length, "compiled_kernels", count)
+    monkeypatch.setattr(focal_length, "_POLLING_INTERVAL_S", 0.01)
     with BackgroundEstimators(assumed_camera(64, 48, 64.0), 64, 48, live, None) as background:
         background.wait_for_solver(reported.append)
     assert live.is_ready
@@ -52,7 +55,7 @@ def test_only_compiling_is_reported(monkeypatch, compiled):
 
 def test_a_cancel_while_compiling_is_passed_on(monkeypatch):
     live = SlowBody()
-    monkeypatch.setattr(background_estimators, "compiled_kernels", lambda: 1)
+    monkeypatch.setattr(focal_length, "compiled_kernels", lambda: 1)
 
     def cancel(_):
         live.may_end.set()
