@@ -31,7 +31,7 @@ from ..scope_addon.capture.fitting.stature import FIXED, with_population
 from ..scope_addon.capture.fitting.weights import WEIGHTS
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.options import CaptureOptions
-from ..scope_addon.capture.overlay.overlay_video import camera_vertices
+from ..scope_addon.capture.overlay_video import camera_vertices
 from ..scope_addon.capture.perception.lifter import Lifted, default_lifter, windows_around
 from ..scope_addon.capture.perception.observation import PersonMask
 from ..scope_addon.capture.pipeline import shot_of

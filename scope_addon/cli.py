@@ -339,7 +339,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     # Imported here, so that --help and errors in the arguments are printed immediately.
     from .capture.camera.calibration import write_calibration
     from .capture.long_clips.windowed_clip import lasting
-    from .capture.overlay.overlay_video import write_overlay
+    from .capture.overlay_video import write_overlay
     from .capture.pipeline import capture
     from .capture.several_views.capture_views import capture_views
     from .job.unfinished import unfinished_capture

@@ -204,9 +204,7 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(
-        "scope.scope_addon.capture.overlay.overlay_video.write_overlay", interrupted
-    )
+    monkeypatch.setattr("scope.scope_addon.capture.overlay_video.write_overlay", interrupted)
     motion = tmp_path / "a.npz"
     options = [*BRIEF, "-o", motion, "--overlay", tmp_path / "a.mp4"]
     status, _, err = run(capsys, "capture", SAMPLE, *options)

@@ -13,9 +13,9 @@ import numpy as np
 
 from ...scope_addon.arrays import Float64Array, Uint8Array
 from ...scope_addon.atomic_write import atomic_path
-from ...scope_addon.capture.overlay.overlay_video import blended, body_colors
-from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
-from ...scope_addon.capture.overlay.video_writer import VideoWriter
+from ...scope_addon.capture.fitting.rasterizer import Canvas, rasterize
+from ...scope_addon.capture.media.video_writer import VideoWriter
+from ...scope_addon.capture.overlay_video import blended, body_colors
 from ...solver.rotations import exp
 from .surroundings import Surroundings
 from .walk import Walker

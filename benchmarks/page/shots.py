@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
-from ...scope_addon.capture.overlay.overlay_video import body_colors, draw_overlay, painted_frames
+from ...scope_addon.capture.overlay_video import body_colors, draw_overlay, painted_frames
 from ...scope_addon.motion import Motion
 from ...scope_addon.report.page import Markup, Picture, small_picture, spread_rows
 from ...solver.body import Body

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.fitting.live_body import LiveBody
+from ...scope_addon.capture.fitting.rasterizer import Canvas, rasterize
 from ...scope_addon.capture.media.frame import Frame
 from ...scope_addon.capture.options import CaptureOptions
-from ...scope_addon.capture.overlay.overlay_video import camera_vertices
-from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
+from ...scope_addon.capture.overlay_video import camera_vertices
 from ...scope_addon.capture.perception.landmark_network import INPUT_SIZE, LandmarkNetwork
 from ...scope_addon.capture.perception.observation import Observation
 from ...scope_addon.capture.perception.region import Region

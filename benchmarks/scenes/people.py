@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.rasterizer import vertex_normals
+from ...scope_addon.capture.fitting.rasterizer import vertex_normals
 from ...solver import Body
 from ...tools.render_sample.truth import LIMBS
 

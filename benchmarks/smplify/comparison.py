@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.options import CaptureOptions
-from ...scope_addon.capture.overlay.overlay_video import body_colors, camera_vertices, draw_overlay
+from ...scope_addon.capture.overlay_video import body_colors, camera_vertices, draw_overlay
 from ...scope_addon.capture.pipeline import capture
 from ...scope_addon.motion import Motion
 from ...solver import (

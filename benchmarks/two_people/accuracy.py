@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.options import CaptureOptions
-from ...scope_addon.capture.overlay.overlay_video import camera_vertices
+from ...scope_addon.capture.overlay_video import camera_vertices
 from ...scope_addon.capture.perception.landmark_network import KEYPOINT_COUNT, LandmarkNetwork
 from ...scope_addon.capture.perception.region import Region, bounds, region_from_points
 from ...scope_addon.capture.pipeline import capture

@@ -25,7 +25,7 @@ from ..atomic_write import atomic_path
 from ..capture.camera.intrinsics import scaled_intrinsics
 from ..capture.fitting.live_body import LiveBody, LivePose
 from ..capture.media.frame import Frame
-from ..capture.overlay.overlay_video import body_colors, draw_overlay
+from ..capture.overlay_video import body_colors, draw_overlay
 from ..capture.perception.landmark_network import KEYPOINT_NAMES
 from ..capture.perception.observation import Observation
 from ..temporary import remove

@@ -13,9 +13,9 @@ import gc
 import numpy as np
 
 from ...solver.body_file import ASSETS
+from ..capture.fitting.rasterizer import fill_silhouette
 from ..capture.media.video_range import VideoRange
 from ..capture.options import CaptureOptions
-from ..capture.overlay.rasterizer import fill_silhouette
 from ..capture.pipeline import capture
 from ..capture.stages.clock import Progress
 from ..edit.corrected_motion import with_corrections

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from ...solver.errors import ScopeError
 from ..atomic_write import create_new, finish, reason
-from ..capture.overlay.video_writer import VideoWriter
+from ..capture.media.video_writer import VideoWriter
 from ..errors import OutputError
 from ..notices import counted
 from ..temporary import remove

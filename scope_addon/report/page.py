@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ..capture.media.video_range import FootageRange
-from ..capture.overlay.overlay_video import painted_frames
+from ..capture.overlay_video import painted_frames
 from ..errors import OutputError
 from ..motion import Motion
 

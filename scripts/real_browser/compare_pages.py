@@ -23,7 +23,7 @@ import numpy as np
 from scope.benchmarks.page.commands import Command, Outcome
 from scope.benchmarks.page.recorded import Run, write_run
 from scope.benchmarks.report import experiment_lines, table
-from scope.scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
+from scope.scope_addon.capture.overlay_video import camera_vertices, draw_overlay
 from scope.scope_addon.capture_report import Report
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.motion import Motion

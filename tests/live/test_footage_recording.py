@@ -10,7 +10,7 @@ import av
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
-from scope.scope_addon.capture.overlay.video_writer import VideoWriter
+from scope.scope_addon.capture.media.video_writer import VideoWriter
 from scope.scope_addon.errors import OutputError
 from scope.scope_addon.live.footage_recording import Footage
 from scope.scope_addon.live.source import Picture

@@ -47,8 +47,8 @@ WRITES = {
     # the content of temporary files
     "scope_addon/atomic_write.py",
     "scope_addon/capture/media/guards.py",
-    "scope_addon/capture/overlay/overlay_video.py",
-    "scope_addon/capture/overlay/video_writer.py",
+    "scope_addon/capture/overlay_video.py",
+    "scope_addon/capture/media/video_writer.py",
     "scope_addon/job/finished_clip.py",
     "scope_addon/job/preview.py",
     "scope_addon/motion.py",

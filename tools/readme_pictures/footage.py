@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.media.video import open_video
-from ...scope_addon.capture.overlay.overlay_video import camera_vertices, draw_overlay
+from ...scope_addon.capture.overlay_video import camera_vertices, draw_overlay
 from ...scope_addon.motion import Motion
 from ...solver import Body
 from .clips import SAMPLE, default_body

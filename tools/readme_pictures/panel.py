@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.overlay_video import draw_overlay
-from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize
+from ...scope_addon.capture.fitting.rasterizer import Canvas, rasterize
+from ...scope_addon.capture.overlay_video import draw_overlay
 from ...solver import Body
 from .shapes import stick_figure
 from .view import View

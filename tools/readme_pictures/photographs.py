@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.overlay_video import draw_overlay
+from ...scope_addon.capture.overlay_video import draw_overlay
 from ...scope_addon.motion import Motion
 from ..pinned_wheel import DOWNLOADS, PinnedWheel
 from .clips import body_with_face, captured_in_total

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.overlay_video import camera_vertices
+from ...scope_addon.capture.overlay_video import camera_vertices
 from ...scope_addon.kinematics.face import mouth_faces_of
 from ...scope_addon.motion import Motion
 from ...solver import Body

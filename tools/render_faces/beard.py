@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.rasterizer import vertex_normals
+from ...scope_addon.capture.fitting.rasterizer import vertex_normals
 from ...scope_addon.kinematics.face import mouth_faces_of
 from ...solver.body import Body
 from .looks import masks

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize, vertex_normals
+from ...scope_addon.capture.fitting.rasterizer import Canvas, rasterize, vertex_normals
 from ...scope_addon.kinematics.face import mouth_faces_of
 from ...solver.body import Body
 from .looks import Look

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scope_addon.capture.overlay.rasterizer import Canvas, rasterize, vertex_normals
-from ...scope_addon.capture.overlay.video_writer import VideoWriter
+from ...scope_addon.capture.fitting.rasterizer import Canvas, rasterize, vertex_normals
+from ...scope_addon.capture.media.video_writer import VideoWriter
 from ...scope_addon.kinematics.face import mouth_faces_of
 from ...solver.body import Body
 from ..render_faces.looks import HAIR, draw_look

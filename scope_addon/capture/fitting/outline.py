@@ -26,11 +26,11 @@ from ...arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ...kinematics.body_surface import one_per_cell
 from ...kinematics.contact_points import with_keypoints
 from ..camera.intrinsics import Camera
-from ..overlay.rasterizer import fill_silhouette, vertex_normals
 from ..perception.observation import PersonMask
 from ..perception.region import Region
 from .frame_measurements import Measurer
 from .prepared_track import PreparedTrack
+from .rasterizer import fill_silhouette, vertex_normals
 from .weights import ROBUST, cold_stages, warm_stages
 
 SPACING_M = 0.03  # between candidates, at rest

@@ -12,7 +12,7 @@ from scope.scope_addon.capture.fitting import focal_length
 from scope.scope_addon.capture.fitting.live_body import LiveBody
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.overlay.overlay_video import draw_overlay
+from scope.scope_addon.capture.overlay_video import draw_overlay
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError

@@ -47,7 +47,7 @@ from fractions import Fraction
 from pathlib import Path
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.overlay.video_writer import VideoWriter
+from scope.scope_addon.capture.media.video_writer import VideoWriter
 video, overlay = map(Path, sys.argv[1:])
 with open_video(video, VideoRange(end_s=0.1)) as opened:
     images = [frame.image_rgb for frame in opened]

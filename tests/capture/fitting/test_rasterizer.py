@@ -8,7 +8,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.overlay.rasterizer import (
+from scope.scope_addon.capture.fitting.rasterizer import (
     NEAR,
     Canvas,
     fill_silhouette,

@@ -13,7 +13,7 @@ import av
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.overlay.video_writer import VideoWriter
+from scope.scope_addon.capture.media.video_writer import VideoWriter
 from scope.scope_addon.errors import OutputError
 
 GREY = np.full((48, 64, 3), 90, np.uint8)

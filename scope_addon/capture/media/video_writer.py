@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Uint8Array
 from ...errors import OutputError
-from ..media.guards import utf8_name
+from .guards import utf8_name
 
 if TYPE_CHECKING:
     import av

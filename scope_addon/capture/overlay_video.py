@@ -18,21 +18,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from ....solver.body import Body
-from ....solver.errors import ShapeError
-from ....solver.kernel import cached
-from ....solver.rotations import exp
-from ...arrays import Float64Array, FloatArray, Uint8Array
-from ...atomic_write import atomic_path, reason
-from ...errors import OutputError, VideoError
-from ...motion import Motion
-from ..camera.intrinsics import scaled_intrinsics
-from ..media.frame import Frame
-from ..media.video import Video, open_video
-from ..media.video_range import FootageRange
-from ..perception.landmark_network import KEYPOINT_COUNT
-from .rasterizer import Canvas, rasterize
-from .video_writer import VideoWriter
+from ...solver.body import Body
+from ...solver.errors import ShapeError
+from ...solver.kernel import cached
+from ...solver.rotations import exp
+from ..arrays import Float64Array, FloatArray, Uint8Array
+from ..atomic_write import atomic_path, reason
+from ..errors import OutputError, VideoError
+from ..motion import Motion
+from .camera.intrinsics import scaled_intrinsics
+from .fitting.rasterizer import Canvas, rasterize
+from .media.frame import Frame
+from .media.video import Video, open_video
+from .media.video_range import FootageRange
+from .media.video_writer import VideoWriter
+from .perception.landmark_network import KEYPOINT_COUNT
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 STILL_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")

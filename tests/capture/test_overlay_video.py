@@ -11,25 +11,25 @@ import av
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture import overlay_video
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.overlay import overlay_video
-from scope.scope_addon.capture.overlay.overlay_video import (
+from scope.scope_addon.capture.media.video_writer import VideoWriter
+from scope.scope_addon.capture.overlay_video import (
     body_colors,
     camera_vertices,
     draw_overlay,
     painted_frames,
     write_overlay,
 )
-from scope.scope_addon.capture.overlay.video_writer import VideoWriter
 from scope.scope_addon.errors import CancelledError, OutputError, VideoError
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL, world_from_level_camera
 from scope.scope_addon.motion import Motion
 from scope.solver.body import Body
 from scope.solver.errors import ShapeError
 
-from ...made_motion import made_face, made_motion
-from ..media.made_video import with_time_table
+from ..made_motion import made_face, made_motion
+from .media.made_video import with_time_table
 
 W = 160
 H = 120
