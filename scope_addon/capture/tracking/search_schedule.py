@@ -53,7 +53,7 @@ class SearchSchedule:
     def forget(self) -> None:
         """Forget when the last searches were."""
         self._search_s = self._close_search_s = self._small_search_s = -math.inf
-        self._parts = _RarerSearch(self._clock)
+        self._thorough = _RarerSearch(self._clock)
         self._turned = _RarerSearch(self._clock)
 
     def is_due(
@@ -98,14 +98,15 @@ class SearchSchedule:
         self._small_search_s = self._clock.time_s
         return True
 
-    def begin_parts(self, live: Sequence[TrackedTarget]) -> bool:
-        """Return whether to look for people beside larger ones in this frame, and if so, note it.
+    def begin_thorough(self, live: Sequence[TrackedTarget]) -> bool:
+        """Return whether to look for people beside larger ones and behind others in this frame, and
+        if so, note it.
 
         Only where fewer people are tracked than are wanted, and more and more rarely until their
         number changes: somebody whom a close search missed is mostly there from the start.
         """
         is_wanted = not self._largest_only and 0 < len(live) < self._wanted
-        return self._parts.begin(len(live), is_wanted)
+        return self._thorough.begin(len(live), is_wanted)
 
     def begin_turned(self, live: Sequence[TrackedTarget]) -> bool:
         """Return whether to look for people who are not upright in this frame, and if so, note it.

@@ -60,23 +60,23 @@ def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracke
     assert not schedule.begin_small(IMAGE, [], [person(300.0)])
 
 
-def test_the_search_beside_people_becomes_rare_until_their_number_changes() -> None:
+def test_the_thorough_search_becomes_rare_until_their_number_changes() -> None:
     clock = FrameClock()
     schedule = SearchSchedule(clock, 4)
     times = []
     for t in range(600):
         clock.advance(t / 30)
         live = [person(300.0)] * (1 if t < 450 else 2)
-        if schedule.begin_parts(live):
+        if schedule.begin_thorough(live):
             times.append(t)
     gaps = np.diff([t for t in times if t < 450])
     assert list(gaps[:4]) == [8, 16, 32, 64]  # frames; it doubles
     assert gaps.max() == 64
     after = [t for t in times if t >= 450]
     assert np.diff(after)[0] == 8
-    assert not schedule.begin_parts([])
-    assert not schedule.begin_parts([person(300.0)] * 4)
-    assert not SearchSchedule(clock, None).begin_parts([person(300.0)])
+    assert not schedule.begin_thorough([])
+    assert not schedule.begin_thorough([person(300.0)] * 4)
+    assert not SearchSchedule(clock, None).begin_thorough([person(300.0)])
 
 
 @pytest.mark.parametrize("people", [None, 2])

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A picture from which people are removed, so that the detector finds those behind them.
+
+The detector looks at small pictures, in which somebody partly behind another person is one spot
+with that person. Where the person in front has been painted over with what surrounds them, the rest
+of the other one is detected by itself; and the landmark network, which takes the foremost person of
+its region, takes the right one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import cv2
+import numpy as np
+
+from ...arrays import Float64Array, FloatArray, Uint8Array
+from ..perception.region import Region
+
+LARGEST_SIDE_PX = 448  # of the picture in which is painted: twice the detector's input
+_SURE = 0.5  # probability from which a pixel belongs to the person
+_BORDER_PX = 5  # the masks are a little too narrow
+_RADIUS_PX = 3  # of inpainting; a larger one takes longer, and makes no difference to the detector
+
+
+def remove_people(image_rgb: Uint8Array, people: Sequence[tuple[Region, FloatArray]]) -> Uint8Array:
+    """Return a picture (H, W, 3) in which people are painted over with their surroundings.
+
+    The paint has a lower resolution than the picture.
+
+    :param image_rgb: (H, W, 3).
+    :param people: a region of the landmark network and the probability (S, S) in its crop, of each.
+    """
+    height, width = image_rgb.shape[:2]
+    scale = min(1.0, LARGEST_SIDE_PX / max(height, width))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    probability = np.zeros(size[::-1], np.float32)
+    for region, mask in people:
+        A = _small_from_crop(region, len(mask), size[0] / width, size[1] / height)
+        probability = np.maximum(probability, cv2.warpAffine(mask.astype(np.float32), A, size))
+    shown = (probability > _SURE).astype(np.uint8)
+    removed = cv2.dilate(shown, np.ones((_BORDER_PX, _BORDER_PX), np.uint8))
+    small_rgb = cv2.resize(image_rgb, size, interpolation=cv2.INTER_AREA)
+    painted_rgb = cv2.inpaint(small_rgb, removed, _RADIUS_PX, cv2.INPAINT_TELEA)
+    is_removed = cv2.resize(removed, (width, height), interpolation=cv2.INTER_NEAREST) > 0
+    paint_rgb = cv2.resize(painted_rgb, (width, height), interpolation=cv2.INTER_LINEAR)
+    return cast(Uint8Array, np.where(is_removed[..., None], paint_rgb, image_rgb))
+
+
+def _small_from_crop(region: Region, size: int, scale_x: float, scale_y: float) -> Float64Array:
+    """Return the affine map (2, 3) from pixels of a crop of (size, size) to those of the picture
+    scaled by ``scale_x`` and ``scale_y``.
+    """
+    corners_crop = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    corners = (region.image_from_crop(corners_crop) + 0.5) * [scale_x, scale_y] - 0.5
+    pixels_crop = corners_crop * size - 0.5
+    A = cv2.getAffineTransform(pixels_crop.astype(np.float32), corners.astype(np.float32))
+    return cast(Float64Array, A)
