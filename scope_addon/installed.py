@@ -137,8 +137,6 @@ def check_memory_limit(*, with_scene: bool) -> None:
     :param with_scene: whether Blender's module will be loaded.
     :raises SetupError: it is too low.
     """
-    from .errors import SetupError
-
     limit = address_space_limit()
     needed = _NEEDED_WITH_SCENE if with_scene else _NEEDED_BYTES
     if limit is not None and limit < needed:

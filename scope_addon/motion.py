@@ -172,19 +172,31 @@ class Motion:
     def __len__(self) -> int:
         return len(self.frames)
 
-    def validate(self, where: str = "motion") -> None:
+    def joint_rotations(self) -> NDArray[np.float64]:
+        """Return the rotations of ``poses``, (T, K+1, 3, 3)."""
+        from ..solver.rotations import exp  # Loads numba, which reading a motion does not need.
+
+        return exp(self.poses.reshape(len(self), -1, 3).astype(float))
+
+    def parts_in_world(self, body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the orientations (T, K+1, 3, 3) and origins (T, K+1, 3) of a body's parts, metres,
+        world frame.
+        """
+        betas = self.betas.astype(float)
+        return body.forward_kinematics(self.joint_rotations(), self.trans.astype(float), betas)
+
+    def validate(self) -> None:
         """Check that the shapes of all arrays agree.
 
-        :param where: what the message names as the source of the arrays.
         :raises MotionFileError: an array has the wrong shape; the message names it.
         """
         T = len(self.frames)
         if self.footage_rotation % 90 or not 0 < self.footage_speed < np.inf:
             raise MotionFileError(
-                f"{where}: footage_rotation must be a multiple of 90, and footage_speed above 0"
+                "motion: footage_rotation must be a multiple of 90, and footage_speed above 0"
             )
         if self.joints_cam.ndim != 3 or self.keypoints2d.ndim != 3:
-            raise MotionFileError(f"{where}: joints_cam and keypoints2d must have three dimensions")
+            raise MotionFileError("motion: joints_cam and keypoints2d must have three dimensions")
         sizes = {
             "T": T,
             "K1": self.joints_cam.shape[1],
@@ -198,32 +210,32 @@ class Motion:
             expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
             got = getattr(self, name).shape
             if got != expected:
-                raise MotionFileError(f"{where}: {name} must have shape {expected}, but has {got}")
+                raise MotionFileError(f"motion: {name} must have shape {expected}, but has {got}")
         if self.zoom is not None and (
             self.zoom.shape != (T,)
             or not ((self.zoom >= 1.0 / _LARGEST_ZOOM) & (self.zoom <= _LARGEST_ZOOM)).all()
         ):
             raise MotionFileError(
-                f"{where}: zoom must have a ratio of focal lengths from {1.0 / _LARGEST_ZOOM:g} "
+                f"motion: zoom must have a ratio of focal lengths from {1.0 / _LARGEST_ZOOM:g} "
                 f"to {_LARGEST_ZOOM:g} for each of {T} frames; capture again"
             )
         # An imported motion was seen by no camera.
         if self.image_size.any() and not _is_lens(self.intrinsics, self.image_size):
             raise MotionFileError(
-                f"{where}: intrinsics and image_size must be finite, and have focal lengths and "
+                "motion: intrinsics and image_size must be finite, and have focal lengths and "
                 "sides above 0; capture again"
             )
-        self._validate_face(where)
-        self._validate_views(where)
+        self._validate_face()
+        self._validate_views()
 
-    def _validate_views(self, where: str) -> None:
+    def _validate_views(self) -> None:
         if not self.views:
             return
         sizes = {"V": len(np.atleast_1d(self.views.get("view_sources", ())))}
-        self._validate_group(where, self.views, _VIEW_SCHEMA, sizes, "further cameras")
+        self._validate_group(self.views, _VIEW_SCHEMA, sizes, "further cameras")
         if sizes["V"] > MAX_VIEWS:
             raise MotionFileError(
-                f"{where} has {sizes['V']} further cameras; at most {MAX_VIEWS} are read"
+                f"motion has {sizes['V']} further cameras; at most {MAX_VIEWS} are read"
             )
         T_view_camera = self.views["view_from_camera"]
         R = T_view_camera[:, :3, :3]
@@ -240,17 +252,17 @@ class Motion:
         ).all()
         if not is_rigid or not has_times:
             raise MotionFileError(
-                f"{where}: view_from_camera must be rotations and translations, "
+                "motion: view_from_camera must be rotations and translations, "
                 "view_frame_rates above 0, and all of them and view_offsets_s below "
                 f"{_LARGEST_FIGURE:g}; capture again"
             )
         if not _is_lens(self.views["view_intrinsics"], self.views["view_image_sizes"]):
             raise MotionFileError(
-                f"{where}: view_intrinsics and view_image_sizes must have focal lengths and sides "
+                "motion: view_intrinsics and view_image_sizes must have focal lengths and sides "
                 "above 0; capture again"
             )
 
-    def _validate_face(self, where: str) -> None:
+    def _validate_face(self) -> None:
         if not self.face:
             return
         sizes = {
@@ -258,11 +270,10 @@ class Motion:
             "E": np.size(self.face.get("expression_names", ())),
             "F": np.size(self.face.get("face_landmarks", ())),
         }
-        self._validate_group(where, self.face, _FACE_SCHEMA, sizes, "a face")
+        self._validate_group(self.face, _FACE_SCHEMA, sizes, "a face")
 
     def _validate_group(
         self,
-        where: str,
         group: dict[str, NDArray[Any]],
         schema: dict[str, tuple[tuple[str | int, ...], type]],
         sizes: dict[str, int],
@@ -271,17 +282,17 @@ class Motion:
         """Check arrays that a file has together or not at all."""
         if missing := sorted(set(schema) - set(group)):
             raise MotionFileError(
-                f"{where} has {what}, but lacks {', '.join(missing)}; capture again"
+                f"motion has {what}, but lacks {', '.join(missing)}; capture again"
             )
         for name, (shape, dtype) in schema.items():
             expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
             if group[name].shape != expected:
                 raise MotionFileError(
-                    f"{where}: {name} must have shape {expected}, but has {group[name].shape}"
+                    f"motion: {name} must have shape {expected}, but has {group[name].shape}"
                 )
             if issubclass(dtype, np.floating) and not np.isfinite(group[name]).all():
                 raise MotionFileError(
-                    f"{where}: {name} has values that are not finite; capture again"
+                    f"motion: {name} has values that are not finite; capture again"
                 )
 
     def check_body(self, body: Body, where: str = "the motion") -> None:

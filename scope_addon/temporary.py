@@ -206,14 +206,6 @@ def remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def remove_own(folder: Path, own_name: re.Pattern[str]) -> None:
-    """Remove what has a name of ours in a folder, no link; then the folder, if it is empty."""
-    for path in own_entries(folder, own_name):
-        remove(path)
-    if not folder.is_symlink():
-        remove_if_empty(folder)
-
-
 def own_entries(folder: Path, own_name: re.Pattern[str]) -> list[Path]:
     """Return the folders, no links, in a folder, itself no link, that are the user's own and have a
     name of ours; empty if the folder cannot be read.

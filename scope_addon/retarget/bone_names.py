@@ -85,11 +85,6 @@ def parse_names(names: list[str]) -> list[BoneName]:
     return [_parsed(name, words) for name, words in zip(names, listed, strict=True)]
 
 
-def parse_name(name: str) -> BoneName:
-    """Take one name apart."""
-    return _parsed(name, _words(name))
-
-
 def _words(name: str) -> list[str]:
     """Return the words of a name in lower case, without what comes before a colon or bar."""
     text = unicodedata.normalize("NFKC", name)

@@ -20,6 +20,7 @@ from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from .datablocks import shape_keys_of
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
@@ -316,18 +317,11 @@ def animated_together(
     """Return an armature with an action, and of its root object and the shape keys of its meshes
     those that move.
     """
-    keys = [
-        getattr(obj.data, "shape_keys", None)
-        for obj in armature.children_recursive
-        if obj.type == "MESH"
-    ]
-    others = [
-        block
-        for block in dict.fromkeys([root, *keys])
-        if block is not None and block.library is None
-    ]
+    others = [*filter(None, [root]), *shape_keys_of(armature)]
     moving = [
-        block for block in others if any(len(curve.keyframe_points) > 1 for curve in fcurves(block))
+        block
+        for block in others
+        if block.library is None and any(len(curve.keyframe_points) > 1 for curve in fcurves(block))
     ]
     return [armature, *moving]
 

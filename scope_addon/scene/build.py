@@ -6,7 +6,7 @@ each person; and removing a capture with everything that was made for it, and no
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,14 +29,19 @@ from .character.armature import remove_unused_ring
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
 from .character.root_object import ROOT_TAG
-from .datablocks import check_local, remove_blocks, short_name
+from .datablocks import (
+    CAPTURE_TAG,
+    captures_of,
+    check_local,
+    enter_object_mode,
+    remove_blocks,
+    short_name,
+)
 from .packed_motion import motion_texts
 from .transaction import all_or_nothing
 
-CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection, for exporters
 # Custom property of a capture's collection: the names of its markers on the timeline, by lines.
 MARKERS = "scope_markers"
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -105,23 +110,20 @@ def build_scene(
     body: Body,
     footage: str | Path | None = None,
     options: BuildOptions | None = None,
-    progress: Progress | None = None,
 ) -> BuildResult:
     """Build the motions of one capture in the active scene.
 
     The options determine whether the scene's frame rate and resolution change. When anything fails,
-    or ``progress`` raises ``CancelledError``, the scene is left as it was.
+    the scene is left as it was.
 
     :param body: the body that the motions were fitted with; it must have their joints and shape
         coefficients.
     :param footage: video or picture to show as the camera's background.
-    :param progress: called with a fraction 0..1 and the current step; may raise to stop.
     :raises UsageError: when there are no motions, or the active scene is linked.
     :raises MotionFileError: when a motion does not belong to the body.
     :raises VideoError: when the footage is missing.
     """
     options = options or BuildOptions()
-    report = progress or (lambda fraction, message: None)
     if not motions:
         raise UsageError("there is no motion to build; capture a video first")
     for motion in motions:
@@ -129,7 +131,7 @@ def build_scene(
     scene = bpy.context.scene
     check_local(scene)
     with all_or_nothing(scene):
-        return _build(scene, motions, body, footage, options, report)
+        return _build(scene, motions, body, footage, options)
 
 
 def _build(
@@ -138,7 +140,6 @@ def _build(
     body: Body,
     footage: str | Path | None,
     options: BuildOptions,
-    report: Progress,
 ) -> BuildResult:
     name = short_name(
         options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem)
@@ -153,7 +154,6 @@ def _build(
     scene.collection.children.link(collection)
     people: list[Person] = []
     for index, motion in enumerate(motions):
-        report(index / len(motions), f"building person {index + 1} of {len(motions)}")
         label = name if len(motions) == 1 else f"{name}_person{index + 1}"
         people.append(_build_person(label, motion, body, collection, rate, options))
     if options.with_markers:
@@ -178,7 +178,6 @@ def _build(
     if options.set_frame_range:
         _set_frame_range(scene, collection, first, last)
     scene.frame_set(math.floor(first) if options.set_frame_range else scene.frame_current)
-    report(1.0, "built")
     _select(people)
     return BuildResult(collection, people, rate, (first, last), warnings)
 
@@ -193,9 +192,7 @@ def _set_frame_range(
     scene: bpy.types.Scene, collection: bpy.types.Collection, first: float, last: float
 ) -> None:
     """Set the scene's frame range to a capture's, together with that of the captures before."""
-    if [each for each in scene.collection.children_recursive if CAPTURE_TAG in each] != [
-        collection
-    ]:
+    if captures_of(scene) != [collection]:
         first = min(first, scene.frame_start)
         last = max(last, scene.frame_end)
     timing.set_frame_range(scene, first, last)
@@ -327,9 +324,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     Objects of the user's in the collection stay where they are, in the scene's own collection, and
     so does data that something else uses.
     """
-    active = bpy.context.view_layer.objects.active if bpy.context.view_layer else None
-    if active is not None and active.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
+    enter_object_mode(bpy.context.view_layer)
     own = [obj for obj in collection.all_objects if _is_ours(obj)]
     used = [*_data_of(own), *motion_texts(own)]
     for child in [child for obj in own for child in obj.children if child not in own]:

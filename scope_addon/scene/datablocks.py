@@ -16,6 +16,7 @@ from ..errors import UsageError
 
 _LONGEST = 63 if bpy.app.version < (5, 0) else 255  # bytes
 SUFFIX_BYTES = 24  # room for what is appended to a capture's name, such as ``_person12_body.001``
+CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection
 KINDS = ("objects", "meshes", "armatures", "collections", "materials")
 
 
@@ -47,6 +48,26 @@ def _contains(objects: bpy.types.bpy_prop_collection, obj: bpy.types.Object) -> 
     # the panel asks at every redraw, and only a namesake needs the whole scene
     named = objects.get(obj.name)
     return named == obj or (named is not None and any(each == obj for each in objects))
+
+
+def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
+    """Return the collections of a scene that contain captures, the last added last."""
+    return [each for each in scene.collection.children_recursive if CAPTURE_TAG in each]
+
+
+def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:
+    """Return the shape keys of the meshes below an armature, each once."""
+    meshes = [obj.data for obj in armature.children_recursive if obj.type == "MESH"]
+    return list(dict.fromkeys(mesh.shape_keys for mesh in meshes if mesh.shape_keys))
+
+
+def enter_object_mode(view_layer: bpy.types.ViewLayer | None) -> None:
+    """Leave the mode of a view layer's active object, such as Edit Mode, if there is one: neither
+    can such an object be removed, nor another one be selected or edited.
+    """
+    active = view_layer.objects.active if view_layer else None
+    if active is not None and active.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def check_local(scene: bpy.types.Scene) -> None:

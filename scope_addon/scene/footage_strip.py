@@ -116,11 +116,6 @@ def _file_of(strip: bpy.types.Strip) -> Path | None:
 # Blender 5.1 renamed these properties of strips, and 6.0 removes the old names.
 
 
-def start_of(strip: bpy.types.Strip) -> int:
-    """Return the scene frame of the strip's first visible frame."""
-    return int(strip.left_handle if hasattr(strip, "left_handle") else strip.frame_final_start)
-
-
 def length_of(strip: bpy.types.Strip) -> int:
     """Return the number of frames of the strip's source."""
     return int(

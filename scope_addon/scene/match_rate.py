@@ -26,7 +26,7 @@ from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
 from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
-from .datablocks import holds
+from .datablocks import holds, shape_keys_of
 from .rig_action import is_retargeted, retime_written_keys, source_of
 from .stored_values import FrameSpan, parse_spans, start_frame
 from .timing import Retiming, action_strips, retime_keys, retime_strip
@@ -116,19 +116,12 @@ def _played(scene: bpy.types.Scene, people: Iterable[bpy.types.Object]) -> list[
 
 def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
     """Return what a capture animates of a person: armature, root motion, and shape keys."""
-    keys = [
-        getattr(child.data, "shape_keys", None)
-        for child in person.children_recursive
-        if child.type == "MESH"
-    ]
-    root = root_object(person)
     shapes = [
-        block
-        for block in keys
-        if block is not None
-        and (shape_key_name(0) in block.key_blocks or has_expression_keys(block))
+        keys
+        for keys in shape_keys_of(person)
+        if shape_key_name(0) in keys.key_blocks or has_expression_keys(keys)
     ]
-    return [person, *([root] if root is not None else []), *shapes]
+    return [person, *filter(None, [root_object(person)]), *shapes]
 
 
 def _retime(datablock: bpy.types.ID, retiming: Retiming, done: set[bpy.types.Action]) -> None:

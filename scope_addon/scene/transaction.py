@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 
 from .actions import has_slots, read_modifiers, read_whole_keys, write_modifiers, write_whole_keys
-from .datablocks import NewDatablocks
+from .datablocks import NewDatablocks, enter_object_mode
 
 # Kinds of datablock that the work may create; shape keys go with their mesh.
 _KINDS = (
@@ -71,7 +71,7 @@ def all_or_nothing(
     try:
         yield
     except BaseException:
-        settings.leave_edit_mode()
+        enter_object_mode(settings.layer)
         for transform in transforms:
             transform.restore()
         for saved in animated:
@@ -90,22 +90,16 @@ class _SavedScene:
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene
-        self._layer = bpy.context.view_layer
+        self.layer = bpy.context.view_layer
         self._settings = {name: getattr(scene, name) for name in _SCENE}
         self._render = {name: getattr(scene.render, name) for name in _RENDER}
         self._current = scene.frame_current, scene.frame_subframe
-        self._active = self._layer.objects.active
+        self._active = self.layer.objects.active
         self._mode = self._active.mode if self._active else "OBJECT"
         self._markers = set(scene.timeline_markers.values())
         self._selected = [
-            obj for obj in self._layer.objects if obj.select_get(view_layer=self._layer)
+            obj for obj in self.layer.objects if obj.select_get(view_layer=self.layer)
         ]
-
-    def leave_edit_mode(self) -> None:
-        """Leave Edit Mode, in which the active object cannot be removed."""
-        now = self._layer.objects.active
-        if now is not None and now.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
 
     def restore(self) -> None:
         """Restore the scene; the new objects must have been removed."""
@@ -118,9 +112,9 @@ class _SavedScene:
         for name, value in self._settings.items():
             setattr(scene, name, value)
         scene.frame_set(self._current[0], subframe=self._current[1])
-        for obj in self._layer.objects:
-            obj.select_set(obj in self._selected, view_layer=self._layer)
-        self._layer.objects.active = self._active
+        for obj in self.layer.objects:
+            obj.select_set(obj in self._selected, view_layer=self.layer)
+        self.layer.objects.active = self._active
         if self._active is not None and self._mode != self._active.mode:
             bpy.ops.object.mode_set(mode=self._mode)
 

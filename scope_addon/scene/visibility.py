@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import bpy
 
-from .datablocks import is_in_layer
+from .datablocks import found, is_in_layer
 
 # Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value
 # says whether the object stays hidden or is only shown temporarily.
@@ -81,9 +81,7 @@ class SceneBefore:
 
     def restore(self) -> None:
         """Restore what still exists."""
-        scene = next(
-            (scene for scene in bpy.data.scenes if scene.session_uid == self._scene_uid), None
-        )
+        scene = found("scenes", "", self._scene_uid)
         layer = scene.view_layers.get(self._layer) if scene else None
         if layer is None:
             return

@@ -7,7 +7,6 @@ The modal operator calls ``step`` on a timer; scripts and tests call it in a loo
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -33,7 +32,7 @@ from ..options.capture import AUTO
 from ..review_spans import Span, find_review_spans
 from ..scene.build import BuildOptions, BuildResult, build_scene
 from ..scene.camera import pixel_aspect
-from ..scene.datablocks import check_local
+from ..scene.datablocks import check_local, found
 from ..scene.packed_motion import pack_motion
 from ..scene.stored_values import FrameSpan, in_scene
 from ..untrusted.body_file import load_body
@@ -41,7 +40,7 @@ from . import preview_picture
 from .captures import hide_others
 from .declared_properties import option_values
 from .frame_rate_operators import rate_warnings
-from .preferences import cache, preferences
+from .preferences import cache, preferences, python_command
 from .reporting import add_warning
 from .scene_camera import scene_camera_path
 
@@ -73,8 +72,7 @@ class CaptureJob:
         self._result_s = 0.0
         self._building = False
         if self._captured is None:
-            # Blender 4.2 has no such attribute; its Python is isolated as well.
-            python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+            python = python or python_command()
             folder = self._cache.new_job_folder()
             self._worker = WorkerProcess(
                 self._request, folder, self._cache.kernels, python, START_SCRIPT
@@ -110,7 +108,7 @@ class CaptureJob:
             self._building = True
             self.progress.update(BUILDING, 0, 0)
             return True
-        scene = next((s for s in bpy.data.scenes if s.session_uid == self._scene_uid), None)
+        scene = found("scenes", "", self._scene_uid)
         if scene is None:
             raise UsageError("the scene was removed during the capture; capture in another scene")
         self._build(scene, self._captured)

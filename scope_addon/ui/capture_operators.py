@@ -14,6 +14,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ...solver.errors import ScopeError
+from ..scene.datablocks import found
 from . import preview_picture, warm_up
 from .captures import unit_text
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
@@ -388,7 +389,7 @@ def _clip_of_job() -> Any | None:
 
 def _scene_of_job() -> bpy.types.Scene | None:
     """Return the scene that the running job belongs to; None if it was removed."""
-    return next((s for s in bpy.data.scenes if s.session_uid == state.scene_uid), None)
+    return found("scenes", "", state.scene_uid)
 
 
 class SCOPE_OT_cancel(bpy.types.Operator):

@@ -30,6 +30,7 @@ from ..options import Place, Section, options_at
 from ..scene.stored_values import parse_spans
 from . import preview_picture, warm_up
 from .capture_operators import CAPTURING, DONE, FAILED, WAITING, state
+from .captured_person import has_captured_person
 from .captures import (
     draw_captures,
     people_of,
@@ -66,6 +67,15 @@ class Tab:
     bl_category = "Scope"
     bl_order = 2  # below Capture and Live
     bl_translation_context = CONTEXT
+
+
+class PersonTab(Tab):
+    """A panel about a captured person."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a captured person."""
+        return has_captured_person(context)
 
 
 class SCOPE_PT_capture(Tab, bpy.types.Panel):

@@ -14,14 +14,13 @@ import bpy
 from bpy.props import StringProperty
 
 from ..notices import notice
-from ..scene.datablocks import is_in_layer
+from ..scene.datablocks import captures_of, is_in_layer
 from .captured_person import captured_armature
 from .reporting import iface_, sentence, tip_
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
-CAPTURE = "scope_capture"  # custom property that ``scene.build`` gives to a capture's collection
 _HIDDEN = "scope_hidden"  # custom property of a collection that was hidden here, not by the user
 # Widths in pixels at a scale of 1: what surrounds a row of the list in the sidebar, an icon, and
 # what the text may be.
@@ -32,13 +31,6 @@ _SAME_SIZE = 0.01
 # of a text; of a sidebar with room for the words beside the number of people
 _PADDING = 10.0
 _WIDE = 340.0
-
-
-def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
-    """Return the captures of a scene, the last added last."""
-    return [
-        collection for collection in scene.collection.children_recursive if CAPTURE in collection
-    ]
 
 
 def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:

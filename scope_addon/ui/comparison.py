@@ -26,9 +26,9 @@ import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
-from ..scene.datablocks import holds
+from ..scene.datablocks import captures_of, enter_object_mode, holds
 from .captured_person import body_of, captured_armature
-from .captures import captures_of
+from .captures import people_of
 from .sidebar import viewport_at, viewports
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     cameras = cameras_of(context.scene)
     compared = [each for each in cameras if each == context.scene.camera]
     camera = next(iter([*compared, *cameras]), None)
-    people = [o for o in collection.all_objects if "scope_source" in o]
+    people = people_of(collection)
     active = captured_armature(context)
     if camera is None or not people:
         return
@@ -282,9 +282,7 @@ def _show_alone(
     from ..scene.visibility import show
 
     selected = context.selected_objects
-    active = context.view_layer.objects.active
-    if active and active.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
+    enter_object_mode(context.view_layer)
     with _in(context.window, area):
         if area.spaces.active.local_view:
             bpy.ops.view3d.localview(frame_selected=False)

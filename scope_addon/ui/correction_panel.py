@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 
 from ..scene.character.correction_list import listed_corrections
-from .capture_panel import Tab
-from .captured_person import captured_armature, has_captured_person
+from .capture_panel import PersonTab
+from .captured_person import captured_armature
 from .pin_tool import is_running
 
 _ICONS = {
@@ -22,7 +22,7 @@ _ICONS = {
 }
 
 
-class SCOPE_PT_corrections(Tab, bpy.types.Panel):
+class SCOPE_PT_corrections(PersonTab, bpy.types.Panel):
     """Pins, feet that stand, exchanged sides, kept edits, the upright line and the floor of the
     selected person.
     """
@@ -30,11 +30,6 @@ class SCOPE_PT_corrections(Tab, bpy.types.Panel):
     bl_idname = "SCOPE_PT_corrections"
     bl_label = "Corrections"
     bl_parent_id = "SCOPE_PT_edit"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a captured person."""
-        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""

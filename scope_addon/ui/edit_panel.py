@@ -18,9 +18,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ...solver.errors import ScopeError
-from ..scene.datablocks import holds
+from ..scene.datablocks import captures_of, holds
 from ..scene.stored_values import start_frame
-from .capture_panel import Tab
+from .capture_panel import PersonTab
 from .captured_person import (
     EditOperator,
     SpanOperator,
@@ -28,12 +28,11 @@ from .captured_person import (
     captured_armature,
     draw_active_person,
     edit_clip,
-    has_captured_person,
     library_of,
     motion_of,
     set_motion_of,
 )
-from .captures import captures_of, people_of, shown_capture
+from .captures import people_of, shown_capture
 from .correction_operators import (
     CorrectionOperator,
     CorrectSpanOperator,
@@ -55,16 +54,11 @@ if TYPE_CHECKING:
     from ..edit.corrections import Correction
 
 
-class SCOPE_PT_edit(Tab, bpy.types.Panel):
+class SCOPE_PT_edit(PersonTab, bpy.types.Panel):
     """Smoothing, repairs, floor, root motion, loops and keys of the selected person."""
 
     bl_idname = "SCOPE_PT_edit"
     bl_label = "Refine"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a captured person."""
-        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""

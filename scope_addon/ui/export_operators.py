@@ -13,9 +13,9 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..errors import UsageError
 from ..options import Place
-from ..scene.datablocks import holds
+from ..scene.datablocks import captures_of, holds
 from .captured_person import PERSON, body_of, motion_of
-from .captures import captures_of, people_of, shown_capture
+from .captures import people_of, shown_capture
 from .comparison import cameras_of
 from .declared_properties import with_options
 from .file_field import SavingOperator, output_file
@@ -213,9 +213,7 @@ class SCOPE_OT_export(SavingOperator):
 
         :raises UsageError: the active object belongs to none.
         """
-        from ..scene.export.export import captures
-
-        collections = captures(context.scene)
+        collections = captures_of(context.scene)
         if self.which == "SHOWN":
             return [c for c in collections if c == shown_capture(context.scene)]
         if self.which == "ACTIVE":
@@ -232,7 +230,6 @@ class SCOPE_OT_export(SavingOperator):
 
         :raises UsageError: no rig is chosen, or the format has none.
         """
-        from ..scene.export.export import captures
         from ..scene.rig_export import export_rig
 
         rig = scene.scope_retarget.rig
@@ -245,7 +242,8 @@ class SCOPE_OT_export(SavingOperator):
             raise UsageError(
                 "no rig is chosen under Retarget; choose a rig there and press Retarget first"
             )
-        return export_rig(path, rig, replace(self._options(), take=_take_of(rig, captures(scene))))
+        take = _take_of(rig, captures_of(scene))
+        return export_rig(path, rig, replace(self._options(), take=take))
 
 
 def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[Path]:
@@ -256,7 +254,7 @@ def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[
     from ..scene.export.output_paths import check_output
     from ..scene.export.without_scene import write_without_scene
 
-    people = [obj for c in collections for obj in c.all_objects if "scope_source" in obj]
+    people = [person for capture in collections for person in people_of(capture)]
     if not people:
         raise UsageError(
             f"cannot write {path.name}: the capture's armature was removed; undo that or "

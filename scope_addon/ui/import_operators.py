@@ -13,7 +13,8 @@ from bpy.props import BoolProperty, CollectionProperty, StringProperty
 from ..errors import UsageError
 from ..footage import FOOTAGE_SUFFIXES
 from ..options import option
-from .captures import captures_of, hide_others
+from ..scene.datablocks import captures_of
+from .captures import hide_others
 from .declared_properties import blender_property
 from .frame_rate_operators import rate_warnings
 from .preferences import preferences

@@ -8,7 +8,6 @@ The modal operator calls ``step`` on a timer; tests call it in a loop.
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +39,7 @@ from ..temporary import remove
 from ..untrusted.body_file import load_body
 from .capture_job import build_capture, build_options, chosen_values, window_shows
 from .live_properties import with_login
-from .preferences import cache
+from .preferences import cache, python_command
 from .retarget_maps import listed_map
 from .retarget_operators import retarget_options, retarget_to_chosen_rig
 
@@ -103,8 +102,7 @@ class LiveJob:
         self._last_pose_s = self._notice_s = self._stopped_s = self._result_s = time.monotonic()
         # whether the last step, or one before, created the body
         self.created = self._was_created = False
-        # Blender 4.2 has no such attribute; its Python is isolated as well.
-        python = python or [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
+        python = python or python_command()
         self._cache = cache()
         self._worker = LiveProcess(
             self._request, self._cache.new_job_folder(), self._cache.kernels, python, START_SCRIPT

@@ -8,7 +8,6 @@ timer waits for it.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import bpy
@@ -20,7 +19,7 @@ from .capture_operators import nothing_runs
 from .capture_panel import draw_text
 from .job_operator import JobOperator
 from .live_properties import state, stop_job
-from .preferences import cache
+from .preferences import cache, python_command
 from .reporting import iface_, refuse, restore_libraries, sentence, tip_, warning_text
 from .sidebar import redraw_sidebars, viewports
 from .view_operators import frame_selected, hide_startup_cube
@@ -282,13 +281,12 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
         typed = context.scene.scope_live.camera
         state.message = ""
         state.scene_uid = context.scene.session_uid
-        python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
         try:
             if (source := camera_source(typed)) is None:
                 raise UsageError(
                     f"'{typed.strip()}' is not a camera; enter its number, 0 for the first"
                 )
-            state.asking = FormatsProcess(source, cache().new_job_folder(), python)
+            state.asking = FormatsProcess(source, cache().new_job_folder(), python_command())
         except (ScopeError, OSError) as error:
             state.message = sentence(error)
             self.report({"ERROR"}, state.message)

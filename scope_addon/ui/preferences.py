@@ -6,6 +6,7 @@ Footage in the 3D viewport, which the user can change in the preferences.
 from __future__ import annotations
 
 import math
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -139,6 +140,12 @@ def cache() -> Cache:
         # In a subfolder, because clearing the cache must never remove the user's files.
         return Cache(Path(bpy.path.abspath(chosen.cache_folder)) / "scope-cache")
     return Cache(user_folder() / "cache")
+
+
+def python_command() -> list[str]:
+    """Return the command of Blender's own Python, which leaves out the user's packages."""
+    # Blender 4.2 has no such attribute; its Python is isolated as well.
+    return [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
 
 
 def keep_machine_code() -> None:

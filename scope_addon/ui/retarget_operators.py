@@ -11,6 +11,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..errors import UsageError
+from ..scene.datablocks import enter_object_mode
 from .captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
 from .reporting import ReportingOperator, refuse, rpt_, tip_, warning_text
 from .retarget_maps import (
@@ -138,7 +139,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     """
     from ..scene.rig_retarget import retarget, usable_guess
     from ..scene.timing import scene_rate
-    from ..scene.visibility import hide, show
+    from ..scene.visibility import hide, select_only, show
 
     settings = context.scene.scope_retarget
     body = body_of(source)
@@ -159,7 +160,9 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
         fill_expressions(settings, face)
     settings.rig[PERSON] = source
     if settings.captured == "hide":
-        _select_only(context, settings.rig)
+        # A hidden object cannot be selected.
+        enter_object_mode(context.view_layer)
+        select_only(context.view_layer, settings.rig)
         hide(source, context.view_layer)
     else:
         show(source, context.view_layer)
@@ -230,18 +233,6 @@ class SCOPE_OT_edit_bone_pair(_RigOperator, EditListOperator):
     def message(self, count: int) -> str:
         """Return how many bones are listed."""
         return rpt_("{count} bone" if count == 1 else "{count} bones", count=count)
-
-
-def _select_only(context: bpy.types.Context, rig: bpy.types.Object) -> None:
-    """Make the rig the active and the only selected object, because a hidden object cannot be
-    selected.
-    """
-    active = context.view_layer.objects.active
-    if active is not None and active.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
-    for obj in context.view_layer.objects:
-        obj.select_set(obj == rig, view_layer=context.view_layer)
-    context.view_layer.objects.active = rig
 
 
 class _FaceOperator(ReportingOperator):

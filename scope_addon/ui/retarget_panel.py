@@ -17,8 +17,8 @@ from bpy.props import (
     StringProperty,
 )
 
-from .capture_panel import Tab
-from .captured_person import draw_active_person, has_captured_person
+from .capture_panel import PersonTab, Tab
+from .captured_person import draw_active_person
 from .retarget_maps import (
     SHAPE_KEY,
     bones_move,
@@ -63,17 +63,12 @@ class SCOPE_UL_bone_pairs(bpy.types.UIList):
             row.label(text="", icon="QUESTION" if known else "ERROR")
 
 
-class SCOPE_PT_retarget(Tab, bpy.types.Panel):
+class SCOPE_PT_retarget(PersonTab, bpy.types.Panel):
     """Retargeting of the captured motion to the user's rig."""
 
     bl_idname = "SCOPE_PT_retarget"
     bl_label = "Retarget"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a captured person."""
-        return has_captured_person(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""

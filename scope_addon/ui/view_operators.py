@@ -11,6 +11,7 @@ from ..scene.datablocks import holds
 from ..scene.stored_values import start_frame
 from . import comparison
 from .captured_person import captured_people
+from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .reporting import ReportingOperator, refuse, rpt_, tip_
 from .sidebar import redraw_sidebars_twice, viewport_of
@@ -105,10 +106,8 @@ class SCOPE_OT_look_through(bpy.types.Operator):
             comparison.end(context.window, context.area)
             if side := comparison.side_area(context.window.screen):
                 comparison.close_side_view(context.window, side)
-            for obj in [
-                obj for obj in scene.scope.result.collection.all_objects if "scope_source" in obj
-            ]:
-                hide_again(obj, context.view_layer)
+            for person in people_of(scene.scope.result.collection):
+                hide_again(person, context.view_layer)
             redraw_sidebars_twice()
             return {"FINISHED"}
         assert camera is not None  # checked by poll

@@ -19,7 +19,7 @@ import bpy
 
 from ..machine_code.kernel_count import kernel_count
 from ..temporary import discard, new_folder
-from .preferences import PACKAGE, cache, preferences
+from .preferences import PACKAGE, cache, preferences, python_command
 from .reporting import iface_
 from .sidebar import redraw_sidebars
 
@@ -82,13 +82,12 @@ def start() -> bool:
     windows_flags = getattr(subprocess, "CREATE_NO_WINDOW", 0) | getattr(
         subprocess, "IDLE_PRIORITY_CLASS", 0
     )
-    python = [sys.executable, *getattr(bpy.app, "python_args", ("-I",))]
     kernels = cache().kernels
     try:
         kernels.mkdir(parents=True, exist_ok=True)
         WarmUp.files_before = _files()
         WarmUp.folder = new_folder("warm-up")
-        command, environment = worker_command(python, ROOT, WarmUp.folder, kernels)
+        command, environment = worker_command(python_command(), ROOT, WarmUp.folder, kernels)
         quiet = subprocess.DEVNULL
         WarmUp.process = subprocess.Popen(
             command,

@@ -110,7 +110,7 @@ def read_members(
                         arrays[key] = _read_array(file, entry.file_size, key)
                 else:
                     with archive.open(entry) as file:
-                        shape, _, _ = _read_header(file, key)
+                        shape, _, _ = read_header(file, key)
     except ModelFileError as cause:
         raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
     except UNREADABLE as cause:
@@ -120,7 +120,13 @@ def read_members(
     return arrays, shape
 
 
-def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Return the shape of an array in numpy's format, whether it is in the order of Fortran, and
+    its type.
+
+    :param key: what the array is called in messages.
+    :raises ModelFileError: the format is of a version that numpy does not use for plain arrays.
+    """
     version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
     if version not in _HEADER_READERS:
         raise ModelFileError(
@@ -131,7 +137,7 @@ def _read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.d
 
 
 def _read_array(file: IO[bytes], size: int, key: str) -> NDArray[Any]:
-    shape, fortran, dtype = _read_header(file, key)
+    shape, fortran, dtype = read_header(file, key)
     if dtype.hasobject:
         raise ModelFileError(
             f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file"

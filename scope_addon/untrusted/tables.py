@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError, ModelFileError
-from .files import LARGEST_BYTES, UNREADABLE, check_regular, in_one_line, read_npz
+from .files import LARGEST_BYTES, UNREADABLE, check_regular, in_one_line, read_header, read_npz
 from .pickles import (
     HANDLERS,
     UNREADABLE_PICKLE,
@@ -108,11 +108,7 @@ def _of_archive(
     for entry in archive.infolist():
         key = entry.filename.removesuffix(".npy")
         with archive.open(entry) as file:
-            version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
-            if version == (1, 0):
-                shape, _, dtype = np.lib.format.read_array_header_1_0(file)  # type: ignore[no-untyped-call]
-            else:
-                shape, _, dtype = np.lib.format.read_array_header_2_0(file)  # type: ignore[no-untyped-call]
+            shape, _, dtype = read_header(file, key)
             if dtype.hasobject:
                 if entry.file_size > _LARGEST_PICKLE:
                     raise ModelFileError(f"{key} is too large")
@@ -150,8 +146,7 @@ def _of_stream(path: Path) -> Any:
         raise ModelFileError(f"it is larger than {_LARGEST_PICKLE >> 20} MiB")
     if data.startswith(np.lib.format.MAGIC_PREFIX):
         stream = io.BytesIO(data)
-        np.lib.format.read_magic(stream)  # type: ignore[no-untyped-call]
-        _, _, dtype = np.lib.format.read_array_header_1_0(stream)  # type: ignore[no-untyped-call]
+        _, _, dtype = read_header(stream, "its array")
         if not dtype.hasobject:
             raise ModelFileError("it holds a single array without a name")
         return _Plain().convert(_unpickled(stream.read()))

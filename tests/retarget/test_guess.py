@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.retarget.bone_names import parse_name
+from scope.scope_addon.retarget.bone_names import parse_names
 from scope.scope_addon.retarget.guess import by_geometry, by_name, guess, other_side
 from scope.scope_addon.retarget.rest_pose import RestPose
 
@@ -117,7 +117,7 @@ def test_what_is_no_person_has_no_map() -> None:
     ],
 )
 def test_names_are_taken_apart(name: str, core: str, side: str) -> None:
-    found = parse_name(name)
+    (found,) = parse_names([name])
     assert (found.core, found.side) == (core, side)
 
 

@@ -4,10 +4,11 @@ import dataclasses
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.errors import CancelledError, MotionFileError, UsageError, VideoError
+from scope.scope_addon.errors import MotionFileError, UsageError, VideoError
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
-from scope.scope_addon.scene import actions, build
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
+from scope.scope_addon.scene.datablocks import CAPTURE_TAG
 
 
 def data_counts() -> dict[str, int]:
@@ -235,7 +236,7 @@ def test_unknown_options_are_refused():
         BuildOptions(frame_rate="guess")
 
 
-def test_cancel_and_failure_leave_the_scene_as_it_was(body, make_motion, tmp_path):
+def test_failures_leave_the_scene_as_it_was(body, make_motion, tmp_path):
     bpy.ops.mesh.primitive_cube_add()
     cube = bpy.context.object
     bpy.ops.object.mode_set(mode="EDIT")
@@ -268,13 +269,10 @@ def test_cancel_and_failure_leave_the_scene_as_it_was(body, make_motion, tmp_pat
 
     before = state()
 
-    def cancel(fraction: float, message: str) -> None:
-        if fraction > 0:
-            raise CancelledError("stopped")
-
     motions = [make_motion(body), make_motion(body, seed=1)]
-    with pytest.raises(CancelledError):
-        build_scene(motions, body, options=NEW_SCENE, progress=cancel)
+    broken = dataclasses.replace(motions[1], timestamps=np.zeros(len(motions[1])))
+    with pytest.raises(MotionFileError, match="increasing"):
+        build_scene([motions[0], broken], body, options=NEW_SCENE)
     assert state() == before
     with pytest.raises(VideoError, match="does not exist"):
         build_scene(motions, body, footage=tmp_path / "gone.mp4", options=NEW_SCENE)
@@ -291,4 +289,4 @@ def test_a_single_picture_is_a_motion_of_one_frame(body, make_motion, blender, t
 
 def test_captures_are_marked_for_the_exporters(body, make_motion):
     collection = build_scene([make_motion(body)], body).collection
-    assert collection[build.CAPTURE_TAG] == "walk.mp4"
+    assert collection[CAPTURE_TAG] == "walk.mp4"

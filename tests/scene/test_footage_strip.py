@@ -5,7 +5,13 @@ import bpy
 import pytest
 import scope
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.scene.footage_strip import add_footage_strips, start_of, strips_of
+from scope.scope_addon.scene.footage_strip import add_footage_strips, strips_of
+
+
+def start_of(strip):
+    """Return the scene frame of a strip's first visible frame; Blender 5.1 renamed the property."""
+    return strip.left_handle if hasattr(strip, "left_handle") else strip.frame_final_start
+
 
 SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
 

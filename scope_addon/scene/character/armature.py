@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ....solver.body import Body
 from ...kinematics.axes import R_WORLD_MODEL, UP
+from ..datablocks import enter_object_mode
 
 SHORTEST_BONE = 0.02  # metres; Blender deletes bones of zero length
 _FRONT = np.array([0.0, -1.0, 0.0])
@@ -96,9 +97,7 @@ def build_armature(
     obj = bpy.data.objects.new(name, data)
     collection.objects.link(obj)
     view_layer = bpy.context.view_layer
-    active = view_layer.objects.active
-    if active is not None and active.mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
+    enter_object_mode(view_layer)
     view_layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
     try:

@@ -23,6 +23,7 @@ from ...motion import Motion
 from ...notices import REASONS
 from ...review_spans import find_review_spans
 from ..actions import Channels, bone_property_path, fcurves, read_keys, rewrite_keys, shape_key_path
+from ..datablocks import shape_keys_of
 from ..stored_values import in_scene
 from .body_mesh import shape_key_name
 from .keys import channel_curves
@@ -101,12 +102,7 @@ def restore_whole_motion(
 
 def _curves(armature: bpy.types.Object) -> list[bpy.types.FCurve]:
     """Return the curves of an armature and of its meshes' shape keys that this file may change."""
-    keys = [
-        getattr(obj.data, "shape_keys", None)
-        for obj in armature.children_recursive
-        if obj.type == "MESH"
-    ]
-    blocks = [armature, *dict.fromkeys(block for block in keys if block is not None)]
+    blocks = [armature, *shape_keys_of(armature)]
     return [curve for block in blocks if block.library is None for curve in fcurves(block)]
 
 

@@ -28,8 +28,9 @@ from ...notices import Notice
 from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
-from ..build import CAPTURE_TAG, NEW_SCENE, BuildOptions, BuildResult, build_scene
+from ..build import NEW_SCENE, BuildOptions, BuildResult, build_scene
 from ..character.armature import remove_unused_ring
+from ..datablocks import captures_of
 from ..packed_motion import motion_texts, pack_motion
 from . import formats
 from .bone_names import OWN, SKELETONS, bone_names
@@ -47,7 +48,6 @@ from .export_states import (
     unit_of_captures,
 )
 from .output_paths import WITHOUT_SCENE, check_output, person_paths
-from .without_scene import write_without_scene
 
 SHAPES = ("auto", "keys", "baked")
 
@@ -89,11 +89,6 @@ class ExportOptions:
         return self.shape == "baked" or (self.shape == "auto" and suffix == ".usdc")
 
 
-def captures(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
-    """Return the collections of a scene that contain captures."""
-    return [c for c in scene.collection.children_recursive if CAPTURE_TAG in c]
-
-
 def export(
     path: str | Path,
     collections: Sequence[bpy.types.Collection] | None = None,
@@ -114,7 +109,7 @@ def export(
             f"cannot write {path.name} from a scene: it follows from a motion file; write one, and "
             "convert it with scope import"
         )
-    chosen = list(collections) if collections is not None else captures(bpy.context.scene)
+    chosen = list(collections) if collections is not None else captures_of(bpy.context.scene)
     if not chosen:
         raise UsageError(
             f"cannot write {path.name}: the scene holds no capture; capture a video first"
@@ -191,7 +186,7 @@ def _write_one(
 def export_motions(
     motions: list[Motion],
     body: Body,
-    path: str | Path | Sequence[str | Path],
+    path: Path | Sequence[Path],
     footage: str | Path | None = None,
     build_options: BuildOptions | None = None,
     export_options: ExportOptions | None = None,
@@ -202,29 +197,23 @@ def export_motions(
     The scene has the motion's frame rate and the footage's resolution.
 
     :return: the files written, and the warnings of the build.
-    :raises UsageError: when a suffix is unknown.
+    :raises UsageError: when a suffix is not that of a file which holds a scene.
     :raises MotionFileError: when a motion does not belong to the body.
     :raises VideoError: when the footage is missing.
     :raises OutputError: when a file cannot be written.
     """
-    paths = [path] if isinstance(path, str | Path) else list(path)
+    paths = [path] if isinstance(path, Path) else list(path)
     for each in paths:
         check_output(each)
     written: list[Path] = []
-    warnings: list[Notice] = []
-    scene_paths = [p for p in paths if Path(p).suffix.lower() not in WITHOUT_SCENE]
-    for each in map(Path, (p for p in paths if p not in scene_paths)):
-        written += write_without_scene(each, motions, [body] * len(motions))
-    if not scene_paths:
-        return written, warnings
-    build_options = build_options or replace(NEW_SCENE, name=Path(scene_paths[0]).stem)
+    build_options = build_options or replace(NEW_SCENE, name=paths[0].stem)
     with temporary_scene("Capturing"):
         result = build_scene(motions, body, footage, build_options)
         try:
-            if any(Path(path).suffix.lower() == ".blend" for path in scene_paths):
+            if any(each.suffix.lower() == ".blend" for each in paths):
                 for person in result.people:
                     pack_motion(person.armature, person.motion.to_bytes())
-            for each in scene_paths:
+            for each in paths:
                 written += export(each, [result.collection], export_options)
         finally:
             _remove(result)

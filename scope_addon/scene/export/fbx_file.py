@@ -60,7 +60,7 @@ _ADD = {
     "c": "add_byte_array",
 }
 _MATRICES = (b"Matrix", b"Transform", b"TransformLink", b"TransformAssociateModel")
-_TRANSLATION = slice(12, 15)  # of a matrix's 16 elements
+_TRANSLATION = [12, 13, 14]  # of a matrix's 16 elements
 _SEPARATOR = b"\0\x01"  # between an object's name and its class
 # The moment that Blender's exporter writes as the file's CreationTime.
 _CREATED = {
@@ -91,7 +91,6 @@ Node = Any
 _OBJECTS = (b"Null", b"Mesh")
 # Scales that differ by less are the same; single precision has seven digits.
 _SAME = 1e-5
-_TRANSLATION_ELEMENTS = [12, 13, 14]  # of a matrix's 16 elements
 _LINEAR = [0, 1, 2, 4, 5, 6, 8, 9, 10]
 
 
@@ -126,13 +125,11 @@ def _start_at_zero(root: Node) -> None:
     """Subtract the start of the take from the times of all keys and from the take's limits, in
     place.
     """
-    stacks = [
-        node for objects in below(root, b"Objects") for node in below(objects, b"AnimationStack")
-    ]
+    stacks = [node for node in _objects(root) if node.id == b"AnimationStack"]
     limits = [p for stack in stacks for p in properties(stack) if p.props[0] in _LIMITS]
     # The format's own ticks, as the exporter has rounded them; it omits a start at 0.
     ticks = next((limit.props[-1] for limit in limits if limit.props[0] == b"LocalStart"), 0)
-    for node in (child for objects in below(root, b"Objects") for child in objects.elems):
+    for node in _objects(root):
         for times in below(node, b"KeyTime") if node.id == b"AnimationCurve" else ():
             np.frombuffer(times.props[0], np.int64)[:] -= ticks
     for limit in limits:
@@ -144,9 +141,7 @@ def _start_at_zero(root: Node) -> None:
 
 def _name_take(root: Node, name: bytes) -> None:
     """Give the only take and its animation stack a name, in place."""
-    for stack in (
-        node for objects in below(root, b"Objects") for node in below(objects, b"AnimationStack")
-    ):
+    for stack in (node for node in _objects(root) if node.id == b"AnimationStack"):
         stack.props[1] = name + stack.props[1][stack.props[1].index(_SEPARATOR) :]
     for takes in below(root, b"Takes"):
         for current in below(takes, b"Current"):
@@ -188,7 +183,7 @@ def _set_creation_time(root: Node) -> None:
 def _multiply_lengths(root: Node, factor: float) -> None:
     """Multiply all lengths in the file, in place."""
     translations = _translation_curves(root)
-    for node in (child for objects in below(root, b"Objects") for child in objects.elems):
+    for node in _objects(root):
         for holder in _length_holders(node, translations):
             _multiply(holder, factor)
         if node.id in (b"Pose", b"Deformer"):
@@ -210,7 +205,7 @@ def _length_holders(node: Node, translations: set[int]) -> Iterable[Node]:
     return ()
 
 
-def _multiply(node: Node, factor: float, only: slice = slice(None)) -> None:
+def _multiply(node: Node, factor: float, only: list[int] | slice = slice(None)) -> None:
     """Multiply a node's doubles, and the selected elements of its arrays of floats and doubles, in
     place.
     """
@@ -223,12 +218,7 @@ def _multiply(node: Node, factor: float, only: slice = slice(None)) -> None:
 
 def _translation_curves(root: Node) -> set[int]:
     """Return the ids of the curve nodes that animate a model's translation, and of their curves."""
-    links = [
-        c.props
-        for node in below(root, b"Connections")
-        for c in below(node, b"C")
-        if c.props[0] == b"OP"
-    ]
+    links = [link for link in _links(root) if link[0] == b"OP"]
     nodes = {link[1] for link in links if link[3] == b"Lcl Translation"}
     return nodes | {link[1] for link in links if link[2] in nodes}
 
@@ -255,8 +245,8 @@ class _Model:
 
 def fold_scales(root: Node) -> None:
     """Give every object with one positive, constant scale the scale 1, in place."""
-    nodes = {node.props[0]: node for top in below(root, b"Objects") for node in top.elems}
-    links = [link.props for top in below(root, b"Connections") for link in below(top, b"C")]
+    nodes = {node.props[0]: node for node in _objects(root)}
+    links = _links(root)
     models = _models(nodes, links)
     for number, model in models.items():
         model.own = _movable_scale(nodes, links, models, number)
@@ -269,7 +259,7 @@ def fold_scales(root: Node) -> None:
         _scale_channel(nodes, links, model, b"Lcl Scaling", 1.0 / model.own if model.own else above)
         for geometry in model.geometries if model.own else ():
             for vertices in below(nodes[geometry], b"Vertices"):
-                _multiply_array(vertices, total[number])
+                _multiply(vertices, total[number])
     _scale_matrices(nodes, links, models, total)
 
 
@@ -286,6 +276,18 @@ def _total(models: dict[int, _Model], number: int) -> float:
 def below(node: Node, *names: bytes) -> Iterator[Node]:
     """Yield the child nodes with one of these names."""
     return (child for child in node.elems if child.id in names)
+
+
+def _objects(root: Node) -> list[Node]:
+    """Return the nodes of the file's objects: models, meshes, curves and others."""
+    return [node for objects in below(root, b"Objects") for node in objects.elems]
+
+
+def _links(root: Node) -> list[list[Any]]:
+    """Return the connections between objects: their kind, the two numbers and, of kind OP, the
+    property.
+    """
+    return [link.props for top in below(root, b"Connections") for link in below(top, b"C")]
 
 
 def properties(node: Node) -> list[Node]:
@@ -380,13 +382,13 @@ def _scale_channel(
         return
     for entry in properties(model.node):
         if entry.props[0] == channel:
-            _multiply_numbers(entry, factor)
+            _multiply(entry, factor)
     for number in model.curves.get(channel, ()):
         for entry in properties(nodes[number]):
-            _multiply_numbers(entry, factor)
+            _multiply(entry, factor)
     for curve in _curves(nodes, links, model, channel):
         for keys in below(curve, b"KeyValueFloat"):
-            _multiply_array(keys, factor)
+            _multiply(keys, factor)
 
 
 def _scale_matrices(
@@ -407,7 +409,7 @@ def _scale_matrices(
             number = next(below(entry, b"Node")).props[0]
             if number in models:
                 for matrix in below(entry, b"Matrix"):
-                    _multiply_array(matrix, 1.0 / total[number], _LINEAR)
+                    _multiply(matrix, 1.0 / total[number], _LINEAR)
     for number, cluster in nodes.items():
         bones = [child for child in users.get(number, ()) if child in models]
         if cluster.id != b"Deformer" or not bones:
@@ -418,25 +420,12 @@ def _scale_matrices(
         of_bone = total[bones[0]]
         of_mesh = total.get(mesh, 1.0)
         for matrix in below(cluster, b"Transform"):
-            _multiply_array(matrix, of_bone / of_mesh, _LINEAR)
-            _multiply_array(matrix, of_bone, _TRANSLATION_ELEMENTS)
+            _multiply(matrix, of_bone / of_mesh, _LINEAR)
+            _multiply(matrix, of_bone, _TRANSLATION)
         for matrix in below(cluster, b"TransformLink"):
-            _multiply_array(matrix, 1.0 / of_bone, _LINEAR)
+            _multiply(matrix, 1.0 / of_bone, _LINEAR)
         armature = bones[0]
         while armature in models and models[armature].node.props[2] not in _OBJECTS:
             armature = models[armature].parent
         for matrix in below(cluster, b"TransformAssociateModel"):
-            _multiply_array(matrix, 1.0 / total.get(armature, 1.0), _LINEAR)
-
-
-def _multiply_numbers(node: Node, factor: float) -> None:
-    """Multiply a node's doubles, in place."""
-    for index, kind in enumerate(node.props_type.decode()):
-        if kind == "D":
-            node.props[index] *= factor
-
-
-def _multiply_array(node: Node, factor: float, only: list[int] | slice = slice(None)) -> None:
-    """Multiply the selected elements of a node's array of floats or doubles, in place."""
-    kind = node.props_type.decode()
-    np.frombuffer(node.props[0], kind)[only] *= factor
+            _multiply(matrix, 1.0 / total.get(armature, 1.0), _LINEAR)

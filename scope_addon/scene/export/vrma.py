@@ -34,14 +34,13 @@ def vrma_bytes(motion: Motion, body: Body) -> bytes:
 
     :param body: that the motion was fitted with.
     """
-    # They load numba, and the command line starts without it.
-    from ....solver import rotations
+    # It loads numba, and the command line starts without it.
     from ...kinematics.smoothing import continuous_quaternions
 
     betas = np.asarray(motion.betas, float)
     rest = body.rest_joints(betas)
     rest_height_m = rest[0, 1] - body.rest_vertices(betas)[:, 1].min()
-    local = rotations.exp(np.asarray(motion.poses, float).reshape(len(motion), -1, 3))
+    local = motion.joint_rotations()
     hips = (rest[0] + np.asarray(motion.trans, float)) @ R_WORLD_MODEL
     # The root of the motion turns the model into the world, z up; here, the world is y up, too.
     local[:, 0] = R_WORLD_MODEL.T @ local[:, 0]

@@ -151,11 +151,7 @@ def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.flo
     """Return the names of the M markers, where they are (T, M, 3), world, metres, and the joint
     that moves each.
     """
-    from ....solver import rotations  # Loads numba, and the command line starts without it.
-
-    betas = np.asarray(motion.betas, float)
-    R = rotations.exp(np.asarray(motion.poses, float).reshape(len(motion), -1, 3))
-    R_parts, joints = body.forward_kinematics(R, np.asarray(motion.trans, float), betas)
+    R_parts, joints = motion.parts_in_world(body)
     keypoints = body.keypoint_set("blazepose")
     of_joints = {
         f"{short}{ours}": f"{side}_{name}"
@@ -170,7 +166,7 @@ def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.flo
     of_keypoints["Nose"] = "nose"
     at = [body.joint_names.index(name) for name in of_joints.values()]
     which = [keypoints[name] for name in of_keypoints.values()]
-    on_surface = body.keypoints(R_parts, joints, betas, which)
+    on_surface = body.keypoints(R_parts, joints, motion.betas.astype(float), which)
     hips = [body.joint_names.index(f"{side}_hip") for side in _SIDES.values()]
     between = joints[:, hips].mean(axis=1, keepdims=True)
     neck = joints[:, [body.joint_names.index("neck")]]
@@ -211,11 +207,7 @@ def joint_angles(motion: Motion, body: Body) -> dict[str, NDArray[np.float64]]:
     """Return the angles (T,) of each joint, degrees without jumps by whole turns, and the place of
     the pelvis, metres, by OpenSim's names.
     """
-    from ....solver import rotations  # Loads numba, and the command line starts without it.
-
-    R_local = rotations.exp(np.asarray(motion.poses, float).reshape(len(motion), -1, 3))
-    betas = np.asarray(motion.betas, float)
-    R_world_part, joints = body.forward_kinematics(R_local, np.asarray(motion.trans, float), betas)
+    R_world_part, joints = motion.parts_in_world(body)
     R_opensim_part = R_OPENSIM_WORLD @ R_world_part @ R_OPENSIM_MODEL.T
     segments = {name: R_opensim_part[:, k] for k, name in enumerate(body.joint_names)}
     pelvis = segments["pelvis"]

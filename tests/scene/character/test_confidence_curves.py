@@ -2,7 +2,7 @@
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.errors import CancelledError
+from scope.scope_addon.errors import VideoError
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
 from scope.solver.rotations import exp
@@ -101,17 +101,12 @@ def under_floor_depth(body, motion):
     return np.array([body.skin(*pose, betas)[:, 2].min() for pose in poses])
 
 
-def test_no_markers_unless_requested_and_none_after_a_cancel(body, doubtful):
+def test_no_markers_unless_requested_and_none_after_a_failure(body, doubtful, tmp_path):
     scene = bpy.context.scene
     scene.timeline_markers.new("mine", frame=7)
     build_scene([doubtful], body, options=BuildOptions(with_markers=False))
-
-    def cancel(fraction: float, message: str) -> None:
-        if fraction == 1.0:
-            raise CancelledError("stopped")
-
-    with pytest.raises(CancelledError):
-        build_scene([doubtful], body, progress=cancel)
+    with pytest.raises(VideoError):  # the camera comes after the markers
+        build_scene([doubtful], body, footage=tmp_path / "gone.mp4")
     assert [m.name for m in scene.timeline_markers] == ["mine"]
 
 

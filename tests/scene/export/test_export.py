@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import scope
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
+from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.export.export import ExportOptions, captures, export, export_motions
+from scope.scope_addon.scene.export.export import ExportOptions, export, export_motions
 from scope.scope_addon.scene.export.output_paths import SUFFIXES, WITHOUT_SCENE
 
 from ...required import package
@@ -232,7 +232,7 @@ def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path
     assert (scene.name, scene.frame_start, scene.frame_end) == ("Capture", 0, 5)
     assert (scene.render.resolution_x, scene.render.resolution_y) == (1080, 1920)
     assert scene.camera == blender.only("CAMERA")
-    assert captures(scene)[0].name == "walk"
+    assert captures_of(scene)[0].name == "walk"
     keys = blender.only("MESH").data.shape_keys.key_blocks
     assert (keys["Shape001"].slider_min, keys["Shape001"].slider_max) == (-10, 10)
 
@@ -337,14 +337,8 @@ def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(
     assert span == [0, pytest.approx(0.2 * second)]
 
 
-def test_npz_is_the_motion_itself(body, make_motion, tmp_path):
-    motion = make_motion(body)
-    written, _ = export_motions([motion], body, tmp_path / "walk.npz")
-    np.testing.assert_array_equal(Motion.load(written[0]).poses, motion.poses)
-
-
 def test_several_files_at_once(body, make_motion, tmp_path):
-    paths = [tmp_path / "a.glb", tmp_path / "b.npz", tmp_path / "c.bvh"]
+    paths = [tmp_path / "a.glb", tmp_path / "c.bvh"]
     written, _ = export_motions([make_motion(body, 2)], body, paths)
     assert sorted(written) == paths
     assert all(p.stat().st_size for p in paths)

@@ -12,6 +12,7 @@ from scope.scope_addon.errors import OutputError, UsageError
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import export, export_motions
 from scope.scope_addon.scene.export.output_paths import SUFFIXES, WITHOUT_SCENE, person_paths
+from scope.scope_addon.scene.export.without_scene import write_without_scene
 
 SCENE_SUFFIXES = [suffix for suffix in SUFFIXES if suffix not in WITHOUT_SCENE]
 NOBODY = 65534
@@ -39,15 +40,22 @@ def test_a_missing_folder_is_named(body, make_motion, tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="Windows counts letters, and those of the whole path")
 @pytest.mark.parametrize("suffix", [".bvh", ".npz"])
 def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_path, suffix):
+    def write(people, path):
+        motions = [make_motion(body, 1)] * people
+        if suffix in WITHOUT_SCENE:
+            write_without_scene(path, motions, [body] * people)
+        else:
+            export_motions(motions, body, path)
+
     longest = tmp_path / ("ä" * 125 + suffix)  # 254 bytes
-    export_motions([make_motion(body, 1)], body, longest)
+    write(1, longest)
     assert list(tmp_path.iterdir()) == [longest]
     for people in (1, 2):
         too_long = tmp_path / ("x" * (252 if people == 1 else 245) + suffix)
         with pytest.raises(
             OutputError, match=f"cannot write .*x(.person1)?{suffix}: .*; choose a shorter name"
         ):
-            export_motions([make_motion(body, 1)] * people, body, too_long)
+            write(people, too_long)
     assert list(tmp_path.iterdir()) == [longest]
 
 
@@ -82,7 +90,7 @@ def test_an_unwritable_folder_is_named(body, make_motion, closed_folder):
 @pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
 def test_a_folder_that_accepts_no_files_is_named(body, make_motion, suffix):
     with pytest.raises(OutputError, match="cannot write /proc/walk"):
-        export_motions([make_motion(body, 1)], body, f"/proc/walk{suffix}")
+        export_motions([make_motion(body, 1)], body, Path(f"/proc/walk{suffix}"))
 
 
 @pytest.mark.skipif(
@@ -159,7 +167,7 @@ def test_a_scene_without_captures_cannot_be_exported(tmp_path):
 
 
 def test_writers_keep_standard_output_clean(body, make_motion, tmp_path, capfd):
-    paths = [tmp_path / f"walk{suffix}" for suffix in SUFFIXES]
+    paths = [tmp_path / f"walk{suffix}" for suffix in SCENE_SUFFIXES]
     capfd.readouterr()
     export_motions([make_motion(body, 2)], body, paths)
     assert capfd.readouterr().out == ""

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
+from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.ui import capture_operators
 from scope.scope_addon.ui.capture_job import CaptureJob
 from scope.scope_addon.ui.capture_operators import (
@@ -20,7 +21,6 @@ from scope.scope_addon.ui.capture_operators import (
     end_capture,
     state,
 )
-from scope.scope_addon.ui.captures import captures_of
 from scope.scope_addon.ui.job_operator import JobOperator
 
 

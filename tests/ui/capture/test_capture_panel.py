@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scope.scope_addon.job.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.footage_strip import start_of, strips_of
+from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.scene.stored_values import parse_spans
 from scope.scope_addon.ui import capture_job
 from scope.scope_addon.ui.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
 
 from ...job.processes import wait_for
+from ...scene.test_footage_strip import start_of
 
 FINISH = "finish()"
 

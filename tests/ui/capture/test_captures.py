@@ -5,8 +5,9 @@ armatures.
 
 import bpy
 import pytest
+from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
-from scope.scope_addon.ui.captures import captures_of, elided, people_of, shown_capture, unit_text
+from scope.scope_addon.ui.captures import elided, people_of, shown_capture, unit_text
 
 
 def capture(fake_worker, footage, people=1, warnings=("a warning",)):
