@@ -26,7 +26,7 @@ from .command_line.arguments import (
     path_argument,
     with_bare_values,
 )
-from .command_line.blender_folder import discard_temporary
+from .command_line.blender_module import discard_temporary
 from .command_line.cluster_arguments import (
     WINDOW_SECONDS,
     add_window_arguments,

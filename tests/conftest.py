@@ -156,7 +156,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if "bpy" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
-        from scope.scope_addon.command_line.blender_folder import discard_temporary
+        from scope.scope_addon.command_line.blender_module import discard_temporary
 
         discard_temporary()
         os._exit(int(config.stash.get(EXIT_STATUS, 1)))

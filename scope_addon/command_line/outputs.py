@@ -22,7 +22,7 @@ from ..notices import Notice, counted
 from ..options import option
 from ..scene.export.output_paths import WITHOUT_SCENE, check_output
 from ..scene.export.without_scene import write_without_scene
-from .blender_folder import load_blender
+from .blender_module import bounded_import, load_blender
 
 if TYPE_CHECKING:
     from ..retarget.rig_source import RigSource
@@ -262,7 +262,6 @@ def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -
     ]
     load_blender()
     from ..scene.rig_file import check_rig
-    from .bounded_import import bounded_import
 
     written = [*outputs, *filter(None, (getattr(args, "overlay", None),))]
     for rig in rigs:

@@ -357,7 +357,7 @@ def test_f15_a_shell_that_limits_memory(
 KILLED = """
 import os, pathlib, signal
 from scope.scope_addon.atomic_write import atomic_path
-from scope.scope_addon.command_line.blender_folder import load_blender
+from scope.scope_addon.command_line.blender_module import load_blender
 load_blender()
 with atomic_path(pathlib.Path("o.fbx")) as temporary:
     temporary.write_text("half")

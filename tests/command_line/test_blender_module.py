@@ -10,7 +10,7 @@ import pytest
 
 CODE = """
 import pathlib, sys, time
-from scope.scope_addon.command_line import bounded_import as b
+from scope.scope_addon.command_line import blender_module as b
 b.BASE_S, b.BASE_BYTES = {seconds}, 100_000_000
 with b.bounded_import(pathlib.Path(sys.argv[1])):
     pass
