@@ -20,6 +20,7 @@ from ..errors import UsageError
 from ..motion import Motion
 from ..review_spans import find_review_spans
 from .character.armature import SIDES, side_of
+from .timing import current_frame_kept
 
 TAGS = ("mocap", "scope")
 CATALOGS_FILE = "blender_assets.cats.txt"
@@ -74,9 +75,8 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
     :param armature: animated by the action.
     """
     scene = bpy.context.scene
-    current = scene.frame_current, scene.frame_subframe
-    scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
-    try:
+    with current_frame_kept(scene):
+        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
         posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         bones = [bone for bone in posed.pose.bones if bone.bone.use_deform] or list(
             posed.pose.bones
@@ -90,8 +90,6 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
         scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
         radii = scale * np.array([_radius(bone) for bone in bones])
         colors = np.array([SIDES[side_of(bone.name)] for bone in bones])
-    finally:
-        scene.frame_set(current[0], subframe=current[1])
     pixels = skeleton_picture(ends[:, 0], ends[:, 1], radii, colors, _SIZE)
     preview = action.preview_ensure()
     preview.image_size = (_SIZE, _SIZE)

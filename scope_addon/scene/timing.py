@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -113,6 +115,16 @@ def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
     have the scene's.
     """
     return stored_rate(armature, scene_rate(scene))
+
+
+@contextmanager
+def current_frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    """Go back to the scene's current frame when the block ends."""
+    frame, subframe = scene.frame_current, scene.frame_subframe
+    try:
+        yield
+    finally:
+        scene.frame_set(frame, subframe=subframe)
 
 
 def set_frame_range(scene: bpy.types.Scene, first: float, last: float) -> None:

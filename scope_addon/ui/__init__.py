@@ -13,19 +13,20 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 import bpy
+from bpy.app.handlers import persistent
 
 from . import (
     action_operators,
     capture_operators,
     capture_panel,
     captures,
+    comparison,
     correction_operators,
     correction_panel,
     edit_panel,
     export_operators,
     file_field,
     frame_rate_operators,
-    handlers,
     import_operators,
     live_operators,
     live_panel,
@@ -116,6 +117,27 @@ def _remove_command() -> None:
     _command = None
 
 
+@persistent
+def _unlink_rings(*_: object) -> None:
+    """Take the rings that bones of an appended armature show out of the scene, where Blender puts
+    them.
+    """
+    from ..scene.character.armature import unlink_rings
+
+    unlink_rings()
+
+
+def _add_ring_handler() -> None:
+    # Before 4.3, Blender says nothing of appended files, and the rings stay.
+    if hasattr(bpy.app.handlers, "blend_import_post"):
+        bpy.app.handlers.blend_import_post.append(_unlink_rings)
+
+
+def _remove_ring_handler() -> None:
+    if hasattr(bpy.app.handlers, "blend_import_post"):
+        bpy.app.handlers.blend_import_post.remove(_unlink_rings)
+
+
 def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
     """Return what attaches things other than classes to Blender, and what detaches them."""
     return [
@@ -124,7 +146,8 @@ def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
         (live_properties.attach, live_properties.detach),
         (_add_command, _remove_command),
         (correction_panel.attach, correction_panel.detach),
-        (handlers.attach, handlers.detach),
+        (comparison.attach, comparison.detach),
+        (_add_ring_handler, _remove_ring_handler),
         (import_operators.attach, import_operators.detach),
         (menus.attach, menus.detach),
         (preferences.attach, preferences.detach),

@@ -185,13 +185,35 @@ def build_capture(
     with window_shows(scene):
         result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
     store_motions(result, [content for _, content in contents], body)
-    if options.frame_rate == "keep" and len(motions[0]) > 1:
-        warnings += rate_warnings(result.frame_rate, float(motions[0].mocap_framerate))
+    keeps_rate = options.frame_rate == "keep"
+    show_build(scene, result, footage, replace(report, warnings=warnings), keeps_rate=keeps_rate)
+    hide_others(scene, [result.collection])
+    return result
+
+
+def show_build(
+    scene: bpy.types.Scene,
+    result: BuildResult,
+    footage: str,
+    report: Report,
+    *,
+    keeps_rate: bool,
+    what: str = "footage",
+) -> None:
+    """Show what was built in a scene, with what is to be known about it.
+
+    :param footage: path of the video or picture; empty if there is none.
+    :param report: of the capture.
+    :param keeps_rate: whether the scene keeps its own frame rate.
+    :param what: has the other rate: a key of ``notices.PHRASES``.
+    """
+    motion = result.people[0].motion
+    warnings = list(report.warnings)
+    if keeps_rate and len(motion) > 1:
+        warnings += rate_warnings(result.frame_rate, float(motion.mocap_framerate), what)
     report = replace(report, warnings=warnings + result.warnings)
     show_result(result.collection.scope_result, footage, report, result)
     scene.scope.capture = result.collection
-    hide_others(scene, [result.collection])
-    return result
 
 
 def capture_request(scene: bpy.types.Scene) -> JobRequest:

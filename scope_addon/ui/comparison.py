@@ -3,7 +3,7 @@
 capture from its side.
 
 Views are not part of what Blender undoes and saves with a scene, so this state is read from the
-viewports themselves.
+viewports themselves, and a viewport is restored when "Compare with Footage" is undone.
 
 The camera's frame is fitted into the part of a viewport that no sidebar or toolbar covers. Seen
 through a camera, a viewport of ``w`` × ``h`` pixels at zoom ``z`` shows the sensor ``f · max(w,
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
@@ -46,6 +47,8 @@ _ZOOMS = (-30.0, 600.0)  # Blender's limits
 _former: dict[int, tuple[float, tuple[float, float]]] = {}
 _HALF_HEIGHT_M = 1.3  # above and below the pelvis of a person
 _HALF_WIDTH_M = 0.5  # to the left and right of it
+_looked_through: set[int] = set()  # areas that showed a capture through its camera before the undo
+_sides: set[int] = set()  # areas that showed a capture from its side
 
 
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -423,3 +426,48 @@ def _pelvis_path(armature: bpy.types.Object, rate: float) -> NDArray[np.float64]
     return np.column_stack(
         [frames, clip_as_displayed(armature, clip, frames).root @ M[:3, :3].T + M[:3, 3]]
     )
+
+
+def attach() -> None:
+    """Add the handlers of undo."""
+    bpy.app.handlers.undo_pre.append(_before_undo)
+    bpy.app.handlers.undo_post.append(_after_undo)
+
+
+def detach() -> None:
+    """Remove the handlers of undo."""
+    bpy.app.handlers.undo_pre.remove(_before_undo)
+    bpy.app.handlers.undo_post.remove(_after_undo)
+
+
+@persistent
+def _before_undo(*_: object) -> None:
+    _looked_through.clear()
+    _sides.clear()
+    for window, area in viewports():
+        if area == side_area(window.screen):
+            _sides.add(area.as_pointer())
+        if looks_through(window.scene, area.spaces.active):
+            _looked_through.add(area.as_pointer())
+
+
+@persistent
+def _after_undo(*_: object) -> None:
+    if _looked_through:
+        bpy.app.timers.register(_leave)  # operators must not run during an undo
+
+
+def _leave() -> None:
+    """Leave local view and camera view in the viewports that no longer show a capture through its
+    camera.
+    """
+    left = False
+    for window, area in viewports():
+        if area.as_pointer() in _looked_through and not looks_through(
+            window.scene, area.spaces.active
+        ):
+            end(window, area)
+            left = True
+    for window, side in [pair for pair in viewports() if left and pair[1].as_pointer() in _sides]:
+        close_side_view(window, side)
+    _looked_through.clear()

@@ -277,18 +277,16 @@ class SCOPE_OT_add_pin(EditOperator):
     ) -> str:
         """Add the pin and change the keys around it."""
         from ..edit.corrections import added
+        from ..scene.timing import current_frame_kept
 
         scene = context.scene
-        current = scene.frame_current, scene.frame_subframe
-        if self.frame != _NOW:
-            scene.frame_set(self.frame)
-        try:
+        with current_frame_kept(scene):
+            if self.frame != _NOW:
+                scene.frame_set(self.frame)
             place = tuple(self.location), self.in_image, self.reach
             pin = pin_at(context, armature, motion_of(armature), self.joint, place)
             change_corrections(armature, body, rate, lambda present: added(present, pin), pin)
             here = scene.frame_current
-        finally:
-            scene.frame_set(current[0], subframe=current[1])
         last_pin_warnings[:] = _pin_warnings(armature, body, self.joint, here)
         for warning in last_pin_warnings:
             self.report({"WARNING"}, warning)

@@ -16,7 +16,6 @@ from ..options import option
 from ..scene.datablocks import captures_of
 from .captures import hide_others
 from .declared_properties import blender_property
-from .frame_rate_operators import rate_warnings
 from .preferences import preferences
 from .reporting import ReportingOperator, iface_, rpt_, sentence
 from .view_operators import show_new_capture
@@ -133,7 +132,7 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     from ..capture_report import Report
     from ..scene.build import build_scene
     from ..scene.packed_motion import pack_motion
-    from .capture_job import show_result
+    from .capture_job import show_build
 
     motion = imported.motion
     footage = None
@@ -153,17 +152,14 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
     )
     result = build_scene([motion], imported.body, footage, options)
     pack_motion(result.people[0].armature, motion.to_bytes())
-    rate = (
-        float(motion.mocap_framerate) if options.frame_rate == "keep" and len(motion) > 1 else 0.0
+    show_build(
+        scene,
+        result,
+        str(footage or ""),
+        Report(warnings=imported.notes),
+        keeps_rate=options.frame_rate == "keep",
+        what="motion",
     )
-    warnings = [
-        *imported.notes,
-        *rate_warnings(result.frame_rate, rate, "motion"),
-        *result.warnings,
-    ]
-    report = Report(warnings=warnings)
-    show_result(result.collection.scope_result, str(footage or ""), report, result)
-    scene.scope.capture = result.collection
 
 
 def _footage_beside(path: Path, source: str) -> Path | None:

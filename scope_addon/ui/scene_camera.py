@@ -25,6 +25,7 @@ import numpy as np
 from ..arrays import Float64Array
 from ..errors import UsageError
 from ..scene.camera import camera_pose
+from ..scene.timing import current_frame_kept
 
 _SAME_LENS = 1e-3  # of a focal length that does not change, relative
 _MAX_SCALE = 1e-3  # by which an object's axes may be longer or shorter than 1
@@ -63,11 +64,10 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
     """Return the content of the file: lens, times and poses."""
     render = scene.render
     rate = render.fps / render.fps_base
-    shown = scene.frame_current, scene.frame_subframe
     times_s = []
     poses = []
     lenses = []
-    try:
+    with current_frame_kept(scene):
         for frame in range(scene.frame_start, scene.frame_end + 1):
             if not _is_solved(scene, camera, frame):
                 continue
@@ -76,8 +76,6 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
             lenses.append(_intrinsics(scene, evaluated))
             poses.append(_pose(scene, evaluated, frame))
             times_s.append((frame - scene.scope.start_frame) / rate)
-    finally:
-        scene.frame_set(shown[0], subframe=shown[1])
     if lenses:
         focal = np.array(lenses)[:, 0, 0]
         if np.ptp(focal) > _SAME_LENS * focal.max():

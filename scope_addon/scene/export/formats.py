@@ -194,15 +194,13 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
     rest = np.array([np.array(bone.matrix_local) for bone in bones])
     frames = range(scene.frame_start, scene.frame_end + 1)
     posed = np.empty((len(frames), len(bones), 4, 4))
-    before = scene.frame_current, scene.frame_subframe
-    with _without_deformation(scene):
+    with timing.current_frame_kept(scene), _without_deformation(scene):
         for row, frame in enumerate(frames):
             scene.frame_set(frame)
             evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
             world = np.array(evaluated.matrix_world)
             for column, name in enumerate(names):
                 posed[row, column] = world @ np.array(evaluated.pose.bones[name].matrix)
-    scene.frame_set(before[0], subframe=before[1])
     world = np.array(rig.matrix_world)
     rest_world = world @ rest
     tails = np.array([world[:3, :3] @ np.array(bone.tail_local) + world[:3, 3] for bone in bones])
