@@ -311,12 +311,20 @@ def write_outputs(
             separate=args.file_per_person, bvh_unit=args.bvh_unit, skeleton=args.skeleton
         )
         if rigs:
-            from ..scene.rig_export import RigExportOptions, export_on_rig
+            from ..scene.rig_export import export_on_rig
 
-            rig_options = RigExportOptions(options, args.retarget_root, separate)
             shares = [scene_files] if len(rigs) == 1 else [[path] for path in scene_files]
             for rig, paths in zip(rigs, shares, strict=True):
-                files, more = export_on_rig(motions, body, paths, rig, rig_options, footage)
+                files, more = export_on_rig(
+                    motions,
+                    body,
+                    paths,
+                    rig,
+                    options,
+                    footage,
+                    root=args.retarget_root,
+                    export_options=separate,
+                )
                 written += files
                 warnings += more
         else:

@@ -30,6 +30,7 @@ from ...solver.errors import InputError
 from ...solver.rotations import exp
 from ..kinematics.face import EXPRESSIONS
 from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map
+from .skeleton import BoneMotion
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "face" / "controls"
 # The built-in maps, and bones that only the rig of each has.
@@ -47,15 +48,6 @@ _MIN_LENGTH = 1e-9
 # the mouth.
 _BY_LIDS = ("lid",)
 _BY_EYES = ("brow", "nose", "cheek.T", "oculi", "levator06")
-
-
-@dataclass(frozen=True)
-class ControlMotion:
-    """The channels of one control, T frames; None for those that it does not have."""
-
-    bone: str
-    locations: NDArray[np.float64] | None  # (T, 3) in the axes of its location channel
-    rotations: NDArray[np.float64] | None  # (T, 3, 3) relative to rest
 
 
 def has_face_controls(bones: Collection[str]) -> bool:
@@ -79,7 +71,7 @@ def guess_control_map(bones: Collection[str]) -> ExpressionMap:
 
 def control_motions(
     expression_map: ExpressionMap, weights: NDArray[np.floating[Any]], bones: Mapping[str, RestBone]
-) -> list[ControlMotion]:
+) -> list[BoneMotion]:
     """Return the channels of the controls that the map and the rig have.
 
     :param weights: (T, 52) in the order of `EXPRESSIONS`.
@@ -105,7 +97,7 @@ def control_motions(
 
 def _motion(
     bone: str, sums: dict[str, NDArray[np.float64]], frame: FaceFrame, bones: Mapping[str, RestBone]
-) -> ControlMotion:
+) -> BoneMotion:
     """Return the channels of one control.
 
     :param sums: (T,) of each channel of the map.
@@ -117,18 +109,15 @@ def _motion(
         np.stack([sums.get(name, still) for name in names], axis=1) for names in (MOVED, TURNED)
     )
     moved = moved * frame.length(bone)
-    moves = not sums.keys().isdisjoint(MOVED)
-    turns = not sums.keys().isdisjoint(TURNED)
     eye = pivot(bones, bone)
-    if eye is not None and turns:
+    if eye is not None:
         moved = moved + _around(eye, rest.head, turned, frame)
-        moves = True
-        turns = False
+        turned = np.zeros_like(turned)
     location_axes = to_face if rest.local_location else frame.axes
-    return ControlMotion(
+    return BoneMotion(
         bone,
-        moved @ location_axes.T if moves else None,
-        to_face @ exp(np.radians(turned)) @ to_face.T if turns else None,
+        rotations=to_face @ exp(np.radians(turned)) @ to_face.T,
+        locations=moved @ location_axes.T,
     )
 
 

@@ -56,6 +56,16 @@ class Pose:
     facing: float
 
 
+@dataclass(frozen=True)
+class BoneMotion:
+    """The channels of one bone, T frames."""
+
+    bone: str
+    rotations: NDArray[np.float64]  # (T, 3, 3) relative to parent and rest pose
+    # (T, 3) in the axes of the location channel; None: not keyed
+    locations: NDArray[np.float64] | None = None
+
+
 def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     """Convert world rotations to the bones' channels: ``B = (R_parent R_parent0ᵀ R_b0)ᵀ R_b``.
 

@@ -9,7 +9,6 @@ is level, and shows the widest side of the pose.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -38,19 +37,13 @@ _LIGHT = np.array([-0.45, 0.6, 0.66])  # unit vector towards the light: right, u
 _AMBIENT = 0.4
 
 
-@dataclass(frozen=True)
-class AssetDetails:
-    """What the asset browser shows of an asset."""
-
-    author: str = ""
-    description: str = ""
-    catalog: str = ""  # path of the catalog, such as "Poses/Walks"; empty: unassigned
-
-
-def mark_action(action: bpy.types.Action, details: AssetDetails) -> None:
+def mark_action(
+    action: bpy.types.Action, author: str = "", description: str = "", catalog: str = ""
+) -> None:
     """Mark an action as an asset, or change the metadata of one; tags that the user has given it
     stay.
 
+    :param catalog: path of the catalog, such as "Poses/Walks"; empty: it stays as it is.
     :raises UsageError: the action is linked, or the catalog does not exist.
     """
     if action.library is not None:
@@ -58,15 +51,15 @@ def mark_action(action: bpy.types.Action, details: AssetDetails) -> None:
             f"the action '{action.name}' is linked from {action.library.filepath}; "
             "make it local first"
         )
-    catalog = _catalog_id(details.catalog) if details.catalog else None
+    catalog_id = _catalog_id(catalog) if catalog else None
     action.asset_mark()
     data = action.asset_data
     for tag in TAGS:
         data.tags.new(tag, skip_if_exists=True)
-    data.author = details.author
-    data.description = details.description
-    if catalog is not None:
-        data.catalog_id = catalog
+    data.author = author
+    data.description = description
+    if catalog_id is not None:
+        data.catalog_id = catalog_id
 
 
 def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: float) -> None:
@@ -177,7 +170,7 @@ def skeleton_picture(
     depth = np.full((fine, fine), -np.inf)
     picture = np.zeros((fine, fine, 4))
     for start, end, radius, color in zip(a, b, r, colors, strict=True):
-        _draw_capsule(picture, depth, (start, end, float(radius)), color)
+        _draw_capsule(picture, depth, start, end, float(radius), color)
     blocks = picture.reshape(size, _FINER, size, _FINER, 4)
     alpha = blocks[..., 3].mean(axis=(1, 3))
     color = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-6)[
@@ -215,16 +208,18 @@ def _on_screen(
 def _draw_capsule(
     picture: NDArray[np.float64],
     depth: NDArray[np.float64],
-    capsule: tuple[NDArray[np.float64], NDArray[np.float64], float],
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    radius: float,
     color: NDArray[np.float64],
 ) -> None:
     """Draw where the capsule is nearer to the viewer than what is there.
 
     :param picture: (S, S, 4), changed.
     :param depth: (S, S) towards the viewer, changed.
-    :param capsule: ends (3,) and radius in pixels.
+    :param start, end: (3,) of the capsule's axis, pixels.
+    :param radius: pixels.
     """
-    start, end, radius = capsule
     size = len(depth)
     low = np.clip(np.floor(np.minimum(start, end)[:2] - radius), 0, size).astype(int)
     high = np.clip(np.ceil(np.maximum(start, end)[:2] + radius) + 1, 0, size).astype(int)

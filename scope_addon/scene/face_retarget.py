@@ -17,12 +17,12 @@ from ..errors import UsageError
 from ..kinematics.face import EXPRESSIONS
 from ..retarget.expression_map import ExpressionMap, guess_expression_map
 from ..retarget.face_controls import (
-    ControlMotion,
     RestBone,
     control_motions,
     guess_control_map,
     has_face_controls,
 )
+from ..retarget.skeleton import BoneMotion
 from .actions import Channels, bone_path, check_not_in_nla, fcurves, read_keys, shape_key_path
 from .character.expression_keys import MOVES, has_expression_keys
 from .rig_action import channel_of_rotation, leave_tweak_mode, mark_written, override_nla, retire
@@ -273,19 +273,18 @@ def rest_face(rig: bpy.types.Object, keys: FaceKeys) -> None:
             rig.pose.bones[bone].matrix_basis = Matrix()
 
 
-def _channels(rig: bpy.types.Object, motion: ControlMotion) -> dict[str, NDArray[np.float64]]:
+def _channels(rig: bpy.types.Object, motion: BoneMotion) -> dict[str, NDArray[np.float64]]:
     """Return the values (T, n) of a control's channels; (1, n) of those that do not move, and none
     of those at rest.
     """
+    assert motion.locations is not None
     bone = rig.pose.bones[motion.bone]
-    found = []
-    if motion.locations is not None:
-        found.append(("location", motion.locations, np.zeros(3), _STILL * bone.length))
-    if motion.rotations is not None:
-        name, values = channel_of_rotation(bone.rotation_mode, motion.rotations)
-        found.append(
-            (name, values, channel_of_rotation(bone.rotation_mode, np.eye(3)[None])[1][0], _STILL)
-        )
+    name, values = channel_of_rotation(bone.rotation_mode, motion.rotations)
+    _, (at_rest,) = channel_of_rotation(bone.rotation_mode, np.eye(3)[None])
+    found = [
+        ("location", motion.locations, np.zeros(3), _STILL * bone.length),
+        (name, values, at_rest, _STILL),
+    ]
     out = {}
     for name, values, rest, least in found:
         if np.ptp(values, axis=0).max() >= least:

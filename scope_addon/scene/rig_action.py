@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -13,7 +12,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...solver.rotations import quaternion_from_matrix
-from ..retarget.skeleton import Skeleton
+from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from .character.animation import on_one_hemisphere
 from .stored_values import stored_text
@@ -25,23 +24,6 @@ _CHECKSUM = "scope_keys"
 _SOURCE = "scope_keys_of"
 # channels of a bone beside its rotation, and their values at rest
 _OFFSETS = {"location": 0.0, "scale": 1.0}
-
-
-@dataclass(frozen=True)
-class BoneKeys:
-    """The channels of one bone, T frames."""
-
-    bone: str
-    rotations: NDArray[np.float64]  # (T, 3, 3) relative to parent and rest pose
-    # (T, 3) in the axes of the location channel; None: not keyed
-    locations: NDArray[np.float64] | None = None
-
-    def basis(self, t: int) -> Matrix:
-        """Return the bone's ``matrix_basis`` of one frame."""
-        matrix = Matrix(self.rotations[t].tolist()).to_4x4()
-        if self.locations is not None:
-            matrix.translation = self.locations[t].tolist()
-        return matrix
 
 
 def root_locations(
@@ -67,7 +49,7 @@ def root_locations(
 
 
 def write_action(
-    rig: bpy.types.Object, keys: list[BoneKeys], frames: NDArray[np.float64], source: str
+    rig: bpy.types.Object, keys: list[BoneMotion], frames: NDArray[np.float64], source: str
 ) -> bpy.types.Action:
     """Create a new action with the keys, in the rotation mode of each bone.
 

@@ -6,7 +6,7 @@ scene.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -32,26 +32,21 @@ from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
 from .rig_retarget import RetargetOptions, common_travel, retarget
 
 
-@dataclass(frozen=True)
-class RigExportOptions:
-    """Options of ``export_on_rig``."""
-
-    build: BuildOptions
-    root: str = "bone"  # where the root motion goes, see ``RetargetOptions``
-    export: ExportOptions | None = None
-
-
 def export_on_rig(
     motions: list[Motion],
     body: Body,
     paths: Sequence[Path],
     source: RigSource,
-    options: RigExportOptions,
+    build_options: BuildOptions,
     footage: Path | None = None,
+    *,
+    root: str = "bone",
+    export_options: ExportOptions | None = None,
 ) -> tuple[list[Path], list[Notice]]:
     """Retarget every person's motion to a copy of the rig, write one or more files, and leave the
     session as it was.
 
+    :param root: where the root motion goes, see ``RetargetOptions``.
     :return: the files written, and the warnings.
     :raises InputError: when the rig cannot be used; see ``load_rig``.
     :raises UsageError: when the choice of armature is ambiguous, a suffix unknown, or the
@@ -62,7 +57,7 @@ def export_on_rig(
         check_output(path)
     written: list[Path] = []
     with temporary_datablocks(), temporary_scene("Retargeting"):
-        result = build_scene(motions, body, footage, options.build)
+        result = build_scene(motions, body, footage, build_options)
         warnings = list(result.warnings)
         travel: float | None = None  # of one person: their own
         for number, person in enumerate(result.people, 1):
@@ -78,7 +73,7 @@ def export_on_rig(
             rate = result.frame_rate
             faces = faces_of(with_meshes(rig, bpy.context.scene.objects))
             retargeting = RetargetOptions(
-                root=options.root, face=_face_of_bones(rig, faces, source), travel=travel
+                root=root, face=_face_of_bones(rig, faces, source), travel=travel
             )
             warnings += retarget(
                 person.armature, body, betas, rig, bones, rate, retargeting
@@ -90,7 +85,7 @@ def export_on_rig(
             [obj for person in result.people for obj in (person.armature, person.mesh)]
         )
         for path in paths:
-            written += export(path, [result.collection], options=options.export)
+            written += export(path, [result.collection], options=export_options)
     return written, warnings
 
 

@@ -22,7 +22,7 @@ from ..retarget.expression_map import ExpressionMap
 from ..retarget.guess import SHAPED, guess
 from ..retarget.rest_pose import rest_faults
 from ..retarget.rig_source import ROOTS
-from ..retarget.skeleton import Pose, Skeleton, basis
+from ..retarget.skeleton import BoneMotion, Pose, Skeleton, basis
 from ..retarget.transfer import Transfer, leg_ratio
 from .character.keys import read_clip
 from .character.root_object import (
@@ -35,7 +35,6 @@ from .character.root_object import (
 )
 from .face_retarget import captured_expressions, face_keys, key_face, rest_face
 from .rig_action import (
-    BoneKeys,
     clear_offsets,
     leave_tweak_mode,
     override_nla,
@@ -201,7 +200,7 @@ def retarget(
             turns = basis(skeleton, motion.rotations)
             warnings = map_notices(rig, bone_map)
             warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)
-            keys = [BoneKeys(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
+            keys = [BoneMotion(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(
                 keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads)
             )

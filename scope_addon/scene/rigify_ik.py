@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .rig_action import BoneKeys
+from ..retarget.skeleton import BoneMotion
 
 # Limb, middle bone, end and, of legs, toe.
 _LIMBS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand", ""))
@@ -38,7 +38,7 @@ class _Limb:
     at_rest: tuple[str, ...]  # further controls below the end's, which stay at rest
 
 
-def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
+def ik_keys(rig: bpy.types.Object, keys: list[BoneMotion]) -> list[BoneMotion]:
     """Return the keys of the IK controls; none for other rigs, and for limbs of which an FK control
     has no keys.
 
@@ -57,7 +57,7 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
             rig.pose.bones[name].matrix_basis = Matrix()
     for t in _shown_at_the_mouse(count):
         for key in keys:
-            rig.pose.bones[key.bone].matrix_basis = key.basis(t)
+            rig.pose.bones[key.bone].matrix_basis = _basis(key, t)
         bpy.context.view_layer.update()
         for limb in limbs:  # first, because the parents of the other controls follow it
             _match(rig, limb.ik[2], limb.fk[2], bases)
@@ -69,6 +69,14 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneKeys]) -> list[BoneKeys]:
     found = [_keys_of(bone, matrices) for bone, matrices in bases.items()]
     still = [bone for limb in limbs for bone in limb.at_rest]
     return found + [_keys_of(bone, [Matrix()] * count) for bone in still]
+
+
+def _basis(key: BoneMotion, t: int) -> Matrix:
+    """Return the bone's ``matrix_basis`` of one frame."""
+    matrix = Matrix(key.rotations[t].tolist()).to_4x4()
+    if key.locations is not None:
+        matrix.translation = key.locations[t].tolist()
+    return matrix
 
 
 def _shown_at_the_mouse(count: int) -> Iterator[int]:
@@ -204,6 +212,6 @@ def _set(rig: bpy.types.Object, name: str, matrix: Matrix, bases: dict[str, list
     bases.setdefault(name, []).append(bone.matrix_basis.copy())
 
 
-def _keys_of(bone: str, bases: list[Matrix]) -> BoneKeys:
+def _keys_of(bone: str, bases: list[Matrix]) -> BoneMotion:
     rotations = np.array([np.array(matrix.to_quaternion().to_matrix()) for matrix in bases])
-    return BoneKeys(bone, rotations, np.array([matrix.translation for matrix in bases], float))
+    return BoneMotion(bone, rotations, np.array([matrix.translation for matrix in bases], float))

@@ -242,13 +242,13 @@ class SCOPE_OT_mark_asset(ActionOperator):
 
         :raises UsageError: the action is linked, or the catalog does not exist.
         """
-        from ..scene.action_asset import AssetDetails, mark_action, set_preview
+        from ..scene.action_asset import mark_action, set_preview
 
         armature = animated_armature(context)
         assert armature is not None  # checked by poll
         action = armature.animation_data.action
         description = self.description_text or _described(context, armature)
-        mark_action(action, AssetDetails(self.author.strip(), description, self.catalog.strip()))
+        mark_action(action, self.author.strip(), description, self.catalog.strip())
         set_preview(action, armature, self._frame(context, armature))
         if not bpy.data.filepath:
             return rpt_(

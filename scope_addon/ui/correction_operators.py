@@ -68,7 +68,7 @@ def change_corrections(
     before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
     keys = rewrite_changed_keys(
-        armature, body, rate, (before, after), stored_keys(armature), added, rise
+        armature, body, rate, before, after, stored_keys(armature), added, rise
     )
     set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
     store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))
@@ -147,13 +147,17 @@ def pin_at(
     armature: bpy.types.Object,
     motion: Motion,
     joint: str,
-    place: tuple[Any, bool, float],
+    location: Any,
+    *,
+    in_image: bool,
+    reach: float,
 ) -> Pin:
     """Return a pin at the scene's current frame.
 
-    :param place: the joint's position in the scene (3,); whether it was placed in the view of the
-        capture's camera; and the seconds over which the correction fades out. A pin in the image
-        needs the camera where it was captured.
+    :param location: (3,) the joint's position in the scene.
+    :param in_image: whether it was placed in the view of the capture's camera, which then has to
+        be where it was captured.
+    :param reach: seconds over which the correction fades out.
     :raises UsageError: the current frame is outside of the motion.
     """
     import numpy as np
@@ -163,7 +167,6 @@ def pin_at(
     from ..scene.character.corrected_keys import captured_points
 
     scene = context.scene
-    (location, in_image, reach) = place
     context.view_layer.update()
     current = scene.frame_current + scene.frame_subframe
     frame = shown_frame(scene, armature, motion)
@@ -283,8 +286,15 @@ class SCOPE_OT_add_pin(EditOperator):
         with current_frame_kept(scene):
             if self.frame != _NOW:
                 scene.frame_set(self.frame)
-            place = tuple(self.location), self.in_image, self.reach
-            pin = pin_at(context, armature, motion_of(armature), self.joint, place)
+            pin = pin_at(
+                context,
+                armature,
+                motion_of(armature),
+                self.joint,
+                tuple(self.location),
+                in_image=self.in_image,
+                reach=self.reach,
+            )
             change_corrections(armature, body, rate, lambda present: added(present, pin), pin)
             here = scene.frame_current
         last_pin_warnings[:] = _pin_warnings(armature, body, self.joint, here)

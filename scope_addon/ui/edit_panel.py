@@ -143,8 +143,8 @@ class SCOPE_OT_smooth(EditOperator):
         frames = key_frames(motion.timestamps, rate, start_frame(armature))
         clip = smoothed(body, motion, self.strength)
         if motion.corrections:
-            clips = smoothed(body, uncorrected(motion), self.strength), clip
-            keys = write_both(armature, body, clips, frames, rate)
+            free = smoothed(body, uncorrected(motion), self.strength)
+            keys = write_both(armature, body, free, clip, frames, rate)
             set_motion_of(armature, motion, keys.to_bytes())
         else:
             write_clip(armature, body, clip, frames)
@@ -449,7 +449,7 @@ class SCOPE_OT_refloor(CorrectionOperator):
                 armature,
                 body,
                 rate,
-                lambda clip, frames: floored(armature, body, betas, (clip, frames), feet),
+                lambda clip, frames: floored(armature, body, betas, clip, frames, feet),
             )
             return ""
         change_corrections(armature, body, rate, lambda present: added(present, feet), feet)

@@ -306,7 +306,7 @@ class SCOPE_OT_floor_here(CorrectionOperator):
         scene = context.scene
         motion = motion_of(armature)
         frame = shown_frame(scene, armature, motion)
-        height, shown = heights_of_foot(armature, body, rate, motion, (frame, self.foot))
+        height, shown = heights_of_foot(armature, body, rate, motion, frame, self.foot)
         floor = Floor(frame, height)
         # Edited keys may have the foot elsewhere than the motion.
         rise = height - shown if abs(height - shown) > _SAME_M else 0.0

@@ -97,11 +97,9 @@ class RigifyFace:
         weights = np.zeros((1, len(EXPRESSIONS)))
         weights[0, EXPRESSIONS.index("jawOpen")] = 1.0
         for motion in control_motions(ExpressionMap({}, controls), weights, self.bones):
-            R = np.eye(3) if motion.rotations is None else motion.rotations[0]
-            basis = Matrix(R.tolist()).to_4x4()
-            basis.translation = (
-                (0.0, 0.0, 0.0) if motion.locations is None else motion.locations[0].tolist()
-            )
+            assert motion.locations is not None
+            basis = Matrix(motion.rotations[0].tolist()).to_4x4()
+            basis.translation = motion.locations[0].tolist()
             self.rig.pose.bones[motion.bone].matrix_basis = basis
         return in_lengths(self._points() - self.at_rest, self.frame)
 

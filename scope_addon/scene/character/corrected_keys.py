@@ -48,7 +48,8 @@ def rewrite_changed_keys(
     armature: bpy.types.Object,
     body: Body,
     rate: float,
-    motions: tuple[Motion, Motion],
+    before: Motion,
+    after: Motion,
     stored: object = None,
     added: Correction | None = None,
     rise: float = 0.0,
@@ -59,7 +60,6 @@ def rewrite_changed_keys(
     keys from before.
 
     :param rate: scene frames per second.
-    :param motions: before and after.
     :param stored: bytes of the ``UncorrectedKeys`` of the last change.
     :param added: a new correction; a pin or an edit holds even if edited keys differ from the
         motion.
@@ -68,7 +68,6 @@ def rewrite_changed_keys(
     :raises UsageError: when a bone or its keys are missing.
     """
     start = start_frame(armature)
-    (before, after) = motions
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
     on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
@@ -80,7 +79,7 @@ def rewrite_changed_keys(
         _at(smoothed(body, m, strength), clip.times, _start(armature, rate))
         for m in (uncorrected(before), before, after)
     )
-    was, now = (world_of(corrections_of(m)) for m in motions)
+    was, now = (world_of(corrections_of(m)) for m in (before, after))
     _check_root_motion(armature, was, now)
     old, new = (
         c if T is None else moved_clip(c, np.linalg.inv(T)) for c, T in ((old, was), (new, now))
@@ -114,7 +113,7 @@ def rewrite_changed_keys(
     after_values = keyed_values(armature, body, rows)
     same = (values == after_values) | (np.isnan(values) & np.isnan(after_values))
     changed = differ(free, new) | ~same.all(axis=1) | (now is not None)
-    return changed_rows(rows, exact & changed, (values, after_values), start, rate)
+    return changed_rows(rows, exact & changed, values, after_values, start, rate)
 
 
 def _raise_keys(armature: bpy.types.Object, body: Body, rate: float, rise: float) -> None:
@@ -164,15 +163,15 @@ def _meet_pin(
 
 
 def heights_of_foot(
-    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, place: tuple[int, str]
+    armature: bpy.types.Object, body: Body, rate: float, motion: Motion, frame: int, foot: str
 ) -> tuple[float, float]:
     """Return how high a foot is in a frame, metres: in the motion, as smooth as the keys are, and
     in the edited keys.
 
     :param rate: scene frames per second.
-    :param place: frame of the footage, and the foot as in `foot_height`.
+    :param frame: of the footage.
+    :param foot: as in `foot_height`.
     """
-    frame, foot = place
     captured = smoothed(body, motion, smoothing_of(armature))
     clip, frames = read_clip(armature, body, rate)
     shown = clip_with_root_motion(armature, clip, frames), _start(armature, rate)
@@ -404,9 +403,8 @@ def begin_with_edits(
     if feet is None or not enough:
         return keys, old
     height = floor_above(edits.corrections, feet)
-    placed = floored(
-        armature, body, edits.betas, (keys.rows(edits.rows), frames[edits.rows]), feet, height
-    )
+    rows = edits.rows
+    placed = floored(armature, body, edits.betas, keys.rows(rows), frames[rows], feet, height)
     others = tuple(c for c in edits.corrections if not isinstance(c, Interpolation))
     compared = edited(old.rows(edits.rows), body, edits.betas, others, edits.shot)
     return _replaced(keys, edits.rows, placed), _replaced(old, edits.rows, compared)
@@ -425,7 +423,7 @@ def meet_floor(
         return
     clip, frames = read_clip(armature, body, rate)
     height = floor_above(edits.corrections, feet)
-    placed = floored(armature, body, edits.betas, (clip, frames), feet, height)
+    placed = floored(armature, body, edits.betas, clip, frames, feet, height)
     if np.abs(placed.root - clip.root).max() > _SAME_M:
         write_keys(armature, body, placed, frames, np.ones(len(frames), bool))
 
@@ -434,17 +432,17 @@ def floored(
     armature: bpy.types.Object,
     body: Body,
     betas: NDArray[np.floating[Any]],
-    keys: tuple[Clip, NDArray[np.float64]],
+    clip: Clip,
+    frames: NDArray[np.float64],
     feet: FeetOnFloor,
     height: float = 0.0,
 ) -> Clip:
     """Put the feet of keys on the floor: those in contact are at rest only with their root motion.
 
     :param betas: (P,) shape coefficients.
-    :param keys: the keys, and their scene frames (T,).
+    :param frames: (T,) scene frames of the keys.
     :param height: z of the floor, metres, in the armature's space.
     """
-    clip, frames = keys
     positions, angles = removed_root_motion(armature, frames)
     path = positions * [1.0, 1.0, 0.0], angles
     placed = refloor(with_trajectory(clip, *path), body, betas, feet, height)

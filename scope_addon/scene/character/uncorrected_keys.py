@@ -111,24 +111,24 @@ def restore(
 def write_both(
     armature: bpy.types.Object,
     body: Body,
-    clips: tuple[Clip, Clip],
+    free: Clip,
+    corrected: Clip,
     frames: NDArray[np.float64],
     rate: float,
 ) -> UncorrectedKeys:
     """Replace all keys by those of a corrected clip, at scene frames (T,).
 
-    :param clips: without and with corrections.
+    :param free: without corrections.
     :param rate: scene frames per second.
     :return: the keys that the corrections change.
     """
-    free, corrected = clips
-    values = []
-    for clip in clips:
-        write_clip(armature, body, clip, frames)
-        values.append(keyed_values(armature, body, frames.astype(np.float32)))
-    start = start_frame(armature)
+    keyed_frames = frames.astype(np.float32)
+    write_clip(armature, body, free, frames)
+    before = keyed_values(armature, body, keyed_frames)
+    write_clip(armature, body, corrected, frames)
+    after = keyed_values(armature, body, keyed_frames)
     rows = differ(free, corrected)
-    return changed_rows(frames.astype(np.float32), rows, (values[0], values[1]), start, rate)
+    return changed_rows(keyed_frames, rows, before, after, start_frame(armature), rate)
 
 
 def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
@@ -142,7 +142,8 @@ def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
 def changed_rows(
     frames: NDArray[np.float32],
     rows: NDArray[np.bool_],
-    values: tuple[NDArray[np.float32], NDArray[np.float32]],
+    before: NDArray[np.float32],
+    after: NDArray[np.float32],
     start: float,
     rate: float,
 ) -> UncorrectedKeys:
@@ -150,9 +151,8 @@ def changed_rows(
 
     :param frames: (T,) scene frames.
     :param rows: (T,) which rows.
-    :param values: keys before and after, (T, C) each.
+    :param before, after: (T, C) the keys.
     :param start: scene frame of timestamp 0.
     :param rate: scene frames per second.
     """
-    before, after = values
     return UncorrectedKeys((frames[rows].astype(float) - start) / rate, before[rows], after[rows])

@@ -55,11 +55,8 @@ def posed(bones, motions):
     """Where each control's head is, (3,), and how it is turned, (3, 3), in the armature's space."""
     return {
         m.bone: (
-            bones[m.bone].head
-            + (bones[m.bone].rotation @ m.locations[0] if m.locations is not None else 0),
-            bones[m.bone].rotation @ m.rotations[0] @ bones[m.bone].rotation.T
-            if m.rotations is not None
-            else np.eye(3),
+            bones[m.bone].head + bones[m.bone].rotation @ m.locations[0],
+            bones[m.bone].rotation @ m.rotations[0] @ bones[m.bone].rotation.T,
         )
         for m in motions
     }
@@ -108,7 +105,7 @@ def test_an_eye_looks_at_its_target_by_the_angle():
     )
     for name, angle in (("eyeLookOutLeft", 20), ("eyeLookDownLeft", 10)):
         (motion,) = control_motions(amounts, weights(**{name: 1}), bones)
-        assert motion.rotations is None
+        assert np.allclose(motion.rotations, np.eye(3), atol=1e-15)
         seen = posed(bones, [motion])["eye.L"][0] - PLACES["ORG-eye.L"]
         side = (
             (np.sin(np.radians(20)), 0)
@@ -149,12 +146,8 @@ def test_a_scaled_and_turned_face_moves_alike():
 def test_a_neutral_face_is_at_rest_exactly():
     bones = face()
     for motion in control_motions(built_in("rigify"), weights(), bones):
-        assert motion.locations is None or not motion.locations.any()
-        assert (
-            motion.rotations is None
-            or (motion.rotations == np.eye(3)).all()
-            or np.allclose(motion.rotations, np.eye(3), atol=1e-15)
-        )
+        assert not motion.locations.any()
+        assert np.allclose(motion.rotations, np.eye(3), atol=1e-15)
 
 
 def test_locations_in_the_armatures_axes():

@@ -18,7 +18,7 @@ from scope.benchmarks.rigs.measured import measured
 from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
-from scope.scope_addon.scene.rig_export import RigExportOptions, export_on_rig
+from scope.scope_addon.scene.rig_export import export_on_rig
 from scope.scope_addon.scene.rig_file import load_rig, rig_bone_map
 from scope.scope_addon.scene.rig_retarget import retarget, usable_guess
 from scope.solver.errors import InputError
@@ -164,7 +164,7 @@ def test_a_rig_in_centimetres_is_the_same_in_an_fbx_file_as_one_in_metres(tmp_pa
         formats.write_blend(tmp_path / "rig.blend", bpy.context.scene)
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         out = tmp_path / "out.fbx"
-        options = RigExportOptions(replace(NEW_SCENE, name="walk"))
+        options = replace(NEW_SCENE, name="walk")
         export_on_rig([MOTION], BODY, [out], rig_source(tmp_path / "rig.blend"), options)
         models = fbx_models(out)
         scales = [np.ravel(values.get("Lcl Scaling", [1.0] * 3)) for values in models.values()]

@@ -20,7 +20,7 @@ from scope.scope_addon.scene.face_retarget import (
     faces_of,
     retarget_expressions,
 )
-from scope.scope_addon.scene.rig_export import RigExportOptions, export_on_rig
+from scope.scope_addon.scene.rig_export import export_on_rig
 
 from ...edit.walking import motion_of, walk
 from ...made_motion import made_face
@@ -170,7 +170,7 @@ def test_a_rig_file_gets_body_and_face(whole_body, tmp_path, names, moving):
     T = len(motion.frames)
     motion = replace(motion, face=made_face(T, jawOpen=np.linspace(0, 0.5, T)))
     _, warnings = export_on_rig(
-        [motion], whole_body, [tmp_path / "out.glb"], RigSource(path), RigExportOptions(NEW_SCENE)
+        [motion], whole_body, [tmp_path / "out.glb"], RigSource(path), NEW_SCENE
     )
     found = [warning for warning in map(str, warnings) if "face" in warning]
     if moving is None:
@@ -199,7 +199,7 @@ def test_a_rig_file_whose_bones_move_the_face(whole_body, tmp_path, known_keys):
         whole_body,
         [tmp_path / "out.blend"],
         RigSource(tmp_path / "hero.blend"),
-        RigExportOptions(NEW_SCENE),
+        NEW_SCENE,
     )
     assert not [warning for warning in map(str, warnings) if "face" in warning]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))

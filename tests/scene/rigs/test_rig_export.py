@@ -19,7 +19,7 @@ from scope.scope_addon.retarget.rig_source import rig_source
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions
-from scope.scope_addon.scene.rig_export import RigExportOptions, export_on_rig, export_rig
+from scope.scope_addon.scene.rig_export import export_on_rig, export_rig
 from scope.scope_addon.scene.rig_file import check_rig
 from scope.scope_addon.scene.rig_retarget import guess_bone_map, retarget
 from scope.solver.errors import InputError
@@ -113,9 +113,7 @@ def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
         k: len(getattr(bpy.data, k))
         for k in ("objects", "meshes", "armatures", "actions", "collections")
     }
-    written, _ = export_on_rig(
-        [motion_of(walk(2.0))], BODY, targets, source, RigExportOptions(OPTIONS)
-    )
+    written, _ = export_on_rig([motion_of(walk(2.0))], BODY, targets, source, OPTIONS)
     assert written == targets
     assert {k: len(getattr(bpy.data, k)) for k in before} == before
     for path in targets[:3]:
@@ -158,7 +156,7 @@ def test_two_people_have_a_rig_each(tmp_path):
     other = walk(2.0)
     other.root[:, 0] += 2.0
     motions = [motion_of(walk(2.0)), motion_of(other)]
-    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, RigExportOptions(OPTIONS))
+    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, OPTIONS)
     rigs = read(tmp_path / "out.glb")
     places = [seen(rig, [names_of("mixamo")["pelvis"]], [30])[0, 0, 0] for rig in rigs]
     assert len(rigs) == 2
@@ -186,7 +184,7 @@ def test_people_of_different_heights_keep_their_places_in_proportion(tmp_path):
         wanted.append(clip.joints(BODY, betas)[9, hips].mean(axis=0))
         motions.append(replace(motion_of(clip), betas=betas, trans=clip.root - rest[0]))
     assert max(legs) > 1.05 * min(legs)
-    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, RigExportOptions(OPTIONS))
+    export_on_rig(motions, BODY, [tmp_path / "out.glb"], source, OPTIONS)
     rigs = sorted(read(tmp_path / "out.glb"), key=lambda rig: rig.name)
     hips = [names_of("mixamo")[f"{side}_hip"] for side in ("left", "right")]
     places = [seen(rig, hips, [10])[0].mean(axis=0) for rig in rigs]
@@ -347,7 +345,7 @@ def test_root_motion_on_an_object_is_the_same_in_every_format(tmp_path, kind):
     paths = {}
     for root in ("bone", "object"):
         out = tmp_path / f"{root}{kind}"
-        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, RigExportOptions(OPTIONS, root))
+        export_on_rig([motion_of(walk(2.0))], BODY, [out], source, OPTIONS, root=root)
         rigs = read(out)
         bone = names_of("mixamo")["pelvis"]
         paths[root] = (
@@ -441,7 +439,5 @@ def test_footage_of_a_distorting_lens_does_not_stay_in_the_session(tmp_path):
     source = rig_source(save_rig(tmp_path / "rig.blend"))
     motion = motion_of(walk(0.2))
     motion.dist[0] = -0.1
-    export_on_rig(
-        [motion], BODY, [tmp_path / "out.bvh"], source, RigExportOptions(NEW_SCENE), SAMPLE
-    )
+    export_on_rig([motion], BODY, [tmp_path / "out.bvh"], source, NEW_SCENE, SAMPLE)
     assert list(bpy.data.movieclips) == []

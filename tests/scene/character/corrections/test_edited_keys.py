@@ -38,10 +38,10 @@ def test_feet_of_displayed_keys_are_put_on_the_floor_wherever_the_motion_has_the
     )
     np.testing.assert_allclose(keys.root, old.root, atol=1e-9)
     assert np.abs(keys.soles(BODY, BETAS)[..., 2].min(axis=1)).max() < 0.06
-    same = floored(rig, BODY, BETAS, (raised(0.3), FRAMES), FeetOnFloor())
+    same = floored(rig, BODY, BETAS, raised(0.3), FRAMES, FeetOnFloor())
     np.testing.assert_allclose(keys.root, same.root, atol=1e-12)
     np.testing.assert_allclose(
-        floored(rig, BODY, BETAS, (WALK, FRAMES), FeetOnFloor(), 0.2).root[:, 2] - 0.2,
+        floored(rig, BODY, BETAS, WALK, FRAMES, FeetOnFloor(), 0.2).root[:, 2] - 0.2,
         same.root[:, 2],
     )
 
