@@ -17,7 +17,13 @@ from ..errors import UsageError
 _LONGEST = 63 if bpy.app.version < (5, 0) else 255  # bytes
 SUFFIX_BYTES = 24  # room for what is appended to a capture's name, such as ``_person12_body.001``
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection
-KINDS = ("objects", "meshes", "armatures", "collections", "materials")
+# Kinds of datablock that a file or a capture may contain, users before the datablocks that they
+# use. Shape keys go with their mesh, and ``temporary_scene`` removes scenes.
+_KINDS = (
+    "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs",
+    "lattices", "actions",
+    "materials", "node_groups", "textures", "images", "movieclips", "texts", "worlds", "libraries",
+)  # fmt: skip
 
 
 def short_name(name: str) -> str:
@@ -84,14 +90,11 @@ def check_local(scene: bpy.types.Scene) -> None:
 
 
 class NewDatablocks:
-    """The datablocks of some kinds that are new since a moment.
+    """The datablocks that are new since a moment."""
 
-    :param kinds: names of collections of ``bpy.data``.
-    """
-
-    def __init__(self, kinds: Sequence[str]) -> None:
+    def __init__(self) -> None:
         self._before = {
-            kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in kinds
+            kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in _KINDS
         }
 
     def all(self) -> list[tuple[str, bpy.types.ID]]:

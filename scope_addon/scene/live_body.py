@@ -25,7 +25,7 @@ from ...solver.rotations import matrix_from_quaternion
 from ..kinematics.axes import R_WORLD_MODEL
 from .character import armature, body_mesh
 from .character.animation import quaternion_from_matrix, quaternion_product
-from .datablocks import KINDS, NewDatablocks, found, remove, scene_of
+from .datablocks import NewDatablocks, found, remove, scene_of
 
 _Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)
 _MIN_CHANGE = 0.01  # of a shape coefficient that changes the mesh: less than half a millimetre
@@ -124,7 +124,7 @@ class LiveBody:
         """
         scene = scene_of(self._scene_uid)
         body = self._body
-        new = NewDatablocks(KINDS)
+        new = NewDatablocks()
         remove(self._blocks)
         collection = bpy.data.collections.new(self._name)
         scene.collection.children.link(collection)

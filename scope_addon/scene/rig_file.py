@@ -24,14 +24,6 @@ from .export.export_states import temporary_scene
 from .rig_probe import at_rest, probe
 from .rig_retarget import usable_guess
 
-# Kinds of datablock that a file or a capture may contain, users before the datablocks that they
-# use. Scenes are removed by ``temporary_scene``.
-_KINDS = (
-    "collections", "objects", "meshes", "armatures", "curves", "cameras", "lights", "metaballs",
-    "lattices", "actions",
-    "materials", "node_groups", "textures", "images", "movieclips", "texts", "worlds", "libraries",
-)  # fmt: skip
-
 
 def load_rig(source: RigSource, collection: bpy.types.Collection) -> bpy.types.Object:
     """Load the rig into ``collection`` of the active scene, without animation; return its armature.
@@ -152,7 +144,7 @@ def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
 @contextmanager
 def temporary_datablocks() -> Iterator[None]:
     """Remove all datablocks that the block has added to the file."""
-    new = NewDatablocks(_KINDS)
+    new = NewDatablocks()
     try:
         yield
     finally:

@@ -20,21 +20,6 @@ import numpy as np
 from .actions import has_slots, read_modifiers, read_whole_keys, write_modifiers, write_whole_keys
 from .datablocks import NewDatablocks, enter_object_mode
 
-# Kinds of datablock that the work may create; shape keys go with their mesh.
-_KINDS = (
-    *(
-        "collections",
-        "objects",
-        "meshes",
-        "armatures",
-        "cameras",
-        "actions",
-        "materials",
-        "movieclips",
-        "images",
-    ),
-    "texts",  # packed motions
-)
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
 _RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
 _SETTINGS = ("use_frame_range", "use_cyclic", "frame_start", "frame_end")
@@ -65,7 +50,7 @@ def all_or_nothing(
     unique = list(dict.fromkeys(objects))
     animated = [_SavedAnimation(owner) for owner in (*unique, *keys)]
     values = [(block, block.value) for key in keys for block in key.key_blocks]
-    new = NewDatablocks(_KINDS)
+    new = NewDatablocks()
     settings = _SavedScene(scene)
     transforms = [_SavedTransform(obj) for obj in unique]
     try:

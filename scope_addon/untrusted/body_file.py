@@ -21,7 +21,7 @@ from ...solver.body import Body
 from ...solver.body_file import BUILT_IN, CHOICE, as_path, scope_body
 from ...solver.body_file import load_body as load_trusted_body
 from ...solver.errors import ModelFileError
-from ...solver.smpl_family import MAX_BETAS, REQUIRED, SMPLX_SHAPE, smpl_body
+from ...solver.smpl_family import REQUIRED, smpl_body
 from .files import npz_keys, read_members, read_npz
 from .pickles import read_pickle, to_array
 
@@ -107,11 +107,10 @@ def is_motion(path: Path) -> bool:
     return {"poses", "trans"} <= keys and "v_template" not in keys
 
 
-def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
+def load_model(path: str | Path) -> Body:
     """Load a user's SMPL, SMPL+H, SMPL-X or STAR file, .npz or .pkl: see ``solver.smpl_family``.
     The file may be hostile; nothing in it is run.
 
-    :param max_betas: the most shape coefficients to keep, 0 to 300; the leading ones are kept.
     :raises ModelFileError: missing, unreadable, not a body, contradicts itself, or asks for more
         than arrays.
     """
@@ -120,11 +119,9 @@ def load_model(path: str | Path, max_betas: int = MAX_BETAS) -> Body:
         raise ModelFileError(
             f"{path} does not exist; choose an SMPL, SMPL+H, SMPL-X or STAR file (.npz or .pkl)"
         )
-    if not 0 <= max_betas <= SMPLX_SHAPE:
-        raise ModelFileError(f"max_betas must lie in 0..{SMPLX_SHAPE}, but is {max_betas}")
     arrays = _read_tables(path)
     try:
-        body = smpl_body(arrays, path, max_betas)
+        body = smpl_body(arrays, path)
     except MemoryError as cause:
         raise ModelFileError(
             f"{path} is too large for this computer's memory; choose a smaller body file"
