@@ -82,8 +82,8 @@ SENTENCES = {
     "cuts": "{footage} cuts to another scene {times:times}: capture each scene separately, with a "
     "start and end time",
     "left_out": "{footage} shows more people than were captured: at least {others} more, one of "
-    "them at {place} (x, y in pixels, @ seconds). Capture everyone, or choose the one to be captured "
-    "with --person {place}",
+    "them at {place} (x, y in pixels, @ seconds). Capture everyone, or choose the one to be "
+    "captured with --person {place}",
     "turned_footage": "{footage}: the person lies or stands on the head in the picture from "
     "beginning to end. If the camera was turned, capture with Turn, --rotate {degrees} on the "
     "command line",
