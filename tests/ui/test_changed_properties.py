@@ -90,7 +90,7 @@ def try_all():
     listed_corrections(bpy.context.object)
 
 
-@pytest.mark.parametrize("kind", ["text", "list", "group"])
+@pytest.mark.parametrize("kind", ["text", "group"])
 def test_no_operator_fails_with_a_traceback(rig, kind):
     for name in PROPERTIES:
         before = rig.get(name)
@@ -192,7 +192,7 @@ def test_a_changed_rate_is_the_scenes(rig):
         assert keyed_rate(rig, scene) == (7.0 if value == 7 else 30.0)
 
 
-@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
+@pytest.mark.parametrize("value", [VALUES["text"], VALUES["group"]])
 def test_a_changed_person_of_a_rig_is_none(rig, tmp_path, value):
     own, _ = made_rigs.build_rig("unreal")
     bpy.context.scene.scope_retarget.rig = own

@@ -87,9 +87,13 @@ def test_plain_arrays_of_python_3(tmp_path, tables_of, protocol):
     assert_same_model(tmp_path / "body.pkl", tables)
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("form", ["csc", "csr", "coo", "new coo"])
-@pytest.mark.parametrize("private", [False, True])
+LAYOUTS = [
+    *((protocol, "csc", False) for protocol in PROTOCOLS),
+    *((2, form, private) for form in ("csr", "coo", "new coo") for private in (False, True)),
+]
+
+
+@pytest.mark.parametrize(("protocol", "form", "private"), LAYOUTS)
 def test_the_official_layout(tmp_path, monkeypatch, tables_of, stand_ins, protocol, form, private):
     tables = tables_of("smpl")
     ch = stand_ins("chumpy.ch.Ch")

@@ -100,7 +100,7 @@ def test_a_last_pose_between_whole_frames_is_reached(
 
 
 @pytest.mark.parametrize("suffix", [".fbx", ".blend", ".bvh"])
-@pytest.mark.parametrize("rate", [24000 / 1001, 25.0, 30000 / 1001, 60000 / 1001])
+@pytest.mark.parametrize("rate", [25.0, 30000 / 1001])
 def test_formats_that_store_a_frame_rate_store_the_right_one(
     body, make_motion, tmp_path, suffix, rate
 ):
@@ -196,10 +196,10 @@ def test_the_footages_camera_is_exported_on_request(body, make_motion, tmp_path,
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
-@pytest.mark.parametrize(("fx", "fy"), [(600.0, 600.0), (600.0, 900.0)])
 def test_the_camera_keeps_its_field_of_view_in_a_scene_of_another_shape(
-    body, make_motion, tmp_path, blender, suffix, fx, fy
+    body, make_motion, tmp_path, blender, suffix
 ):
+    fx, fy = 600.0, 900.0  # pixels need not be square
     motion = make_motion(body, 2, intrinsics=np.array([[fx, 0, 320], [0, fy, 240], [0, 0, 1]]))
     bpy.context.scene.render.resolution_x = 1920
     bpy.context.scene.render.resolution_y = 1080
@@ -281,8 +281,8 @@ def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender,
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
 def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blender, truth, suffix):
-    motions = [make_motion(body, 6), make_motion(body, 6, seed=1), make_motion(body, 6, seed=2)]
-    path = tmp_path / f"three{suffix}"
+    motions = [make_motion(body, 6), make_motion(body, 6, seed=1)]
+    path = tmp_path / f"pair{suffix}"
     export_motions(motions, body, path)
     first = read_back(path)
     armatures = sorted(
@@ -297,7 +297,7 @@ def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blende
             )
 
 
-@pytest.mark.parametrize("first_frame", [0.0, 1.0, 7.0])
+@pytest.mark.parametrize("first_frame", [0.0, 7.0])
 def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(
     body, make_motion, tmp_path, first_frame
 ):

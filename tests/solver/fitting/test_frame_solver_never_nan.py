@@ -15,9 +15,12 @@ from scope.solver import (
     Keypoints3D,
     Measurements,
     Options,
+    OrientationField,
     PosePriors,
+    Stage,
     State,
     Status,
+    Weights,
     fit,
     fit_clip,
 )
@@ -27,7 +30,17 @@ from ..synthetic import random_body, random_state
 from .test_frame_solver import INTRINSICS, measured
 
 STOPPED = {Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS}
-BODIES = {"P0": (23, 0), "K51": (51, 10), "P300": (23, 300), "one joint": (1, 0)}
+FREE = Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0)
+UNGUARDED = Options(
+    stages=[Stage(FREE, 1e-5, 50)], robust_keypoints2d=np.inf, robust_keypoints3d=np.inf
+)
+BODIES = {
+    "P0": (23, 0, Options()),
+    "K51": (51, 10, Options()),
+    "P100": (23, 100, Options()),
+    "one joint": (1, 0, Options()),
+    "without priors and kernels": (23, 10, UNGUARDED),
+}
 
 
 def masked(m, value):
@@ -38,6 +51,11 @@ def masked(m, value):
         for k in kinds
     }
     return replace(m, **fields)
+
+
+def placed(m, change):
+    """The 3D keypoints changed: in contradiction to the image, unless it says so little."""
+    return replace(m, keypoints3d=replace(m.keypoints3d, points=change(m.keypoints3d.points)))
 
 
 def contradiction(m):
@@ -67,26 +85,40 @@ def half_turned(m):
     )
 
 
-def mirrored(m):
-    """Points behind the camera, where the image says they are in front."""
-    return replace(m, keypoints3d=replace(m.keypoints3d, points=-m.keypoints3d.points))
+def opposite_directions(m):
+    o = m.orientation_field
+    both = [
+        np.concatenate([a, b])
+        for a, b in ((o.starts, o.starts), (o.ends, o.ends), (o.directions, -o.directions))
+    ]
+    return Measurements(orientation_field=OrientationField(*both))
 
 
-def gathered(m):
-    """All points in the camera's centre."""
-    return replace(m, keypoints3d=replace(m.keypoints3d, points=0.0 * m.keypoints3d.points))
+def zero_directions(m):
+    o = m.orientation_field
+    return Measurements(orientation_field=replace(o, directions=np.zeros((len(o.starts), 3))))
+
+
+def with_pixels(m, factor):
+    return Measurements(INTRINSICS, replace(m.keypoints2d, pixels=m.keypoints2d.pixels * factor))
 
 
 SPOILED = {
     "nothing": (lambda m: Measurements(), {Status.NO_MEASUREMENTS}),
     "no confidence": (lambda m: masked(m, 0.0), {Status.NO_MEASUREMENTS}),
     "confidence not a number": (lambda m: masked(m, np.nan), {Status.NO_MEASUREMENTS}),
+    "pixels not a number": (lambda m: with_pixels(m, np.nan), {Status.NO_MEASUREMENTS}),
+    "directions without a length": (zero_directions, {Status.NO_MEASUREMENTS}),
     "one point": (
         lambda m: Measurements(INTRINSICS, Keypoints2D([0], [[100.0, 100.0]], [1.0])),
         STOPPED,
     ),
-    "behind the camera": (mirrored, STOPPED),
-    "all in the camera": (gathered, STOPPED),
+    "all in one place": (lambda m: placed(m, lambda p: 0.0 * p + [0.0, 0.0, 2.0]), STOPPED),
+    "behind the camera": (lambda m: placed(m, lambda p: -p), STOPPED),
+    "all in the camera": (lambda m: placed(m, lambda p: 0.0 * p), STOPPED),
+    "far away": (lambda m: placed(m, lambda p: p + 1e9), STOPPED),
+    "huge pixels": (lambda m: with_pixels(m, 1e12), STOPPED),
+    "opposite directions": (opposite_directions, STOPPED),
     "contradictory": (contradiction, STOPPED),
     "beneath its own floor": (beneath_its_own_floor, STOPPED),
     "against its prior": (half_turned, STOPPED),
@@ -95,25 +127,27 @@ SPOILED = {
 
 @pytest.fixture(scope="module", params=BODIES.values(), ids=list(BODIES))
 def scene(request):
-    K, P = request.param
+    K, P, options = request.param
     rng = np.random.default_rng(K + P)
     body = random_body(rng, K, P, 2 * (K + 1), 0.02 if P < 100 else 0.004)
-    return body, measured(body, random_state(rng, K, P, 0.4)), State.rest(K, P)
+    return body, measured(body, random_state(rng, K, P, 0.4)), State.rest(K, P), options
 
 
 @pytest.mark.filterwarnings("error", "ignore::scope.solver.errors.ScopeWarning")
 @pytest.mark.parametrize("warm", [True, False], ids=["warm", "cold"])
 @pytest.mark.parametrize("spoiled", SPOILED.values(), ids=SPOILED)
 def test_any_body_ends_in_a_finite_pose(scene, spoiled, warm):
-    body, m, rest = scene
+    body, m, rest, options = scene
     spoil, allowed = spoiled
-    found, again = (fit(body, spoil(m), init=rest if warm else None) for _ in range(2))
+    init = rest if warm else None
+    found, again = (fit(body, spoil(m), init=init, options=options) for _ in range(2))
     s = found.state
     for array in (
         s.R_camera_root,
         s.t_camera_root,
         s.Omega,
         s.beta,
+        found.R_camera_part,
         found.t_camera_part,
         found.beta_information,
     ):
