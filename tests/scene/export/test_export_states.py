@@ -11,7 +11,7 @@ import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.export.export import ExportOptions, export
+from scope.scope_addon.scene.export.export import export
 
 from ...made_motion import made_face
 from ..character.test_expression_keys import morph_animation
@@ -73,27 +73,19 @@ def test_a_linked_capture_is_exported_with_its_shape_baked(
     )
 
 
-def _in_rest_position(person, collection):
-    person.armature.data.pose_position = "REST"
-
-
 def _in_edit_mode(person, collection):
     bpy.context.view_layer.objects.active = person.armature
     bpy.ops.object.mode_set(mode="EDIT")
 
 
-def _out_of_viewports(person, collection):
+def _hidden_at_rest(person, collection):
+    person.armature.data.pose_position = "REST"
     collection.hide_viewport = person.armature.hide_viewport = person.mesh.hide_viewport = True
-
-
-def _out_of_renders(person, collection):
     collection.hide_render = person.armature.hide_render = person.mesh.hide_render = True
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
-@pytest.mark.parametrize(
-    "hide", [_in_rest_position, _in_edit_mode, _out_of_viewports, _out_of_renders]
-)
+@pytest.mark.parametrize("hide", [_in_edit_mode, _hidden_at_rest])
 def test_motion_disabled_in_the_viewport_is_exported(
     body, make_motion, tmp_path, blender, truth, suffix, hide
 ):
@@ -201,20 +193,18 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
-@pytest.mark.parametrize("shape", ["keys", "baked"])
-def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path, shape):
+def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path):
     jaw = np.array([0.0, 0.3, 0.9, 0.2, 0.5])
     motion = replace(make_motion(whole_body, 5), face=made_face(5, jawOpen=jaw))
     person = build_scene([motion], whole_body, options=BuildOptions(frame_rate="set")).people[0]
     kept = [_to_nla(block, 40) for block in (person.armature, person.mesh.data.shape_keys)]
     actions_before = set(bpy.data.actions)
-    export(tmp_path / "talk.glb", options=ExportOptions(shape=shape))
+    export(tmp_path / "talk.glb")
     assert [(animation.action, animation.use_nla) for animation in kept] == [(None, True)] * 2
     assert set(bpy.data.actions) == actions_before
     weights = morph_animation(tmp_path / "talk.glb")
     np.testing.assert_allclose(weights["jawOpen"], jaw, atol=1e-5)
-    if shape == "keys":
-        np.testing.assert_allclose(weights["Shape000"], motion.betas[0], atol=1e-5)
+    np.testing.assert_allclose(weights["Shape000"], motion.betas[0], atol=1e-5)
 
 
 def test_a_solo_track_determines_the_frame_range(body, make_motion):
@@ -227,8 +217,10 @@ def test_a_solo_track_determines_the_frame_range(body, make_motion):
     assert actions.frame_range([person.armature])[1] < 10
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
-@pytest.mark.parametrize("size", [1.0, 100.0])
+@pytest.mark.parametrize(
+    ("suffix", "size"),
+    [(".glb", 1.0), (".glb", 100.0), (".fbx", 100.0), (".usdc", 100.0), (".bvh", 100.0)],
+)
 def test_a_capture_in_a_scene_in_centimetres_has_its_true_size(
     body, make_motion, tmp_path, blender, truth, size, suffix
 ):
