@@ -19,18 +19,18 @@ from .own_targets import KEY
 from .targets import TARGETS
 
 COUNT = {
-    "picture": 60,
-    "video": 100,
-    "body": 60,
-    "motion": 100,
-    "smpl_motion": 60,
+    "picture": 30,
+    "video": 50,
+    "body": 30,
+    "motion": 50,
+    "smpl_motion": 30,
     "network_run": 3,
-}  # of inputs, in some 10 s of CPU
+}  # of inputs, in some 5 s of CPU
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_damaged_inputs_raise_nothing_but_ours(tmp_path: Path, name: str) -> None:
-    for path in islice(inputs(name, tmp_path, seed=1), COUNT.get(name, 250)):
+    for path in islice(inputs(name, tmp_path, seed=1), COUNT.get(name, 125)):
         check(name, path)
 
 

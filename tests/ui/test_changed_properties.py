@@ -36,6 +36,7 @@ VALUES = {
     "frames": "1 2",
     "many": "9999999999 9999999999 -9999999999 99999999999999999999999",
 }
+KINDS = ("text", "list", "group", "nan", "huge", "number")
 PROPERTIES = (
     "scope_start",
     "scope_rate",
@@ -109,8 +110,9 @@ def test_no_operator_fails_with_a_traceback(rig, kind):
             rig[name] = kept
 
 
-@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
-def test_a_changed_start_is_that_of_a_capture_at_frame_0(rig, value):
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_changed_start_is_that_of_a_capture_at_frame_0(rig, kind):
+    value = VALUES[kind]
     rig["scope_start"] = value
     bpy.ops.scope.smooth(strength=1.0)
     keys = next(
@@ -139,7 +141,8 @@ def test_a_person_without_a_body_is_said(rig):
 
 
 @pytest.mark.parametrize(
-    "value", [*VALUES.values(), [1.0, 2.0, 3.0], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]]
+    "value",
+    [VALUES["text"], VALUES["group"], [1.0, 2.0, 3.0], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]],
 )
 def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, value):
     before = made_rigs.seen(rig, NAMES, [5, 20])
@@ -155,7 +158,8 @@ def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, val
 
 
 @pytest.mark.parametrize(
-    "value", [*VALUES.values(), [0.0] * 16, [1.0] * 15, [3.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]]
+    "value",
+    [VALUES["text"], VALUES["list"], VALUES["group"], [0.0] * 16, [1.0] * 15],
 )
 @pytest.mark.parametrize("name", ["scope_place", "scope_root"])
 def test_a_changed_root_object_goes_with_smoothing(rig, name, value):
@@ -168,14 +172,14 @@ def test_a_changed_root_object_goes_with_smoothing(rig, name, value):
     np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [5, 20]), before, atol=1e-4)
 
 
-@pytest.mark.parametrize("value", [*VALUES.values(), [1920.0, 0.0, 1.0, 1.0], [1e300] * 4])
-def test_a_changed_picture_leaves_the_resolution(rig, value):
+def test_a_changed_picture_leaves_the_resolution(rig):
     scene = bpy.context.scene
     collection = rig.users_collection[0]
     scene.render.resolution_x = 123
-    collection["scope_picture"] = value
-    set_resolution(scene, collection)
-    assert scene.render.resolution_x == 123
+    for value in (*VALUES.values(), [1920.0, 0.0, 1.0, 1.0], [1e300] * 4):
+        collection["scope_picture"] = value
+        set_resolution(scene, collection)
+        assert scene.render.resolution_x == 123
 
 
 def test_listed_frames_that_no_scene_has_are_left_out(rig):

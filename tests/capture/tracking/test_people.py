@@ -80,7 +80,7 @@ def identities(track: Track, people: list[Person]) -> set[int]:
 @pytest.mark.parametrize(
     "colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"]
 )
-@pytest.mark.parametrize("hidden", [0, 10, 20])
+@pytest.mark.parametrize("hidden", [0, 20])
 def test_identities_survive_a_crossing(
     follow: Callable[..., list[Track]], colors: tuple, hidden: int
 ) -> None:
@@ -99,28 +99,6 @@ def test_identities_survive_a_crossing(
     assert tracks[0].seen.mean() >= 0.98
     # not while the two bodies are indistinguishable
     assert tracks[1].seen.sum() >= 120 - hidden - 22
-
-
-@pytest.mark.parametrize("turns", [False, True], ids=["pass", "turn back"])
-@pytest.mark.parametrize(
-    "colors", [(RED, BLUE), (RED, RED)], ids=["different clothes", "same clothes"]
-)
-def test_identities_after_both_people_were_hidden(
-    follow: Callable[..., list[Track]], colors: tuple, turns: bool
-) -> None:
-    """Behind a pillar, where they pass each other or turn back; only clothes can tell which."""
-    hidden = range(50, 70)
-    way = (lambda t: min(t, 120 - t)) if turns else (lambda t: t)
-    left = Person(lambda t: (200 + 6.0 * way(t), 200), colors[0], hidden=hidden)
-    right = Person(lambda t: (920 - 6.0 * way(t), 205), colors[1], size_px=110, hidden=hidden)
-    tracks = follow([left, right], 120, wanted=2)
-    assert [track.seen[hidden].any() for track in tracks] == [False, False]
-    assert all(track.seen[80:].all() for track in tracks)
-    # taken for people who pass each other, which is all that is to be seen
-    switched = turns and colors[0] == colors[1]
-    assert [identities(track, [left, right]) for track in tracks] == (
-        [{0, 1}] * 2 if switched else [{1}, {0}]
-    )
 
 
 @pytest.mark.parametrize("count", [2, 8])
@@ -178,7 +156,7 @@ def test_a_person_who_enters_and_leaves(follow: Callable[..., list[Track]]) -> N
     assert seen[-1] == 99
 
 
-@pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
+@pytest.mark.parametrize("fps", [5, 24, 60])
 @pytest.mark.parametrize(("wanted", "within_s"), [(4, 0.27), (None, 0.67)], ids=["all", "largest"])
 def test_a_newcomer_is_found_equally_soon_at_any_rate(
     follow: Callable[..., list[Track]], fps: int, wanted: int | None, within_s: float
@@ -193,7 +171,7 @@ def test_a_newcomer_is_found_equally_soon_at_any_rate(
     assert comes <= found <= 1 + within_s + 0.5 / fps
 
 
-@pytest.mark.parametrize("fps", [5, 24, 30, 60, 120])
+@pytest.mark.parametrize("fps", [5, 24, 60])
 def test_the_networks_run_equally_often_at_any_rate(
     monkeypatch: pytest.MonkeyPatch, fps: int
 ) -> None:
@@ -349,65 +327,6 @@ def test_a_rival_at_the_start_is_searched_for_closely(
     assert identities(track, people) == ({1} if comes_s == 0 else {0})
     if comes_s == 0:
         assert track.seen[4:].all()
-
-
-def test_small_people_are_looked_for_once_a_second_and_only_where_there_is_nobody(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    person = Person(lambda t: (300, 200) if 100 <= t < 150 else None, BLUE)
-    looked: list[int] = []
-
-    class Detector(FakeDetector):
-        def detect_small(self, image: np.ndarray) -> list[Detection]:
-            looked.append(t)
-            return []
-
-    monkeypatch.setattr(
-        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks([person])
-    )
-    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector([person]))
-    tracker = PeopleTracker("best", 1)
-    for t, image in enumerate(pictures([person], 300)):
-        tracker.step(image, time_s=t / FPS)
-    assert [t for t in looked if t < 150] == [0, 30, 60, 90]
-    after = [t for t in looked if t >= 150]
-    # for so long, a person of that size would be found again without it
-    assert after[0] >= 150 + 2 * FPS - 1
-    assert (np.diff(after) == 30).all()
-
-
-@pytest.mark.parametrize("wanted", [None, 1, 2])
-def test_people_beside_larger_ones_are_looked_for_ever_more_rarely_and_only_while_one_is_missing(
-    monkeypatch: pytest.MonkeyPatch, wanted: int | None
-) -> None:
-    people = [
-        Person(standing(300), BLUE),
-        Person(lambda t: (900, 200) if 130 <= t < 170 else None, RED),
-    ]
-    looked: list[int] = []
-
-    class Detector(FakeDetector):
-        def detect_in_parts(self, image: np.ndarray) -> list[Detection]:
-            looked.append(t)
-            return []
-
-    monkeypatch.setattr(
-        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
-    )
-    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: Detector(people))
-    tracker = PeopleTracker("best", 1, wanted)
-    for t, image in enumerate(pictures(people, 400)):
-        tracker.step(image, time_s=t / FPS)
-    if wanted != 2:
-        assert looked == []
-        return
-    assert [t for t in looked if t < 130] == [0, 8, 24, 56, 120]
-    after = np.array([t for t in looked if t >= 130])
-    assert 170 <= after[0] <= 172  # as soon as the second person is lost
-    pauses = np.diff(after)
-    assert pauses[0] <= 9  # a quarter of a second
-    assert (np.diff(pauses) >= 0).all()
-    assert (pauses[-2:] == 64).all()
 
 
 def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(
@@ -580,8 +499,8 @@ def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(
 
 
 @pytest.mark.usefixtures("networks")
-@pytest.mark.parametrize("every", [1, 6], ids=["30 fps", "5 fps"])
-def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: int) -> None:
+def test_a_real_newcomer_is_found_soon_at_a_low_rate(shared: Path) -> None:
+    every = 6  # of the frames, of which there are 30 a second
     tracker = PeopleTracker("fast", threads=2, people=4)
     comes_s = 0.5
     found_s = None
@@ -601,13 +520,7 @@ def test_a_real_newcomer_is_found_equally_soon_at_any_rate(shared: Path, every: 
 
 
 @pytest.mark.usefixtures("networks")
-@pytest.mark.parametrize(
-    ("cameras", "crossing"),
-    [(("cam2", "cam3"), True), (("cam1", "cam3"), False)],
-)
-def test_identities_of_real_people_are_never_switched(
-    shared: Path, cameras: tuple[str, str], crossing: bool
-) -> None:
+def test_identities_of_real_people_are_not_switched_where_they_cross(shared: Path) -> None:
     """The same man twice, so that appearance does not help; occluded for a third of a second where
     the clips cross.
     """
@@ -615,14 +528,14 @@ def test_identities_of_real_people_are_never_switched(
     followed = FollowedPeople()
     places = []
     hidden = []
-    for t, (image, at, is_hidden) in enumerate(composite(shared, cameras, crossing)):
+    for t, (image, at, is_hidden) in enumerate(composite(shared, ("cam2", "cam3"), crossing=True)):
         followed.add(t / 30, tracker.step(image, time_s=t / 30))
         places.append(at)
         hidden.append(is_hidden)
     truth = np.array(places)
     visible = ~np.array(hidden)
     assert visible.sum() >= 37
-    assert crossing == (not visible.all())
+    assert not visible.all()
     tracks = followed.tracks(2)
     assert len(tracks) == 2
     found = []
@@ -636,4 +549,4 @@ def test_identities_of_real_people_are_never_switched(
         found.append(int(people[0]))
     assert sorted(found) == [0, 1]
     for track, person in zip(tracks, found, strict=True):
-        assert track.seen[visible].mean() >= (0.98 if person == 1 or not crossing else 0.9)
+        assert track.seen[visible].mean() >= (0.98 if person == 1 else 0.9)

@@ -155,11 +155,10 @@ def test_no_tooth_sticks_through_the_lips_of_any_shape(body, weights):
     """Seen from in front, lips that are closed hide them, but for some in the gap between."""
     inside = vertices_of(body, "teeth", "gums", "tongue")
     rng = np.random.default_rng(2)
-    shapes = [np.zeros(body.P), *rng.normal(size=(3, body.P))]
+    shapes = [np.zeros(body.P), *rng.normal(size=(1, body.P))]
     if body.P > 10:
         shapes = [
-            np.append(beta[:10], growth)
-            for beta, growth in zip(shapes, (0, -0.3, -0.7, -1), strict=True)
+            np.append(beta[:10], growth) for beta, growth in zip(shapes, (-0.3, -1), strict=True)
         ]
     for beta in shapes:
         vertices = moved(body, beta, **weights)

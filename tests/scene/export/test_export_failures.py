@@ -103,7 +103,7 @@ def test_a_full_disk_is_reported_in_one_sentence_and_leaves_nothing(
     import resource
 
     path = tmp_path / f"walk{suffix}"
-    motion = make_motion(body, 200)
+    motion = make_motion(body, 100)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
     try:

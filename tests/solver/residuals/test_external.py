@@ -141,14 +141,6 @@ def test_a_python_residual_of_a_part_fits_as_the_solvers_own_kernel():
     assert a.cost_by_term["slow_pose"] > 1.0
 
 
-def test_the_python_residual_of_the_example_fits_as_its_kernel():
-    rows = np.array([[2], [5]]), np.array([[0.3, 1.0], [-0.4, 2.0]])
-    a = fitted("height", rows, 1e4)
-    b = fitted("slow_height", rows, 1e4)
-    assert_same(a, b, 1e-6)
-    np.testing.assert_allclose(a.cost_by_term["height"], b.cost_by_term["slow_height"], rtol=1e-6)
-
-
 def test_the_cost_of_an_own_residual_is_what_its_equation_says():
     rows = np.array([[3]]), np.array([[0.9, 2.0]])
     found = fitted("height", rows, 500.0)

@@ -8,7 +8,7 @@ import inspect
 import numpy as np
 import pytest
 from scope.solver import Options, Priors, State, make_tree, rotations
-from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose, place_parts
+from scope.solver.gauss_newton.linearize import linearize, make_blocks, place_parts
 from scope.solver.gauss_newton.recursion import make_workspace
 from scope.solver.gauss_newton.terms import make_terms
 from scope.solver.measurements import Keypoints2D, Keypoints3D, Measurements, OrientationField
@@ -113,7 +113,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_derivatives_at_random_states(name, seed):
     check_derivatives(lambda part: CASES[name](part, 1.7), random_part(np.random.default_rng(seed)))
 
@@ -204,7 +204,6 @@ def check_blocks(tree, blocks, cost, i, found):
     assert not blocks.H_uu[others].any()
 
 
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "name",
     [
@@ -219,8 +218,8 @@ def check_blocks(tree, blocks, cost, i, found):
         ),
     ],
 )
-def test_table_kernels_accumulate_their_residual(name, seed):
-    rng, body, tree, pose = chain(seed)
+def test_table_kernels_accumulate_their_residual(name):
+    _, body, tree, pose = chain()
     i = 3
     w = 1.9
     k = int(np.flatnonzero(body.keypoint_part == i)[0])
@@ -387,21 +386,3 @@ def test_triggs_correction_is_the_second_derivative_along_the_residual(way):
     k = 1 / (1 + s * inv_sigma)
     expected = w * k**2 * (G.T @ G - 4 * inv_sigma * k * np.outer(G.T @ r, G.T @ r))
     np.testing.assert_allclose(W, expected[np.triu_indices(3)], rtol=1e-9, atol=1e-12)
-
-
-def test_knees_and_elbows_bend_the_right_way():
-    """In SMPL's T-pose (x left, y up, z forward) a bent knee takes the foot back, a bent elbow the
-    hand forward.
-    """
-    rest = {
-        "left_knee": [0, -1.0, 0],
-        "right_knee": [0, -1.0, 0],
-        "left_elbow": [1.0, 0, 0],
-        "right_elbow": [-1.0, 0, 0],
-    }
-    ints, floats = joint_limits.hinges_of(["pelvis", *rest])
-    assert ints.ravel().tolist() == [1, 2, 3, 4]
-    for row, (name, bone) in zip(floats, rest.items(), strict=True):
-        end = rotations.exp(0.5 * (row[3] + row[4]) * row[:3]) @ bone
-        assert end[2] < -0.5 if "knee" in name else end[2] > 0.5
-    assert make_pose(make_tree(random_body(np.random.default_rng(0), 3, 0, 0))).beta.size == 0

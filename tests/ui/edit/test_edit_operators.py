@@ -45,15 +45,6 @@ def turned(a, b):
     return np.degrees(np.linalg.norm(log(np.swapaxes(a, -1, -2) @ b), axis=-1).max())
 
 
-def test_the_keys_are_read_as_they_were_written(rig):
-    clip, frames = keys(rig)
-    truth = walk(SECONDS)
-    assert turned(clip.rotations, truth.rotations) < 0.01
-    np.testing.assert_allclose(clip.root, truth.root, atol=1e-5)
-    np.testing.assert_allclose(frames, 1 + np.arange(len(truth)))
-    np.testing.assert_allclose(clip.joints(BODY, np.zeros(BODY.P))[0], seen(rig, [1])[0], atol=1e-4)
-
-
 def test_a_scene_of_the_users_own_body_knows_its_file(tmp_path, monkeypatch):
     """The command line, which has no cache, makes such a scene."""
     monkeypatch.chdir(tmp_path)
@@ -191,21 +182,6 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
     assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
-@pytest.mark.parametrize("tilt", [0.0, 0.5])
-def test_root_motion_of_an_armature_that_was_moved_looks_the_same(rig, tilt):
-    rig.location = (1.0, 2.0, 0.5)
-    rig.rotation_euler = (tilt, -0.4 * tilt, 0.8)
-    rig.scale = (1.2,) * 3
-    rig.rotation_mode = "XYZ"
-    before = seen(rig)
-    for mode in ("OBJECT", "OBJECT", "IN_PLACE", "OBJECT", "BONES"):
-        bpy.ops.scope.root_motion(mode=mode)
-        if mode == "IN_PLACE":
-            np.testing.assert_allclose(seen(rig)[0], before[0], atol=3e-4)
-        else:
-            np.testing.assert_allclose(seen(rig), before, atol=3e-4)
-
-
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
 def test_a_moved_armature_is_in_place_again_when_root_motion_returns_to_the_bones(rig, mode):
     rig.rotation_mode = "XYZ"
@@ -332,25 +308,20 @@ def test_all_people_are_smoothed_at_once_on_request(tmp_path):
         assert turned(keys(person)[0].rotations, raw) < 0.01
 
 
-def test_smoothing_a_loop_restores_the_whole_motion(rig):
-    last = 1 + round(SECONDS * RATE)
-    bpy.ops.scope.smooth()
-    before = seen(rig, [1, last, last + 20])
-    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
-    bpy.ops.scope.smooth()
-    np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
-
-
-def test_smoothing_a_loop_restores_the_frame_range(rig):
+def test_smoothing_a_loop_restores_the_motion_and_the_frame_range(rig):
     scene = bpy.context.scene
     scene.frame_start = 2
     scene.frame_end = 120
+    last = 1 + round(SECONDS * RATE)
+    bpy.ops.scope.smooth()
+    before = seen(rig, [1, last, last + 20])
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     cycle = scene.frame_start, scene.frame_end
     # again, within the first one
     bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)
     bpy.ops.scope.smooth()
     assert (scene.frame_start, scene.frame_end) == (2, 120)
+    np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     scene.frame_start = 1  # a manual setting is kept
     bpy.ops.scope.smooth()
@@ -396,7 +367,7 @@ def _is_beside(curve):
     return not curve.data_path.endswith(("rotation_quaternion", "location"))
 
 
-@pytest.mark.parametrize("suffix", ["glb", "fbx", "bvh"])
+@pytest.mark.parametrize("suffix", ["glb", "bvh"])
 def test_only_the_loop_is_exported(rig, tmp_path, suffix):
     """Neither cyclic curves nor confidence keys outside the cycle make the file longer."""
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
@@ -407,7 +378,6 @@ def test_only_the_loop_is_exported(rig, tmp_path, suffix):
     bpy.context.scene.render.fps = int(RATE)
     operators = {
         "glb": bpy.ops.import_scene.gltf,
-        "fbx": bpy.ops.import_scene.fbx,
         "bvh": bpy.ops.import_anim.bvh,
     }
     operators[suffix](filepath=path)
@@ -428,9 +398,9 @@ def test_a_motion_file_without_the_armature_is_an_error(rig, tmp_path):
 def test_reduced_keys_stay_within_the_chosen_error(rig, degrees):
     before = seen(rig, range(1, 91))
     dense = keys(rig)[0]
-    count = sum(len(c.keyframe_points) for c in _curves(rig))
+    count = sum(len(c.keyframe_points) for c in fcurves(rig))
     bpy.ops.scope.reduce_keys(degrees=degrees, millimetres=3.0)
-    after = sum(len(c.keyframe_points) for c in _curves(rig))
+    after = sum(len(c.keyframe_points) for c in fcurves(rig))
     assert after < 0.5 * count
     reduced, frames = keys(rig)
     truth = dense.rotations[np.round(frames - 1).astype(int)]
@@ -492,19 +462,8 @@ def test_missing_keys_are_an_error_and_change_nothing(rig):
         bpy.ops.scope.refloor()
 
 
-@pytest.mark.parametrize(
-    "edit",
-    [
-        lambda: bpy.ops.scope.refloor(),
-        lambda: bpy.ops.scope.smooth(strength=2.0),
-        lambda: bpy.ops.scope.root_motion(mode="OBJECT"),
-        lambda: bpy.ops.scope.reduce_keys(),
-        lambda: bpy.ops.scope.add_pin(joint="left_wrist", frame=20, location=(0.3, 0.0, 1.2)),
-        lambda: bpy.ops.scope.floor_here(),
-    ],
-)
 @pytest.mark.parametrize("change", ["name", "mode"])
-def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, edit, change):
+def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, change):
     bpy.context.scene.frame_set(20)
     if change == "name":
         rig.data.bones["left_elbow"].name = "forearm.L"
@@ -516,9 +475,18 @@ def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, edit, chang
             "effect"
         )
     before = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)]
-    with pytest.raises(RuntimeError, match=wanted):
-        edit()
-    assert [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)] == before
+    for edit in (
+        lambda: bpy.ops.scope.refloor(),
+        lambda: bpy.ops.scope.smooth(strength=2.0),
+        lambda: bpy.ops.scope.root_motion(mode="OBJECT"),
+        lambda: bpy.ops.scope.reduce_keys(),
+        lambda: bpy.ops.scope.add_pin(joint="left_wrist", frame=20, location=(0.3, 0.0, 1.2)),
+        lambda: bpy.ops.scope.floor_here(),
+    ):
+        with pytest.raises(RuntimeError, match=wanted):
+            edit()
+        now = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)]
+        assert now == before
 
 
 def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
@@ -581,7 +549,3 @@ def test_an_edit_keeps_manual_changes(rig):
     write_clip(rig, BODY, clip, 1 + np.arange(len(clip)))
     bpy.ops.scope.refloor()
     assert turned(keys(rig)[0].rotations[:, NAMES.index("head")], exp([0.3, 0.0, 0.0])) < 0.01
-
-
-def _curves(rig):
-    return fcurves(rig)

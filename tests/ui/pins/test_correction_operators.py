@@ -165,7 +165,6 @@ EDITS = {
     "captured": lambda: None,
     "reduced": lambda: bpy.ops.scope.reduce_keys(degrees=2.0),
     "bridged": lambda: bpy.ops.scope.interpolate_span(start=FRAME - 5, end=FRAME + 5),
-    "smoothed": lambda: bpy.ops.scope.smooth(strength=2.5),
     "on an object": lambda: bpy.ops.scope.root_motion(mode="OBJECT"),
 }
 
@@ -177,7 +176,7 @@ def assert_same_keys(found, expected):
 
 
 ALL_KINDS = ("pin", "sides", "foot")
-ORDERS = [("captured", ("rests",)), *((edit, ALL_KINDS) for edit in EDITS)]
+ORDERS = [("captured", ("rests",)), *((edit, ALL_KINDS) for edit in EDITS if edit != "captured")]
 
 
 @pytest.mark.parametrize(
@@ -421,9 +420,6 @@ RIG_ANKLE = NAMES.index("left_ankle")
 FRAMES = (*range(EXCHANGED[0], EXCHANGED[1] + 1), *range(STANDS[0], STANDS[1] + 1))
 
 
-SUFFIXES = {"GLB": "glb", "FBX": "fbx", "BVH": "bvh"}
-
-
 @pytest.fixture
 def retargeted_rig(tmp_path):
     """A captured walk, with its motion file."""
@@ -493,12 +489,11 @@ def test_the_rig_that_the_motion_is_retargeted_to_is_corrected(retargeted_rig):
     check(made_rigs.seen(own, names, FRAMES), before, target)
 
 
-@pytest.mark.parametrize("kind", SUFFIXES)
-def test_exported_files_are_corrected(retargeted_rig, tmp_path, kind):
+def test_exported_files_are_corrected(retargeted_rig, tmp_path):
     before, target = correct(retargeted_rig)
     bpy.context.view_layer.objects.active = retargeted_rig
-    path = tmp_path / f"walk.{SUFFIXES[kind]}"
-    bpy.ops.scope.export(filepath=str(path), format=kind, which="ALL")
+    path = tmp_path / "walk.glb"
+    bpy.ops.scope.export(filepath=str(path), format="GLB", which="ALL")
     first = read_back(path)
     (imported,) = (o for o in bpy.data.objects if o.type == "ARMATURE")
     check(

@@ -282,8 +282,7 @@ def test_a_renamed_take_still_replaces_its_action(rig):
     assert len(bpy.data.actions) == before
 
 
-@pytest.mark.parametrize("suffix", ["glb", "fbx"])
-def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
+def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path):
     scene = bpy.context.scene
     layer = bpy.context.view_layer
     active = layer.objects.active
@@ -294,16 +293,13 @@ def test_siblings_of_the_rig_are_not_exported_with_it(rig, tmp_path, suffix):
     layer.objects.active = active
     bpy.ops.scope.retarget()
     wanted = seen(rig, ["pelvis", "hand_l"], [10])
-    path = str(tmp_path / f"rig.{suffix}")
-    bpy.ops.scope.export(filepath=path, format=suffix.upper(), which="RIG")
+    path = str(tmp_path / "rig.fbx")
+    bpy.ops.scope.export(filepath=path, format="FBX", which="RIG")
     assert rig.parent == stage
     rate = scene.render.fps
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.fps = rate
-    if suffix == "glb":
-        bpy.ops.import_scene.gltf(filepath=path)
-    else:
-        bpy.ops.import_scene.fbx(filepath=path, anim_offset=0.0)
+    bpy.ops.import_scene.fbx(filepath=path, anim_offset=0.0)
     assert not {obj.name for obj in bpy.data.objects} & {"Cube", "Plane"}
     rig = next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
     # the file starts at 0 s
@@ -383,7 +379,7 @@ def test_undo_removes_the_motion(rig):
     assert bpy.data.objects[name].animation_data.action is not None
 
 
-@pytest.mark.parametrize("kind", ["fbx", "glb", "bvh"])
+@pytest.mark.parametrize("kind", ["glb", "bvh"])
 def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path, kind):
     """The captured body is not exported, and the scene does not change."""
     mesh = bpy.data.meshes.new("skin")

@@ -36,15 +36,18 @@ def unit_colours(path: Path, **more: object) -> None:
     path.with_suffix(".json").write_text(json.dumps({"mean": 0, "std": 255, **more}))
 
 
-def assert_finds_the_spots(path: Path, region: Region, atol: float) -> None:
+def assert_finds_the_spots(path: Path, atol: float) -> None:
     unit_colours(path)
     network = KeypointNetwork(path, threads=1)
     assert network.keypoint_set.name == "coco17"
-    (seen,) = network.estimate(spots(), [region])
-    for k, name in enumerate(COCO_17):
-        j = KEYPOINT_NAMES.index(name)
-        np.testing.assert_allclose(seen.keypoints_px[j], SPOTS[k % 3], atol=atol)
-        assert seen.keypoints_confidence[j] > 0.4
-    assert seen.presence == 1.0
-    assert not seen.world_landmarks.any()
-    assert seen.disagreement == 0.0
+    for where, region in REGIONS.items():
+        (seen,) = network.estimate(spots(), [region])
+        for k, name in enumerate(COCO_17):
+            j = KEYPOINT_NAMES.index(name)
+            np.testing.assert_allclose(
+                seen.keypoints_px[j], SPOTS[k % 3], atol=atol, err_msg=f"{name}, {where}"
+            )
+            assert seen.keypoints_confidence[j] > 0.4
+        assert seen.presence == 1.0
+        assert not seen.world_landmarks.any()
+        assert seen.disagreement == 0.0

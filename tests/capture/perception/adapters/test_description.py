@@ -134,8 +134,10 @@ def opened(path: Path, description: Description | None = None) -> Graph:
     return Graph(path, description or Description(), threads=1)
 
 
-@pytest.mark.parametrize("kind", [TensorProto.FLOAT, TensorProto.FLOAT16, TensorProto.UINT8])
-@pytest.mark.parametrize("channels_last", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "channels_last"),
+    [(TensorProto.FLOAT, False), (TensorProto.FLOAT16, False), (TensorProto.UINT8, True)],
+)
 def test_the_graph_gets_the_image_in_its_own_layout_and_type(
     tmp_path: Path, kind: int, channels_last: bool
 ) -> None:

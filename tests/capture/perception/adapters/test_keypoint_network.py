@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -130,12 +131,12 @@ def test_the_next_region_contains_the_keypoints(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
 @pytest.mark.parametrize("size", SIZES, ids=str)
-def test_known_pixels_are_found_in_heatmaps(
-    tmp_path: Path, region: Region, size: tuple[int, int]
+@pytest.mark.parametrize(("make", "atol"), [(heatmaps, 1.0), (simcc, 0.8)])
+def test_known_pixels_are_found(
+    tmp_path: Path, make: Callable[..., Path], atol: float, size: tuple[int, int]
 ) -> None:
-    assert_finds_the_spots(heatmaps(tmp_path / "m.onnx", 17, *size), region, atol=1.0)
+    assert_finds_the_spots(make(tmp_path / "m.onnx", 17, *size), atol)
 
 
 @pytest.mark.parametrize("how", ["dark", "quarter"])
@@ -159,14 +160,6 @@ def test_heatmap_peaks_between_cells(tmp_path: Path, how: str, udp: bool) -> Non
     pixels = middle * ([191 / 47, 255 / 63] if udp else 4.0)
     assert np.abs(points - pixels).max() < (0.05 if how == "dark" else 1.1)
     assert scores.min() > 0.9
-
-
-@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
-@pytest.mark.parametrize("size", SIZES, ids=str)
-def test_known_pixels_are_found_by_simcc(
-    tmp_path: Path, region: Region, size: tuple[int, int]
-) -> None:
-    assert_finds_the_spots(simcc(tmp_path / "m.onnx", 17, *size), region, atol=0.8)
 
 
 def numbered(count: int) -> tuple[np.ndarray, np.ndarray]:
