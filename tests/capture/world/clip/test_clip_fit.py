@@ -72,16 +72,17 @@ def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
     lifted = track.world_landmarks + rng.normal(0.0, 0.03, track.world_landmarks.shape)
     prepared = prepare(noisy, lifted)
     together = fit(prepared, true)
-    alone = [fit(prepared, replace(true, valid=np.arange(48) == k)) for k in range(48)]
+    some = range(0, 48, 4)
+    alone = [fit(prepared, replace(true, valid=np.arange(48) == k)) for k in some]
     wrist = BODY.joint_names.index("left_wrist")
     truth = joints(true)
-    one_by_one = np.array([joints(each)[k] for k, each in enumerate(alone)])
+    one_by_one = np.array([joints(each)[k] for k, each in zip(some, alone, strict=True)])
     without_noise = joints(fit(prepare(track), true))  # its trunk leans more than the true one
 
     def error(found):
-        return np.linalg.norm(found - without_noise, axis=-1).mean()
+        return np.linalg.norm(found - without_noise[some], axis=-1).mean()
 
-    assert error(joints(together)) < 0.4 * error(one_by_one)
+    assert error(joints(together)[some]) < 0.4 * error(one_by_one)
     assert abs(np.ptp(joints(together)[:, wrist, 1]) / np.ptp(truth[:, wrist, 1]) - 1) < 0.05
 
 
@@ -331,16 +332,13 @@ LIMB_SEARCH_FRAMES = 64
 SPAN = slice(12, 52)
 
 
-@pytest.mark.parametrize("moving", [False, True])
-def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was(moving: bool) -> None:
-    """For forty frames, the lifter cannot tell the thigh before the hip from one behind it, and the
-    start is wrong.
+def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was() -> None:
+    """For forty frames of a moving camera, the lifter cannot tell the thigh before the hip from one
+    behind it, and the start is wrong.
     """
     angles = np.linspace(0.0, 0.3, LIMB_SEARCH_FRAMES)
-    turns = exp(np.array([[0.0, angle, 0.0] for angle in (angles if moving else 0.0 * angles)]))
-    path = CameraPath(
-        turns, np.linspace([0.0, 0.0, 0.0], [0.4, 0.0, 0.0], LIMB_SEARCH_FRAMES) * moving
-    )
+    turns = exp(angles[:, None] * [0.0, 1.0, 0.0])
+    path = CameraPath(turns, np.linspace([0.0, 0.0, 0.0], [0.4, 0.0, 0.0], LIMB_SEARCH_FRAMES))
     track, true = person(LIMB_SEARCH_FRAMES, path)
     unsure = track.world_landmarks.copy()
     sigma = np.full((LIMB_SEARCH_FRAMES, JOINTS), 0.1)
