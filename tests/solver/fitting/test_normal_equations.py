@@ -27,7 +27,7 @@ from ..gauss_newton.test_recursion import dense_system, problem
 OPTIONS = Options(weights=Weights(joint_limits=0.0))
 
 
-@pytest.mark.parametrize(("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (1, 3, 20), (51, 10, 60)])
+@pytest.mark.parametrize(("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (1, 3, 20)])
 def test_they_equal_dense_ones(K, P, M):
     _, body, state, _, _, _, raw, sigmas, scales, priors, weights, seen = problem(1, K, P, M)
     J, r, cost = dense_system(body, state, raw, sigmas, scales, priors, weights)

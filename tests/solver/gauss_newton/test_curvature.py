@@ -163,7 +163,7 @@ def test_the_default_stop_is_close_to_the_end(body):
     solver = FrameSolver(body)
     close = []
     end = Options(stages=(Stage(Weights(), 1e-13, 500),))
-    for seed in range(80):
+    for seed in range(40):
         start, m = noisy(body, seed)
         found, best = (solver.fit(m, start, None, o) for o in (Options(), end))
         apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()

@@ -108,13 +108,12 @@ def dense_system(body, state, raw, sigmas, scales, priors, weights, extra=0):
     return J, r, cost + 0.5 * shape @ shape
 
 
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(
-    ("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (51, 10, 60), (51, 0, 60), (1, 3, 20), (7, 5, 24)]
+    ("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (51, 10, 60), (1, 3, 20), (7, 5, 24)]
 )
-def test_step_equals_dense_step(K, P, M, seed):
+def test_step_equals_dense_step(K, P, M):
     rng, body, state, tree, terms, stage, raw, sigmas, scales, priors, weights, _ = problem(
-        seed, K, P, M
+        0, K, P, M
     )
     J_terms, r_terms, cost = dense_system(body, state, raw, sigmas, scales, priors, weights)
     for damping, coupled in product((0.0, 40.0), (False, True)):
