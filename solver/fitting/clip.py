@@ -42,9 +42,8 @@ from ..state import MULTI, ClipFit, Fit, State, Status, given_states
 from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_switch, check_type, check_weight
-from .frame_solver import fit_tree
+from .frame_solver import cost_by_term, fit_tree
 from .misfit import warn_of_mirrored_clip
-from .report import Outcome, cost_by_term, make_fit
 
 
 def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
@@ -400,9 +399,22 @@ class _Joint(SeveralFrames):
             f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
             eliminate(self.tree, f.pose, f.blocks, MIN_DAMPING, self.settings.root_scale, f.work)
             shares = self._shares(f) if self.report else {}
-            outcome = Outcome(self.status, float(f.cost), self.iterations, self.rejected, shares)
-            information = f.work.C[: self.P, : self.P].copy()
-            out.append(make_fit(self.tree, f.pose, outcome, information, f.counts))
+            seen, measurements = f.counts
+            out.append(
+                Fit(
+                    state=State.from_pose(self.tree, f.pose),
+                    R_camera_part=f.pose.R.copy(),
+                    t_camera_part=f.pose.t.copy(),
+                    beta_information=f.work.C[: self.P, : self.P].copy(),
+                    seen=seen,
+                    measurements=measurements,
+                    status=self.status,
+                    cost=float(f.cost),
+                    iterations=self.iterations,
+                    rejected=self.rejected,
+                    cost_by_term=shares,
+                )
+            )
         return out
 
     def _shares(self, f: _Active) -> dict[str, float]:

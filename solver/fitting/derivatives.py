@@ -34,8 +34,8 @@ from ..rotations import hat
 from ..state import State
 from ..tree import BodyArrays, Tree
 from ..validation import check_finite, check_list, check_type
+from .frame_solver import COLUMNS
 from .normal_equations import gradient, moved, preconditioner, problem_of
-from .report import COLUMNS
 
 _STEP = 1e-5  # of the unknowns, radians, metres and shape
 _SHARE = 1e-6  # by which a measured number is changed, of a standard deviation its share

@@ -11,23 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gauss_newton.curvature import make_curvature
-from ..gauss_newton.linearize import make_blocks, make_pose
+from ..gauss_newton.linearize import linearize, make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
 from ..gauss_newton.recursion import make_workspace
-from ..gauss_newton.terms import Layout, PackedPriors, fill_terms, pack_priors, usable
+from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms, pack_priors, usable
 from ..kernel import announce_compilation, kernel
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
+from ..part import Blocks, Pose
 from ..points import numbered
-from ..residuals.external import raise_failure
-from ..residuals.registry import SHAPE_PRIOR
+from ..residuals.external import external_residuals, raise_failure
+from ..residuals.registry import (
+    KEYPOINT2D,
+    KEYPOINT3D,
+    ORIENTATION_FIELD,
+    RESIDUALS,
+    SHAPE_PRIOR,
+    column_of,
+)
 from ..rotations import nearest_rotation, orthonormalize
 from ..state import MULTI, Fit, State, Status
 from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type
 from .initialize import initial_states
 from .misfit import warn_of_mirrored_clip, warn_of_wrong_points
-from .report import Outcome, cost_by_term, make_fit
 
 
 def fit(
@@ -164,8 +171,19 @@ class FrameSolver:
                 shares = cost_by_term(
                     tree, terms, last, options.triggs, found, memory.blocks[0], work.scratch
                 )
-            outcome = Outcome(Status(code), cost, iterations, rejected, shares)
-            fitted = make_fit(tree, found, outcome, information, (seen, count))
+            fitted = Fit(
+                state=State.from_pose(tree, found),
+                R_camera_part=found.R.copy(),
+                t_camera_part=found.t.copy(),
+                beta_information=information,
+                seen=seen,
+                measurements=count,
+                status=Status(code),
+                cost=cost,
+                iterations=iterations,
+                rejected=rejected,
+                cost_by_term=shares,
+            )
             if best is None or fitted.cost < best.cost or not np.isfinite(best.cost):
                 best = fitted
         assert best is not None
@@ -220,3 +238,45 @@ def _enter(R, t, Omega, beta, pose):  # type: ignore[no-untyped-def]
         pose.beta[a] = beta[a]
     pose.log_focal[0] = 0.0
     return orthonormalize(pose.R[:1]) and orthonormalize(pose.Omega)
+
+
+# Columns of a stage's weights by name, in their order.
+COLUMNS = {
+    "keypoints2d": KEYPOINT2D,
+    "keypoints3d": KEYPOINT3D,
+    "orientation_field": ORIENTATION_FIELD,
+    "shape_prior": SHAPE_PRIOR,
+    **{name: column_of(name) for name in RESIDUALS},
+}
+
+
+def cost_by_term(
+    tree: Tree,
+    terms: Terms,
+    stage: NDArray[np.float64],
+    triggs: float,
+    pose: Pose,
+    blocks: Blocks,
+    scratch: NDArray[np.float64],
+) -> dict[str, float]:
+    """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns
+    there.
+
+    Every residual's cost is linear in its weight, so the share of one kind is the cost with all
+    other weights at zero. Kinds whose weight is zero are left out.
+
+    :param stage: (2, C) a row of weights and a row of 1/sigma, in the registry's order.
+    :param scratch: (12, W) of `make_scratch`. :param blocks: overwritten. Others as of
+        `linearize`.
+    """
+    found = {}
+    measured = terms.external.calls[:, 4]  # columns of external residuals that have rows
+    external = {
+        name: column_of(name) for name in external_residuals() if column_of(name) in measured
+    }
+    for name, column in {**COLUMNS, **external}.items():
+        if stage[0, column] > 0.0:
+            alone = stage.copy()
+            alone[0] = np.where(np.arange(len(stage[0])) == column, stage[0], 0.0)
+            found[name] = float(linearize(tree, terms, alone, triggs, pose, blocks, scratch))
+    return found

@@ -167,9 +167,7 @@ def refine_pose(
     for step in range(POSE_STEPS):
         points = places @ R.T + t
         residuals = projected(points) - rays
-        width = scale * max(1.0, 8.0 * 0.5**step)
-        weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
-        weight *= points[:, 2] > _NEAREST
+        weight = narrowing_weights(residuals, scale, step) * (points[:, 2] > _NEAREST)
         by_point = projection_jacobian(points)
         by_pose = np.concatenate([-by_point @ cross_matrices(points), by_point], axis=2)
         weighted = by_pose * weight[:, None, None]
@@ -182,6 +180,15 @@ def refine_pose(
         R = turn @ R
         t = turn @ t + change[3:]
     return R, t
+
+
+def narrowing_weights(residuals: Float64Array, scale: float, step: int) -> Float64Array:
+    """Return the (n,) weights of residuals (n, 2) by a robust kernel (Geman and McClure), which is
+    eight times as wide as ``scale`` in the first step, and half as wide in each further one.
+    """
+    width = scale * max(1.0, 8.0 * 0.5**step)
+    weight: Float64Array = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
+    return weight
 
 
 def projected(points: Float64Array) -> Float64Array:

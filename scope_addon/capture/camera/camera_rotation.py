@@ -31,7 +31,7 @@ from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Ar
 from ..perception.region import inside, surroundings
 from .background_record import REVEALING_S, BackgroundRecord, is_rotated
 from .bars import find_bars
-from .corner_tracks import SAMPLES_HZ, CornerFollower, follow_corners
+from .corner_tracks import SAMPLES_HZ, CornerFollower, background_mask, follow_corners
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
 from .intrinsics import Camera
 from .line_segments import find_segments
@@ -42,6 +42,7 @@ MAX_CORNERS = 240
 MIN_CORNERS = 24
 KEY_SHARE = 0.5  # of a key frame's corners; with fewer left, the next key frame begins
 INLIER_PX = 1.2  # in the working image
+MAX_RETURN_PX = 0.7  # between a corner and where it is found when it is followed back, likewise
 MIN_INLIER_SHARE = 0.35  # of corners; a crowd or water that fills the picture gives no rotation
 REVEALED_SHARE = 0.01  # of the image: how much must have come into view
 CELLS = 40  # of the grid of hidden background, along either side of the image
@@ -188,10 +189,7 @@ class BackgroundTracker:
         if len(self._points) < MIN_CORNERS:
             return None
         assert self._image is not None
-        moved, found = follow_corners(self._image, image, self._points)
-        back, again = follow_corners(image, self._image, moved, near=self._points)
-        good = found & again & (np.abs(back - self._points).max(1) < 0.7)
-        good &= ((moved >= 0) & (moved < self._size)).all(1) & ~inside(moved, boxes)
+        moved, good = follow_corners(self._image, image, self._points, boxes, MAX_RETURN_PX)
         self._points = moved[good]
         self._key_rays = self._key_rays[good]
         if len(self._points) < MIN_CORNERS:
@@ -217,9 +215,7 @@ class BackgroundTracker:
         return cast(Uint8Array, grey)
 
     def _begin_key(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
-        mask = np.full(image.shape, 255, np.uint8)
-        for x0, y0, x1, y1 in boxes:
-            mask[max(0, int(y0)) : max(0, int(y1) + 1), max(0, int(x0)) : max(0, int(x1) + 1)] = 0
+        mask = background_mask(image, boxes)
         corners = cv2.goodFeaturesToTrack(image, MAX_CORNERS, 0.01, 7, mask=mask)
         self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
         self._key_rays = self._rays(self._points)

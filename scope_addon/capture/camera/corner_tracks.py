@@ -124,11 +124,7 @@ class CornerFollower:
 
     def _follow(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
         assert self._image is not None
-        moved, found = follow_corners(self._image, image, self._points)
-        back, again = follow_corners(image, self._image, moved, near=self._points)
-        height, width = image.shape
-        good = found & again & (np.abs(back - self._points).max(axis=1) < MAX_RETURN_PX)
-        good &= ((moved >= 0) & (moved < (width, height))).all(axis=1) & ~inside(moved, boxes)
+        moved, good = follow_corners(self._image, image, self._points, boxes, MAX_RETURN_PX)
         self._points = moved[good]
         self._numbers = self._numbers[good]
 
@@ -145,9 +141,7 @@ class CornerFollower:
         return bool(np.median(steps) > (SLOWLY_MOVED_PX if is_slow else MOVED_PX))
 
     def _replenish(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
-        mask = np.full(image.shape, 255, np.uint8)
-        for x0, y0, x1, y1 in boxes:
-            mask[max(0, int(y0)) : max(0, int(y1) + 1), max(0, int(x0)) : max(0, int(x1) + 1)] = 0
+        mask = background_mask(image, boxes)
         for x, y in self._points:
             cv2.circle(mask, (round(float(x)), round(float(y))), SPACING_PX, (0,), -1)
         wanted = MAX_CORNERS - len(self._points)
@@ -161,7 +155,36 @@ class CornerFollower:
         self._next_number += len(new)
 
 
+def background_mask(image: Uint8Array, boxes: Sequence[Float64Array]) -> Uint8Array:
+    """Return an image (H, W) that is 0 within the boxes x0, y0, x1, y1 and 255 elsewhere."""
+    mask = np.full(image.shape, 255, np.uint8)
+    for x0, y0, x1, y1 in boxes:
+        mask[max(0, int(y0)) : max(0, int(y1) + 1), max(0, int(x0)) : max(0, int(x1) + 1)] = 0
+    return mask
+
+
 def follow_corners(
+    before: Uint8Array,
+    after: Uint8Array,
+    points: Float32Array,
+    boxes: Sequence[Float64Array],
+    max_return_px: float,
+) -> tuple[Float32Array, BoolArray]:
+    """Follow corners (n, 2) from one working image (H, W) to another, and back.
+
+    :param boxes: (m, 4) what is not background: x0, y0, x1, y1 each, in pixels of the images.
+    :param max_return_px: between a corner and where it is found when it is followed back.
+    :return: positions (n, 2), and (n,) whether each was found, in the background.
+    """
+    moved, found = _flow(before, after, points)
+    back, again = _flow(after, before, moved, near=points)
+    height, width = after.shape
+    good: BoolArray = found & again & (np.abs(back - points).max(axis=1) < max_return_px)
+    good &= ((moved >= 0) & (moved < (width, height))).all(axis=1) & ~inside(moved, boxes)
+    return moved, good
+
+
+def _flow(
     before: Uint8Array, after: Uint8Array, points: Float32Array, near: Float32Array | None = None
 ) -> tuple[Float32Array, BoolArray]:
     """Follow corners (n, 2) from one working image to another (Lucas-Kanade).

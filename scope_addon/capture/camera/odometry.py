@@ -24,7 +24,7 @@ import numpy as np
 from ....solver.rotations import exp, log, nearest_rotation
 from ...arrays import BoolArray, Float64Array, IndexArray
 from ...kinematics.smoothing import interpolated_places, interpolated_rotations
-from .bundle_adjustment import Bundle, adjust, projected, refine_pose
+from .bundle_adjustment import Bundle, adjust, narrowing_weights, projected, refine_pose
 from .corner_tracks import CornerTracks
 from .intrinsics import Camera
 
@@ -437,8 +437,7 @@ class Turn:
         turn = self
         for step in range(steps):
             residuals = turn.residuals(rays_a, rays_b)
-            width = scale * max(1.0, 8.0 * 0.5**step)
-            weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / width**2) ** 2
+            weight = narrowing_weights(residuals, scale, step)
             J = np.empty((*residuals.shape, 5))
             for k, direction in enumerate(np.eye(5) * _DIFFERENCE):
                 J[..., k] = (turn.moved(direction).residuals(rays_a, rays_b) - residuals) / (

@@ -19,7 +19,7 @@ from scope.solver import (
     fit_clip,
     load_body,
 )
-from scope.solver.fitting.report import COLUMNS
+from scope.solver.fitting.frame_solver import COLUMNS
 
 from ..residuals.test_foot_contact import BODY, FEET, INTRINSICS, points, seen, standing
 from .test_frame_solver import measured, scene
