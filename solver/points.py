@@ -16,7 +16,7 @@ from .body import number_of, numbers_of
 from .errors import InvalidValueError, ShapeError
 from .measurements import Measurements
 from .part import Array
-from .validation import check_list
+from .validation import check_list, check_type
 
 # Of each kind of measurement, what holds numbers of points, as messages call it.
 _NUMBERED = {
@@ -95,7 +95,9 @@ def frames_of(
     """
     if not isinstance(measurements, Measurements):
         check_list(measurements, name, "frame")
-        return [numbered(body, m) if isinstance(m, Measurements) else m for m in measurements]
+        for k, m in enumerate(measurements):
+            check_type(m, Measurements, f"{name}[{k}]")
+        return [numbered(body, m) for m in measurements]
     clip = numbered(body, measurements)
     lengths = {
         f"{key} of {field}": len(value)

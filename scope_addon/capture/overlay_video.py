@@ -24,12 +24,12 @@ from ...solver.kernel import cached
 from ...solver.rotations import exp
 from ..arrays import Float64Array, FloatArray, Uint8Array
 from ..atomic_write import atomic_path, reason
-from ..errors import OutputError, VideoError
+from ..errors import OutputError
 from ..motion import Motion
 from .camera.intrinsics import scaled_intrinsics
 from .fitting.rasterizer import Canvas, rasterize
 from .media.frame import Frame
-from .media.video import Video, open_video
+from .media.video import Video, no_frames_error, open_video
 from .media.video_range import FootageRange
 from .media.video_writer import VideoWriter
 from .perception.landmark_network import KEYPOINT_COUNT
@@ -327,17 +327,11 @@ def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> Non
         if frame.index >= index:
             break
     if shown is None:
-        raise _without_frames(video)
+        raise no_frames_error(video)
     ok, data = cv2.imencode(path.suffix, cv2.cvtColor(painter.paint(shown), cv2.COLOR_RGB2BGR))
     if not ok:
         raise OutputError(f"cannot encode a {path.suffix} image; choose .png")
     path.write_bytes(data.tobytes())
-
-
-def _without_frames(video: Video) -> VideoError:
-    return VideoError(
-        f"{video.path} has no frames between the given start and end; change one of them"
-    )
 
 
 def _shown_s(time_s: float, fps: Fraction, before_s: float) -> float:
@@ -364,4 +358,4 @@ def _write_video(
             if progress is not None:
                 progress(frame.index + 1, max(video.frame_count, frame.index + 1))
         if start_s is None:
-            raise _without_frames(video)
+            raise no_frames_error(video)

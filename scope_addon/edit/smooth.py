@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ..errors import UsageError
 from ..kinematics.frame_blocks import by_blocks
-from ..kinematics.leg_reach import move_feet
+from ..kinematics.leg_reach import LEGS, move_ends
 from ..kinematics.smoothing import (
     ROTATION_CUTOFF_HZ,
     gaussian_smooth,
@@ -146,7 +146,7 @@ def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -
     ) -> tuple[NDArray[np.float64]]:  # fmt: skip
         poses = body.forward_kinematics(R, root - pelvis_at_rest, motion.betas)
         held = body.forward_kinematics(R_held, root_held - pelvis_at_rest, motion.betas)[1]
-        return (move_feet(body, R, poses, share[..., None] * (held - poses[1])[:, ankles]),)
+        return (move_ends(body, LEGS, R, poses, share[..., None] * (held - poses[1])[:, ankles]),)
 
     rotations = by_blocks(
         bend, calm.rotations, calm.root, finished.rotations, finished.root, share

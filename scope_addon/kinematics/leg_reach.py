@@ -32,54 +32,34 @@ SHORTEST = 0.35  # Share of the stretched leg's length: a knee bent by 140 degre
 
 # Of a limb's two bones and its end: the joints, and the axis of the upper bone's part about which
 # the limb bends, on the left and on the right.
-_LEG = ("hip", "knee", "ankle")
-_LEG_HINGES = (np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
-_ARM = ("shoulder", "elbow", "wrist")
-_ARM_HINGES = (np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+Limbs = tuple[tuple[str, str, str], tuple[NDArray[np.float64], NDArray[np.float64]]]
+LEGS: Limbs = ("hip", "knee", "ankle"), (np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+ARMS: Limbs = (
+    ("shoulder", "elbow", "wrist"),
+    (np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0])),
+)
 
 
-def move_feet(
+def move_ends(
     body: Body,
+    limbs: Limbs,
     rotations: NDArray[np.floating[Any]],
     poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
     shift: NDArray[np.floating[Any]],
 ) -> NDArray[np.float64]:
-    """Return the rotations (T, K+1, 3, 3) that move both ankles as far as the legs reach.
+    """Return the rotations (T, K+1, 3, 3) that move both ankles or wrists as far as legs or arms
+    reach.
 
+    :param limbs: `LEGS` or `ARMS`.
     :param rotations: (T, K+1, 3, 3) the root's, and the others relative to their parents.
     :param poses: (T, K+1, 3, 3) and (T, K+1, 3) part poses of this motion, in any frame.
-    :param shift: (T, 2, 3) of the left and the right ankle, in that frame, metres.
+    :param shift: (T, 2, 3) of the left and the right ankle or wrist, in that frame, metres.
     """
-    return _move_ends(body, rotations, poses, shift, _LEG, _LEG_HINGES)
-
-
-def move_hands(
-    body: Body,
-    rotations: NDArray[np.floating[Any]],
-    poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
-    shift: NDArray[np.floating[Any]],
-) -> NDArray[np.float64]:
-    """Return the rotations (T, K+1, 3, 3) that move both wrists as far as the arms reach.
-
-    :param rotations: (T, K+1, 3, 3), as of `move_feet`.
-    :param poses: (T, K+1, 3, 3) and (T, K+1, 3) part poses of this motion, in any frame.
-    :param shift: (T, 2, 3) of the left and the right wrist, in that frame, metres.
-    """
-    return _move_ends(body, rotations, poses, shift, _ARM, _ARM_HINGES)
-
-
-def _move_ends(
-    body: Body,
-    rotations: NDArray[np.floating[Any]],
-    poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
-    shift: NDArray[np.floating[Any]],
-    limb: tuple[str, str, str],
-    hinges: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> NDArray[np.float64]:
+    joints, hinges = limbs
     R, t = poses
     out = np.array(rotations, float)
     for side, name in enumerate(("left", "right")):
-        hip, knee, ankle = (body.joint_names.index(f"{name}_{part}") for part in limb)
+        hip, knee, ankle = (body.joint_names.index(f"{name}_{part}") for part in joints)
         moved = np.flatnonzero(np.linalg.norm(shift[:, side], axis=1) > 1e-6)
         if not len(moved):
             continue

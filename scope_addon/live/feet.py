@@ -45,7 +45,7 @@ from ..kinematics.contact_points import (
     contact_point_positions,
     with_contact_points,
 )
-from ..kinematics.leg_reach import move_feet
+from ..kinematics.leg_reach import LEGS, move_ends
 from ..kinematics.standing import CONTACT_SPEED_M_S, logistic, resting_probability, speed_across
 from .causal_fit import SAME_SHAPE, FittedFrame, Support
 
@@ -193,9 +193,9 @@ class FootHold:
             (points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1)
         )
         poses = R_parts[None], t_parts[None]
-        return move_feet(body, frame.rotations[None], poses, (self._shift @ R)[None])[
-            0
-        ], self._probability
+        shift = (self._shift @ R)[None]
+        rotations = move_ends(body, LEGS, frame.rotations[None], poses, shift)[0]
+        return rotations, self._probability
 
     def _contact(self, up: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
         """Return the contact probability (6,) of the newest frame.

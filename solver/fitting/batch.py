@@ -15,7 +15,7 @@ from ..points import frames_of
 from ..state import MULTI, ClipFit, Fit, State, check_states
 from ..temporal import Temporal
 from ..tree import BodyArrays, make_tree
-from ..validation import check_count, check_list, check_type
+from ..validation import check_count, check_list
 from .clip import fit_clip
 from .frame_solver import fit_tree
 from .misfit import warn_of_mirrored_clip
@@ -48,8 +48,6 @@ def fit_batch(
     :raises InvalidValueError: a value that no fit can use, in whichever frame.
     """
     measurements = frames_of(body, measurements)
-    for k, m in enumerate(measurements):
-        check_type(m, Measurements, f"measurements[{k}]")
     starts: list[State | Literal["multi"] | None] = [None] * len(measurements)
     if isinstance(init, str) and init == MULTI:
         starts = [MULTI] * len(measurements)

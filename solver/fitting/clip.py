@@ -100,8 +100,6 @@ def fit_clip(
     :raises InvalidValueError: a value that no fit can use.
     """
     measurements = frames_of(body, measurements)
-    for k, m in enumerate(measurements):
-        check_type(m, Measurements, f"measurements[{k}]")
     if len(measurements) == 0:
         raise ShapeError("A clip needs at least one frame of measurements, but got none.")
     check_weight(focal_weight, "focal_weight")

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.kinematics.leg_reach import move_feet
+from scope.scope_addon.kinematics.leg_reach import LEGS, move_ends
 from scope.solver import rotations
 from scope.solver.body_file import load_body
 
@@ -17,7 +17,7 @@ def moved(body, omega, shift):
     """Part poses before and after."""
     poses = body.forward_kinematics(omega, np.zeros((len(omega), 3)))
     return poses, body.forward_kinematics(
-        move_feet(body, omega, poses, shift), np.zeros((len(omega), 3))
+        move_ends(body, LEGS, omega, poses, shift), np.zeros((len(omega), 3))
     )
 
 
@@ -90,4 +90,4 @@ def test_a_goal_out_of_reach_stretches_the_leg_without_a_snap(body):
 def test_no_shift_changes_nothing(body):
     omega = random_legs(body, 5, 4)
     poses = body.forward_kinematics(omega, np.zeros((5, 3)))
-    np.testing.assert_array_equal(move_feet(body, omega, poses, np.zeros((5, 2, 3))), omega)
+    np.testing.assert_array_equal(move_ends(body, LEGS, omega, poses, np.zeros((5, 2, 3))), omega)

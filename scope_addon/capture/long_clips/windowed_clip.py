@@ -24,7 +24,7 @@ import numpy as np
 
 from ...errors import UsageError
 from ..media.frame import Frame
-from ..media.video import Video, open_video, opencv_in_one_thread
+from ..media.video import Video, no_frames_error, open_video, opencv_in_one_thread
 from ..options import CaptureOptions
 from ..perception.observation import Observation
 from ..perception.region import Region
@@ -39,7 +39,6 @@ from ..stages.observe import (
     given_camera,
     network_threads,
     new_observer,
-    no_frames_error,
     observe_in_one_pass,
     open_trackers,
 )

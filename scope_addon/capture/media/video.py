@@ -157,6 +157,13 @@ class Video:
         self.close()
 
 
+def no_frames_error(video: Video) -> VideoError:
+    """Return the error for a range without frames."""
+    return VideoError(
+        f"{video.path} has no frames between the given start and end; change one of them"
+    )
+
+
 def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
     """Open a video or a picture (JPEG, HEIC, PNG, WebP, TIFF, ..., also 16-bit and with alpha);
     decode its first frame.

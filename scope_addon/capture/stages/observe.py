@@ -16,7 +16,7 @@ import numpy as np
 
 from ....solver.body import Body
 from ...arrays import Float64Array, Uint8Array
-from ...errors import NoPersonError, VideoError
+from ...errors import NoPersonError
 from ...machine_code.kernel_count import kernel_count
 from ...notices import Notice, notice
 from ...options.capture import AUTO, LARGEST, OFF
@@ -29,7 +29,7 @@ from ..camera.zoom import Zoom
 from ..fitting.focal_length import BackgroundEstimators, FocalFits
 from ..fitting.live_body import LiveBody
 from ..media.frame import AutoExposure, Frame
-from ..media.video import Video, opencv_in_one_thread
+from ..media.video import Video, no_frames_error, opencv_in_one_thread
 from ..options import CaptureOptions, most_people
 from ..perception.adapters.description import description_path
 from ..perception.landmark_network import EstimateMemory
@@ -427,13 +427,6 @@ def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Fr
         with clock.stage("decode"):
             upcoming = next(frames, None)
         yield frame, upcoming
-
-
-def no_frames_error(video: Video) -> VideoError:
-    """Return the error for a range without frames."""
-    return VideoError(
-        f"{video.path} has no frames between the given start and end; change one of them"
-    )
 
 
 def _footage(job: ObservationJob, observed: Observed) -> Footage:

@@ -31,7 +31,7 @@ from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.contact_points import FOOT_PARTS, SOLES
 from ...kinematics.foot_skin import UNDER_FLOOR_M, FootSkin, lower_floors
 from ...kinematics.frame_blocks import by_blocks
-from ...kinematics.leg_reach import move_feet, move_hands
+from ...kinematics.leg_reach import ARMS, LEGS, move_ends
 from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
 from .placement import PlacedTrack
@@ -95,9 +95,9 @@ def raise_body(
         rotations: FloatArray, root: FloatArray, foot_shift: FloatArray, hand_shift: FloatArray
     ) -> tuple[FloatArray]:
         poses = body.forward_kinematics(rotations, root - pelvis_at_rest, placed.betas)
-        moved = move_feet(body, rotations, poses, foot_shift[..., None] * up)
+        moved = move_ends(body, LEGS, rotations, poses, foot_shift[..., None] * up)
         if hand_shift.any():
-            moved = move_hands(body, moved, poses, hand_shift[..., None] * up)
+            moved = move_ends(body, ARMS, moved, poses, hand_shift[..., None] * up)
         return (moved.astype(rotations.dtype, copy=False),)
 
     rotations = by_blocks(bend, placed.rotations, placed.root, foot_shift, hand_shift)[0]

@@ -10,7 +10,7 @@ from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.kinematics import standing
 from scope.scope_addon.kinematics.axes import transform_points
 from scope.scope_addon.kinematics.contact_points import contact_point_positions
-from scope.scope_addon.kinematics.leg_reach import move_hands
+from scope.scope_addon.kinematics.leg_reach import ARMS, move_ends
 from scope.solver import rotations
 
 from ...kinematics.posed_people import FPS, plank_person, stepping_person
@@ -201,7 +201,7 @@ def test_hands_under_the_floor_are_raised_by_their_arms_alone():
     shift = np.repeat(-down[:, None, None] * up, 2, axis=1)
     poses = supported.forward_kinematics(sunk, root - supported.rest_joints()[0])
     _, on_floor = raised(plank, sunk, root)
-    sunk = move_hands(supported, sunk, poses, shift)
+    sunk = move_ends(supported, ARMS, sunk, poses, shift)
     before = skin_heights(plank, sunk, root)[:, hands].min(axis=1)
     assert before.min() < -0.03
     _, found = raised(plank, sunk, root)
