@@ -238,7 +238,7 @@ def eliminate_clip(
     back[:] = 0.0
     front[2 * n + GLOBALS :, 2 * n + GLOBALS :] = system.C
     front[2 * n, 2 * n + GLOBALS :] = system.c
-    middle = _middle(frames)
+    middle = middle_of(frames)
     half = (
         system,
         frames - 1,
@@ -278,7 +278,7 @@ def solve_clip(
     factor.dg[:] = 0.0
     solve_globals(tree, factor.C, factor.c, factor.dg)
     frames = len(factor.d)
-    middle = _middle(len(factor.d))
+    middle = middle_of(len(factor.d))
     both = min(frames, 2)
     factor.d[:] = 0.0
     _substitute_middle(factor, middle, both)
@@ -301,7 +301,7 @@ def run_both(
         waiting.result()
 
 
-def _middle(frames: int) -> int:
+def middle_of(frames: int) -> int:
     """Return the first of the two frames at which the eliminations from both ends meet."""
     return max(frames // 2 - 1, 0)
 

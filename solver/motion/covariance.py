@@ -23,7 +23,7 @@ from ..gauss_newton.recursion import copy_rows, subtract_row
 from ..kernel import kernel
 from ..part import Array, Pose
 from ..tree import Tree
-from .band import Factor, eliminate_clip, run_both
+from .band import Factor, eliminate_clip, middle_of, run_both
 from .system import GLOBALS, ClipSystem
 
 
@@ -63,7 +63,7 @@ def joint_covariances(
     W = len(factor.c)
     C = np.triu(factor.C[:G, :G])
     shared = np.linalg.pinv(C + np.triu(C, 1).T, hermitian=True)
-    middle = max(T // 2 - 1, 0)
+    middle = middle_of(T)
     out = ClipCovariance(np.empty((T, parts, 3, 3)), np.empty((T, parts, 3, 3)), shared)
     front = _make_memory(n, W, parts)
     back = _make_memory(n, W, parts)

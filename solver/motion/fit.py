@@ -371,9 +371,7 @@ class _Clip:
         self.information = shape_information(self.information, P)
 
     def _keep_poses(self, poses: Pose, window: Window) -> None:
-        inner = slice(
-            window.kept.start - window.frames.start, window.kept.stop - window.frames.start
-        )
+        inner = window.inner
         self.R[window.kept] = poses.R[inner]
         self.t[window.kept] = poses.t[inner]
         self.Omega[window.kept] = poses.Omega[inner, 1:]
@@ -394,9 +392,7 @@ class _Clip:
             found = joint_covariances(
                 tree, optimizer.system, poses, root_scale, optimizer.factor, self.pool
             )
-            inner = slice(
-                window.kept.start - window.frames.start, window.kept.stop - window.frames.start
-            )
+            inner = window.inner
             self.covariances[:, window.kept] = found.joints[inner], found.from_root[inner]
 
     def _result(self) -> MotionFit:
@@ -428,6 +424,12 @@ class Window(NamedTuple):
 
     frames: slice
     kept: slice
+
+    @property
+    def inner(self) -> slice:
+        """The frames that are kept, counted from the window's first one."""
+        first = self.frames.start
+        return slice(self.kept.start - first, self.kept.stop - first)
 
 
 def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
