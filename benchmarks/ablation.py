@@ -24,23 +24,23 @@ from unittest import mock
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scope_addon.capture import repair as repair_module
+from ..scope_addon.capture import solve as solve_module
+from ..scope_addon.capture.clock import StageClock
 from ..scope_addon.capture.fitting import prepared_track
 from ..scope_addon.capture.fitting.frame_measurements import DEPTH_SIGMA_M, Measurer
 from ..scope_addon.capture.fitting.prepared_track import Stance
 from ..scope_addon.capture.fitting.stature import FIXED, with_population
 from ..scope_addon.capture.fitting.weights import WEIGHTS
 from ..scope_addon.capture.media.video import open_video
+from ..scope_addon.capture.observe import Listeners, observe
 from ..scope_addon.capture.options import CaptureOptions
 from ..scope_addon.capture.overlay_video import camera_vertices
 from ..scope_addon.capture.perception.lifter import Lifted, default_lifter, windows_around
 from ..scope_addon.capture.perception.observation import PersonMask
 from ..scope_addon.capture.pipeline import shot_of
-from ..scope_addon.capture.stages import repair as repair_module
-from ..scope_addon.capture.stages import solve as solve_module
-from ..scope_addon.capture.stages.clock import StageClock
-from ..scope_addon.capture.stages.observe import Listeners, observe
-from ..scope_addon.capture.stages.repair import repair
-from ..scope_addon.capture.stages.solve import solve
+from ..scope_addon.capture.repair import repair
+from ..scope_addon.capture.solve import solve
 from ..scope_addon.capture.tracking.track import Track
 from ..scope_addon.capture.world import clip_fit
 from ..scope_addon.capture.world import stance as stance_module

@@ -23,7 +23,7 @@ from ...scope_addon.capture.camera.line_segments import Lines
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.observation import Observation
-from ...scope_addon.capture.stages.solve import return_freed_memory, solve
+from ...scope_addon.capture.solve import return_freed_memory, solve
 from ...scope_addon.capture.tracking.left_right import repair_left_right
 from ...scope_addon.capture.tracking.people import build_tracks
 from ...scope_addon.capture.tracking.track import Tracklet

@@ -24,7 +24,7 @@ from .fitting.stature import require_stature
 from .media.video_range import FootageRange, Timecode, VideoRange, parse_range, parse_time
 from .perception.adapters.box_detector import BoxDetector
 from .perception.adapters.keypoint_network import KeypointNetwork
-from .perception.crop import Crop, parse_crop
+from .perception.region import Crop, parse_crop
 from .perception.sessions import Execution, landmark_network_name
 from .tracking.chosen_person import ChosenPerson
 from .tracking.tracker import MAX_PEOPLE

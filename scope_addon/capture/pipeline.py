@@ -13,13 +13,13 @@ from ...solver.body import Body
 from ..capture_report import Report
 from ..footage import display_text
 from ..motion import Motion
+from .clock import Progress, StageClock
 from .media.video import Video, open_video
+from .observe import Footage, Listeners, ObserveFrames, Watch, observe
 from .options import CaptureOptions, check_options
-from .stages.clock import Progress, StageClock
-from .stages.observe import Footage, Listeners, ObserveFrames, Watch, observe
-from .stages.repair import repair
-from .stages.report import make_report
-from .stages.solve import solve
+from .repair import repair
+from .reporting import make_report
+from .solve import solve
 from .tracking.track import Track
 from .world.assemble import Shot
 from .world.camera_path import CameraPath

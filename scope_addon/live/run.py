@@ -23,8 +23,8 @@ from ..capture.fitting.live_body import LiveBody
 from ..capture.fitting.stature import require_stature
 from ..capture.media.frame import Frame
 from ..capture.media.video import opencv_in_one_thread
+from ..capture.observe import network_threads
 from ..capture.perception.sessions import Execution
-from ..capture.stages.observe import network_threads
 from ..capture.tracking.tracker import PeopleTracker
 from .camera import CAMERA_SIZE
 from .newest_frame import NewestFrame

@@ -11,7 +11,7 @@ import pytest
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.crop import Crop
+from scope.scope_addon.capture.perception.region import Crop
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.scope_addon.footage_view import FootageView

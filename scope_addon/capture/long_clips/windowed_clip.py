@@ -23,14 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import UsageError
+from ..clock import FINDING, Progress, StageClock
 from ..media.frame import Frame
 from ..media.video import Video, no_frames_error, open_video, opencv_in_one_thread
-from ..options import CaptureOptions
-from ..perception.observation import Observation
-from ..perception.region import Region
-from ..perception.sessions import Execution
-from ..stages.clock import FINDING, Progress, StageClock
-from ..stages.observe import (
+from ..observe import (
     ObservationJob,
     Observed,
     ObserveFrames,
@@ -42,6 +38,10 @@ from ..stages.observe import (
     observe_in_one_pass,
     open_trackers,
 )
+from ..options import CaptureOptions
+from ..perception.observation import Observation
+from ..perception.region import Region
+from ..perception.sessions import Execution
 from .kept_estimates import KeptEstimates
 from .window_file import KeptWindows, load_window, save_window
 from .windows import JoinedWindows, Window, WindowRecord, WindowRun, plan_windows

@@ -25,9 +25,9 @@ from ...notices import Notice
 from ..camera.background_record import BackgroundRecord, joined_backgrounds
 from ..media.frame import Frame
 from ..media.video import Video
+from ..observe import FrameObserver, Observed, largest_first
 from ..perception.observation import Observation, PendingReference
 from ..perception.region import Region
-from ..stages.observe import FrameObserver, Observed, largest_first
 from ..tracking.people import cheapest_links
 from ..tracking.track import Tracklet, trunk_px
 

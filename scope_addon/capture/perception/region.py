@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a network looks at: a whole picture, fitted into its input (letterboxing), or a rotated
-square of it, for landmarks.
+"""What a network looks at: the part of the picture in which people are looked for, fitted into its
+input (letterboxing), or a rotated square, for landmarks.
 
 Image coordinates are OpenCV's: the centre of the top left pixel is (0, 0), y runs down. Crop
 coordinates s run from (0, 0) at the top left corner of the square to (1, 1) at its bottom right
@@ -10,6 +10,7 @@ one.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -18,6 +19,7 @@ import cv2
 import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array, round_number
+from ...errors import UsageError
 
 _HALVING_FROM = 4.0  # ratio of the sizes
 
@@ -255,3 +257,51 @@ def inside(points: FloatArray, boxes: Sequence[FloatArray]) -> BoolArray:
     for box in boxes:
         found |= ((points >= box[:2]) & (points <= box[2:])).all(1)
     return found
+
+
+MIN_SIDE_PX = 32  # of a part; in a smaller one nobody is found
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A rectangle of the upright picture: its top left corner, width and height in pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    def cut(self, image_rgb: Uint8Array) -> Uint8Array:
+        """Return this part of a picture (H, W, 3), as a view of its pixels."""
+        return image_rgb[self.y : self.y + self.height, self.x : self.x + self.width]
+
+    def check(self, width: int, height: int) -> None:
+        """Check that the part lies within a picture of this size.
+
+        :raises UsageError: it does not.
+        """
+        if self.x + self.width > width or self.y + self.height > height:
+            raise UsageError(
+                f"--crop {self} reaches beyond the footage, which has {width} x {height} pixels"
+            )
+
+    def __str__(self) -> str:
+        """Write the part as the option has it."""
+        return f"{self.x},{self.y},{self.width},{self.height}"
+
+
+def parse_crop(text: str) -> Crop:
+    """Parse "x,y,width,height" in pixels.
+
+    :raises UsageError: the text is not four whole numbers, or the part is too small.
+    """
+    numbers = [number.strip() for number in text.split(",")]
+    if len(numbers) != 4 or not all(re.fullmatch("[0-9]{1,6}", number) for number in numbers):
+        raise UsageError(
+            f"{text[:60]!r} is not a part of the picture: give x, y, width and height in pixels, "
+            "such as 600,0,720,1080"
+        )
+    crop = Crop(*map(int, numbers))
+    if min(crop.width, crop.height) < MIN_SIDE_PX:
+        raise UsageError(f"--crop {crop} is too small: give at least {MIN_SIDE_PX} pixels a side")
+    return crop

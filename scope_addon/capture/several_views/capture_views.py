@@ -20,17 +20,17 @@ from ...footage import display_text
 from ...notices import Notice, notice
 from ..camera.calibration import placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
+from ..clock import FINDING, PLACING, Progress, StageClock
 from ..fitting.keypoint_offsets import with_keypoint_offsets
 from ..fitting.prepared_track import prepare_track
 from ..media.sound import loudness
 from ..media.video import Video, open_video
+from ..observe import Footage, Listeners, Watch, observe
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..stages.clock import FINDING, PLACING, Progress, StageClock
-from ..stages.observe import Footage, Listeners, Watch, observe
-from ..stages.report import make_report
-from ..stages.solve import progress_of_person, solve_people
+from ..reporting import make_report
+from ..solve import progress_of_person, solve_people
 from ..tracking.track import Track
 from ..world.assemble import Shot
 from .bundle import CameraPlace, Given

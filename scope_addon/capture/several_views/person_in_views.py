@@ -16,6 +16,7 @@ from ....solver import Body, MotionFit, MotionPrior, State, fit_motion
 from ...arrays import Float64Array, IndexArray
 from ...kinematics.frame_blocks import to_single_precision
 from ..camera.intrinsics import Camera
+from ..clock import Progress
 from ..fitting.frame_measurements import Measurer
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.outline import fit_shape_to_outline, usable_masks
@@ -23,8 +24,7 @@ from ..fitting.prepared_track import OtherView, PreparedTrack, lift
 from ..fitting.stature import mean_shape, stature_sigma
 from ..fitting.weights import ROBUST, clip_stages, motion_priors
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..stages.clock import Progress
-from ..stages.solve import Person
+from ..solve import Person
 from ..tracking.track import Track
 from ..world.assemble import Shot
 from ..world.placement import PlacedTrack

@@ -21,11 +21,10 @@ import numpy as np
 from ....solver.errors import ShapeError
 from ...arrays import Uint8Array
 from ..perception.adapters.keypoint_network import KeypointNetwork
-from ..perception.crop import Crop
 from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection, possible_regions
-from ..perception.region import MARGIN, Region, bounds
+from ..perception.region import MARGIN, Crop, Region, bounds
 from ..perception.sessions import Execution
 from .appearance import appearance
 from .frame_clock import FRAME_S, FrameClock

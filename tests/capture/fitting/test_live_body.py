@@ -77,7 +77,7 @@ def test_the_result_depends_on_no_watcher_and_no_thread_s_speed(watched, body, m
         time.sleep(0.3)
         return costs(*arguments)
 
-    monkeypatch.setattr("scope.scope_addon.capture.stages.observe.LiveBody", Slow)
+    monkeypatch.setattr("scope.scope_addon.capture.observe.LiveBody", Slow)
     monkeypatch.setattr(focal_length, "camera_by_edges", slow_edges)
     monkeypatch.setattr(FocalFits, "costs", slow_costs)
     slowly = capture(SAMPLE, body, WANTED).motions[0]

@@ -12,17 +12,17 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from scope.scope_addon.capture import observe as observe_module
 from scope.scope_addon.capture.camera.intrinsics import Camera
+from scope.scope_addon.capture.clock import StageClock
 from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.long_clips.windowed_clip import lasting
 from scope.scope_addon.capture.long_clips.windows import WindowRun
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
+from scope.scope_addon.capture.observe import Listeners, observe
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
-from scope.scope_addon.capture.stages import observe as observe_module
-from scope.scope_addon.capture.stages.clock import StageClock
-from scope.scope_addon.capture.stages.observe import Listeners, observe
 from scope.scope_addon.capture.tracking import landmark_estimator
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.errors import CancelledError

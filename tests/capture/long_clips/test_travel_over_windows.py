@@ -10,11 +10,11 @@ import numpy as np
 from scope.scope_addon.capture.camera.background_record import joined_backgrounds
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
+from scope.scope_addon.capture.clock import StageClock
 from scope.scope_addon.capture.long_clips.windowed_clip import run_windows
 from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord, WindowRun
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.stages.clock import StageClock
-from scope.scope_addon.capture.stages.observe import FrameObserver, Trackers
+from scope.scope_addon.capture.observe import FrameObserver, Trackers
 
 WIDTH, HEIGHT = 480, 270
 FOCAL_PX = 400.0

@@ -10,7 +10,7 @@ import pytest
 from scope.scope_addon.capture.perception.lifter import WINDOW, default_lifter
 from scope.solver.body_file import load_body
 
-from ..stages.standing_views import DISTANCE_M, knee_flexion, standing_views
+from ..standing_views import DISTANCE_M, knee_flexion, standing_views
 
 SHAPES = 3  # drawn people besides the mean one
 

@@ -11,24 +11,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....solver.body_file import CHILD_BELOW_M
-from ...arrays import BoolArray, Float64Array
-from ...kinematics.frame_blocks import to_single_precision
-from ...motion import Motion
-from ..fitting.frame_sequence import FittedTrack
-from ..fitting.prepared_track import PreparedTrack, prepare_track
-from ..fitting.track_fit import fit_each_frame, fit_track, ground
-from ..tracking.track import Track
-from ..world.above_floor import raise_body
-from ..world.assemble import FittedPerson, Shot, assemble_motion
-from ..world.camera_path import CameraPath, camera_travel
-from ..world.clip_fit import fit_clip
-from ..world.placement import PlacedTrack, RawMotion, place_track
-from ..world.relative_sizes import relative_sizes, stander
-from ..world.stance import stance_on_ground
-from ..world.travel_scale import belt_travel, contradicting_strides, scaled_travel
-from ..world.world_frame import SharedWorld, find_world
+from ...solver.body_file import CHILD_BELOW_M
+from ..arrays import BoolArray, Float64Array
+from ..kinematics.frame_blocks import to_single_precision
+from ..motion import Motion
 from .clock import Progress
+from .fitting.frame_sequence import FittedTrack
+from .fitting.prepared_track import PreparedTrack, prepare_track
+from .fitting.track_fit import fit_each_frame, fit_track, ground
+from .tracking.track import Track
+from .world.above_floor import raise_body
+from .world.assemble import FittedPerson, Shot, assemble_motion
+from .world.camera_path import CameraPath, camera_travel
+from .world.clip_fit import fit_clip
+from .world.placement import PlacedTrack, RawMotion, place_track
+from .world.relative_sizes import relative_sizes, stander
+from .world.stance import stance_on_ground
+from .world.travel_scale import belt_travel, contradicting_strides, scaled_travel
+from .world.world_frame import SharedWorld, find_world
 
 # Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults
 # best, less suits children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).

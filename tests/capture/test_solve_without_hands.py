@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.solve import prepare, solve
+from scope.scope_addon.capture.solve import prepare, solve
 from scope.solver.body_file import load_body
 
 from .standing_people import seen, steps

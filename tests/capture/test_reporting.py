@@ -6,12 +6,12 @@ What a report says of feet that are not on the floor, for motions whose heights 
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages import report
-from scope.scope_addon.capture.stages.report import face_frames, up_warnings
+from scope.scope_addon.capture import reporting
+from scope.scope_addon.capture.reporting import face_frames, up_warnings
 from scope.scope_addon.capture.world.world_frame import BODIES, LINES
 from scope.solver import load_body, rotations
 
-from ...made_motion import made_face, made_motion
+from ..made_motion import made_face, made_motion
 
 T = 300
 
@@ -91,7 +91,7 @@ def from_second(second, height):
 
 
 def floor_warnings(*arguments) -> list[str]:
-    return list(map(str, report.floor_warnings(*arguments)))
+    return list(map(str, reporting.floor_warnings(*arguments)))
 
 
 def test_nothing_is_said_of_somebody_on_the_floor(body):

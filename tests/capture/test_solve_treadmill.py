@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.solve import Solved, solve
+from scope.scope_addon.capture.solve import Solved, solve
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver.rotations import exp
 

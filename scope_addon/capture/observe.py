@@ -14,36 +14,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....solver.body import Body
-from ...arrays import Float64Array, Uint8Array
-from ...errors import NoPersonError
-from ...machine_code.kernel_count import kernel_count
-from ...notices import Notice, notice
-from ...options.capture import AUTO, LARGEST, OFF
-from ..camera.background_record import BackgroundRecord, CameraMotion
-from ..camera.camera_rotation import BackgroundTracker
-from ..camera.given_path import GivenPath, read_camera_path
-from ..camera.intrinsics import Camera, choose_camera
-from ..camera.line_segments import Lines
-from ..camera.zoom import Zoom
-from ..fitting.focal_length import BackgroundEstimators, FocalFits
-from ..fitting.live_body import LiveBody
-from ..media.frame import AutoExposure, Frame
-from ..media.video import Video, no_frames_error, opencv_in_one_thread
-from ..options import CaptureOptions, most_people
-from ..perception.adapters.description import description_path
-from ..perception.landmark_network import EstimateMemory
-from ..perception.observation import Observation
-from ..perception.sessions import Execution
-from ..tracking.chosen_person import ChosenPerson, find_chosen, needed_turn, place_of
-from ..tracking.face_tracker import FaceTracker
-from ..tracking.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
-from ..tracking.people import people_of
-from ..tracking.scene_cuts import SCENE_GAP_S, SceneCuts
-from ..tracking.search_schedule import MaskSchedule
-from ..tracking.track import Track, Tracklet, make_track
-from ..tracking.tracker import MAX_PEOPLE, PeopleTracker
+from ...solver.body import Body
+from ..arrays import Float64Array, Uint8Array
+from ..errors import NoPersonError
+from ..machine_code.kernel_count import kernel_count
+from ..notices import Notice, notice
+from ..options.capture import AUTO, LARGEST, OFF
+from .camera.background_record import BackgroundRecord, CameraMotion
+from .camera.camera_rotation import BackgroundTracker
+from .camera.given_path import GivenPath, read_camera_path
+from .camera.intrinsics import Camera, choose_camera
+from .camera.line_segments import Lines
+from .camera.zoom import Zoom
 from .clock import COMPILING, FINDING, Progress, StageClock
+from .fitting.focal_length import BackgroundEstimators, FocalFits
+from .fitting.live_body import LiveBody
+from .media.frame import AutoExposure, Frame
+from .media.video import Video, no_frames_error, opencv_in_one_thread
+from .options import CaptureOptions, most_people
+from .perception.adapters.description import description_path
+from .perception.landmark_network import EstimateMemory
+from .perception.observation import Observation
+from .perception.sessions import Execution
+from .tracking.chosen_person import ChosenPerson, find_chosen, needed_turn, place_of
+from .tracking.face_tracker import FaceTracker
+from .tracking.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
+from .tracking.people import people_of
+from .tracking.scene_cuts import SCENE_GAP_S, SceneCuts
+from .tracking.search_schedule import MaskSchedule
+from .tracking.track import Track, Tracklet, make_track
+from .tracking.tracker import MAX_PEOPLE, PeopleTracker
 
 LENGTH_TOLERANCE_S = 1.0  # by which a container may say that footage is too long
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.stature import with_stature
-from scope.scope_addon.capture.stages.solve import solve
+from scope.scope_addon.capture.solve import solve
 from scope.solver import default_priors
 
 from .standing_people import BODY, seen, steps

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.report import floor_warnings
-from scope.scope_addon.capture.stages.solve import solve
+from scope.scope_addon.capture.reporting import floor_warnings
+from scope.scope_addon.capture.solve import solve
 from scope.scope_addon.kinematics.foot_skin import foot_heights, under_floor
 from scope.scope_addon.motion import Motion
 

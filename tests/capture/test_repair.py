@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture import repair as repair_module
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.stages import repair as repair_module
-from scope.scope_addon.capture.stages.repair import repair, wrists_at_hands
+from scope.scope_addon.capture.repair import repair, wrists_at_hands
 from scope.scope_addon.capture.tracking.track import Track
 
-from ..walking import someone_walking, track_without_depth
+from .walking import someone_walking, track_without_depth
 
 T = 12
 

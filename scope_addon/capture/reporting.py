@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from ....solver.body import Body
-from ....solver.names import BODY_JOINTS
-from ...arrays import Float64Array
-from ...capture_report import Report
-from ...kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
-from ...kinematics.sequences import runs
-from ...motion import Motion
-from ...notices import Notice, Value, notice
-from ...options.capture import ON
-from ...review_spans import has_bent_knees, implausible
-from ..media.video import Video
-from ..options import CaptureOptions
-from ..world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
+from ...solver.body import Body
+from ...solver.names import BODY_JOINTS
+from ..arrays import Float64Array
+from ..capture_report import Report
+from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, steps, upper_floors
+from ..kinematics.sequences import runs
+from ..motion import Motion
+from ..notices import Notice, Value, notice
+from ..options.capture import ON
+from ..review_spans import has_bent_knees, implausible
+from .media.video import Video
 from .observe import Footage
+from .options import CaptureOptions
 from .solve import Solved
+from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.stages.solve import solve
+from scope.scope_addon.capture.solve import solve
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.kinematics.axes import transform_points
 from scope.solver.rotations import exp

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..camera.intrinsics import Camera
-from ..perception.hand_landmarks import HAND_LENGTH_M, SIDES, pixels_per_metre
-from ..perception.landmark_network import KEYPOINT_NAMES
-from ..tracking.hand_assignment import confirmed
-from ..tracking.keypoint_jumps import repair_keypoint_jumps
-from ..tracking.left_right import repair_left_right
-from ..tracking.limb_swap import repair_limb_swaps
-from ..tracking.track import Track
+from .camera.intrinsics import Camera
+from .perception.hand_landmarks import HAND_LENGTH_M, SIDES, pixels_per_metre
+from .perception.landmark_network import KEYPOINT_NAMES
+from .tracking.hand_assignment import confirmed
+from .tracking.keypoint_jumps import repair_keypoint_jumps
+from .tracking.left_right import repair_left_right
+from .tracking.limb_swap import repair_limb_swaps
+from .tracking.track import Track
 
 SURE = 0.8  # confidence of a hand from which it counts
 # Distances of its wrist from the body's, in hand lengths, up to which the body's is right, and from

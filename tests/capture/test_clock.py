@@ -11,12 +11,12 @@ import subprocess
 import sys
 
 import pytest
-from scope.scope_addon.capture.stages.clock import StageClock
+from scope.scope_addon.capture.clock import StageClock
 
 
 def test_stages_add_up_also_when_they_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("scope.scope_addon.capture.stages.clock.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr("scope.scope_addon.capture.clock.time.perf_counter", lambda: now[0])
     found = StageClock()
     for name, seconds in (("decode", 1.0), ("solver", 2.0), ("decode", 0.5)):
         with found.stage(name):
@@ -44,7 +44,7 @@ def test_a_stage_that_took_no_time_has_a_rate() -> None:
 # itself.
 PROGRAM = """
 import os
-from scope.scope_addon.capture.stages.solve import return_freed_memory
+from scope.scope_addon.capture.solve import return_freed_memory
 
 def resident_mib():
     with open("/proc/self/statm") as file:

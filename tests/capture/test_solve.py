@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import pytest
-from scope.scope_addon.capture.stages.solve import progress_of_person
+from scope.scope_addon.capture.solve import progress_of_person
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.camera.line_segments import Lines
-from scope.scope_addon.capture.stages.solve import solve
+from scope.scope_addon.capture.solve import solve
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
