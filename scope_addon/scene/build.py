@@ -31,9 +31,11 @@ from .character.keys import bake_whole_frames
 from .character.root_object import ROOT_TAG
 from .datablocks import (
     CAPTURE_TAG,
+    SOURCE_TAG,
     captures_of,
     check_local,
     enter_object_mode,
+    is_person,
     remove_blocks,
     short_name,
 )
@@ -236,7 +238,7 @@ def _build_person(
             mesh, of_keys, motion, frames, options.frame_rate == "resample"
         )
     body_mesh.skin_to_armature(mesh, rig, drawn)
-    rig["scope_source"] = motion.source
+    rig[SOURCE_TAG] = motion.source
     rig["scope_body"] = body.name
     rig["scope_body_file"] = body.file
     rig["scope_start"] = options.start_frame
@@ -353,7 +355,7 @@ def _is_ours(obj: bpy.types.Object) -> bool:
     """
     if obj.type == "MESH":
         return "left_hip" in obj.vertex_groups and "spine1" in obj.vertex_groups
-    return "scope_source" in obj or ROOT_TAG in obj or obj.type == "CAMERA"
+    return is_person(obj) or ROOT_TAG in obj or obj.type == "CAMERA"
 
 
 def _data_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:

@@ -17,6 +17,7 @@ from ..errors import UsageError
 _LONGEST = 63 if bpy.app.version < (5, 0) else 255  # bytes
 SUFFIX_BYTES = 24  # room for what is appended to a capture's name, such as ``_person12_body.001``
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection
+SOURCE_TAG = "scope_source"  # custom property of a captured armature: what it was captured from
 # Kinds of datablock that a file or a capture may contain, users before the datablocks that they
 # use. Shape keys go with their mesh, and ``temporary_scene`` removes scenes.
 _KINDS = (
@@ -59,6 +60,11 @@ def _contains(objects: bpy.types.bpy_prop_collection, obj: bpy.types.Object) -> 
 def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
     """Return the collections of a scene that contain captures, the last added last."""
     return [each for each in scene.collection.children_recursive if CAPTURE_TAG in each]
+
+
+def is_person(obj: bpy.types.Object) -> bool:
+    """Return whether an object is the armature of a captured person."""
+    return SOURCE_TAG in obj
 
 
 def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:

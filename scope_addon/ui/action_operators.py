@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
-from ..scene.datablocks import short_name
+from ..scene.datablocks import SOURCE_TAG, short_name
 from ..scene.stored_values import start_frame, stored_text
 from . import comparison
 from .captured_person import PERSON, captured_armature, motion_of
@@ -288,7 +288,7 @@ def _described(context: bpy.types.Context, armature: bpy.types.Object) -> str:
     """Return the description of an asset that the user has given none"""
     first, last = armature.animation_data.action.frame_range
     seconds = (last - first) * context.scene.render.fps_base / context.scene.render.fps
-    source = stored_text(_captured(armature), "scope_source") or armature.name
+    source = stored_text(_captured(armature), SOURCE_TAG) or armature.name
     return rpt_("Captured from {source}, {seconds:.1f} s", source=source, seconds=seconds)
 
 

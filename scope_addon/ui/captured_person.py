@@ -11,7 +11,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ..errors import UsageError
-from ..scene.datablocks import holds
+from ..scene.datablocks import holds, is_person
 from ..scene.stored_values import stored_numbers, stored_text
 from .reporting import ReportingOperator, refuse, tip_
 
@@ -36,12 +36,12 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     """
     obj = context.view_layer.objects.active if context.view_layer else None
     while obj is not None:
-        if "scope_source" in obj:
+        if is_person(obj):
             return obj
         person = _retargeted_from(context.scene, obj)
         if person is not None:
             return person
-        found = [child for child in obj.children if "scope_source" in child]
+        found = [child for child in obj.children if is_person(child)]
         if len(found) == 1:
             return found[0]
         obj = obj.parent
@@ -56,16 +56,14 @@ def _retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types
     person = rig.get(PERSON)
     if isinstance(person, str):
         person = scene.objects.get(person)
-    if not isinstance(person, bpy.types.Object) or "scope_source" not in person:
+    if not isinstance(person, bpy.types.Object) or not is_person(person):
         return None
     return person if holds(scene.collection, person) else None
 
 
 def captured_people(context: bpy.types.Context) -> list[bpy.types.Object]:
     """Return the captured armatures of the scene."""
-    return [
-        obj for obj in context.scene.objects if obj.type == "ARMATURE" and "scope_source" in obj
-    ]
+    return [obj for obj in context.scene.objects if obj.type == "ARMATURE" and is_person(obj)]
 
 
 def has_captured_person(context: bpy.types.Context) -> bool:

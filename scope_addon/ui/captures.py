@@ -14,7 +14,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..notices import notice
-from ..scene.datablocks import captures_of, is_in_layer
+from ..scene.datablocks import captures_of, is_in_layer, is_person
 from .captured_person import captured_armature
 from .reporting import iface_, sentence, tip_
 
@@ -65,7 +65,7 @@ def show_again(capture: bpy.types.Collection) -> None:
 
 def people_of(capture: bpy.types.Collection) -> list[bpy.types.Object]:
     """Return the captured armatures of a capture; empty if they were deleted."""
-    return [obj for obj in capture.all_objects if obj.type == "ARMATURE" and "scope_source" in obj]
+    return [obj for obj in capture.all_objects if obj.type == "ARMATURE" and is_person(obj)]
 
 
 def unit_text(scene: bpy.types.Scene) -> str:

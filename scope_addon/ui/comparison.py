@@ -27,7 +27,7 @@ from bpy.app.handlers import persistent
 from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
-from ..scene.datablocks import captures_of, enter_object_mode, holds
+from ..scene.datablocks import captures_of, enter_object_mode, holds, is_person
 from .captured_person import body_of, captured_armature
 from .captures import people_of
 from .sidebar import viewport_at, viewports
@@ -184,7 +184,7 @@ def is_side_view(context: bpy.types.Context) -> bool:
 
 def _is_side(space: bpy.types.SpaceView3D) -> bool:
     followed = space.lock_object
-    return bool(space.local_view and followed is not None and "scope_source" in followed)
+    return bool(space.local_view and followed is not None and is_person(followed))
 
 
 def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
@@ -292,7 +292,7 @@ def _show_alone(
         bpy.ops.object.select_all(action="DESELECT")
         # copied, because hiding and showing invalidates the iterator
         for obj in list(collection.all_objects):
-            if "scope_source" in obj:  # it may be hidden because of a retargeted rig
+            if is_person(obj):  # it may be hidden because of a retargeted rig
                 show(obj, context.view_layer, temporarily=True)
             obj.select_set(True)
         bpy.ops.view3d.localview(frame_selected=False)

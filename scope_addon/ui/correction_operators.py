@@ -19,6 +19,7 @@ from bpy.props import (
 
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
+from ..scene.datablocks import is_person
 from ..scene.stored_values import LAST_FRAME
 from .captured_person import EditOperator, SpanOperator, body_of, motion_of, set_motion_of
 from .preferences import keep_machine_code
@@ -101,7 +102,7 @@ def change_world(
 
     motion = motion_of(armature)
     near = [obj for c in armature.users_collection for obj in c.all_objects]
-    people = [obj for obj in near if obj != armature and "scope_source" in obj]
+    people = [obj for obj in near if obj != armature and is_person(obj)]
     together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
     every_camera = [obj for obj in near if obj.type == "CAMERA"]
     further = [obj for obj in every_camera if view_number(obj) is not None]

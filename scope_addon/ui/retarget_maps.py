@@ -14,7 +14,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ...solver.errors import ScopeError
-from ..scene.datablocks import is_in_layer
+from ..scene.datablocks import is_in_layer, is_person
 from .file_field import SavingOperator, output_file
 from .reporting import ReportingOperator, refuse, rpt_, tip_
 
@@ -177,7 +177,7 @@ def bones_move(face: bpy.types.Object | None) -> bool:
     """Return whether a face is a rig whose bones move it, and Scope knows which."""
     from ..scene.face_retarget import has_bone_face
 
-    return face is not None and "scope_source" not in face and has_bone_face(face)
+    return face is not None and not is_person(face) and has_bone_face(face)
 
 
 def has_targets(face: bpy.types.Object | None) -> bool:

@@ -17,6 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..scene.datablocks import is_person
 from .capture_panel import PersonTab, Tab
 from .captured_person import draw_active_person
 from .retarget_maps import (
@@ -284,12 +285,12 @@ class SCOPE_PG_expression_pair(bpy.types.PropertyGroup):
 
 
 def _is_face(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    captured = obj.parent is not None and "scope_source" in obj.parent
+    captured = obj.parent is not None and is_person(obj.parent)
     return not captured and has_targets(obj)
 
 
 def _is_armature(_settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
-    return obj.type == "ARMATURE" and "scope_source" not in obj
+    return obj.type == "ARMATURE" and not is_person(obj)
 
 
 def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
