@@ -78,6 +78,12 @@ def test_a_wrong_shape_is_named():
         motion.validate()
 
 
+@pytest.mark.parametrize("wrong", [{"footage_rotation": 45}, {"footage_speed": 0.0}])
+def test_a_turn_or_speed_that_no_footage_has_is_refused(wrong):
+    with pytest.raises(MotionFileError, match="a multiple of 90, and footage_speed above 0"):
+        replace(make_motion(), **wrong).validate()
+
+
 @pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04broken"])
 def test_a_damaged_file_is_an_error_that_names_it(tmp_path, content):
     path = tmp_path / "bad.npz"

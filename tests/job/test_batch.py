@@ -238,9 +238,10 @@ def test_a_damaged_report_is_ignored(folder, tmp_path):
         (folder / name).unlink()
     out = tmp_path / "out"
     batch(folder, out).run(1)
-    unusable = {"name": "a", "status": "done", "outputs": ["x" * 300]}
+    outputs = {"a": ["x" * 300], "c": "c.npz"}
+    unusable = [{"name": n, "status": "done", "outputs": o} for n, o in outputs.items()]
     texts = ("", "{", "[]", '{"files": 3}', '{"files": [{"name": "a", "status": {}, "key": 1}]}')
-    for text in (*texts, '{"a":' * 100_000, json.dumps({"files": [unusable]})):
+    for text in (*texts, '{"a":' * 100_000, json.dumps({"files": unusable})):
         calls(folder)
         (out / REPORT_NAME).write_text(text)
         batch(folder, out).run(1)
