@@ -29,8 +29,8 @@ from ..scope_addon.capture.fitting.prepared_track import PreparedTrack, prepare_
 from ..scope_addon.capture.media.video import open_video
 from ..scope_addon.capture.media.video_range import VideoRange
 from ..scope_addon.capture.tracking.left_right import repair_left_right
-from ..scope_addon.capture.tracking.people import build_tracks
-from ..scope_addon.capture.tracking.track import Tracklet
+from ..scope_addon.capture.tracking.people import people_of
+from ..scope_addon.capture.tracking.track import Tracklet, make_track
 from ..scope_addon.capture.tracking.tracker import PeopleTracker
 from ..scope_addon.errors import NoPersonError
 from ..solver import Body, Fit, FrameSolver, Options, Priors, Stage, State, fit_batch, load_body
@@ -92,12 +92,13 @@ def prepare(video: Path, body: Body, end_s: float = float("inf")) -> PreparedTra
             for number, observation in tracker.step(frame.image_rgb, time_s=frame.timestamp_s):
                 tracklets[number].add(len(times), observation)
             times.append(frame.timestamp_s)
-    tracks = build_tracks(range(len(times)), times, list(tracklets.values()), 1)
-    if not tracks:
+    people = people_of(times, list(tracklets.values()))
+    if not people:
         raise NoPersonError(
             f"no person was found in {video}: the benchmark needs the clips of ../shared"
         )
-    return prepare_track(body, repair_left_right(tracks[0], camera), camera)
+    track = make_track(range(len(times)), times, people[0])
+    return prepare_track(body, repair_left_right(track, camera), camera)
 
 
 def _record(video: Path, body: Body, path: Path) -> None:

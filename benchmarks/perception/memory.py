@@ -25,8 +25,8 @@ from ...scope_addon.capture.options import CaptureOptions
 from ...scope_addon.capture.perception.observation import Observation
 from ...scope_addon.capture.solve import return_freed_memory, solve
 from ...scope_addon.capture.tracking.left_right import repair_left_right
-from ...scope_addon.capture.tracking.people import build_tracks
-from ...scope_addon.capture.tracking.track import Tracklet
+from ...scope_addon.capture.tracking.people import people_of
+from ...scope_addon.capture.tracking.track import Tracklet, make_track
 from ...scope_addon.capture.tracking.tracker import PeopleTracker
 from ...scope_addon.capture.world.assemble import Shot
 from ...scope_addon.capture.world.camera_path import CameraPath
@@ -55,8 +55,10 @@ def replay(frames: int, people: int) -> dict[str, float]:
         for p, tracklet in enumerate(tracklets):
             tracklet.add(k, moved(seen[k % len(seen)], p * APART_PX))
     peaks["tracking"] = peak_mib()
-    tracks = build_tracks(range(frames), [k / fps for k in range(frames)], tracklets, people)
-    del tracklets, tracklet, tracker
+    times = [k / fps for k in range(frames)]
+    found = people_of(times, tracklets)[:people]
+    tracks = [make_track(range(frames), times, person) for person in found]
+    del found, tracklets, tracklet, tracker
     return_freed_memory()
     tracks = [repair_left_right(track, camera) for track in tracks]
     shot = Shot(

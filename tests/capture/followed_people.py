@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scope.scope_addon.capture.perception.observation import Observation
-from scope.scope_addon.capture.tracking.people import build_tracks
-from scope.scope_addon.capture.tracking.track import Track, Tracklet
+from scope.scope_addon.capture.tracking.people import people_of
+from scope.scope_addon.capture.tracking.track import Track, Tracklet, make_track
 
 
 class FollowedPeople:
@@ -23,6 +23,5 @@ class FollowedPeople:
         self._times.append(time_s)
 
     def tracks(self, most: int) -> list[Track]:
-        return build_tracks(
-            range(len(self._times)), self._times, list(self._tracklets.values()), most
-        )
+        people = people_of(self._times, list(self._tracklets.values()))[:most]
+        return [make_track(range(len(self._times)), self._times, person) for person in people]

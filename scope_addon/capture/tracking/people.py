@@ -24,7 +24,7 @@ import numpy as np
 
 from ...arrays import Float64Array
 from .appearance import distance
-from .track import Track, Tracklet, make_track
+from .track import Tracklet
 
 POSITION_SIGMA = 0.15  # sides of the region
 SPEED_SIGMA = 0.8  # sides per second: nobody keeps exactly the same velocity
@@ -205,19 +205,6 @@ MERGER_DISTANCE = 0.25
 MAX_MERGER_S = 0.38
 # A lost person who is found for a shorter time, and lost again, was something else.
 MIN_REAPPEARANCE_S = 0.1
-
-
-def build_tracks(
-    frames: Sequence[int], times: Sequence[float], tracklets: Sequence[Tracklet], most: int
-) -> list[Track]:
-    """Return the tracks of at most ``most`` people, the most prominent first; see `people_of`.
-
-    Each track has a row per frame.
-
-    :param frames: source frame index of each frame.
-    """
-    people = people_of(times, tracklets)[:most]
-    return [make_track(frames, times, person) for person in people]
 
 
 def people_of(times: Sequence[float], tracklets: Sequence[Tracklet]) -> list[list[Tracklet]]:

@@ -16,11 +16,11 @@ from scope.scope_addon.capture.perception.person_detector import Detection
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking import landmark_estimator
 from scope.scope_addon.capture.tracking.people import (
-    build_tracks,
     frames_before_flicker,
     frames_before_merger,
+    people_of,
 )
-from scope.scope_addon.capture.tracking.track import Track, Tracklet
+from scope.scope_addon.capture.tracking.track import Track, Tracklet, make_track
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
 from ..composites import composite
@@ -494,7 +494,8 @@ def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(
     times = (np.arange(60) / FPS).tolist()
     tracklets = [seen_at(walks), seen_at(passes)]
     assert frames_before_merger(tracklets[0], tracklets, times) == kept
-    (track, *_) = build_tracks(list(range(60)), times, [seen_at(walks), seen_at(passes)], 2)[::-1]
+    *_, person = people_of(times, [seen_at(walks), seen_at(passes)])[:2]
+    track = make_track(list(range(60)), times, person)
     assert track.seen.sum() == kept
 
 
