@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -80,9 +80,11 @@ _MAX_REDETECTION_INNOVATION = 0.35
 CURLED_SPREAD = 0.25
 # Of somebody who is detected with a lower score than `SURE_SCORE` after those who are tracked were
 # removed. In 300 frames of one or two people, background and remains had scores of up to 0.85; but
-# none of these with both limits and plausible keypoints.
+# none of these with both limits and plausible keypoints. The presence counts for somebody who is
+# followed as well, and is near the prediction then.
 _MIN_HIDDEN_SCORE = 0.7
 _MIN_HIDDEN_PRESENCE = 0.95
+_MAX_HIDDEN_INNOVATION = 0.15
 # A second region of a detection counts if it shows the shoulders nearer to the detected ones by so
 # much, in sides. Where there is only one person, both show the same.
 _CLEARLY_NEARER = 0.015
@@ -282,10 +284,51 @@ class PeopleTracker:
             else:
                 target.update(estimate, swapped, self._clock.time_s, self._clock.step_s)
                 kept.append(target)
-        for target in self._live:
-            if target not in kept and target not in self._lost:
+        missed = [f for f in self._live if f not in kept and f not in self._lost]
+        for target, behind in self._estimate_behind(image_rgb, missed, kept):
+            if behind is None:
                 self._lose(target)
+            else:
+                swapped = looks_swapped(target.estimate, behind)
+                target.update(behind, swapped, self._clock.time_s, self._clock.step_s)
+                kept.append(target)
         self._live = sorted(kept, key=lambda f: f.tracklet)
+
+    def _estimate_behind(
+        self, image_rgb: Uint8Array, missed: list[TrackedTarget], kept: list[TrackedTarget]
+    ) -> Iterator[tuple[TrackedTarget, PoseEstimate | None]]:
+        """Estimate people who may be behind those who are still tracked, with these removed.
+
+        :return: each with the estimate; None if too little of them is seen.
+        """
+        for target in missed:
+            predicted = target.estimate.next_region.moved(target.velocity_px)
+            front = [f for f in kept if f.estimate.next_region.is_near(predicted)]
+            rest_rgb = None
+            if front and not self._largest_only:
+                rest_rgb = self._without(image_rgb, front)
+            if rest_rgb is None:
+                yield target, None
+                continue
+            (estimate,) = self._estimator.estimate(rest_rgb, [predicted], sure=False)
+            is_seen = (
+                estimate is not None
+                and estimate.presence >= _MIN_HIDDEN_PRESENCE
+                and target.innovation(estimate) <= _MAX_HIDDEN_INNOVATION
+                and not any(is_same_body(estimate, f.estimate) for f in kept)
+            )
+            yield target, estimate if is_seen else None
+
+    def _without(self, image_rgb: Uint8Array, people: Sequence[TrackedTarget]) -> Uint8Array | None:
+        """Return the image without these people; None if the landmark network is the user's, which
+        has no masks.
+        """
+        network = self._networks.landmarks
+        if not isinstance(network, LandmarkNetwork):
+            return None
+        regions = [f.estimate.next_region for f in people]
+        masks = [network.mask(image_rgb, region) for region in regions]
+        return remove_people(image_rgb, list(zip(regions, masks, strict=True)))
 
     def _start_given(self, image_rgb: Uint8Array) -> None:
         """Start a tracklet for everybody in the given regions, also for those who would lose
@@ -368,16 +411,10 @@ class PeopleTracker:
             )
 
     def _search_behind(self, image_rgb: Uint8Array) -> None:
-        """Start a tracklet for everybody who is seen once those who are tracked are removed.
-
-        A landmark network of the user's has no masks, so nobody is looked for with it.
-        """
-        network = self._networks.landmarks
-        if not isinstance(network, LandmarkNetwork):
+        """Start a tracklet for everybody who is seen once those who are tracked are removed."""
+        rest_rgb = self._without(image_rgb, self._live)
+        if rest_rgb is None:
             return
-        regions = [f.estimate.next_region for f in self._live]
-        masks = [network.mask(image_rgb, region) for region in regions]
-        rest_rgb = remove_people(image_rgb, list(zip(regions, masks, strict=True)))
         found = self._networks.detector.detect(rest_rgb, closely=True)
         found = [detection for detection in found if detection.score >= _MIN_HIDDEN_SCORE]
         for body in self._estimate_detected(rest_rgb, found, SURE_SCORE):

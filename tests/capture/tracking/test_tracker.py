@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.observation import Observation
+from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.errors import ShapeError
 
@@ -144,6 +146,44 @@ def test_two_people_side_by_side_are_both_found(frames: Frames, apart_px: int) -
             np.linalg.norm(truth_px - keypoints_px, axis=1).mean() for keypoints_px in found
         )
         assert off_px < 20  # pixels of a person with a height of about 260
+
+
+def test_somebody_half_hidden_by_another_person_is_found_and_followed(frames: Frames) -> None:
+    """The one in front hides one arm, half of the trunk and a leg."""
+    tracker = PeopleTracker("best", threads=2, people=12)
+    front, behind = (
+        list(islice(frames(f"people/inputs/plumb_studio_{name}"), 8)) for name in (501, 378)
+    )
+    alone = []
+    for images in (front, behind):
+        tracker.reset()
+        alone.append([tracker.step(image)[0][1] for image in images])
+    shoulders_px = [seen[0].keypoints_px[[11, 12]].mean(axis=0) for seen in alone]
+    moved = np.round(shoulders_px[0] - shoulders_px[1] + [67, 0])
+    shift = np.array([[1, 0, moved[0]], [0, 1, moved[1]]])
+
+    tracker.reset()
+    off_px = []
+    for k, (image, other) in enumerate(zip(front, behind, strict=True)):
+        shown = _person_shown(tracker, image, alone[0][k].region)
+        moved_image = cv2.warpAffine(other, shift, image.shape[1::-1])
+        found = tracker.step(np.where(shown[..., None], image, moved_image))
+        truth_px = alone[1][k].keypoints_px + moved
+        off_px.append(
+            min(np.linalg.norm(truth_px - o.keypoints_px, axis=1).mean() for _, o in found)
+        )
+        assert len(found) <= 2
+    assert np.sum(np.array(off_px) < 30) >= 7  # of a person with a height of 260 pixels
+
+
+def _person_shown(tracker: PeopleTracker, image: np.ndarray, region: Region) -> np.ndarray:
+    """Return which pixels (H, W) of an image show the person of a region, by the network's mask."""
+    assert tracker.mask_network is not None
+    probability = tracker.mask_network.mask(image, region)
+    corners_crop = np.array([[0, 0], [1, 0], [0, 1]], np.float32)
+    corners = region.image_from_crop(corners_crop).astype(np.float32)
+    A = cv2.getAffineTransform(corners_crop * len(probability), corners)
+    return cv2.warpAffine(probability, A, image.shape[1::-1]) > 0.5
 
 
 def test_a_small_person_is_tracked_where_there_is_nobody_else(
