@@ -180,9 +180,10 @@ def _person_shown(tracker: PeopleTracker, image: np.ndarray, region: Region) -> 
     """Return which pixels (H, W) of an image show the person of a region, by the network's mask."""
     assert tracker.mask_network is not None
     probability = tracker.mask_network.mask(image, region)
-    corners_crop = np.array([[0, 0], [1, 0], [0, 1]], np.float32)
-    corners = region.image_from_crop(corners_crop).astype(np.float32)
-    A = cv2.getAffineTransform(corners_crop * len(probability), corners)
+    corners_crop = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    pixels_crop = corners_crop * len(probability)
+    pixels = region.image_from_crop(corners_crop)
+    A = cv2.getAffineTransform(pixels_crop.astype(np.float32), pixels.astype(np.float32))
     return cv2.warpAffine(probability, A, image.shape[1::-1]) > 0.5
 
 
