@@ -18,7 +18,7 @@ from scope.scope_addon.ui.retarget_maps import common_prefix
 from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face
 from ...scene.made_rigs import add_mpfb_face, build_rig
-from ...scene.rigs.test_face_retarget import face_mesh
+from ...scene.test_face_retarget import face_mesh
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from scope.scope_addon.ui.retarget_panel import offered_expressions
 
 from ...edit.walking import BODY, motion_of, walk
 from ...made_motion import made_face
-from ...scene.rigs.test_face_retarget import face_mesh
+from ...scene.test_face_retarget import face_mesh
 
 
 @pytest.fixture

@@ -25,8 +25,8 @@ from scope.scope_addon.ui.preferences import cache
 from scope.solver.body_file import load_body
 from scope.solver.errors import ScopeError
 
-from ...job.processes import wait_for
-from ...made_motion import made_views
+from ..job.processes import wait_for
+from ..made_motion import made_views
 
 FINISH = "send('progress', stage='solving', done=1, total=10)\nfinish()"
 

@@ -22,10 +22,10 @@ from scope.scope_addon.scene.face_retarget import (
 )
 from scope.scope_addon.scene.rig_export import export_on_rig
 
-from ...edit.walking import motion_of, walk
-from ...made_motion import made_face
-from ..character.test_expression_keys import morph_animation
-from ..made_rigs import add_mpfb_face, build_rig
+from ..edit.walking import motion_of, walk
+from ..made_motion import made_face
+from .character.test_expression_keys import morph_animation
+from .made_rigs import add_mpfb_face, build_rig
 
 JAW = np.array([0.0, 0.3, 0.9, 0.2])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scope.solver.rotations import exp
 
-from ...edit.rolling import STRIDE, joint, rolling_walk
-from ...edit.walking import motion_of, walk
-from ..made_rigs import FBX, build_rig, captured, seen
+from ..edit.rolling import STRIDE, joint, rolling_walk
+from ..edit.walking import motion_of, walk
+from .made_rigs import FBX, build_rig, captured, seen
 from .test_rig_retarget import run
 
 _, STANDS = rolling_walk()

@@ -23,8 +23,8 @@ from scope.scope_addon.scene.rig_file import load_rig, rig_bone_map
 from scope.scope_addon.scene.rig_retarget import retarget, usable_guess
 from scope.solver.errors import InputError
 
-from ...edit.walking import BETAS, BODY, NAMES, RATE, motion_of, walk
-from ..made_rigs import captured, truth
+from ..edit.walking import BETAS, BODY, NAMES, RATE, motion_of, walk
+from .made_rigs import captured, truth
 
 MOTION = motion_of(walk(0.5, bent=0.2))
 JOINTS = truth(MOTION)

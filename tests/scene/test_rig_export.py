@@ -22,10 +22,10 @@ from scope.scope_addon.scene.rig_file import check_rig
 from scope.scope_addon.scene.rig_retarget import guess_bone_map, retarget
 from scope.solver.errors import InputError
 
-from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
-from ...retarget.naming_schemes import names_of
-from ..exported import read_back
-from ..made_rigs import ARMS, FRAMES, build_rig, captured, seen, truth
+from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ..retarget.naming_schemes import names_of
+from .exported import read_back
+from .made_rigs import ARMS, FRAMES, build_rig, captured, seen, truth
 
 
 def save_rig(path, scheme="mixamo", armatures=1, animated=False):

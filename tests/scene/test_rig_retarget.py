@@ -9,9 +9,9 @@ from scope.scope_addon.retarget.bone_map import BoneMap
 from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 from scope.solver.errors import InputError
 
-from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
-from ...retarget.naming_schemes import SCHEMES
-from ..made_rigs import ARMS, FBX, FRAMES, LEGS, build_rig, captured, seen, truth
+from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
+from ..retarget.naming_schemes import SCHEMES
+from .made_rigs import ARMS, FBX, FRAMES, LEGS, build_rig, captured, seen, truth
 
 
 @pytest.fixture

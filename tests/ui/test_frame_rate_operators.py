@@ -15,8 +15,8 @@ from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.capture_job import show_result
 from scope.scope_addon.ui.frame_rate_operators import keyed_for, rate_warnings
 
-from ...edit.walking import BODY, NAMES, motion_of, walk
-from ...scene.made_rigs import build_rig
+from ..edit.walking import BODY, NAMES, motion_of, walk
+from ..scene.made_rigs import build_rig
 
 START = 11.0
 TIMES = (0.0, 0.4, 1.0, 1.7)  # seconds of the footage

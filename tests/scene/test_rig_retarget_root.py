@@ -16,8 +16,8 @@ from scope.scope_addon.scene.character.root_object import (
 )
 from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
-from ...edit.walking import BODY, RATE, motion_of, walk
-from ..made_rigs import FBX, build_rig, captured, seen
+from ..edit.walking import BODY, RATE, motion_of, walk
+from .made_rigs import FBX, build_rig, captured, seen
 
 TURNED = Matrix.LocRotScale(
     (2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3

@@ -12,7 +12,7 @@ from scope.scope_addon.ui import capture_panel
 from scope.scope_addon.ui.capture_job import review_spans, show_result
 from scope.scope_addon.ui.reporting import add_warning, sentence, stored_warning
 
-from ...made_motion import made_motion
+from ..made_motion import made_motion
 
 
 def test_spans_are_listed_by_reason_in_scene_frames(body):

@@ -12,8 +12,8 @@ from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
-from ...edit.walking import BODY, RATE, motion_of, walk
-from ..made_rigs import FBX, FRAMES, build_rig, captured, seen, truth
+from ..edit.walking import BODY, RATE, motion_of, walk
+from .made_rigs import FBX, FRAMES, build_rig, captured, seen, truth
 
 HANDS = load_body("scope_h")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")

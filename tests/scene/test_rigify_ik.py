@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
-from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
-from ..made_rigs import captured
+from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
+from .made_rigs import captured
 
 LIMBS = [
     (f"{name}.{side}", kind)

@@ -14,8 +14,8 @@ from scope.scope_addon.ui import capture_job
 from scope.scope_addon.ui.capture_operators import end_capture, state
 from scope.scope_addon.ui.preferences import cache
 
-from ...job.processes import wait_for
-from ...scene.test_footage_strip import start_of
+from ..job.processes import wait_for
+from ..scene.test_footage_strip import start_of
 
 FINISH = "finish()"
 
