@@ -12,7 +12,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import bpy
-from shared.session import OUT, addon, until, use
+from shared.session import OUT, interface, until, use
 
 ADDRESS = "http://127.0.0.1:8099/video"
 PORT = "8099"
@@ -23,14 +23,9 @@ GONE_S = 4.0
 report: dict = {}
 
 
-def module(name: str):
-    """Return a module of the extension's interface."""
-    return sys.modules[addon().__name__.replace("capture.capture_operators", name)]
-
-
 def state():
     """Return the state of live captures."""
-    return module("live_properties").state
+    return interface("live_properties").state
 
 
 def camera() -> Generator[float, None, subprocess.Popen]:

@@ -17,7 +17,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from shared.session import ARGUMENTS, FOOTAGE, OUT, addon, invoke, run, until, use
+from shared.session import ARGUMENTS, FOOTAGE, OUT, addon, interface, invoke, run, until, use
 
 
 def footage() -> Iterator[float]:
@@ -38,9 +38,7 @@ def stream(address: str) -> Iterator[float]:
     settings.source = "STREAM"
     settings.stream = address
     use(bpy.ops.scope.live, "INVOKE_DEFAULT")
-    state = sys.modules[
-        addon().__name__.replace("capture.capture_operators", "live_properties")
-    ].state
+    state = interface("live_properties").state
     yield from until(lambda: state.job is None or state.job.has_body, 300, "the first pose")
     return "capturing" if state.job else state.message
 

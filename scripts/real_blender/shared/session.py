@@ -87,11 +87,15 @@ def press(place: tuple[int, int], happened: Callable[[], bool]) -> Iterator[floa
     raise RuntimeError(f"the button at {place} took no click")
 
 
+def interface(name: str):
+    """Return a module of the extension's interface, which is loaded."""
+    module = f".scope_addon.ui.{name}"
+    return sys.modules[next(n for n in sys.modules if n.endswith(module))]
+
+
 def addon():
     """Return the extension's module of operators, to inspect the job."""
-    module = ".scope_addon.ui.capture_operators"
-    name = next(n for n in sys.modules if n.endswith(module))
-    return sys.modules[name]
+    return interface("capture_operators")
 
 
 def invoke(operator, *arguments, **settings) -> set[str]:

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import random
 import shutil
-import sys
 from pathlib import Path
 
 import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from shared.session import addon, invoke, use, viewport
+from shared.session import addon, interface, invoke, use, viewport
 from walk.file_steps import FileSteps, Step
 
 TOOLS = ("pin_limb", "upright_line")
@@ -372,4 +371,4 @@ class Steps(FileSteps):
 
 def cache():
     """Return the extension's cache."""
-    return sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")].cache()
+    return interface("preferences").cache()

@@ -21,6 +21,7 @@ from shared.session import (
     OUT,
     addon,
     captured,
+    interface,
     inventory,
     invoke,
     run,
@@ -32,11 +33,6 @@ from shared.session import (
 
 SAVED = OUT / "reload.blend"
 report: dict[str, int] = {"files_opened": 0}
-
-
-def module(name: str):
-    """Return a module of the extension's interface."""
-    return sys.modules[addon().__name__.replace("capture.capture_operators", name)]
 
 
 def ways() -> tuple[Callable[[], object], ...]:
@@ -58,8 +54,8 @@ def open_file(way: Callable[[], object]) -> Iterator[float]:
     for _ in range(10):
         yield 0.05
     assert addon().state.job is None
-    assert module("live_properties").state.job is None
-    assert not module("pin_tool").is_running()
+    assert interface("live_properties").state.job is None
+    assert not interface("pin_tool").is_running()
 
 
 def prepared() -> Iterator[float]:
@@ -86,7 +82,7 @@ def live(footage: str = FOOTAGE) -> Iterator[float]:
     settings.source = "FILE"
     settings.file = footage
     assert use(bpy.ops.scope.live, "INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    state = module("live_properties").state
+    state = interface("live_properties").state
     yield from until(lambda: state.job is None or state.job.has_body, 120, "the first pose")
     assert state.job is not None, state.message
 
@@ -135,7 +131,7 @@ def removed_in_another_scene() -> Iterator[float]:
     yield 0.1
     use(bpy.ops.scope.cancel_live)
     yield from until(
-        lambda: module("live_properties").state.job is None, 60, "the end of the live capture"
+        lambda: interface("live_properties").state.job is None, 60, "the end of the live capture"
     )
     found = blocks_in_graph(scene)
     assert found == before, f"the hidden scene's graph has {found} datablocks, not {before}"

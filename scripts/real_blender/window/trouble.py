@@ -24,6 +24,7 @@ from shared.session import (
     OUT,
     addon,
     captured,
+    interface,
     inventory,
     invoke,
     picture,
@@ -40,7 +41,7 @@ report: dict[str, str] = {}
 
 def cache():
     """Return the cache of the folder that the preferences name now."""
-    return sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")].cache()
+    return interface("preferences").cache()
 
 
 def preferences() -> bpy.types.AddonPreferences:

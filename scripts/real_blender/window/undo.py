@@ -24,6 +24,7 @@ from shared.session import (
     OUT,
     addon,
     captured,
+    interface,
     invoke,
     picture,
     run,
@@ -249,8 +250,7 @@ def failing() -> Iterator[float]:
 
 def forget_captures() -> None:
     """Empty the cache, except for compiled code, so that the footage is captured again."""
-    preferences = sys.modules[addon().__name__.replace("capture.capture_operators", "preferences")]
-    shutil.rmtree(preferences.cache().root / "captures")
+    shutil.rmtree(interface("preferences").cache().root / "captures")
 
 
 def steps() -> Iterator[float]:
