@@ -79,10 +79,10 @@ _MIN_REDETECTION_PRESENCE = 0.9
 _MAX_REDETECTION_INNOVATION = 0.35
 CURLED_SPREAD = 0.25
 # Of somebody who is detected with a lower score than `SURE_SCORE` after those who are tracked were
-# removed. In 300 frames of one or two people, background and remains had scores of up to 0.85; but
-# none of these with both limits and plausible keypoints. The presence counts for somebody who is
-# followed as well, and is near the prediction then.
-_MIN_HIDDEN_SCORE = 0.7
+# removed. In some 400 frames of one or two people, background and remains had scores of up to 0.85;
+# but none of these with both limits and plausible keypoints. The presence counts for somebody who
+# is followed as well, and is near the prediction then.
+_MIN_HIDDEN_SCORE = 0.8
 _MIN_HIDDEN_PRESENCE = 0.95
 _MAX_HIDDEN_INNOVATION = 0.15
 # A second region of a detection counts if it shows the shoulders nearer to the detected ones by so
