@@ -9,7 +9,7 @@ itself says nothing:
   image, as if it had been solved in front of the body and then behind it;
 - lean: the weight is held beside the feet for seconds, where anybody would fall;
 - floating: both feet are above the floor for longer than a jump takes;
-- bent knees: somebody who stands or walks does not straighten a knee once in the whole clip.
+- bent knees: a person who stands or walks never straightens a knee in the whole clip.
 
 It may be true: of a punch, of somebody who is held or hangs, of a crouch.
 """
@@ -37,11 +37,11 @@ LEAN_S = 2.0
 NOT_SITTING = 0.7  # height of the pelvis over two thighs, from which nobody sits
 FLOATING_M = 0.25  # of both ankles' height above that at which they stand
 FLOATING_S = 1.2  # a jump of 1.7 m
-BENT_KNEE_DEG = 155.0  # the straightest knee of somebody who stands
+BENT_KNEE_DEG = 155.0  # the straightest knee of a standing person
 STANDING = 0.85  # distance of hip and ankle over the leg's length, from which a person stands
 BENT_S = 3.0  # of standing, in which a knee is straight at some time
 
-_ANKLE_M = 0.09  # height of an ankle of somebody who stands
+_ANKLE_M = 0.09  # height of a standing person's ankle
 _FOOT = ("ankle", "foot")
 _AT = {name: k for k, name in enumerate(BODY_JOINTS)}
 # Ends of limbs, and the joints from which they reach.

@@ -237,7 +237,7 @@ def unique(detections: list[Detection]) -> list[Detection]:
 
 def possible_regions(detection: Detection, detections: list[Detection]) -> list[Region]:
     """Return the regions in which the landmark network may find a detected person: the detection's
-    own, and a second one for somebody who stands close to others.
+    own, and a second one for a person standing close to others.
 
     In the second one, the trunk hangs from the person's own shoulders and is the mean of all trunks
     there, in which the pulls from both sides cancel. It is smaller, because the network would take

@@ -21,6 +21,10 @@ import numpy as np
 from ...arrays import BoolArray, Float64Array, FloatArray, Uint8Array, round_number
 from ...errors import UsageError
 
+MARGIN = 1.25  # side of the square over the body circle's diameter
+# To which centre and side, in pixels, and the rotation, in radians, are rounded.
+STEP_PX = 2.0**-20
+STEP_RAD = 2.0**-30
 _HALVING_FROM = 4.0  # ratio of the sizes
 
 
@@ -86,12 +90,6 @@ def halved(image: Uint8Array) -> Uint8Array:
     return cast(Uint8Array, cv2.resize(image, size, interpolation=cv2.INTER_AREA))
 
 
-MARGIN = 1.25  # side of the square over the body circle's diameter
-# To which centre and side, in pixels, and the rotation, in radians, are rounded.
-STEP_PX = 2.0**-20
-STEP_RAD = 2.0**-30
-
-
 @dataclass(frozen=True)
 class Region:
     """A square of ``side_px`` around ``center_px`` (x, y), rotated by ``rotation`` radians,
@@ -133,15 +131,18 @@ class Region:
         cropped: Float64Array = offset @ self.R_image_crop / self.side_px + 0.5
         return cropped
 
+    def image_from_pixels(self, size: int) -> Float64Array:
+        """Return the affine map (2, 3) from the pixels of a crop (size, size) to the image's."""
+        A = self.R_image_crop * (self.side_px / size)
+        return np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
+
     def cut(self, image_rgb: Uint8Array, size: int) -> Uint8Array:
         """Resample the square to (size, size, 3); outside the image (H, W, 3), its border pixels
         are repeated.
 
         A black border would cost the landmark networks 3 mm of accuracy on people at the edge.
         """
-        # The affine map (2, 3) from pixels of the crop to the image.
-        A = self.R_image_crop * (self.side_px / size)
-        A = np.column_stack([A, np.asarray(self.center_px) + A @ np.full(2, 0.5 - size / 2)])
+        A = self.image_from_pixels(size)
         source = image_rgb
         if self.side_px >= 2 * size:
             source, A = _shrink(image_rgb, A, size, int(self.side_px / size).bit_length() - 1)

@@ -15,7 +15,7 @@ from typing import cast
 import cv2
 import numpy as np
 
-from ...arrays import Float64Array, FloatArray, Uint8Array
+from ...arrays import FloatArray, Uint8Array
 from ..perception.region import Region
 
 LARGEST_SIDE_PX = 448  # of the picture in which is painted: twice the detector's input
@@ -35,9 +35,11 @@ def remove_people(image_rgb: Uint8Array, people: Sequence[tuple[Region, FloatArr
     height, width = image_rgb.shape[:2]
     scale = min(1.0, LARGEST_SIDE_PX / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
+    shrinkage = np.array(size) / (width, height)
     probability = np.zeros(size[::-1], np.float32)
     for region, mask in people:
-        A = _small_from_crop(region, len(mask), size[0] / width, size[1] / height)
+        A = region.image_from_pixels(len(mask)) * shrinkage[:, None]
+        A[:, 2] += 0.5 * shrinkage - 0.5  # of the centres of the first pixels
         probability = np.maximum(probability, cv2.warpAffine(mask.astype(np.float32), A, size))
     shown = (probability > _SURE).astype(np.uint8)
     removed = cv2.dilate(shown, np.ones((_BORDER_PX, _BORDER_PX), np.uint8))
@@ -46,14 +48,3 @@ def remove_people(image_rgb: Uint8Array, people: Sequence[tuple[Region, FloatArr
     is_removed = cv2.resize(removed, (width, height), interpolation=cv2.INTER_NEAREST) > 0
     paint_rgb = cv2.resize(painted_rgb, (width, height), interpolation=cv2.INTER_LINEAR)
     return cast(Uint8Array, np.where(is_removed[..., None], paint_rgb, image_rgb))
-
-
-def _small_from_crop(region: Region, size: int, scale_x: float, scale_y: float) -> Float64Array:
-    """Return the affine map (2, 3) from pixels of a crop of (size, size) to those of the picture
-    scaled by ``scale_x`` and ``scale_y``.
-    """
-    corners_crop = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    corners = (region.image_from_crop(corners_crop) + 0.5) * [scale_x, scale_y] - 0.5
-    pixels_crop = corners_crop * size - 0.5
-    A = cv2.getAffineTransform(pixels_crop.astype(np.float32), corners.astype(np.float32))
-    return cast(Float64Array, A)

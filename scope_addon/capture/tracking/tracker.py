@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -284,8 +284,10 @@ class PeopleTracker:
             else:
                 target.update(estimate, swapped, self._clock.time_s, self._clock.step_s)
                 kept.append(target)
-        missed = [f for f in self._live if f not in kept and f not in self._lost]
-        for target, behind in self._estimate_behind(image_rgb, missed, kept):
+        for target in self._live:
+            if target in kept or target in self._lost:
+                continue
+            behind = self._estimate_behind(image_rgb, target, kept)
             if behind is None:
                 self._lose(target)
             else:
@@ -295,29 +297,26 @@ class PeopleTracker:
         self._live = sorted(kept, key=lambda f: f.tracklet)
 
     def _estimate_behind(
-        self, image_rgb: Uint8Array, missed: list[TrackedTarget], kept: list[TrackedTarget]
-    ) -> Iterator[tuple[TrackedTarget, PoseEstimate | None]]:
-        """Estimate people who may be behind those who are still tracked, with these removed.
-
-        :return: each with the estimate; None if too little of them is seen.
+        self, image_rgb: Uint8Array, target: TrackedTarget, kept: list[TrackedTarget]
+    ) -> PoseEstimate | None:
+        """Estimate a person who may be behind those who are still tracked, with these removed; None
+        if too little of the person is seen.
         """
-        for target in missed:
-            predicted = target.estimate.next_region.moved(target.velocity_px)
-            front = [f for f in kept if f.estimate.next_region.is_near(predicted)]
-            rest_rgb = None
-            if front and not self._largest_only:
-                rest_rgb = self._without(image_rgb, front)
-            if rest_rgb is None:
-                yield target, None
-                continue
-            (estimate,) = self._estimator.estimate(rest_rgb, [predicted], sure=False)
-            is_seen = (
-                estimate is not None
-                and estimate.presence >= _MIN_HIDDEN_PRESENCE
-                and target.innovation(estimate) <= _MAX_HIDDEN_INNOVATION
-                and not any(is_same_body(estimate, f.estimate) for f in kept)
-            )
-            yield target, estimate if is_seen else None
+        predicted = target.estimate.next_region.moved(target.velocity_px)
+        front = [f for f in kept if f.estimate.next_region.is_near(predicted)]
+        if self._largest_only or not front:
+            return None
+        rest_rgb = self._without(image_rgb, front)
+        if rest_rgb is None:
+            return None
+        (estimate,) = self._estimator.estimate(rest_rgb, [predicted], sure=False)
+        is_seen = (
+            estimate is not None
+            and estimate.presence >= _MIN_HIDDEN_PRESENCE
+            and target.innovation(estimate) <= _MAX_HIDDEN_INNOVATION
+            and not any(is_same_body(estimate, f.estimate) for f in kept)
+        )
+        return estimate if is_seen else None
 
     def _without(self, image_rgb: Uint8Array, people: Sequence[TrackedTarget]) -> Uint8Array | None:
         """Return the image without these people; None if the landmark network is the user's, which
