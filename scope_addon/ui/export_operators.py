@@ -37,34 +37,35 @@ FORMATS = (
     (
         "NPZ",
         "NPZ",
-        "For research: SMPL-style arrays of the captured motion before any editing, one "
-        "file per person",
+        "For research: SMPL-style arrays of the captured motion with its corrections, one file per "
+        "person",
         4,
     ),
     (
         "TRC",
         "TRC",
-        "For OpenSim and Pose2Sim: markers of the captured motion before any editing, one file per "
-        "person",
+        "For OpenSim and Pose2Sim: markers of the captured motion with its corrections, one file "
+        "per person",
         5,
     ),
     (
         "MOT",
         "MOT",
-        "For OpenSim: joint angles of the captured motion before any editing, one file per person",
+        "For OpenSim: joint angles of the captured motion with its corrections, one file per "
+        "person",
         6,
     ),
     (
         "C3D",
         "C3D",
-        "For Visual3D, Mokka and other biomechanics: markers of the captured motion before any "
-        "editing, one file per person",
+        "For Visual3D, Mokka and other biomechanics: markers of the captured motion with its "
+        "corrections, one file per person",
         7,
     ),
     (
         "VRMA",
         "VRMA",
-        "For VRM avatars: an animation of the captured motion before any editing, without the "
+        "For VRM avatars: an animation of the captured motion with its corrections, without the "
         "face, one file per person",
         8,
     ),
