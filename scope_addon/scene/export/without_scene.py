@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...atomic_write import write_result
+from ...footage import display_text
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
 from .c3d import c3d_bytes
@@ -114,7 +115,7 @@ def trc_text(name: str, motion: Motion, body: Body) -> str:
     count = len(times_s)
     numbers = range(1, len(names) + 1)
     lines = [
-        f"PathFileType\t4\t(X/Y/Z)\t{name}",
+        f"PathFileType\t4\t(X/Y/Z)\t{display_text(name)}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\t"
         "OrigNumFrames",
         f"{rate:g}\t{rate:g}\t{count}\t{len(names)}\tm\t{rate:g}\t1\t{count}",
@@ -193,7 +194,7 @@ def write_angles(path: Path, motion: Motion, body: Body) -> None:
         lines.append(separator.join([f"{time_s:.6f}", *(f"{value:.6f}" for value in row)]))
     if separator == "\t":
         lines[:0] = [
-            path.stem,
+            display_text(path.stem),
             "version=1",
             f"nRows={len(times_s)}",
             f"nColumns={len(names)}",

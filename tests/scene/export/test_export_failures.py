@@ -3,6 +3,7 @@
 
 import ctypes
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -57,6 +58,20 @@ def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_pat
         ):
             write(people, too_long)
     assert list(tmp_path.iterdir()) == [longest]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_name_may_be_no_text(whole_body, make_motion, tmp_path, suffix):
+    """Bytes that are not UTF-8, as old discs and archives have them, and ends of lines."""
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9\nforged" + suffix.encode()))
+    motion = make_motion(whole_body, 2)
+    if suffix in WITHOUT_SCENE:
+        write_without_scene(path, [motion], [whole_body])
+    else:
+        export_motions([motion], whole_body, path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert suffix not in WITHOUT_SCENE or b"\nforged" not in path.read_bytes()
 
 
 @pytest.fixture
