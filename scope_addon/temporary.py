@@ -173,6 +173,11 @@ def is_abandoned(lock: Path) -> bool:
     return False
 
 
+def is_held(lock: Path) -> bool:
+    """Return whether a lock that `hold` has taken is there, and its process has not ended."""
+    return lock.exists() and not is_abandoned(lock)
+
+
 def sync_folder(folder: Path) -> None:
     """Wait until a folder's names are on the disk, where the system can: Windows opens no folder,
     and some network file systems refuse.

@@ -13,10 +13,17 @@ from typing import TYPE_CHECKING, Any
 from ...solver.errors import ScopeError
 from ..errors import NoPersonError, UsageError, system_error_message
 from ..installed import CAPTURE, check_installed, check_live, check_memory_limit
+from ..live.unfinished import (
+    SUFFIX,
+    is_recording,
+    is_unfinished,
+    remove_recording,
+    unfinished_video,
+)
 from ..notices import counted
 from ..options import Place
 from ..options.body_choice import chosen_body
-from ..scene.export.output_paths import person_paths
+from ..scene.export.output_paths import check_output, person_paths
 from .arguments import add_options, values_in_range
 from .outputs import check_outputs, confine
 from .signals import interrupted
@@ -57,9 +64,10 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     check_memory_limit(with_scene=False)
     options = _checked(values)
     check_outputs(_paths(values), vars(args), overlay=values["keep_footage"])
+    if values["keep_footage"]:  # its name is longer while it grows
+        check_output(unfinished_video(values["keep_footage"]), (".mp4",))
     # Imported here, so that errors in the arguments are printed immediately.
     from ..live.open_source import is_stream
-    from ..live.unfinished import is_recording
 
     to_finish = [Path(args.source)] if is_recording(args.source) else []
     is_served = values["json_port"] is not None or values["preview"]
@@ -87,7 +95,6 @@ def _capture(
     from ..live.open_source import open_source
     from ..live.recording import Keep, PeopleRecording
     from ..live.run import Listeners, run_live
-    from ..live.unfinished import SUFFIX, is_unfinished, unfinished_video
     from ..untrusted.body_file import load_body
 
     source = open_source(args.source)
@@ -180,7 +187,6 @@ def _finish_recording(journal: Path, record: Path | None) -> dict[str, Any]:
     :raises ScopeError: it cannot be read, or a file cannot be written.
     """
     from ..live.recording import unfinished_recording
-    from ..live.unfinished import remove_recording
 
     def paths(people: int) -> list[Path]:
         chosen = person_paths(record or journal.with_suffix(".npz"), people, separate=True)

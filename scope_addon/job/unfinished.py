@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from ..errors import ChangedFootageError, NoPersonError
 from ..notices import Notice, notice
-from ..temporary import hold, is_abandoned, own_entries, release, remove, remove_if_empty
+from ..temporary import hold, is_abandoned, is_held, own_entries, release, remove, remove_if_empty
 from .request import code_version
 from .watched_footage import WatchedFootage
 
@@ -98,8 +98,7 @@ def _lock(folder: Path) -> bool:
 
 
 def _is_running(folder: Path) -> bool:
-    lock = _lock_of(folder)
-    return lock.exists() and not is_abandoned(lock)
+    return is_held(_lock_of(folder))
 
 
 def _folder(root: Path, path: Path, footage: WatchedFootage) -> Path | None:

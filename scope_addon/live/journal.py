@@ -13,7 +13,9 @@ Blender's window loads this module, so that what reads footage is imported where
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
+import os
 import queue
 import threading
 import time
@@ -93,7 +95,8 @@ class Journal:
         self._file: IO[bytes] | None = None
         # Where the recording is, or at least its beginning; None if it is in memory alone.
         self.path: Path | None = None
-        self._begin()
+        if refused := self._begin():
+            self._say_where(path, refused)
         self._thread = threading.Thread(target=self._run, name="scope-recording", daemon=True)
         self._thread.start()
 
@@ -125,7 +128,7 @@ class Journal:
             if self._file is None:
                 continue
             try:
-                self._file.write(self._packed(record))
+                _write(self._file, self._packed(record))
                 if time.monotonic() - synced_s > _SYNC_S:
                     sync_open_file(self._file.fileno())
                     synced_s = time.monotonic()
@@ -139,36 +142,51 @@ class Journal:
         with contextlib.suppress(OSError):
             self._file.close()
         self._file = self.path = None
+        assert former is not None
         self._begin()
         if self.path is None:
             self.path = former
-            where = f"begins in {former}, goes on in memory, and ends there if it is killed"
         else:
-            where = f"is kept in {self.path} while it runs"
-            if former is not None:
-                _remove_held(former)
-        self._say(f"the recording {where}: {former} cannot be written ({reason(error)})")
+            _remove_held(former)
+        self._say_where(former, error)
 
-    def _begin(self) -> None:
-        """Open a file in the next place that takes one, with the records so far."""
+    def _say_where(self, refused: Path, error: OSError) -> None:
+        """Say where the recording is, since a place refuses it."""
+        if self._file is not None:
+            where = f"is kept in {self.path} while it runs"
+        elif self.path is not None:
+            where = f"begins in {self.path}, goes on in memory, and ends there if it is killed"
+        else:
+            where = "is in memory alone, and lost if it is killed"
+        self._say(f"the recording {where}: {refused} cannot be written ({reason(error)})")
+
+    def _begin(self) -> OSError | None:
+        """Open a file in the next place that takes one, with the records so far.
+
+        :return: why the first of these places refuses.
+        """
+        refused: OSError | None = None
         while self._places and self._file is None:
             wanted = self._places.pop(0)
             try:
                 wanted.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
                 path = create_new(wanted)
-            except OSError:
+            except OSError as error:
+                refused = refused or error
                 continue
             with contextlib.suppress(OSError):  # where there are no locks, it is not held
                 hold(lock_of(path))
             try:
                 file = path.open("wb", buffering=0)  # what is written is the system's at once
-                file.write(json.dumps(asdict(self._about)).encode() + b"\n")
+                _write(file, json.dumps(asdict(self._about)).encode() + b"\n")
                 for record in self._records:
-                    file.write(self._packed(record))
+                    _write(file, self._packed(record))
                 self._file = file
                 self.path = path
-            except OSError:
+            except OSError as error:
+                refused = refused or error
                 _remove_held(path)
+        return refused
 
     def _packed(self, record: Record) -> bytes:
         pose, camera = record
@@ -185,6 +203,15 @@ class Journal:
         row["camera"] = camera.source.encode()[:_SOURCE_BYTES]
         content = row.tobytes()
         return zlib.crc32(content).to_bytes(_CHECKSUM_BYTES, "little") + content
+
+
+def _write(file: IO[bytes], content: bytes) -> None:
+    """Write all of something to a file without a buffer, of which a full disk may take a part.
+
+    :raises OSError: the disk does not take all of it.
+    """
+    if file.write(content) < len(content):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _remove_held(path: Path) -> None:
@@ -237,7 +264,7 @@ def read_about(path: Path) -> About:
 
 
 def read_records(path: Path, about: About, body: Body) -> list[Record]:
-    """Read the poses and cameras of a recording, up to the first record that is not whole.
+    """Read the poses and cameras of a recording, without records that are damaged.
 
     :param body: that of the recording.
     :raises InputError: the file cannot be read.
@@ -257,7 +284,7 @@ def read_records(path: Path, about: About, body: Body) -> list[Record]:
             while len(piece := file.read(_CHECKSUM_BYTES + record.itemsize)) > record.itemsize:
                 content = piece[_CHECKSUM_BYTES:]
                 if zlib.crc32(content) != int.from_bytes(piece[:_CHECKSUM_BYTES], "little"):
-                    break
+                    continue
                 row = np.frombuffer(content, record)[0]
                 person = int(row["person"])
                 is_sound = (
@@ -267,7 +294,7 @@ def read_records(path: Path, about: About, body: Body) -> list[Record]:
                     and all(np.isfinite(row[name]).all() for name in _FLOATS)
                 )
                 if not is_sound:
-                    break
+                    continue
                 last_s[person] = row["timestamp_s"]
                 last_index[person] = row["index"]
                 found.append(_unpacked(row))

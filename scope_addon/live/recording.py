@@ -31,15 +31,16 @@ from ..capture.tracking.track import Track
 from ..capture.world.assemble import FittedPerson, Shot, assemble_motion
 from ..capture.world.camera_path import CameraPath
 from ..capture.world.placement import RawMotion, place_track
-from ..errors import NoPersonError, OutputError
+from ..errors import NoPersonError, OutputError, UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..motion import Motion
-from ..temporary import remove
+from ..temporary import is_held, remove
 from ..untrusted.body_file import load_body
 from .journal import About, Journal, fingerprint, read_about, read_records, saved_elsewhere
 from .people import LivePeople
 from .pose import LivePose, Presence
 from .smoothing import DELAY_S
+from .unfinished import lock_of
 
 _SAME_TIME_S = 1e-3
 _SAME_SHAPE = 0.01
@@ -428,8 +429,10 @@ def unfinished_recording(
     :param paths: gives a file for each of some people.
     :raises InputError: it cannot be read.
     :raises NoPersonError: there is no whole pose.
-    :raises UsageError: its body has changed.
+    :raises UsageError: it still grows, or its body has changed.
     """
+    if is_held(lock_of(journal)):
+        raise UsageError(f"{journal} is still being recorded; end that live capture first")
     about = read_about(journal)
     body = load_body(about.body)
     records = read_records(journal, about, body)

@@ -20,7 +20,9 @@ from scope.scope_addon.errors import NoPersonError, OutputError, UsageError, Vid
 from scope.scope_addon.live import journal, run
 from scope.scope_addon.live.journal import read_about, read_records
 from scope.scope_addon.live.recording import Keep, PeopleRecording, unfinished_recording
+from scope.scope_addon.live.unfinished import lock_of
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.temporary import release
 from scope.solver.body_file import load_body
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp
@@ -97,7 +99,7 @@ def test_what_a_kill_leaves_is_finished_as_if_there_had_been_none(
     assert (about.people, about.source, about.size) == (people, "fake", SIZE)
 
 
-def test_a_cut_or_damaged_file_gives_what_came_before(tmp_path, body):
+def test_a_cut_or_damaged_file_gives_what_is_whole(tmp_path, body):
     recording, _ = recorded(tmp_path / "a", body)
     recording._journal.close()
     content = recording._journal.path.read_bytes()
@@ -110,7 +112,7 @@ def test_a_cut_or_damaged_file_gives_what_came_before(tmp_path, body):
         content[:-1]: POSES - 1,
         content[: line + 3 * size + 7]: 3,
         content[: line + 5 * size] + bytes(2 * size): 5,  # as a power cut leaves it
-        content[: line + 5 * size + 99] + b"x" + content[line + 5 * size + 100 :]: 5,
+        content[: line + 5 * size + 99] + b"x" + content[line + 5 * size + 100 :]: POSES - 1,
         content[: line + size] + content[line : line + size]: 1,  # the same pose again
         content[:line]: 0,
     }
@@ -131,6 +133,16 @@ def test_a_recording_with_another_body_is_not_finished(tmp_path, body):
     about = replace(read_about(recording._journal.path), fingerprint=1)
     with pytest.raises(UsageError, match="was recorded with another body than scope is now"):
         read_records(recording._journal.path, about, body)
+
+
+def test_what_still_grows_is_not_finished(tmp_path, body, capfd):
+    """It would be removed while the other process writes to it."""
+    recording, (path,) = recorded(tmp_path / "a", body)
+    growing = recording._journal.path
+    assert main(["live", str(growing), "--record", str(tmp_path / "early.npz")]) == 2
+    assert f"{growing} is still being recorded; end that live" in capfd.readouterr().err
+    assert growing.is_file()
+    assert recording.save() == [path]
 
 
 on_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits sizes of files as Linux does")
@@ -196,6 +208,58 @@ def test_a_disk_that_fills_meanwhile_moves_the_growing_file_to_a_second_place(tm
     assert [file for file in tmp_path.rglob("*") if file.is_file()] == [path]
 
 
+def test_a_disk_that_takes_a_part_of_a_pose_moves_the_growing_file_too(tmp_path, body):
+    """A full disk says so only at the next write, and what is written after that could not be
+    read.
+    """
+    recording, _ = recorded(tmp_path / "full", body)
+    growing = recording._journal
+    while growing._waiting.qsize() or len(growing._records) < POSES:
+        pass
+    growing._file.close()
+    growing._file = SimpleNamespace(write=lambda content: len(content) - 1, close=lambda: None)
+    recording.send(replace(pose_of(body), index=2 * POSES, timestamp_s=POSES / 15), 0.0)
+    growing.close()
+    other = tmp_path / "user" / "recordings" / "take.recording"
+    assert len(read_records(other, read_about(other), body)) == POSES + 1
+
+
+def test_where_a_recording_grows_is_said_if_its_place_refuses_from_the_beginning(
+    tmp_path, body, monkeypatch
+):
+    said = []
+    real = journal.create_new
+
+    def full(path):
+        if path.parent == tmp_path / "full":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real(path)
+
+    monkeypatch.setattr(journal, "create_new", full)
+    recorded(tmp_path / "full", body, say=said.append)
+    other = tmp_path / "user" / "recordings" / "take.recording"
+    refused = f"{tmp_path / 'full' / 'take.recording'} cannot be written (No space left on device"
+    assert said[0].startswith(f"the recording is kept in {other} while it runs: {refused}")
+
+
+def test_a_recording_in_memory_alone_is_said_to_be_that(tmp_path, body):
+    """As with a name that is too long once it has the growing file's suffix."""
+    said = []
+    about = read_about(recorded(tmp_path / "a", body)[0]._journal.path)
+    growing = journal.Journal(tmp_path / f"{'x' * 250}.recording", about, body, said.append)
+    assert growing.path is None
+    assert said[0].startswith("the recording is in memory alone, and lost if it is killed: ")
+    growing.remove()
+
+
+def test_the_name_of_the_growing_images_is_checked_before_the_capture(tmp_path, monkeypatch, capfd):
+    fake_run(monkeypatch, lambda: None)
+    video = tmp_path / f"{'x' * 246}.mp4"
+    assert main(["live", str(SAMPLE), "--keep-footage", str(video)]) == 1
+    assert "choose a shorter name" in capfd.readouterr().err
+    assert list(tmp_path.glob("*.mp4")) == []
+
+
 def refusing(monkeypatch, *folders):
     """Let files of motions below some folders be refused."""
     save = Motion.save
@@ -246,6 +310,7 @@ def test_when_every_place_refuses_the_growing_file_stays_and_is_named(tmp_path, 
         file = tmp_path / "full" / "take.recording"
         with pytest.raises(journal.OutputError, match=f"finish it with scope live {file}"):
             recording.save()
+    release(lock_of(file))  # as the end of the process does
     assert main(["live", str(file), "--record", str(path), "--quiet"]) == 0
     assert len(Motion.load(path)) > POSES
 
