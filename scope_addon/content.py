@@ -40,9 +40,11 @@ def add_content(digest: hashlib._Hash, path: Path, most_bytes: int) -> None:
 def state_of(path: Path) -> tuple[int, ...]:
     """Return what differs when a file is replaced or written: its identity, size and time; empty if
     it is not there.
+
+    :raises OSError: that cannot be seen, as where a server is gone.
     """
     try:
         status = os.stat(path)
-    except OSError:
+    except (FileNotFoundError, NotADirectoryError):
         return ()
     return (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)

@@ -21,6 +21,7 @@ Each message says what was wrong, with which file or value, and what to do about
 from __future__ import annotations
 
 import errno
+from pathlib import Path
 
 from ..solver.errors import InputError, ScopeError
 
@@ -89,6 +90,14 @@ def internal_error_message(error: Exception) -> str:
     return (
         f"an internal error, {cause}; please report it (the environment variable SCOPE_TRACEBACK=1 "
         f"shows where)"
+    )
+
+
+def unreadable(footage: Path, error: OSError) -> VideoError:
+    """Return the error for footage whose disk or server fails while it is read."""
+    return VideoError(
+        f"{footage} cannot be read any more ({error.strerror}); check its disk or server, and "
+        "capture again"
     )
 
 

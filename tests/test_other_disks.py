@@ -32,7 +32,7 @@ from scope.scope_addon.atomic_write import (
     write_result,
 )
 from scope.scope_addon.command_line.outputs import refuse_inputs
-from scope.scope_addon.errors import ChangedFootageError, OutputError, UsageError
+from scope.scope_addon.errors import ChangedFootageError, OutputError, UsageError, VideoError
 from scope.scope_addon.job.cache import Cache
 from scope.scope_addon.job.unfinished import UnfinishedCapture, unfinished_capture
 from scope.scope_addon.job.watched_footage import WatchedFootage
@@ -242,6 +242,37 @@ def test_footage_of_another_number_is_the_same_if_its_content_is(
     os.replace(other, footage)
     with pytest.raises(ChangedFootageError):
         watched.check()
+
+
+@pytest.mark.parametrize("number", [errno.ESTALE, errno.EIO, errno.ETIMEDOUT, errno.EACCES])
+def test_a_server_that_is_gone_for_a_while_costs_no_capture(
+    tmp_path: Path, monkeypatch: Patch, number: int
+) -> None:
+    """The footage was said to be changed, and what was observed was removed."""
+    footage = tmp_path / "walk.mp4"
+    footage.write_bytes(bytes(1000))
+    real = os.stat
+
+    def gone(path: Any, *how: Any, **more: Any) -> os.stat_result:
+        if str(path) == str(footage):
+            raise OSError(number, os.strerror(number), str(path))
+        return real(path, *how, **more)
+
+    def capture() -> None:
+        with unfinished_capture(tmp_path / "caches", footage) as unfinished:
+            assert unfinished.folder is not None
+            unfinished.folder.mkdir()
+            monkeypatch.setattr(os, "stat", gone)
+            unfinished.footage.check()
+
+    with pytest.raises(VideoError, match="walk.mp4 cannot be read any more") as raised:
+        capture()
+    assert not isinstance(raised.value, ChangedFootageError)
+    monkeypatch.undo()
+    with unfinished_capture(tmp_path / "caches", footage) as again:
+        assert again.folder is not None
+        assert again.folder.is_dir()
+        again.footage.check()
 
 
 def test_the_input_is_not_written_by_a_name_in_other_letters(

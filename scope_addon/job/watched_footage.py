@@ -8,12 +8,13 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ...solver.errors import ScopeError
 from ..content import add_content, state_of
-from ..errors import ChangedFootageError
+from ..errors import ChangedFootageError, unreadable
 
 _INTERVAL_S = 2.0  # between two looks at the files
 # Of which the content is read; more of a video, or of all pictures together, is sampled.
@@ -30,7 +31,9 @@ class WatchedFootage:
     def __init__(self, path: Path, rate_given: bool = False) -> None:
         self._path = path
         self._rate_given = rate_given
-        self._states = {file: state_of(file) for file in self._files()}
+        self._states: dict[Path, tuple[int, ...]] = {}
+        with suppress(OSError):  # which the capture says
+            self._states = {file: state_of(file) for file in self._files()}
         self._contents: dict[Path, bytes] = {}  # once they are asked for
         self._grows = self._ends()
         self._looked_s = time.monotonic()
@@ -52,11 +55,16 @@ class WatchedFootage:
         is read of it is what was there.
 
         :raises ChangedFootageError: a file was replaced, changed, added or removed.
+        :raises VideoError: that cannot be seen, as where a server is gone.
         """
         self._looked_s = time.monotonic()
-        files = self._files()
-        changed = [file for file in files if not self._is_as_it_was(file)]
-        if self._has_grown():
+        try:
+            files = self._files()
+            changed = [file for file in files if not self._is_as_it_was(file)]
+            has_grown = self._has_grown()
+        except OSError as error:
+            raise unreadable(self._path, error) from error
+        if has_grown:
             return
         if changed or len(files) != len(self._states):
             which = changed[0] if changed else self._path
@@ -74,6 +82,8 @@ class WatchedFootage:
         """Return whether a file's state is that of the beginning, or differs in the number alone
         that the file system gives it, and the content is the same: some file systems of networks
         and of user space give a file another number after a while.
+
+        :raises OSError: that cannot be seen.
         """
         before = self._states.get(file, ())
         now = state_of(file)
@@ -81,10 +91,7 @@ class WatchedFootage:
             return True
         if now[2:] != before[2:] or file not in self._contents:
             return False
-        try:
-            is_same = self._content_of(file) == self._contents[file]
-        except OSError:
-            return False
+        is_same = self._content_of(file) == self._contents[file]
         if is_same:
             self._states[file] = now
         return is_same
@@ -109,7 +116,7 @@ class WatchedFootage:
 
         try:
             sequence = find_sequence(self._path, self._rate_given)
-        except (ScopeError, OSError):
+        except ScopeError:
             return []  # which the capture says
         if sequence is not None:
             return list(sequence.paths)

@@ -27,7 +27,7 @@ from typing import cast
 import cv2
 
 from ...arrays import Uint8Array
-from ...errors import VideoError
+from ...errors import VideoError, unreadable
 from ...notices import Notice, notice
 from .frame import Frame
 from .frame_readers import (
@@ -53,6 +53,7 @@ _VARYING = Fraction(2, 100)  # of the rate, by which the average differs where i
 _SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
 # Of a frame; a fifth of what videos of calls and surveillance have at their lowest quality.
 _LEAST_BYTES = 100
+_PIECE_BYTES = 1 << 20
 _QUEUED_FRAMES = 4  # decoded ahead; a 4K frame takes 25 MB
 
 
@@ -401,6 +402,7 @@ class _Decoder:
         """Warn if the file ended early, or was still being written.
 
         :param index: of the frame that would have come next.
+        :raises VideoError: it ended early because the disk or the server does not give it.
         """
         video = self._video
         # Both tests: a container that counts frames from its duration is wrong for a variable frame
@@ -408,6 +410,8 @@ class _Decoder:
         missing = video.frame_count - index
         last = min(float((video.frame_count - 1) / video.average_fps), video.wanted.end_s)
         if missing > max(1, video.frame_count // 50) and time < 0.95 * last:
+            if video._bytes is not None:
+                _check_readable(video.path)
             self._warn(
                 notice(
                     "decoding_stopped",
@@ -434,6 +438,20 @@ class _Decoder:
     def _warn(self, warning: Notice) -> None:
         if warning not in self._video.warnings:
             self._video.warnings.append(warning)
+
+
+def _check_readable(path: Path) -> None:
+    """Read a file to its end, because FFmpeg reports a disk or server that fails as it reports
+    damaged data, and a capture of a part would count as finished.
+
+    :raises VideoError: it cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            while file.read(_PIECE_BYTES):
+                pass
+    except OSError as error:
+        raise unreadable(path, error) from error
 
 
 @contextmanager

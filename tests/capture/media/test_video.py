@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 import threading
@@ -390,6 +391,23 @@ def test_a_truncated_video_gives_its_frames_and_a_warning(tmp_path, capfd):
     assert len(video.warnings) == 1
     assert "stopped after" in str(video.warnings[0])
     assert capfd.readouterr().err == ""
+
+
+def test_footage_whose_disk_fails_meanwhile_is_no_shorter_video(tmp_path, monkeypatch):
+    """A capture of a part would be done, and skipped by the next batch. FFmpeg says the same of
+    damaged data.
+    """
+    path = write_video(tmp_path / "a.mkv", ramp(40))
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    video = open_video(path)
+
+    def fail(*_, **__):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(Path, "open", fail)
+    with pytest.raises(VideoError, match=r"a.mkv cannot be read any more \(Input/output error\)"):
+        list(video)
 
 
 @pytest.mark.parametrize("end_s", [np.inf, 0.2])
