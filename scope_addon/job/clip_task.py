@@ -20,7 +20,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import NO_PERSON, system_error_message
-from ..footage import FOOTAGE_SUFFIXES, PICTURE_SUFFIXES, VIDEO_SUFFIXES, is_sequence, pictures_in
+from ..footage import (
+    FOOTAGE_SUFFIXES,
+    PICTURE_SUFFIXES,
+    VIDEO_SUFFIXES,
+    is_sequence,
+    numbered_from,
+    pictures_in,
+)
 from .finished_clip import (
     FINISHED_FILE,
     content_of,
@@ -144,7 +151,7 @@ def capture_clip(
     out = Path(task.out)
     entry: Entry = {"file": task.file, "name": task.name}
     try:
-        entry["key"] = task.key or _key(task.basis, footage)
+        entry["key"] = task.key or _key(task.basis, footage, "--fps" in task.settings.options)
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
     # on a cluster, results are moved when they are finished
@@ -254,12 +261,19 @@ def _window_arguments(task: ClipTask) -> list[str]:
     return [f"{option}={value}" for option, value in given.items() if value]
 
 
-def _key(basis: str, footage: Path) -> str:
-    """Hash the program, the options and the footage."""
+def _key(basis: str, footage: Path, rate_given: bool) -> str:
+    """Hash the program, the options and the footage.
+
+    :param rate_given: whether a frame rate is given, so that a picture begins a sequence.
+    """
     digest = hashlib.sha256(basis.encode())
     files = [footage]
     if footage.is_dir():
         files = videos_of_take(footage) or list(filter(Path.is_file, sorted(footage.iterdir())))
+    elif rate_given:
+        files = numbered_from(footage) or files
+    # The numbers of pictures are their times.
+    digest.update(json.dumps([file.name for file in files]).encode())
     _add_files(digest, files)
     return digest.hexdigest()
 

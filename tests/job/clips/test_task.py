@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scope.scope_addon.job.clip_task import CaptureSettings
+import pytest
+from scope.scope_addon.footage import is_sequence, pictures_in
+from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask, capture_clip
 
 
 def basis(**options: str | None) -> str:
@@ -27,3 +29,40 @@ def test_files_count_by_their_content_and_threads_do_not(tmp_path: Path) -> None
 def test_a_value_that_is_too_long_for_a_name_is_no_file() -> None:
     heights = ",".join(["170"] * 100)
     assert basis(height=heights) != basis(height=heights + ",171")
+
+
+def key(footage: Path, out: Path, **options: str | None) -> str:
+    """Return the key with which a clip is captured, which fails at once."""
+    settings = CaptureSettings({f"--{name}": value for name, value in options.items()}, (".npz",))
+    task = ClipTask("walk", footage.name, str(footage), str(out), "basis", settings)
+    found: list[str] = []
+
+    def run(arguments: list[str]) -> tuple[int, str, str]:
+        found.append(arguments[-1])
+        return 1, "", ""
+
+    capture_clip(task, ["scope"], run)
+    return found[0]
+
+
+@pytest.mark.parametrize("first_alone", [False, True])
+def test_the_numbers_of_pictures_count_since_they_are_times(
+    tmp_path: Path, first_alone: bool
+) -> None:
+    """A batch skipped a sequence whose pictures had got other numbers, or, where the first one
+    stands for all, other content.
+    """
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    for number in (1, 2, 3):
+        (frames / f"f_{number}.png").write_bytes(b"picture %d" % number)
+    assert is_sequence(pictures_in(frames))
+    footage = frames / "f_1.png" if first_alone else frames
+    options = {"fps": "30"} if first_alone else {}
+    keys = [key(footage, tmp_path, **options)]
+    assert key(footage, tmp_path, **options) == keys[0]
+    (frames / "f_3.png").rename(frames / "f_9.png")
+    keys.append(key(footage, tmp_path, **options))
+    (frames / "f_9.png").write_bytes(b"picture X")
+    keys.append(key(footage, tmp_path, **options))
+    assert len(set(keys)) == 3
