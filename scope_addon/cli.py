@@ -68,7 +68,7 @@ from .errors import (
     lacks_memory,
     system_error_message,
 )
-from .footage import display_text, is_url, json_text
+from .footage import display_text, files_of_footage, is_url, json_text
 from .installed import CAPTURE, check_installed, check_memory_limit
 from .job.clip_task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.finished_clip import FINISHED_FILE, write_finished
@@ -446,8 +446,10 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
         batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out))
         footage = batch.clips(args.recursive, args.views)
-        videos = [path for path in footage.values() if path.is_file()]
-        refuse_inputs(batch.results(footage), [*files_to_read(vars(args)), *videos])
+        read = files_to_read(vars(args))
+        for path in footage.values():
+            read += [path] if path.is_file() else files_of_footage(path)
+        refuse_inputs([batch.report_file, *batch.results(footage)], read)
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         stack.enter_context(
             interrupted("finished clips are kept; run the same command again to continue")

@@ -153,3 +153,26 @@ def test_the_command_line_refuses_before_it_begins(tmp_path, capsys):
     assert main([*batch, "--formats", "npz"]) == 2
     assert "walk.npz is the input itself" in capsys.readouterr().err
     assert body.read_text() == "body"
+
+
+def test_a_batch_replaces_no_picture_of_a_sequence_and_no_map_by_its_report(tmp_path, capsys):
+    frames = tmp_path / "clips" / "frames"
+    frames.mkdir(parents=True)
+    pictures = [frames / f"f_{number}.png" for number in (1, 2)]
+    for picture in pictures:
+        picture.write_text("picture")
+    (tmp_path / "clips" / "walk.mp4").write_text("clip")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "walk.npz").symlink_to(pictures[1])
+    batch = ["batch", str(tmp_path / "clips"), "--out", str(out), "--formats", "npz"]
+    assert main(batch) == 2
+    assert "walk.npz is the input itself" in capsys.readouterr().err
+    assert pictures[1].read_text() == "picture"
+    (out / "walk.npz").unlink()
+    calibration = out / "scope-batch.json"
+    intrinsics = [[900, 0, 320], [0, 900, 240], [0, 0, 1]]
+    camera = {"intrinsics": intrinsics, "dist": [0, 0, 0, 0, 0], "size": [640, 480]}
+    calibration.write_text(json.dumps(camera))
+    assert main([*batch, "--calibration", str(calibration)]) == 2
+    assert "scope-batch.json is the input itself" in capsys.readouterr().err
