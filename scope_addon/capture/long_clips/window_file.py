@@ -26,6 +26,7 @@ from ...content import add_content
 from ...notices import Notice, notices_of
 from ...untrusted.files import read_members
 from ..camera.background_record import BackgroundRecord
+from ..camera.calibration_tables import files_of_calibration
 from ..camera.corner_tracks import CornerTracks
 from ..camera.heading_drift import FrameEdges
 from ..camera.line_segments import Segments
@@ -383,7 +384,8 @@ def _digest(options: CaptureOptions) -> str:
         value = getattr(options, field.name)
         described.append(f"{field.name}={value!r}")
         if isinstance(value, Path):
-            described += map(_state, (value, description_path(value)))
+            files = (*files_of_calibration(value), description_path(value))
+            described += map(_state, files)
     return hashlib.sha256("\n".join(described).encode("utf-8", "surrogateescape")).hexdigest()[:32]
 
 

@@ -16,8 +16,9 @@ import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
 from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.line_segments import Segments
-from scope.scope_addon.capture.long_clips.window_file import load_window, save_window
+from scope.scope_addon.capture.long_clips.window_file import KeptWindows, load_window, save_window
 from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord, known_reference
+from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.face_record import RECORD
 from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.scope_addon.capture.perception.region import Region
@@ -164,3 +165,15 @@ def test_a_full_disk_is_an_error_and_leaves_nothing(
     gc.collect()
     assert list(tmp_path.iterdir()) == []
     assert unraisable == []
+
+
+@pytest.mark.parametrize("name", ["cameras.toml", "cameras.toml#left"])
+def test_windows_of_another_calibration_are_not_continued(tmp_path: Path, name: str) -> None:
+    """Also where the camera is named after its file."""
+    file = tmp_path / "cameras.toml"
+    options = CaptureOptions(calibration=tmp_path / name)
+    folders = []
+    for content in ("one", "one", "two"):
+        file.write_text(content)
+        folders.append(KeptWindows(tmp_path, options, (640, 480))._folder)
+    assert folders[0] == folders[1] != folders[2]
