@@ -431,7 +431,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    checked_rigs(args, clips, args.hands != OFF)
+    rigs = checked_rigs(args, clips, args.hands != OFF)
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
     extras = Extras(args.overlays, args.reports)
@@ -444,9 +444,10 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         given = non_default_arguments(args)
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
-        batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out))
+        files = [file for rig in rigs for file in rig.files]
+        batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out), files)
         footage = batch.clips(args.recursive, args.views)
-        read = files_to_read(vars(args))
+        read = [*files_to_read(vars(args)), *files]
         for path in footage.values():
             read += [path] if path.is_file() else files_of_footage(path)
         refuse_inputs([batch.report_file, *batch.results(footage)], read)

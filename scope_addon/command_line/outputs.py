@@ -264,11 +264,13 @@ def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -
     from ..scene.rig_file import check_rig
 
     written = [*outputs, *filter(None, (getattr(args, "overlay", None),))]
+    checked = []
     for rig in rigs:
         with bounded_import(rig.path):
             referred = check_rig(rig, fingers=fingers)
         refuse_inputs(written, referred)
-    return rigs
+        checked.append(replace(rig, files=referred))
+    return checked
 
 
 def write_outputs(

@@ -55,6 +55,7 @@ class Batch:
     :param extras: what else to write of each clip.
     :param is_mirror: the output folder stands for a store and has files of the same sizes, so that
         results of an earlier batch are compared by their sizes alone.
+    :param further_files: that decide the results, besides those that the options name.
     :raises InputError: the folder of footage does not exist.
     """
 
@@ -67,6 +68,7 @@ class Batch:
         suffixes: Sequence[str],
         extras: Extras = NO_EXTRAS,
         is_mirror: bool = False,
+        further_files: Sequence[Path] = (),
     ) -> None:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder; give the folder with the footage")
@@ -76,7 +78,7 @@ class Batch:
         self.settings = CaptureSettings(options, tuple(suffixes), extras)
         self._program = list(program)
         self._is_mirror = is_mirror
-        self._basis = self.settings.basis(program_version(ROOT))
+        self._basis = self.settings.basis(program_version(ROOT), further_files)
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
 

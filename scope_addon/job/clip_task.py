@@ -77,10 +77,11 @@ class CaptureSettings(NamedTuple):
     suffixes: tuple[str, ...]
     extras: Extras = NO_EXTRAS
 
-    def basis(self, program_version: str) -> str:
+    def basis(self, program_version: str, further_files: Sequence[Path] = ()) -> str:
         """Return the part of the clips' keys that is the same for all: program, options, and files
         that these name.
 
+        :param further_files: to which those refer, such as textures.
         :raises OSError: a file cannot be read.
         """
         values = {k: v for k, v in self.options.items() if k != "--threads"}
@@ -98,6 +99,7 @@ class CaptureSettings(NamedTuple):
                 files = files_of_calibration(Path(value))
             # unlike Path's, False for what is too long for a name
             _add_files(digest, filter(os.path.isfile, files))
+        _add_files(digest, filter(os.path.isfile, further_files))
         return digest.hexdigest()
 
 

@@ -20,7 +20,7 @@ import json
 import re
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -79,6 +79,8 @@ class RigSource:
     expression_map: ExpressionMap | None = None
     # Bone of each of VRM's parts, if the file says so.
     humanoid: Mapping[str, str] = field(default_factory=dict)
+    # What its file refers to, such as textures; known once Blender has read it.
+    files: Sequence[Path] = ()
 
 
 def rig_source(
@@ -254,6 +256,17 @@ def check_gltf(path: Path) -> None:
         raise InputError(
             f"{path}: this glTF file is damaged; export it again or choose another"
         ) from error
+
+
+def files_beside_gltf(path: Path) -> list[Path]:
+    """Return the files that a .gltf or .glb refers to, which `check_gltf` has checked.
+
+    :raises OSError: the file cannot be read.
+    """
+    gltf, _ = _read(path)
+    named = [each.get("uri") for kind in ("buffers", "images") for each in gltf.get(kind, ())]
+    uris = [uri for uri in named if uri is not None and not uri.startswith("data:")]
+    return [path.resolve().parent / _decoded(uri) for uri in uris]
 
 
 def humanoid_table(path: Path) -> dict[str, str]:

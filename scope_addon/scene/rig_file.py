@@ -17,7 +17,7 @@ from ...solver.errors import InputError
 from ..errors import UsageError
 from ..retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ..retarget.guess import from_humanoid
-from ..retarget.rig_source import RigSource
+from ..retarget.rig_source import RigSource, files_beside_gltf
 from .datablocks import NewDatablocks
 from .export import formats
 from .export.export_states import temporary_scene
@@ -105,12 +105,12 @@ def check_rig(source: RigSource, *, fingers: bool = True) -> list[Path]:
         }
         with at_rest(rig):
             probe(rig, moved)
-        return _files_referred_to()
+        return _files_referred_to(source.path)
 
 
-def _files_referred_to() -> list[Path]:
-    """Return the existing files of the session's images and libraries."""
-    files = []
+def _files_referred_to(rig: Path) -> list[Path]:
+    """Return the existing files of the session's images and libraries, and of a glTF file."""
+    files = files_beside_gltf(rig) if rig.suffix.lower() == ".gltf" else []
     for block in (*bpy.data.images, *bpy.data.libraries):
         path = Path(bpy.path.abspath(block.filepath, library=block.library))
         if path.is_file():

@@ -45,6 +45,13 @@ bpy.ops.export_scene.gltf(
 sys.stdout.flush()
 os._exit(0)  # without Blender's exit handlers, which can wait for ever
 """
+# Instead of a capture.
+WRITE_RESULTS = """
+import json, sys
+path = sys.argv[sys.argv.index("-o") + 1]
+open(path, "w").write("result")
+print(json.dumps({"outputs": [path], "warnings": []}))
+"""
 WRITTEN = {"outputs": ".npz", "overlay": ".mp4", "report": ".html"}
 NAMES = ("symbolic link", "hard link", "detour")
 
@@ -116,23 +123,51 @@ def test_the_file_of_one_of_several_people_is_no_input(tmp_path):
         check("outputs", tmp_path / "take.npz", {"body": body})
 
 
-def test_what_a_rigs_file_refers_to_is_no_output(tmp_path, capsys):
-    """The texture of a rig is read whenever the rig is exported."""
-    clip = tmp_path / "walk.png"
-    clip.write_text("clip")
-    texture = tmp_path / "texture.png"
-    rigs = [str(tmp_path / f"rig{suffix}") for suffix in (".blend", ".gltf")]
+@pytest.fixture(scope="module")
+def texture_and_rigs(tmp_path_factory):
+    """The texture of a rig, which is read whenever the rig is exported, and files of the rig."""
+    folder = tmp_path_factory.mktemp("rigs")
+    texture = folder / "texture.png"
+    rigs = [str(folder / f"rig{suffix}") for suffix in (".blend", ".gltf")]
     subprocess.run(
         [sys.executable, "-c", RIG_WITH_TEXTURE, str(texture), *rigs],
         check=True,
         cwd=Path(__file__).parents[2],
     )
+    return texture, rigs
+
+
+def test_what_a_rigs_file_refers_to_is_no_output(tmp_path, capsys, texture_and_rigs):
+    clip = tmp_path / "walk.png"
+    clip.write_text("clip")
+    texture, rigs = texture_and_rigs
     was = texture.read_bytes()
     for rig in rigs:
         command = ["capture", str(clip), "--overlay", str(texture), "--retarget", rig]
         assert main([*command, "-o", str(tmp_path / "out.glb"), "--quiet"]) == 2
         assert "texture.png is the input itself" in capsys.readouterr().err
         assert texture.read_bytes() == was
+
+
+def test_a_clip_is_captured_again_when_a_file_of_its_rig_has_changed(
+    tmp_path, capsys, texture_and_rigs
+):
+    clips = tmp_path / "clips"
+    clips.mkdir()
+    (clips / "walk.png").write_text("clip")
+    texture, rigs = texture_and_rigs
+    batch = ["batch", str(clips), "--out", str(tmp_path / "out"), "--formats", "glb"]
+
+    def outcome(rig):
+        assert main([*batch, "--retarget", rig], [sys.executable, "-c", WRITE_RESULTS]) == 0
+        return capsys.readouterr().err.splitlines()[0].split()[-1]
+
+    for rig in rigs:
+        further = [texture, *texture.parent.glob("*.bin")] if rig.endswith(".gltf") else [texture]
+        for file in further:
+            assert outcome(rig) == "done"
+            assert outcome(rig) == "skipped"
+            file.write_bytes(file.read_bytes() + b"changed")
 
 
 def test_the_command_line_refuses_before_it_begins(tmp_path, capsys):
