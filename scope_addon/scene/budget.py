@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much memory Blender may need for a file: a base, and more for each byte of content.
+"""How much memory a file may need: a base, and more for each byte of content.
 
 A few bytes of a file can claim hours of motion, years between two frames, or a rig of endless
 arrays. Files of real captures and rigs need far less than what is permitted here.
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 BASE_BYTES = 2 << 30
 LAST_FRAME = 1_048_574  # of a scene, which Blender does not let it exceed
 _BYTES_PER_BONE = 2900  # of a frame, by the exporter of .glb; the others need less
+_BYTES_PER_ROW = 10_000  # of markers or angles, and of a frame from which they follow
 _BYTES_PER_BYTE = 1000  # of compressed content; captures need 300, from 100 to 400
 _SAMPLES_PER_KEY = 5  # of a scene whose rate is higher than the footage's
 _CURVES_PER_BONE = 4  # of a rotation
@@ -34,14 +35,36 @@ def check_content(motion: Motion) -> None:
     :raises MotionFileError: it is one.
     """
     needed_bytes = len(motion) * motion.joint_count * _BYTES_PER_BONE
-    if needed_bytes <= BASE_BYTES:
-        return
-    content = zlib.compress(np.concatenate([motion.poses, motion.trans], axis=1).tobytes(), 1)
-    if needed_bytes > BASE_BYTES + _BYTES_PER_BYTE * len(content):
+    if not _is_explained(motion, needed_bytes):
         raise MotionFileError(
             f"the motion has {len(motion)} frames, but hardly any movement; as keyframes it would "
             f"need {needed_bytes / 1e9:.0f} GB of memory: cut it, or write an .npz"
         )
+
+
+def check_rows(motion: Motion) -> None:
+    """Refuse a motion of which a file with one row for each moment, at the motion's rate, would
+    need far more memory than its content explains.
+
+    :raises OutputError: it is one.
+    """
+    duration_s = float(motion.timestamps[-1] - motion.timestamps[0])
+    rows = 1.0 + duration_s * motion.mocap_framerate
+    needed_bytes = (len(motion) + rows) * _BYTES_PER_ROW
+    if not _is_explained(motion, needed_bytes):
+        raise OutputError(
+            f"the motion has {len(motion)} frames within {duration_s:.0f} s, but hardly any "
+            f"movement; in this format it would need {needed_bytes / 1e9:.0f} GB of memory: cut "
+            "it, or write an .npz"
+        )
+
+
+def _is_explained(motion: Motion, needed_bytes: float) -> bool:
+    """Return whether a motion's content explains that it needs so much memory."""
+    if needed_bytes <= BASE_BYTES:
+        return True
+    content = zlib.compress(np.concatenate([motion.poses, motion.trans], axis=1).tobytes(), 1)
+    return needed_bytes <= BASE_BYTES + _BYTES_PER_BYTE * len(content)
 
 
 def check_last_frame(frame: float) -> None:

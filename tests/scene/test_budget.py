@@ -16,8 +16,14 @@ import pytest
 from numpy.typing import NDArray
 from scope.scope_addon.errors import MotionFileError, OutputError
 from scope.scope_addon.scene.actions import Channels, bone_path
-from scope.scope_addon.scene.budget import check_content, check_last_frame, check_samples
+from scope.scope_addon.scene.budget import (
+    check_content,
+    check_last_frame,
+    check_rows,
+    check_samples,
+)
 from scope.scope_addon.scene.export.export import export_motions
+from scope.scope_addon.scene.export.without_scene import write_without_scene
 from scope.solver.body import Body
 
 from ..made_motion import made_motion
@@ -72,6 +78,8 @@ class Capture:
         random = np.random.default_rng(0)
         self.poses = (np.abs(random.normal(size=(frames, 72))) * noise_rad).astype(np.float32)
         self.trans = np.zeros((frames, 3), np.float32)
+        self.timestamps = np.arange(frames) / 30.0
+        self.mocap_framerate = 30.0
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -82,6 +90,31 @@ def test_hours_of_a_real_motion_are_permitted() -> None:
     check_content(Capture(20_000, 0.0))  # type: ignore[arg-type]
     with pytest.raises(MotionFileError, match="40000 frames, but hardly any movement"):
         check_content(Capture(40_000, 0.0))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("suffix", [".trc", ".c3d", ".mot", ".csv", ".vrma"])
+def test_rows_that_hardly_any_movement_fills_are_refused(
+    whole_body: Body, tmp_path: Path, suffix: str
+) -> None:
+    """Two frames with a day between them took all memory."""
+    motion = made_motion(whole_body, np.zeros((2, 72)), np.zeros((2, 3)))
+    motion.timestamps[:] = 0.0, 86400.0
+    with pytest.raises(OutputError, match=r"hardly any movement; in this format .* GB of memory"):
+        write_without_scene(tmp_path / f"out{suffix}", [motion], [whole_body])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_hours_of_rows_without_movement_are_refused() -> None:
+    with pytest.raises(OutputError, match="200000 frames within 6667 s, but hardly any movement"):
+        check_rows(Capture(200_000, 0.0))  # type: ignore[arg-type]
+
+
+def test_an_hour_of_a_recorded_screen_is_permitted() -> None:
+    """Its images come when something changes, 4 each second here, at a rate of 60."""
+    screen = Capture(14_400, 1e-3)
+    screen.timestamps = np.arange(14_400) / 4.0
+    screen.mocap_framerate = 60.0
+    check_rows(screen)  # type: ignore[arg-type]
 
 
 def test_frames_after_the_last_one_of_blender_are_refused() -> None:

@@ -29,6 +29,7 @@ from ...atomic_write import write_result
 from ...footage import display_text
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
+from ..budget import check_rows
 from .c3d import c3d_bytes
 from .output_paths import person_paths
 from .vrma import vrma_bytes
@@ -62,8 +63,11 @@ def write_without_scene(
     :raises OutputError: when a file cannot be written.
     """
     targets = person_paths(path, len(motions))
+    suffix = path.suffix.lower()
+    if suffix != ".npz":
+        for motion in motions:
+            check_rows(motion)
     for target, motion, body in zip(targets, motions, bodies, strict=True):
-        suffix = path.suffix.lower()
         if suffix == ".trc":
             write_trc(target, motion, body)
         elif suffix == ".c3d":
