@@ -17,6 +17,7 @@ from ..live.unfinished import (
     SUFFIX,
     is_recording,
     is_unfinished,
+    lock_of,
     remove_recording,
     unfinished_video,
 )
@@ -24,6 +25,7 @@ from ..notices import counted
 from ..options import Place
 from ..options.body_choice import chosen_body
 from ..scene.export.output_paths import check_output, person_paths
+from ..temporary import is_held
 from .arguments import add_options, values_in_range
 from .outputs import check_outputs, confine
 from .signals import interrupted
@@ -108,6 +110,11 @@ def _capture(
         recording = None
         if values["record"]:
             file = values["record"].with_suffix(SUFFIX)
+            if is_held(lock_of(file)):
+                raise UsageError(
+                    f"another live capture records to {values['record']}; give another name with "
+                    "--record"
+                )
             if is_unfinished(file):
                 print_message(f"{file} has a recording that is not finished: scope live {file}")
             keep = Keep(
@@ -142,7 +149,7 @@ def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Pa
     def save_video(footage: Footage) -> None:
         try:
             video.append(footage.save())
-        except ScopeError:
+        except (ScopeError, OSError):
             for failure in failures:  # which would not be told after this one
                 print_message(failure)
             raise

@@ -10,6 +10,7 @@ whatever ends the capture; it gets its name when it is whole.
 
 from __future__ import annotations
 
+import os
 import queue
 import threading
 from contextlib import suppress
@@ -94,7 +95,7 @@ class Footage:
 
     def _kept(self) -> str:
         """Say where the pictures are that were written; remove a file without any."""
-        if self.unfinished is None:
+        if self.unfinished is None or not os.path.exists(self.unfinished):  # its folder is gone
             return ""
         if self.unfinished.stat().st_size == 0:
             remove(self.unfinished)

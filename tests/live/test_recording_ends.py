@@ -2,6 +2,7 @@
 """Whatever ends a live capture, its recording is there, whole, and where the command says."""
 
 import errno
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,9 +18,11 @@ from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import live_command
 from scope.scope_addon.errors import NoPersonError, OutputError, UsageError, VideoError
-from scope.scope_addon.live import journal, run
+from scope.scope_addon.live import footage_recording, journal, run
+from scope.scope_addon.live.footage_recording import Footage
 from scope.scope_addon.live.journal import read_about, read_records
 from scope.scope_addon.live.recording import Keep, PeopleRecording, unfinished_recording
+from scope.scope_addon.live.source import Picture
 from scope.scope_addon.live.unfinished import lock_of
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.temporary import release
@@ -143,6 +146,36 @@ def test_what_still_grows_is_not_finished(tmp_path, body, capfd):
     assert f"{growing} is still being recorded; end that live" in capfd.readouterr().err
     assert growing.is_file()
     assert recording.save() == [path]
+
+
+def test_a_second_capture_of_the_same_name_is_refused(tmp_path, body, monkeypatch, capfd):
+    """The one that ends last would replace the take of the other."""
+    recording, (path,) = recorded(tmp_path, body)
+    fake_run(monkeypatch, lambda: None)
+    name = str(recording._journal.path.with_suffix(".npz"))
+    assert main(["live", str(SAMPLE), "--record", name]) == 2
+    assert f"another live capture records to {name}" in capfd.readouterr().err
+    assert recording.save() == [path]
+
+
+def test_where_a_recording_is_is_said_if_the_folder_is_gone(tmp_path, body, monkeypatch, capfd):
+    path = tmp_path / "out" / "take.npz"
+    path.parent.mkdir()
+    images = Footage(path.with_suffix(".mp4"), Fraction(30))
+
+    def remove_folder():
+        images.add(Picture(0, 0.0, 0.0, np.zeros((48, 64, 3), np.uint8)))
+        shutil.rmtree(path.parent)
+
+    fake_run(monkeypatch, remove_folder)
+    monkeypatch.setattr(footage_recording, "Footage", lambda *_: images)
+    images_too = ["--keep-footage", str(path.with_suffix(".mp4"))]
+    assert main(["live", str(SAMPLE), "--record", str(path), *images_too]) == 1
+    said = capfd.readouterr().err
+    other = tmp_path / "user" / "recordings" / path.name
+    assert f"the recording is in {other}" in said
+    assert len(Motion.load(other)) > POSES
+    assert "take.mp4" in said
 
 
 on_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits sizes of files as Linux does")
