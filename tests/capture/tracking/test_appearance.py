@@ -41,12 +41,3 @@ def test_distances_order_people_by_their_clothes() -> None:
     assert distance(first, 5 * first) == pytest.approx(0.0, abs=1e-6)  # sums over frames
     assert distance(first, darker) < 0.35 < distance(first, half) < distance(first, other)
     assert distance(first, other) > 0.8
-
-
-def test_parts_outside_the_image_do_not_count() -> None:
-    image = picture(RED, GREY)
-    upper = appearance(image[:185], BODY)
-    assert not upper.reshape(2, -1)[1].any()
-    assert distance(upper, appearance(image, BODY)) < 0.05
-    lower = np.where(np.arange(SIZE) < SIZE // 2, 0.0, appearance(image, BODY))
-    assert distance(upper, lower) == 0.5

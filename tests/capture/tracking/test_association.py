@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.tracking.appearance import SIZE
-from scope.scope_addon.capture.tracking.people import assign, cheapest_links, link
+from scope.scope_addon.capture.tracking.people import assign, link
 from scope.scope_addon.capture.tracking.track import Tracklet
 
 RATE = 30.0
@@ -27,12 +27,6 @@ def test_the_assignment_is_the_cheapest_of_all(shape: tuple[int, int], seed: int
         cost[rows, list(columns)].sum() for columns in permutations(range(shape[1]), shape[0])
     )
     assert cost[rows, chosen].sum() == pytest.approx(best)
-
-
-def test_links_that_cost_too_much_are_left_out() -> None:
-    cost = np.array([[1.0, 9.0, 2.0], [9.0, 9.0, 9.0], [1.5, 9.0, 9.0]])
-    assert cheapest_links(cost, 3.0) == {0: 2, 2: 0}
-    assert cheapest_links(cost, 0.5) == {}
 
 
 def tracklet(
@@ -82,30 +76,6 @@ def test_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
     before = [tracklet(0, 50, *right, RED), tracklet(0, 50, *left, others)]
     after = [tracklet(60, 120, *left, RED), tracklet(60, 120, *right, others)]
     assert sorted(link(before + after, times)) == people
-
-
-@pytest.mark.parametrize(
-    ("apart_px", "people"), [(20.0, [[0, 2], [1, 3]]), (120.0, [[0, 3], [1, 2]])]
-)
-def test_a_child_and_an_adult_in_the_same_place_are_told_apart_by_size(
-    apart_px: float, people: list[list[int]]
-) -> None:
-    """Where they are apart, somebody of another size in the same place bends over or stands up."""
-    times = (np.arange(120) / RATE).tolist()
-    here = 400.0
-    there = 400.0 + apart_px
-    before = [tracklet(0, 50, here, 0.0, RED, 200.0), tracklet(0, 50, there, 0.0, RED, 100.0)]
-    after = [tracklet(60, 120, there, 0.0, RED, 200.0), tracklet(60, 120, here, 0.0, RED, 100.0)]
-    assert sorted(link(before + after, times)) == people
-
-
-@pytest.mark.parametrize(("returns", "people"), [(RED, [[0, 1]]), (BLUE, [[0], [1]])])
-def test_after_a_long_time_the_appearance_decides(
-    returns: np.ndarray, people: list[list[int]]
-) -> None:
-    times = (np.arange(240) / RATE).tolist()
-    tracklets = [tracklet(0, 60, 100.0, 0.0, RED), tracklet(180, 240, 900.0, 0.0, returns)]
-    assert sorted(link(tracklets, times)) == people
 
 
 def test_tracklets_at_the_same_time_are_different_people() -> None:

@@ -43,12 +43,6 @@ def test_who_moves_is_preferred_to_a_larger_spectator() -> None:
     assert first_x(people_of(TIMES, [spectator, dancer])) == 200.0
 
 
-def test_the_noise_of_keypoints_is_no_movement_and_size_decides() -> None:
-    assert first_x(people_of(TIMES, [person(200.0), person(900.0, side=220.0)])) == 900.0
-    walkers = [person(200.0, swing=0.2), person(900.0, side=220.0, swing=0.2)]
-    assert first_x(people_of(TIMES, walkers)) == 900.0
-
-
 def test_a_place_chooses_whoever_is_there_then() -> None:
     people = [[person(200.0)], [person(600.0, rows=range(30, 90))], [person(900.0)]]
     assert find_chosen(ChosenPerson(890.0, 310.0, 1.0), people, TIMES) == 2
@@ -99,9 +93,3 @@ def seen_turned(angles_deg: np.ndarray) -> Track:
 def test_somebody_who_lies_all_the_time_needs_a_turn_of_the_picture(angle: int, turn: int) -> None:
     noise = np.random.default_rng(0).normal(scale=5.0, size=60)
     assert needed_turn(seen_turned(angle + noise)) == turn
-
-
-def test_somebody_who_lies_down_or_turns_a_somersault_does_not() -> None:
-    assert needed_turn(seen_turned(np.linspace(0, 90, 90))) == 0
-    assert needed_turn(seen_turned(np.linspace(0, 360, 90))) == 0
-    assert needed_turn(seen_turned(np.full(3, 90.0))) == 0

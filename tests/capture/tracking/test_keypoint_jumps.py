@@ -10,7 +10,6 @@ from scope.scope_addon.capture.tracking.keypoint_jumps import (
     CONFIDENCE,
     find_keypoint_jumps,
     repair_keypoint_jumps,
-    scale_px_per_m,
 )
 from scope.scope_addon.capture.tracking.track import Track
 
@@ -62,15 +61,6 @@ def test_a_jump_is_moved_back_onto_the_path(rate: float, frames: int) -> None:
     assert repaired.keypoints_px.dtype == repaired.confidence.dtype == np.float32
 
 
-def test_a_jump_in_depth_alone() -> None:
-    track = standing(90, 60.0)
-    track.world_landmarks[50, WRIST, 2] += 0.5
-    repaired = repair_keypoint_jumps(track)
-    assert abs(repaired.world_landmarks[50, WRIST, 2]) < 0.05
-    np.testing.assert_array_equal(repaired.keypoints_px, track.keypoints_px)
-    np.testing.assert_array_equal(repaired.confidence, track.confidence)
-
-
 @pytest.mark.parametrize("rate", [6.0, 15.0, 30.0, 60.0])
 def test_possible_motion_is_left_alone(rate: float) -> None:
     """A swing, a punch of 0.5 m to and fro in 0.25 s (some 130 m/s2), a step of 0.6 m in 0.15 s."""
@@ -83,16 +73,6 @@ def test_possible_motion_is_left_alone(rate: float) -> None:
             metre * 0.3 * (1 - np.cos(np.pi * np.clip((time - 1.6) / 0.15, 0, 1)))
         )
     assert repair_keypoint_jumps(track) is track
-
-
-@pytest.mark.parametrize("rate", [1.0, 30.0, 240.0])
-def test_a_short_crouch_does_not_change_the_scale(rate: float) -> None:
-    track = standing(max(2, int(4 * rate)), rate)
-    usual = scale_px_per_m(track)
-    crouches = np.abs(track.times - 2.0) < 0.4
-    middle = track.keypoints_px.mean(axis=1, keepdims=True)
-    track.keypoints_px[crouches] = (middle + 0.4 * (track.keypoints_px - middle))[crouches]
-    np.testing.assert_allclose(scale_px_per_m(track), usual, rtol=0.05)
 
 
 def test_gaps_and_ends() -> None:

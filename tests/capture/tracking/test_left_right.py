@@ -8,10 +8,8 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.left_right import (
-    DEPTH_REVERSED,
     LEFT_RIGHT_SWAPPED,
     MIRROR_PARTNER,
-    apply_labels,
     find_labels,
     repair_left_right,
 )
@@ -36,12 +34,6 @@ def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
     return np.einsum("tij,kj->tki", turns, body) + rng.normal(0, 0.01, (count, 33, 3))
 
 
-def test_mirror_partners() -> None:
-    assert MIRROR_PARTNER[0] == 0
-    assert KEYPOINT_NAMES[MIRROR_PARTNER[KEYPOINT_NAMES.index("mouth_left")]] == "mouth_right"
-    np.testing.assert_array_equal(MIRROR_PARTNER[MIRROR_PARTNER], np.arange(33))
-
-
 @pytest.mark.parametrize("turn_rad", [0.0, 2 * np.pi])
 @pytest.mark.parametrize(
     "stretch", [slice(0, 0), slice(20, 21), slice(30, 75), slice(0, 25), slice(90, 120)]
@@ -52,34 +44,6 @@ def test_a_swap_of_less_than_half_the_clip_is_found(stretch: slice, turn_rad: fl
     expected[stretch] = True
     world[stretch] = world[stretch][:, MIRROR_PARTNER]
     np.testing.assert_array_equal(find_labels(world) == LEFT_RIGHT_SWAPPED, expected)
-
-
-def test_gaps_and_new_people() -> None:
-    world = walker(60)
-    expected = np.zeros(60, bool)
-    expected[10:30] = True
-    world[expected] = world[expected][:, MIRROR_PARTNER]
-    world[28:33] = np.nan
-    expected[28:30] = False
-    np.testing.assert_array_equal(find_labels(world) == LEFT_RIGHT_SWAPPED, expected)
-    # another person, seen from behind, in the second half: no swap
-    other = np.concatenate([walker(40), walker(30)[:, MIRROR_PARTNER]])
-    starts = np.arange(70) == 40
-    assert not find_labels(other, starts).any()
-    assert find_labels(other)[40:].all()
-
-
-@pytest.mark.parametrize("turn_rad", [0.0, np.pi])
-def test_few_reference_frames_overrule_the_majority(turn_rad: float) -> None:
-    right = walker(120, turn_rad)
-    expected = np.zeros(120, int)
-    expected[20:100] = LEFT_RIGHT_SWAPPED
-    expected[40:60] = DEPTH_REVERSED
-    wrong = apply_labels(right, expected)  # both operations are their own inverse
-    reference = np.full_like(right, np.nan)
-    reference[::30] = right[::30] + np.random.default_rng(0).normal(0, 0.05, (4, 33, 3))
-    np.testing.assert_array_equal(find_labels(wrong, reference=reference), expected)
-    np.testing.assert_allclose(apply_labels(wrong, expected), right)
 
 
 def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
@@ -110,12 +74,6 @@ def test_a_track_is_repaired_and_left_alone_where_nobody_was_seen() -> None:
     assert (np.abs(repaired.world_landmarks - wrong)[81:84, :, 2].mean(axis=1) > 0.3).all()
     assert not repaired.world_landmarks[~seen].any()
     assert not repaired.keypoints_px[~seen].any()
-
-
-def test_nothing_to_do() -> None:
-    assert find_labels(np.zeros((0, 33, 3))).shape == (0,)
-    assert not find_labels(np.full((5, 33, 3), np.nan)).any()
-    assert not find_labels(np.zeros((5, 33, 3))).any()
 
 
 HEADINGS = {"front": 0.0, "aslant": 0.8, "side": np.pi / 2, "back": np.pi}

@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.scope_addon.capture.tracking.limb_swap import (
     ARMS,
     LEGS,
-    find_limb_swaps,
     repair_limb_swaps,
 )
 from scope.scope_addon.capture.tracking.track import Track
@@ -48,19 +46,6 @@ def walker(heading: float, rate: float = 30.0, count: int = 90, has_depth: bool 
     )
 
 
-def test_the_points_that_are_swapped() -> None:
-    names = {key: {KEYPOINT_NAMES[k] for k in limbs.all_points} for key, limbs in LIMBS.items()}
-    assert names["legs"] == {
-        f"{side}_{part}"
-        for side in ("left", "right")
-        for part in ("knee", "ankle", "heel", "foot_index")
-    }
-    assert {"left_elbow", "right_wrist", "left_thumb", "right_pinky", "left_index"} < names["arms"]
-    assert not any("shoulder" in name or "foot" in name for name in names["arms"])
-    for limbs in LIMBS.values():
-        np.testing.assert_array_equal(MIRROR_PARTNER[limbs.joints], limbs.joints[[1, 0, 3, 2]])
-
-
 @pytest.mark.parametrize("has_depth", [False, True])
 @pytest.mark.parametrize(
     ("which", "name"),
@@ -87,21 +72,6 @@ def test_walking_is_left_alone(heading: float, rate: float) -> None:
         assert repair_limb_swaps(track) is track
 
 
-def test_the_reference_decides_where_more_than_half_is_wrong() -> None:
-    right = walker(HEADINGS["aslant"], has_depth=True)
-    rows = np.array([5, 20, 35, 50])
-    wrong = swapped(right, LEGS.all_points, slice(12, 60))
-    referenced = replace(
-        wrong, reference_rows=rows, reference_landmarks=right.world_landmarks[rows]
-    )
-    alone, helped = (
-        np.linalg.norm(repair_limb_swaps(track).keypoints_px - right.keypoints_px, axis=-1)
-        for track in (wrong, referenced)
-    )
-    assert (alone.max(axis=1) > 12.0).sum() > 40
-    assert (helped.max(axis=1) > 12.0).sum() <= 1
-
-
 def test_hands_go_with_the_arms() -> None:
     true_hands = np.random.default_rng(0).normal(size=(90, 2, 21, 6))
     right = replace(walker(HEADINGS["front"]), hands=true_hands)
@@ -114,37 +84,3 @@ def test_hands_go_with_the_arms() -> None:
     legs = repair_limb_swaps(swapped(right, LEGS.all_points, slice(30, 50)))
     assert legs.hands is not None
     np.testing.assert_array_equal(legs.hands, true_hands)
-
-
-def test_another_person_need_not_continue_the_motion() -> None:
-    one = walker(0.0, count=40)
-    other = walker(np.pi, count=50)
-    both = replace(
-        walker(0.0),
-        keypoints_px=np.concatenate([one.keypoints_px, other.keypoints_px]),
-        acquired=np.isin(np.arange(90), [0, 40]),
-    )
-    assert not find_limb_swaps(both, LEGS).any()
-
-
-def test_nothing_to_do() -> None:
-    track = walker(0.0, count=5)
-    assert repair_limb_swaps(replace(track, seen=np.zeros(5, bool))) is not None
-    for count in (0, 1, 2):
-        rows = slice(0, count)
-        short = replace(
-            track,
-            **{
-                key: getattr(track, key)[rows]
-                for key in (
-                    "frames",
-                    "times",
-                    "seen",
-                    "keypoints_px",
-                    "confidence",
-                    "world_landmarks",
-                    "acquired",
-                )
-            },
-        )
-        assert repair_limb_swaps(short) is short

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.frame_clock import FrameClock
@@ -34,15 +33,6 @@ def searches(
             schedule.begin(IMAGE, live, lost)
             found.append(t / fps)
     return found
-
-
-def test_somebody_small_may_be_in_the_background() -> None:
-    """Before the most prominent person comes; so the search is as frequent as for a person who was
-    lost.
-    """
-    np.testing.assert_allclose(
-        np.diff(searches(None, 30, 10.0, live=[person(150.0)])), 4 / 30, atol=0.02
-    )
 
 
 def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracked() -> None:
@@ -77,34 +67,3 @@ def test_the_thorough_search_becomes_rare_until_their_number_changes() -> None:
     assert not schedule.begin_thorough([])
     assert not schedule.begin_thorough([person(300.0)] * 4)
     assert not SearchSchedule(clock, None).begin_thorough([person(300.0)])
-
-
-@pytest.mark.parametrize("people", [None, 2])
-def test_the_search_in_turned_pictures_becomes_rare_while_it_finds_nobody(
-    people: int | None,
-) -> None:
-    clock = FrameClock()
-    schedule = SearchSchedule(clock, people)
-    times = []
-    for t in range(700):
-        clock.advance(t / 30)
-        live = [person(300.0)] * (people or 1) if 450 <= t < 500 else []
-        if schedule.begin_turned(live):
-            times.append(t)
-    assert list(np.diff(times)[:5]) == [8, 16, 32, 64, 64]  # frames
-    assert not [t for t in times if 450 <= t < 500]
-    lost = [t for t in times if t >= 500]
-    assert lost[0] == 500
-    assert lost[1] == 508
-
-
-def test_after_forgetting_the_next_frame_is_searched() -> None:
-    clock = FrameClock()
-    clock.advance(0.0)
-    schedule = SearchSchedule(clock, None)
-    live = [person(300.0)]
-    schedule.begin(IMAGE, live, [])
-    clock.advance(1 / 30)
-    assert not schedule.is_due(IMAGE, live, [])
-    schedule.forget()
-    assert schedule.is_due(IMAGE, live, [])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.landmark_network import PoseEstimate
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.tracking.tracked_target import RECENT_FRAMES, TrackedTarget
+from scope.scope_addon.capture.tracking.tracked_target import TrackedTarget
 
 SIDE = 400.0
 BODY = np.random.default_rng(1).normal(scale=0.2 * SIDE, size=(33, 2))
@@ -43,13 +43,6 @@ def test_a_jump_with_less_confidence_is_an_occlusion(
     assert walker(30, 30).becomes_occluded(at(30 * 12.0 + jump, confidence)) == occluded
 
 
-def test_a_person_with_low_confidence_throughout_is_not_occluded() -> None:
-    target = TrackedTarget(0, at(0.0, 0.4), np.zeros(2), 0.0)
-    for t in range(1, 30):
-        target.update(at(0.0, 0.4), False, t / 30, 1 / 30)
-    assert not target.becomes_occluded(at(60.0, 0.38))
-
-
 def test_a_person_is_predicted_at_constant_velocity() -> None:
     target = walker(30, 30)  # last seen at 348 px
     assert target.prefetch_region.center_px == pytest.approx((360.0, 300.0))
@@ -58,30 +51,6 @@ def test_a_person_is_predicted_at_constant_velocity() -> None:
         assert target.predicted_region.center_px == pytest.approx((x, 300.0))
         assert target.innovation(at(max(x, 360.0))) == pytest.approx(0.0, abs=1e-9)
         assert target.innovation(at(max(x, 360.0) + 40.0)) == pytest.approx(40.0 / SIDE)
-
-
-def test_an_occluder_is_looked_for_where_the_person_was_and_where_they_walk_to() -> None:
-    target = walker(30, 30, speed_px=24.0)
-    target.is_occluded = True
-    target.frames_lost = 20
-    last = 29 * 24.0
-    now = 49 * 24.0
-    assert [
-        target.is_occluded_by(at(x, 0.4)) for x in (last, now, now + 0.6 * SIDE, last - 0.6 * SIDE)
-    ] == [
-        True,
-        True,
-        False,
-        False,
-    ]
-
-
-@pytest.mark.parametrize("fps", [5, 30, 120])
-def test_recent_confidences_cover_half_a_second(fps: int) -> None:
-    target = walker(3 * fps, fps)
-    times = [time for time, _ in target.confidences]
-    assert len(times) == max(RECENT_FRAMES, fps // 2 + 1)
-    assert times[-1] == target.seen_s
 
 
 def test_an_occluder_is_distinguished_by_confidence_and_position() -> None:

@@ -111,33 +111,6 @@ def test_expressions_are_found_whatever_the_face_at_rest():
     np.testing.assert_allclose(gaze, np.tile([0, 0, 1.0], (T, 2, 1)), atol=0.05)
 
 
-def test_both_eyes_turn_together_and_the_gaze_with_them():
-    truth = np.zeros((T, len(EXPRESSIONS)))
-    truth[30:60, [INDEX["eyeLookOutLeft"], INDEX["eyeLookInRight"]]] = 0.8
-    _, _, weights, gaze, _ = parts(fitted(modelled(truth, 0.002), TIMES))
-    np.testing.assert_allclose(
-        weights[:, INDEX["eyeLookOutLeft"]], truth[:, INDEX["eyeLookOutLeft"]], atol=0.35
-    )
-    np.testing.assert_allclose(
-        weights[:, INDEX["eyeLookInRight"]], weights[:, INDEX["eyeLookOutLeft"]]
-    )
-    assert gaze[45, 0, 0] > 0.1  # to the person's left
-    np.testing.assert_allclose(np.linalg.norm(gaze, axis=-1), 1)
-
-
-def test_noise_alone_is_no_expression():
-    _, _, weights, _, _ = parts(fitted(modelled(np.zeros((T, len(EXPRESSIONS))), 0.008), TIMES))
-    assert weights.mean() < 0.005
-
-
-def test_frames_without_a_face_stay_empty():
-    rows = modelled(talk(), 0.002)
-    rows[35:45] = 0.0
-    out = fitted(rows, TIMES)
-    assert not out[35:45].any()
-    assert out[38 + 10 : 60, 2 + BLINKS[0]].max() > 0.7
-
-
 def test_a_damaged_file_says_what_to_do(tmp_path, monkeypatch):
     path = tmp_path / "response.npz"
     np.savez(path, landmarks=np.arange(3))
@@ -251,18 +224,3 @@ def test_a_transformed_face_comes_back(turn):
     faces = aligned(pixels[None], FACE, SHARES)
     np.testing.assert_allclose(faces.points[0], FACE, atol=1e-9)
     np.testing.assert_allclose(faces.turns[0], turn, atol=1e-9)
-
-
-def test_a_reflected_face_is_not_reflected_back():
-    pixels = FACE * [-1, 1, 1] * Y_UP
-    faces = aligned(pixels[None], FACE, SHARES)
-    assert np.abs(faces.points[0] - FACE).max() > 0.5
-
-
-def test_landmarks_that_coincide_give_finite_numbers():
-    faces = aligned(np.full((2, 40, 3), 7.0), FACE, SHARES)
-    assert np.isfinite(faces.points).all()
-
-
-def test_the_terms_of_steep_views_do_not_grow():
-    assert np.abs(view_terms(np.array([[0.0, 3.0, 0.0]]))).max() < 1

@@ -110,16 +110,6 @@ def test_a_face_has_the_light_around_its_eyes(tracker):
     assert light != 1  # which it is where nothing is known
 
 
-def test_there_is_nothing_where_no_face_is(tracker):
-    values = face_of(tracker, {1: person(300, 200)})[1]
-    assert not any(v.any() for v in values)
-
-
-def test_a_face_of_another_size_is_not_this_persons(tracker):
-    tracker._network.faces = [(*middle(300, 200), 30.0)]
-    assert face_of(tracker, {1: person(300, 200)})[1][0][0] == 0
-
-
 def test_a_lost_face_is_looked_for_less_often(tracker):
     for k in range(60):
         face_of(tracker, {1: person(300, 200)}, k / 30)
@@ -142,12 +132,6 @@ def test_a_face_is_looked_for_on_heads_that_the_body_does_not_see_from_the_side_
     seen = face_of(tracker, {1: person(300, 200, yaw=yaw)})[1][0][0] > 0
     assert seen == is_looked_for
     assert (tracker._network.calls > 0) == is_looked_for
-
-
-def test_a_face_that_turns_away_is_followed(tracker):
-    tracker._network.faces = [(*middle(300, 200), 92.0)]
-    face_of(tracker, {1: person(300, 200, yaw=0)})
-    assert face_of(tracker, {1: person(300, 200, yaw=95)}, 1 / 30)[1][0][0] > 0
 
 
 def test_a_head_too_small_is_not_looked_at(tracker):

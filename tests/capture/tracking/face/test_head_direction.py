@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, choose_camera
 from scope.scope_addon.capture.perception.face_landmarks import FaceEstimate, FaceNetwork
-from scope.scope_addon.capture.perception.face_record import RECORD, presence_of, record
+from scope.scope_addon.capture.perception.face_record import RECORD, record
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.expression_fit import across_head, certainty
 from scope.solver.body_file import load_body
@@ -81,32 +81,11 @@ def test_a_face_that_looks_frontal_at_the_edge_of_the_image_is_turned(seen):
     assert aside - middle == pytest.approx(-30.0, abs=2)
 
 
-def test_a_face_at_the_back_of_a_head_counts_for_nothing(seen):
-    """The network may see one there, while the body's ears are the other way round."""
-    face = record(seen((0, 0, 0)), None)[None]
-    across = across_head(face, camera_of(300.0))
-    full, half, none = (
-        float(certainty(face, across, 0.15 * across @ exp(np.radians([0, angle, 0])))[0])
-        for angle in (10, 45, 100)
-    )
-    assert full > half > 0
-    assert none == 0
-
-
 def test_a_face_of_which_the_network_is_unsure_counts_by_the_cube_of_its_presence(seen):
     rows = np.array([record(replace(seen((0, 0, 0)), presence=p), None) for p in (1.0, 0.5)])
     across = across_head(rows, camera_of(300.0))
     sure, unsure = certainty(rows, across, across)
     assert unsure == pytest.approx(sure / 8, rel=1e-6)
-
-
-def test_the_presence_of_a_small_face_is_that_of_a_large_one(seen):
-    estimate = replace(seen((0, 0, 0)), presence=0.7)
-    rows = np.array(
-        [record(replace(estimate, landmarks=s * estimate.landmarks), None) for s in (1.0, 0.3)]
-    )
-    assert rows[1, 0] < 0.9 * rows[0, 0]
-    np.testing.assert_allclose(presence_of(rows), 0.7, rtol=1e-6)
 
 
 def test_frames_without_a_face_have_no_direction():

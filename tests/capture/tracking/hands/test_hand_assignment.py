@@ -23,7 +23,6 @@ from scope.scope_addon.capture.tracking.hand_assignment import (
     assigned,
     confirmed,
     is_same_hand,
-    without_duplicates,
 )
 
 SCALE = 500.0  # pixels per metre
@@ -133,15 +132,6 @@ def test_a_hand_of_the_wrong_side_at_this_wrist_alone_is_mirrored_in_depth() -> 
     assert assigned(found, person(sure=0.3), SCALE, 0) is None
 
 
-def test_a_hand_that_was_found_twice_goes_to_the_nearest_wrist() -> None:
-    left = hand(0)
-    right = hand(1)
-    again = hand(1, away=0.1, left=0.5)
-    people = {4: person(), 7: person()}
-    found = without_duplicates({(4, 0): left, (4, 1): again, (7, 1): right, (7, 0): None}, people)
-    assert found == {(4, 0): left, (4, 1): None, (7, 1): right, (7, 0): None}
-
-
 def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides() -> None:
     a = hand(0, left=0.95)
     for left, away, is_same in (
@@ -208,10 +198,6 @@ def test_support_ends_after_the_same_time_at_every_rate(fps):
     assert len(believed(hands[::-1], fps)) == int(SUPPORT_S * fps + 1e-6) + 1
 
 
-def test_support_does_not_reach_over_a_gap():
-    assert believed(track([0.9, 0, 0, 0, 0, 0, -0.4])) == [0]
-
-
 def test_a_tentative_hand_of_another_shape_is_not_believed():
     hands = track([0.9, -0.4, -0.4, -0.4])
     hands[1, LEFT] = tentative_hand(-0.4, turned_deg=120)
@@ -219,16 +205,3 @@ def test_a_tentative_hand_of_another_shape_is_not_believed():
     hands = track([0.9, -0.4])
     hands[1, LEFT] = tentative_hand(-0.4, size=90.0)
     assert believed(hands) == [0]
-
-
-def test_a_hand_that_moves_without_turning_is_believed():
-    hands = track([0.9, -0.4])
-    hands[1, LEFT] = tentative_hand(-0.4, wrist=(400.0, 100.0))
-    assert believed(hands) == [0, 1]
-
-
-def test_the_input_stays_as_it_is():
-    hands = track([0.9, -0.4])
-    before = hands.copy()
-    confirmed(hands, np.arange(2) / FPS)
-    np.testing.assert_array_equal(hands, before)

@@ -74,24 +74,9 @@ def test_the_palm_gives_the_colour_and_its_surroundings_do_not():
     np.testing.assert_array_equal(palm_color(image, HAND + [20, 90]), TROUSERS)
 
 
-def test_a_hand_outside_the_image_has_no_colour():
-    image = np.zeros((100, 100, 3), np.uint8)
-    assert palm_color(image, HAND + [300, 62]) is None
-    assert palm_color(image, HAND + [50, 8]) is not None  # cut by the border
-
-
 def test_shadow_leaves_a_hand_alike_and_cloth_does_not():
     assert is_like(0.35 * SKIN, SKIN)
     assert is_like(2.0 * SKIN, SKIN)
     assert not is_like(TROUSERS, SKIN)
     assert not is_like(SKIN, TROUSERS)
     assert is_like(0.75 * SKIN + 0.25 * np.array([160.0, 160, 165]), SKIN)  # blurred over a wall
-
-
-def test_grey_images_never_contradict():
-    assert is_like(np.full(3, 20.0), np.full(3, 180.0))
-
-
-def test_an_unknown_colour_contradicts_nothing():
-    assert is_like(None, SKIN)
-    assert is_like(SKIN, None)

@@ -21,7 +21,6 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking import hand_tracker
-from scope.scope_addon.capture.tracking.hand_assignment import without_duplicates
 from scope.scope_addon.capture.tracking.hand_tracker import HandTracker
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from scope.solver.body_file import load_body
@@ -153,23 +152,6 @@ def test_a_missing_hand_is_searched_equally_often_at_any_frame_rate(follow, rate
     assert 22 <= calls[3 * rate - 1] - calls[rate - 1] <= 32  # in two seconds, both hands
 
 
-def test_hands_below_the_least_size_are_not_looked_for(follow):
-    for least_px, expected in ((0.9 * LENGTH, [True, False]), (1.1 * LENGTH, [False, False])):
-        tracker = follow([hand_at((300, 500))], least_px=least_px)
-        assert list(seen(tracker, person())) == expected
-    assert tracker._network.calls == tracker._palms.calls == 0
-
-
-def test_a_hand_whose_wrist_is_hidden_is_not_looked_for_in_every_frame(follow):
-    """Six to eight times per second from the start, each hand."""
-    tracker = follow([])
-    for k in range(31):
-        tracker.step(
-            IMAGE, [(0, replace(person(), keypoints_confidence=np.full(33, 0.05)))], k / 30
-        )
-    assert 12 <= tracker._palms.calls <= 18
-
-
 def test_a_hand_is_followed_with_the_wrist_where_it_moves_far_in_a_frame(follow):
     hands = [hand_at((300, 500))]
     tracker = follow(hands)
@@ -237,37 +219,6 @@ def test_a_second_look_finds_a_hand_by_an_unsure_palm_but_only_at_the_bodys_wris
     assert seen(tracker, person())[0] == is_seen
 
 
-def test_a_hand_far_from_the_bodys_wrist_is_dropped(follow):
-    tracker = follow([hand_at((300, 500))])
-    assert seen(tracker, person())[0]
-    assert not seen(tracker, person(left_wrist=(300, 900)))[0]
-
-
-@pytest.mark.parametrize(
-    ("hand", "other"),
-    [((300 + 0.4 * LENGTH, 500), (700, 500)), ((300, 500), (300 + 0.8 * LENGTH, 500))],
-    ids=["away from the wrist", "near the other wrist"],
-)
-def test_a_hand_of_the_other_side_is_rejected(follow, hand, other):
-    assert not seen(follow([hand_at(hand, left=0.02)]), person(right_wrist=other))[0]
-
-
-@pytest.mark.parametrize(("left", "are_sides_sure"), [(0.97, True), (0.7, False)])
-def test_hands_of_sure_sides_are_not_exchanged_where_the_bodys_wrists_are(
-    follow, left, are_sides_sure
-):
-    """Forearms cross: the body's elbows are right, but each of its wrists is at the other hand."""
-    at_right = (500, 500)
-    at_left = (500 + 1.2 * LENGTH, 500)
-    tracker = follow([hand_at(at_left, left=left), hand_at(at_right, left=1 - left)])
-    crossed = person(left_wrist=at_right, right_wrist=at_left)
-    for _ in range(3):
-        (_, found), *_ = tracker.step(IMAGE, [(0, crossed)])
-        assert (found.hands[:, 0, 2] > 0).all()
-        np.testing.assert_allclose(found.hands[0, 0, :2], at_left if are_sides_sure else at_right)
-        np.testing.assert_allclose(found.hands[1, 0, :2], at_right if are_sides_sure else at_left)
-
-
 def test_a_hand_beyond_the_forearms_reach_is_not_that_arms(follow):
     """The left elbow is three hands away: the left hand there is somebody else's."""
     here = (500, 500)
@@ -279,92 +230,12 @@ def test_a_hand_beyond_the_forearms_reach_is_not_that_arms(follow):
     assert not seen(tracker, person_).any()
 
 
-def test_a_hand_found_twice_goes_to_its_sure_side(follow):
-    """What the other side's wrist is nearer to has the pixels of this hand and an unsure side."""
-    right = hand_at((500, 500), left=0.03)
-    blurred = hand_at((500 - 0.2 * LENGTH, 500), left=0.6)
-    wrists = person(left_wrist=(500 - 0.2 * LENGTH, 500), right_wrist=(500 + 0.4 * LENGTH, 500))
-    found = {(0, 0): blurred, (0, 1): right}
-    kept = without_duplicates(found, {0: wrists})
-    assert kept[0, 1] is right
-    assert kept[0, 0] is None
-
-
-def test_a_hand_that_only_looks_like_the_other_one_is_mirrored_in_depth(follow):
-    hand = hand_at((300, 500), left=0.02)
-    hand.world_landmarks[:, 2] = np.linspace(-0.05, 0.05, 21)
-    (_, found), *_ = follow([hand]).step(IMAGE, [(0, person())])
-    np.testing.assert_allclose(found.hands[0, :, 3:], hand.world_landmarks * [1, 1, -1])
-
-
-@pytest.mark.parametrize(("away", "presence"), [(0.1, 0.6), (0.4, 0.8)])
-def test_without_a_palm_a_hand_has_to_be_more_certain_the_farther_it_is_from_the_wrist(
-    follow, away, presence
-):
-    for offset in (-0.05, 0.05):
-        tracker = follow([hand_at((300 + away * LENGTH, 500), presence=presence + offset)])
-        tracker._palms.hands = []
-        assert seen(tracker, person())[0] == (offset > 0)
-
-
 def test_one_hand_is_not_assigned_to_both_sides(follow):
     tracker = follow([hand_at((500, 500), left=0.5)])
     assert list(seen(tracker, person(left_wrist=(495, 500), right_wrist=(540, 500)))) == [
         True,
         False,
     ]
-
-
-@pytest.mark.parametrize(("certainty", "are_both_seen"), [(0.95, True), (0.8, False)])
-def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides(
-    follow, certainty, are_both_seen
-):
-    """A hand behind the other one, which the network imagines where that one is, has an unsure
-    side.
-    """
-    left = hand_at((300, 500), left=certainty)
-    right = hand_at((300 + 0.25 * LENGTH, 500), left=0.02)
-    tracker = follow([left, right])
-    wrists = person(left_wrist=(300, 500), right_wrist=(300 + 0.5 * LENGTH, 500))
-    for _ in range(3):
-        assert seen(tracker, wrists).all() == are_both_seen
-        assert seen(tracker, wrists).any()
-
-
-def test_a_hand_whose_place_shows_the_other_one_is_looked_for_beside_it(follow):
-    class SeenInPalms(FakeHands):
-        def estimate(self, image, region):
-            if region.side_px == 2 * LENGTH:
-                return super().estimate(image, region)
-            return hand_at((300, 500), left=0.5)  # both followed regions show the left hand
-
-    hands = [hand_at((300, 500)), hand_at((300 + 0.5 * LENGTH, 500), left=0.02)]
-    tracker = follow(hands)
-    wrists = person(right_wrist=(300 + 0.5 * LENGTH, 500))
-    assert seen(tracker, wrists).all()
-    tracker._network = SeenInPalms(hands)
-    (_, found), *_ = tracker.step(IMAGE, [(0, wrists)])
-    np.testing.assert_allclose(found.hands[1, :, :2], hands[1].keypoints_px, rtol=1e-6)
-    assert found.hands[0, 0, 2] > 0
-
-
-def test_a_followed_hand_may_look_like_the_other_one_farther_from_the_wrist(follow):
-    hands = [hand_at((300, 500))]
-    tracker = follow(hands)
-    assert seen(tracker, person())[0]
-    hands[0] = hand_at((300 + 0.4 * LENGTH, 500), left=0.02)
-    assert seen(tracker, person())[0]
-
-
-@pytest.mark.parametrize(("left", "is_followed"), [(0.97, True), (0.7, False)])
-def test_a_certain_hand_stays_where_the_bodys_wrist_leaves_it_for_the_elbow(
-    follow, left, is_followed
-):
-    tracker = follow([hand_at((300, 500), left=left)])
-    assert seen(tracker, person())[0]
-    bent = person()
-    bent.keypoints_px[KEYPOINT_NAMES.index("left_wrist")] += (0, 1.2 * LENGTH)
-    assert seen(tracker, bent)[0] == is_followed
 
 
 def numbered_pixels(late=True):
@@ -415,21 +286,6 @@ def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which
     assert not track.hands[:, 1].any()
 
 
-def test_a_hand_is_not_followed_back_onto_one_that_is_another(follow):
-    """The left hand comes out from behind the right one, at which it would be seen before."""
-    hands = [hand_at((300, 500), left=0.5)]
-    tracker = follow(hands)
-    found = []
-    tracker._network = InFrame(hands)
-    for k in range(4):
-        if k == 3:
-            hands.append(hand_at((300 + 0.4 * LENGTH, 500)))
-        wrists = person(left_wrist=(300 + 0.4 * LENGTH, 500), right_wrist=(300, 500))
-        ((_, o),) = tracker.step(numbered_pixels(late=k == 3), [(0, wrists)], k / 30)
-        found.append(o.hands)
-    assert [list(hand[:, 0, 2] > 0) for hand in found] == [*3 * [[False, True]], [True, True]]
-
-
 def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
     """They measure some 25 pixels. In the first second they hang down edge-on, afterwards they are
     raised.
@@ -448,21 +304,6 @@ def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
     share = np.mean(found[35:], axis=0)
     assert (share > 0.8).all()
     assert np.median(apart) < 10  # pixels, between the body's and the hand's wrist
-
-
-def test_no_hands_without_people():
-    tracker = HandTracker(1)
-    assert tracker.step(IMAGE, []) == []
-    assert not seen(tracker, person()).any()
-
-
-def test_an_inconsistent_hand_is_rejected(follow):
-    for presence in (0.9, 0.99):  # unless there certainly is a hand
-        hand = hand_at((300, 500), presence=presence)
-        assert hand.disagreement < 1e-9
-        hand.world_landmarks[:] = hand.world_landmarks[:, [1, 0, 2]]
-        assert hand.disagreement > 0.5
-        assert seen(follow([hand]), person())[0] == (presence > 0.95)
 
 
 def test_a_capture_with_hands_from_file_to_motion(shared):

@@ -67,20 +67,6 @@ def test_two_estimates_within_a_tenth_of_a_region_are_one_body(shift_px: float, 
     assert plausibility.is_same_body(moved, body()) is same
 
 
-def test_shares_count_keypoints() -> None:
-    estimate = replace(
-        body(), keypoints_px=np.stack([np.linspace(-160, 639, 33), np.full(33, 100.0)], axis=1)
-    )
-    inside = (estimate.keypoints_px[:, 0] >= 0).mean()
-    assert plausibility.share_in_image(estimate, IMAGE) == pytest.approx(inside)
-    assert plausibility.is_center_in_image(estimate, IMAGE)
-    left = replace(estimate, keypoints_px=estimate.keypoints_px - [400.0, 0.0])
-    assert not plausibility.is_center_in_image(left, IMAGE)
-    # the outermost are its border
-    assert plausibility.share_within(body(), body()) == pytest.approx(1.0, abs=0.13)
-    assert plausibility.share_within(body(), left) == 0.0
-
-
 @pytest.mark.parametrize(
     ("other", "same"),
     [
@@ -151,27 +137,11 @@ def masked(schedule: MaskSchedule, frames: int) -> list[int]:
     ]
 
 
-def test_a_short_clip_has_a_mask_in_its_first_frame_and_then_every_few() -> None:
-    assert masked(schedule(40), 40) == list(range(0, 40, MIN_STRIDE))
-
-
 @pytest.mark.parametrize("expected", [3000, 0])
 def test_masks_spread_over_a_long_clip_whether_or_not_its_length_is_known(expected: int) -> None:
     frames = masked(schedule(expected), 3000)
     assert MASKS <= len(frames) <= 6 * MASKS
     assert frames[-1] > 2400
-
-
-@pytest.mark.parametrize("expected", [3000, 40, 0])
-def test_the_frame_before_knows_which_one_is_due(expected: int) -> None:
-    masks = schedule(expected)
-    due = []
-    told = []
-    for k in range(600):
-        told += [k + 1] if masks.upcoming_is_due else []
-        due += [k] if masks.add(MASK_SCHEDULE_IMAGE, [(0, seen())])[0][1].mask is not None else []
-    assert due[1:] == [k for k in told if k < 600]
-    assert len(due) > 3
 
 
 def test_a_mask_that_the_tracker_gives_is_not_computed_again() -> None:
@@ -188,14 +158,6 @@ def test_a_mask_that_the_tracker_gives_is_not_computed_again() -> None:
     assert doubtful.mask is None
     ((_, not_due),) = masks.add(MASK_SCHEDULE_IMAGE, [(0, seen(mask=given))])
     assert not_due.mask is None
-
-
-def test_nobody_has_no_mask_and_does_not_use_up_a_turn() -> None:
-    masks = schedule(40)
-    assert masks.add(MASK_SCHEDULE_IMAGE, []) == []
-    ((_, doubtful),) = masks.add(MASK_SCHEDULE_IMAGE, [(0, seen(presence=0.3))])
-    assert doubtful.mask is None
-    assert masked(MaskSchedule(None, 40), 40) == []
 
 
 def test_a_track_keeps_masks_with_their_rows() -> None:
