@@ -58,10 +58,3 @@ def test_a_window_without_common_frames_continues_in_the_last_direction_that_is_
     parts = [followed(0, 40, 1), followed(40, 60, 1)]
     whole = joined_backgrounds(parts, [0, 0])
     assert np.allclose(whole.R_first_camera[40], TRUTH[39], atol=1e-9)
-
-
-def test_the_first_edges_are_those_of_the_first_window_that_has_any() -> None:
-    parts = [followed(0, 40, 5), followed(25, 70, 5, (2, 20)), followed(60, 90, 5, (1, 12))]
-    whole = joined_backgrounds(parts, [0, 15, 10])
-    assert [edge.row for edge in whole.edge_frames] == [27, 45, 72]
-    assert whole.edge_frames[0].segments.ends_px[0, 0, 0] == 25

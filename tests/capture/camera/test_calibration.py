@@ -2,7 +2,6 @@
 """Calibration files: their meaning, written out, and which ones are refused rather than misread."""
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -83,33 +82,6 @@ def test_undistorted_points_project_back_through_the_distortion(path):
     assert np.allclose(
         camera.undistort(pixels[None]), np.array([[x, y]]) * 900 + [320, 240], atol=0.05
     )
-
-
-@pytest.mark.parametrize(
-    ("size", "footage"), [((1920, 1080), (1768, 994)), ((854, 480), (3840, 2160))]
-)
-def test_sizes_may_be_rounded(path, size, footage):
-    middle = [[900, 0, size[0] / 2], [0, 900, size[1] / 2], [0, 0, 1]]
-    got = camera(path, {"intrinsics": middle, "size": size}, *footage).intrinsics
-    assert np.allclose(got[:2, 2], np.array(footage) / 2)
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("K", "distortion", "image_size"),
-        ("camera_matrix", "distortion_coefficients", "size"),
-        ("K", "dist_coeffs", "size"),
-    ],
-)
-def test_other_key_names(path, names):
-    expected = camera(path, KNOWN)
-    got = camera(
-        path,
-        dict(zip(names, KNOWN.values(), strict=True)) | {"fps": 60, "rms": 0.2, "name": "left"},
-    )
-    np.testing.assert_array_equal(got.intrinsics, expected.intrinsics)
-    np.testing.assert_array_equal(got.dist, expected.dist)
 
 
 def test_nested_and_trailing_zero_coefficients(path):
@@ -210,26 +182,6 @@ def test_impossible_values_are_refused(path, changed, message):
 )
 def test_other_files_are_refused_by_name(path, text):
     refused(path, text, re.escape(f"{path} is not a calibration"))
-
-
-def test_a_missing_file_is_refused(path, tmp_path):
-    for missing in (path, tmp_path):
-        with pytest.raises(InputError, match="the calibration cannot be read"):
-            choose_camera(640, 480, calibration=missing)
-
-
-@pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="Windows has no such device")
-def test_a_device_is_refused_unread():
-    with pytest.raises(InputError, match="is a pipe or a device"):
-        read_calibration(Path("/dev/zero"))
-
-
-def test_a_large_file_is_refused_unread(tmp_path):
-    path = tmp_path / "calibration.json"
-    with path.open("wb") as file:
-        file.truncate(2 << 20)
-    with pytest.raises(InputError, match="too large for a calibration"):
-        read_calibration(path)
 
 
 def take(tmp_path, *names):

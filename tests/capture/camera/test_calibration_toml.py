@@ -30,16 +30,6 @@ fisheye = {fisheye}
 [metadata]
 adjusted = false
 """
-CALISCOPE = """
-camera_count = 1
-[cam_0]
-port = 0
-size = [ 1280, 720]
-error = 0.3
-matrix = [ [ 900.0, 0.0, 630.0], [ 0.0, 901.0, 350.0], [ 0.0, 0.0, 1.0]]
-distortions = [ 0.1, -0.2, 0.001, 0.002, 0.05]
-exposure = -6
-"""
 
 
 @pytest.fixture
@@ -56,14 +46,6 @@ def test_one_camera_of_several_is_named_after_the_file(path: Path) -> None:
     half = known.intrinsics_for(960, 540)
     np.testing.assert_allclose(half[:2, :2].diagonal(), [840.6, 840.05])
     np.testing.assert_allclose(read_calibration(Path(f"{path}#cam_02")).intrinsics[1, 1], 1001.0)
-
-
-def test_the_only_camera_needs_no_name(tmp_path: Path) -> None:
-    path = tmp_path / "config.toml"
-    path.write_text(CALISCOPE)
-    known = read_calibration(path)
-    np.testing.assert_allclose(known.dist, [0.1, -0.2, 0.001, 0.002, 0.05])
-    assert known.size == (1280, 720)
 
 
 def test_what_does_not_say_which_camera_it_is_is_refused(path: Path) -> None:

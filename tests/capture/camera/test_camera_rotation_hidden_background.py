@@ -102,34 +102,6 @@ def test_a_door_that_somebody_hid_at_first_decides_which_way_is_up() -> None:
     assert off_deg(lines_after(there + away), 4.0) < 1.0
 
 
-def test_edges_are_counted_once_however_often_they_come_into_view() -> None:
-    once = lines_after([560.0, *np.linspace(560.0, 200.0, 24)])
-    again = lines_after(
-        [560.0, *np.linspace(560.0, 200.0, 24), *np.linspace(200.0, 560.0, 24), *[200.0] * 12]
-    )
-    assert len(again.lengths) == len(once.lengths)
-    assert again.lengths.sum() == pytest.approx(once.lengths.sum())
-
-
-def test_edges_of_people_are_left_out_while_they_walk() -> None:
-    walked = lines_after([560.0, *np.linspace(560.0, 300.0, 24)])
-    across = (walked.normals @ np.linalg.inv(K))[:, :2]  # the lines in the picture
-    along = np.array([60.0, HEIGHT_PX[1] - HEIGHT_PX[0]])  # the stripes
-    sine = np.abs(across @ along) / np.linalg.norm(across, axis=1) / np.linalg.norm(along)
-    assert (sine > np.sin(np.radians(1.0))).all()
-
-
-def test_a_camera_that_turns_keeps_to_the_first_edges() -> None:
-    """Otherwise the same edges would be counted again where they come into view."""
-    background = np.concatenate([office(), office()[:, ::-1]], axis=1)
-
-    def picture(k: int) -> NDArray[np.uint8]:
-        return background[:, 5 * k : 5 * k + WIDTH]
-
-    positions = [560.0, *np.linspace(560.0, 300.0, 24)]
-    assert len(lines_after(positions, picture).lengths) == len(lines_after(positions[:1]).lengths)
-
-
 def test_another_scene_adds_no_edges() -> None:
     first = office()
     other = office()[:, ::-1]

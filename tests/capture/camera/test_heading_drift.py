@@ -85,14 +85,6 @@ def test_edges_in_any_direction_change_nothing():
     assert found is drifted
 
 
-def test_few_frames_with_edges_change_nothing():
-    R = exp(np.linspace(0, 0.3, 10)[:, None] * [0, 1.0, 0])
-    times = np.arange(10) / 25
-    assert remove_heading_drift(R, times, [], CAMERA, (WIDTH, HEIGHT)) is R
-    none = [FrameEdges(k, Segments.none()) for k in (0, 4, 8)]
-    assert remove_heading_drift(R, times, none, CAMERA, (WIDTH, HEIGHT)) is R
-
-
 def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared):
     clip = shared / "data/clips/run_moving_camera.mp4"
     motion = capture(clip, load_body("scope"), CaptureOptions(quality="fast")).motions[0]

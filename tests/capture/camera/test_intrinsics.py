@@ -15,10 +15,6 @@ def test_field_of_view_spans_the_longer_side():
         assert np.allclose(K[:2, 2], np.array(size) / 2)
 
 
-def test_focal_mm_is_35_mm_equivalent():
-    assert np.isclose(choose_camera(1800, 1000, focal_mm=36).intrinsics[0, 0], 1800)
-
-
 def test_metadata_counts_only_without_the_users_value():
     assert np.isclose(choose_camera(3600, 2000, metadata_focal_mm=26).intrinsics[0, 0], 2600)
     assert np.isclose(

@@ -60,11 +60,6 @@ def test_edges_on_people_and_at_bars_are_left_out() -> None:
     assert min(distance(s, LINES[0]) for s in without_bar) < 1.5
 
 
-def test_an_image_without_edges_has_none() -> None:
-    assert len(find_segments(np.full((HEIGHT, WIDTH, 3), 90, np.uint8), []).lengths) == 0
-    assert len(Segments.none().lines(choose_camera(WIDTH, HEIGHT)).lengths) == 0
-
-
 def test_the_plane_of_a_segment_contains_the_line_that_it_shows() -> None:
     camera = choose_camera(WIDTH, HEIGHT)
     a = np.array([-1.0, 0.4, 5.0])
@@ -79,18 +74,3 @@ def test_the_plane_of_a_segment_contains_the_line_that_it_shows() -> None:
         assert turned.normals[0] @ R @ point == pytest.approx(0.0, abs=1e-9)
     assert np.linalg.norm(lines.normals[0]) == pytest.approx(1.0)
     np.testing.assert_array_equal(turned.lengths, lines.lengths)
-
-
-def test_segments_of_several_images_are_the_longest_first() -> None:
-    rng = np.random.default_rng(3)
-    parts = [
-        Segments(rng.normal(size=(n, 2, 2)), np.sort(rng.uniform(size=n))[::-1]) for n in (3, 0, 4)
-    ]
-    both = Segments.of_all(parts)
-    assert (np.diff(both.lengths) <= 0).all()
-    for part in parts:
-        for ends, length in zip(part.ends_px, part.lengths, strict=True):
-            np.testing.assert_array_equal(both.ends_px[both.lengths == length][0], ends)
-    assert len(both.lengths) == 7
-    long = both.where(both.lengths > 0.5)
-    np.testing.assert_array_equal(long.lengths, both.lengths[both.lengths > 0.5])

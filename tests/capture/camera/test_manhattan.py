@@ -67,12 +67,6 @@ def test_each_edge_counts_as_far_as_it_points_at_the_nearest_vanishing_point() -
     assert explained == pytest.approx(expected, rel=1e-4)
 
 
-def test_no_edges_explain_nothing() -> None:
-    explained, axes = Edges.of(Segments.none(), WIDTH, HEIGHT).axes(FOCAL_PX)
-    assert explained == 0.0
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3))
-
-
 def test_steps_lead_to_the_directions_of_the_lines() -> None:
     rng = np.random.default_rng(7)
     true = exp(rng.normal(size=3))
@@ -87,24 +81,3 @@ def test_steps_lead_to_the_directions_of_the_lines() -> None:
         found = found @ exp(np.linalg.solve(H, g)).T
     np.testing.assert_allclose(found, true, atol=1e-7)
     np.testing.assert_allclose(supports.sum(), lines.lengths.sum())
-
-
-def test_directions_without_value_do_not_count() -> None:
-    lines = Lines(np.random.default_rng(9).normal(size=(20, 3)) / 2, np.ones(20))
-    H, g, _ = line_normal_equations(lines, np.eye(3), 0.05, np.zeros(3))
-    np.testing.assert_array_equal(H, np.zeros((3, 3)))
-    np.testing.assert_array_equal(g, np.zeros(3))
-
-
-def test_several_sets_of_directions_at_once() -> None:
-    rng = np.random.default_rng(11)
-    lines = Lines(rng.normal(size=(20, 3)) / 2, rng.uniform(0.1, 0.5, 20))
-    several = exp(rng.normal(size=(4, 3)))
-    together = line_normal_equations(lines, several, 0.3, np.array([2.0, 1.0, 1.0]))
-    for k, directions in enumerate(several):
-        for all_of_them, one in zip(
-            together,
-            line_normal_equations(lines, directions, 0.3, np.array([2.0, 1.0, 1.0])),
-            strict=True,
-        ):
-            np.testing.assert_allclose(all_of_them[k], one, rtol=1e-12)

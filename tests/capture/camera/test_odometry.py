@@ -87,15 +87,6 @@ def test_a_camera_that_travels_through_a_street(velocity):
     assert np.degrees(turned).max() < 0.5
 
 
-def test_a_camera_that_travels_along_a_wall():
-    places = wall(np.random.default_rng(0))
-    center = TIMES[:, None] * [1.3, 0.0, 0.0]
-    R = np.tile(np.eye(3), (T, 1, 1))
-    found = travel_of(seen(places, R, center), R, TIMES, camera(), WIDTH)
-    assert found.travels
-    assert np.abs(aligned(found.center, center) - center).max() < 0.3
-
-
 @pytest.mark.parametrize("assumed", [0.8, 1.25])
 def test_a_camera_that_pans_does_not_travel(assumed):
     """Also where the assumed focal length is wrong."""
@@ -155,25 +146,6 @@ def test_a_zoom_after_a_pause_begins_when_it_does():
     kept = CornerTracks(corners.rows[moved], corners.numbers[moved], corners.points_px[moved])
     zoom = find_zoom(kept, TIMES, camera(), WIDTH)
     np.testing.assert_allclose(zoom.factors, factors, rtol=0.01)
-
-
-def test_a_zoom_goes_on_where_all_corners_are_lost_for_a_moment():
-    factors = 1.0 + np.clip(TIMES - 1.0, 0, 3) / 3
-    R = np.tile(np.eye(3), (T, 1, 1))
-    corners = seen(street(np.random.default_rng(0)), R, np.zeros((T, 3)), FOCAL_PX * factors)
-    is_late = corners.rows >= 30
-    numbers = np.where(is_late, corners.numbers + corners.count, corners.numbers)
-    zoom = find_zoom(CornerTracks(corners.rows, numbers, corners.points_px), TIMES, camera(), WIDTH)
-    np.testing.assert_allclose(zoom.factors, factors, rtol=0.01)
-    assert not zoom.is_certain
-
-
-def test_without_corners_nothing_is_known():
-    R = np.tile(np.eye(3), (T, 1, 1))
-    found = travel_of(CornerTracks.none(), R, TIMES, camera(), WIDTH)
-    assert not found.travels
-    np.testing.assert_array_equal(found.center, 0.0)
-    assert find_zoom(CornerTracks.none(), TIMES, camera(), WIDTH) is None
 
 
 def test_windows_that_overlap_share_the_corners_of_common_frames():

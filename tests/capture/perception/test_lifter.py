@@ -14,7 +14,6 @@ from scope.scope_addon.capture.perception.lifter import (
     mixture,
     network_input,
     virtual_camera,
-    windows_around,
 )
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
@@ -77,30 +76,6 @@ def people(body):
     return truth_and_rays(out)
 
 
-@pytest.fixture(scope="module")
-def walkers(body):
-    """Create the same for a walk on the spot that turns once, 4 s at 30 fps, and the times."""
-    times = np.arange(120) / 30
-    out = []
-    for t in times:
-        pose = np.zeros((body.K + 1, 3))
-        swing = 0.5 * np.sin(2 * np.pi * 0.9 * t)
-        turns = {
-            "left_hip": -swing,
-            "right_hip": swing,
-            "left_shoulder": swing,
-            "right_shoulder": -swing,
-        }
-        for name, angle in (turns | {"left_knee": 0.3, "right_knee": 0.3}).items():
-            pose[body.joint_names.index(name), 0] += angle
-        R = exp(pose)
-        for name, side in (("left_shoulder", -1), ("right_shoulder", 1)):
-            k = body.joint_names.index(name)
-            R[k] = R[k] @ exp(np.array([0, 0, 1.2 * side]))
-        out.append(before_camera(body, R, 2 * np.pi * t / 4))
-    return *truth_and_rays(out), times
-
-
 def relative(points):
     return points - points[:, HIPS].mean(axis=1, keepdims=True)
 
@@ -115,48 +90,6 @@ def test_depth_of_people_outside_the_training_data_is_estimated_from_their_image
     flat = np.linalg.norm(relative(people) * [1, 1, 0] - relative(people), axis=-1)[:, limbs].mean()
     assert error < 0.1
     assert error < 0.7 * flat
-
-
-def test_true_world_landmarks_improve_the_estimate(lifter, people):
-    people, rays = people
-    ones = np.ones(people.shape[:2])
-    R = virtual_camera(rays)
-    given = relative(people) @ np.swapaxes(R, 1, 2)  # landmark networks look straight at the person
-    without = lifter.lift(rays, ones, None)
-    informed = lifter.lift(rays, ones, given)
-    error = [
-        np.linalg.norm(x.points - relative(people), axis=-1).mean() for x in (without, informed)
-    ]
-    assert error[1] < error[0]
-
-
-def test_neighbouring_frames_improve_the_estimate(lifter, walkers):
-    """With independent image errors per frame and three seeds: smaller errors and less jitter."""
-    points, seen, times = walkers
-    truth = relative(points)
-    ones = np.ones(points.shape[:2])
-    windows = windows_around(times, np.ones(len(times), bool))
-    for seed in range(3):
-        rays = seen + np.random.default_rng(seed).normal(0, 0.004, seen.shape)
-        error = []
-        unrest = []
-        for around in (None, windows):
-            lifted = lifter.lift(rays, ones, None, around).points
-            error.append(np.linalg.norm(lifted - truth, axis=-1).mean())
-            unrest.append(np.linalg.norm(np.diff(lifted - truth, axis=0), axis=-1).mean())
-        assert error[1] < error[0]
-        assert unrest[1] < 0.8 * unrest[0]
-
-
-def test_long_clips_are_lifted_in_blocks_with_their_neighbours(lifter, walkers, monkeypatch):
-    points, rays, times = walkers
-    ones = np.ones(points.shape[:2])
-    windows = windows_around(times, np.ones(len(times), bool))
-    whole = lifter.lift_mixture(rays, ones, relative(points), windows)
-    monkeypatch.setattr("scope.scope_addon.kinematics.frame_blocks.BLOCK_FRAMES", 17)
-    blocks = lifter.lift_mixture(rays, ones, relative(points), windows)
-    assert np.allclose(blocks.points, whole.points, atol=1e-5)
-    assert np.allclose(blocks.sigma_along, whole.sigma_along, atol=1e-5)
 
 
 def test_errors_match_their_standard_deviations(lifter, people):

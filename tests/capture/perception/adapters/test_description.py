@@ -18,15 +18,11 @@ import pytest
 from onnx import TensorProto, helper
 from scope.scope_addon.capture.perception.adapters.description import (
     Description,
-    description_path,
     read_description,
 )
 from scope.scope_addon.capture.perception.adapters.graph import (
-    IMAGENET,
-    UNIT,
     Graph,
     Normalization,
-    finite,
 )
 from scope.solver.errors import ModelFileError
 
@@ -101,11 +97,6 @@ def test_what_is_no_object_of_finite_numbers_is_refused(tmp_path: Path, text: st
         read(tmp_path, text)
 
 
-def test_a_missing_file_says_nothing(tmp_path: Path) -> None:
-    assert read_description(tmp_path / "m.onnx", TYPES) == Description()
-    assert description_path(Path("a/b.c.onnx")) == Path("a/b.c.json")
-
-
 WIDTH = 32
 
 
@@ -161,12 +152,6 @@ def test_pixels_are_normalized_in_the_order_of_the_channels(tmp_path: Path) -> N
         np.testing.assert_allclose(given[0, channel], expected, rtol=1e-6)
 
 
-def test_the_usual_normalization_is_turned_to_the_order_of_the_json() -> None:
-    turned = IMAGENET.with_description(Description(channel_order="bgr"))
-    assert (turned.mean, turned.std) == (IMAGENET.mean[::-1], IMAGENET.std[::-1])
-    assert UNIT.with_description(Description(mean=(1.0,))) == Normalization((1.0,), (255.0,), "rgb")
-
-
 @pytest.mark.parametrize(
     ("shape", "description", "message"),
     [
@@ -192,17 +177,3 @@ def test_several_inputs_and_other_types_are_refused(tmp_path: Path) -> None:
         opened(identity(tmp_path / "two.onnx", [1, 3, HEIGHT, WIDTH], inputs=2))
     with pytest.raises(ModelFileError, match=r"takes tensor\(int64\)"):
         opened(identity(tmp_path / "whole.onnx", [1, 3, HEIGHT, WIDTH], TensorProto.INT64))
-
-
-def test_a_graph_of_any_size_takes_that_of_the_json(tmp_path: Path) -> None:
-    path = identity(tmp_path / "m.onnx", [1, 3, "h", "w"])
-    graph = opened(path, Description(input_size=(WIDTH, HEIGHT)))
-    np.testing.assert_array_equal(
-        graph.run(PICTURE, Normalization())[0][0].transpose(1, 2, 0), PICTURE
-    )
-
-
-def test_what_is_not_finite_becomes_zero() -> None:
-    values = np.array([1.5, np.nan, np.inf, -np.inf], np.float16)
-    np.testing.assert_array_equal(finite(values), [1.5, 0.0, 0.0, 0.0])
-    assert finite(values).dtype == np.float64

@@ -46,12 +46,6 @@ def test_normalization_is_that_of_imagenet(tmp_path: Path) -> None:
     assert all(o.max() == pytest.approx(1.0, abs=0.02) and o.min() > 0.97 for o in outputs)
 
 
-@pytest.mark.parametrize("name", ["halpe26", "wholebody133"])
-def test_the_set_follows_from_the_count(tmp_path: Path, name: str) -> None:
-    path = simcc(tmp_path / "m.onnx", KEYPOINT_SETS[name].count, 192, 256)
-    assert KeypointNetwork(path, threads=1).keypoint_set.name == name
-
-
 def test_an_unknown_count_asks_for_the_json(tmp_path: Path) -> None:
     path = heatmaps(tmp_path / "m.onnx", 21, 192, 256)
     with pytest.raises(ModelFileError, match=r"21 keypoints.*m\.json.*keypoints"):
