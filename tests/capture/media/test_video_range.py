@@ -215,12 +215,6 @@ def test_consecutive_timecodes_are_consecutive_frames(
             assert timecode(text).frame(fps) == number, text
 
 
-def test_an_hour_of_drop_frame_timecode_is_an_hour() -> None:
-    assert timecode("01:00:00;00").frame(Fraction(30000, 1001)) == 107892
-    assert timecode("01;00;00;00").frame(Fraction(60000, 1001)) == 215784
-    assert timecode("01:00:00:00").frame(Fraction(30000, 1001)) == 108000
-
-
 @pytest.mark.parametrize(
     ("text", "fps", "says"),
     [

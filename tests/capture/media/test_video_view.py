@@ -17,16 +17,6 @@ from scope.scope_addon.footage_view import FootageView
 from .corner_picture import corner_image, corners
 from .made_video import with_time_table, write_video
 
-# As `corners` reads the picture: top left, top right, bottom right, bottom left.
-SHOWN = {
-    (0, False): "rgbw",
-    (0, True): "grwb",
-    (90, False): "brwg",
-    (180, False): "wbgr",
-    (270, False): "gwrb",
-    (90, True): "rbgw",
-}
-
 
 def files(folder: Path) -> list[Path]:
     picture = corner_image()[..., ::-1]

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import struct
 import sys
 from fractions import Fraction
 from pathlib import Path
@@ -24,10 +23,6 @@ GREY = np.full((H, W, 3), 90, np.uint8)
 
 def png(image: np.ndarray) -> bytes:
     return cv2.imencode(".png", image)[1].tobytes()
-
-
-def box(name: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content) + 8) + name + content
 
 
 def avif(path: Path, image_rgb: np.ndarray) -> Path:
