@@ -71,13 +71,6 @@ def test_why_a_device_cannot_be_opened_is_said(device, monkeypatch, number, said
     assert device_problem(device, answering(CAPTURE)) == said
 
 
-@pytest.mark.parametrize(
-    ("number", "said"), [(errno.ENODEV, "not plugged in"), (errno.ENOTTY, "is not a camera")]
-)
-def test_a_device_that_does_not_answer_is_gone_or_no_camera(device, number, said):
-    assert said in device_problem(device, failing(number))
-
-
 @pytest.mark.skipif(not os.access("/dev/null", os.W_OK), reason="/dev/null cannot be opened")
 def test_another_device_is_no_camera():
     source = CameraSource("/dev/null")

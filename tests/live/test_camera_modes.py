@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import pytest
 from scope.scope_addon.live.system_cameras import (
-    LONGEST_LOG,
-    MAX_MODES,
     Mode,
     described,
     nearest_mode,
@@ -65,13 +63,6 @@ def test_dshow_tells_formats_sizes_and_rates():
     assert described(modes) == ["yuyv422 1280×720", "mjpeg 1920×1080", "0x30313050 640×480"]
 
 
-def test_avfoundation_tells_sizes_and_rates():
-    modes = parse_modes(AVFOUNDATION, "avfoundation")
-    # the repetition once
-    assert [(*mode.most, mode.least_fps, mode.most_fps) for mode in modes] == MODES[1:]
-    assert described(modes) == ["1920×1080", "1280×720", "640×480"]
-
-
 @pytest.mark.parametrize(
     "line",
     [
@@ -107,12 +98,6 @@ def test_what_is_no_mode_is_left_out(line, kind):
     known = DSHOW if kind == "dshow" else AVFOUNDATION
     assert parse_modes(f"{line}\n{known}", kind) == parse_modes(known, kind)
     assert parse_modes(line, kind) == []
-
-
-def test_an_endless_log_is_read_to_a_bound():
-    many = "".join(f"  {16 + k}x16@[1.000000 30.000000]fps\n" for k in range(9000))
-    assert len(parse_modes(many, "avfoundation")) == MAX_MODES
-    assert parse_modes("x" * LONGEST_LOG + AVFOUNDATION, "avfoundation") == []
 
 
 def test_the_mode_to_ask_for_is_the_one_nearest_to_720p_and_30_frames_per_second():

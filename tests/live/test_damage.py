@@ -127,11 +127,7 @@ FIRST = slice(0, 2)
     ("codec", "packets"),
     [
         *(("libx264", packets) for packets in (ALL, MIDDLE, LAST, FIRST)),
-        *(
-            (codec, packets)
-            for codec in ("libx265", "mpeg4", "mpeg2video")
-            for packets in (ALL, MIDDLE)
-        ),
+        *((codec, MIDDLE) for codec in ("libx265", "mpeg4", "mpeg2video")),
     ],
 )
 def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(
@@ -146,15 +142,6 @@ def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(
     assert any(picture is None for picture in found)
 
 
-def test_a_lost_picture_is_noticed_by_the_numbers_of_the_others(tmp_path, truth_of):
-    """As a camera leaves out pictures that its connection is too slow for: no packet says that one
-    is missing.
-    """
-    found = served_pictures(tmp_path, without(encoded_once("libx264"), [LOST]))
-    assert numbers(found, truth_of("libx264")) == INTACT
-    assert sum(picture is None for picture in found) == 2 * GROUP - LOST - 1
-
-
 @pytest.mark.parametrize(
     "packets", [ALL, slice(1, 2), FIRST, LAST], ids=["all", "second", "first", "last"]
 )
@@ -167,25 +154,6 @@ def test_a_network_camera_that_loses_packets(truth_of_camera, packets):
         found = shown(address)
     last = len(truth)  # the server hangs up, and the last picture may be incomplete
     assert numbers(found, truth) == [k for k in INTACT if k < last]
-
-
-def test_a_lost_key_frame_costs_its_group(tmp_path, truth_of):
-    data = cut(encoded_once("libx264"), GROUP, ALL)
-    found = numbers(served_pictures(tmp_path, data), truth_of("libx264"))
-    assert found == [*range(GROUP), *range(2 * GROUP, COUNT)]
-
-
-def test_lost_data_just_before_a_key_frame_costs_nothing_after_it(tmp_path, truth_of):
-    found = served_pictures(tmp_path, cut(encoded_once("libx264"), GROUP - 1, ALL))
-    assert numbers(found, truth_of("libx264")) == [k for k in range(COUNT) if k != GROUP - 1]
-    assert all(picture is not None for picture in found)
-
-
-def test_pictures_of_their_own_are_left_out_alone(tmp_path, truth_of):
-    """MJPEG: no picture builds on another one."""
-    found = served_pictures(tmp_path, without(encoded_once("mjpeg", "nut"), [LOST], "nut"))
-    assert numbers(found, truth_of("mjpeg", "nut")) == [k for k in range(COUNT) if k != LOST]
-    assert all(picture is not None for picture in found)
 
 
 def test_a_stream_without_another_key_frame_is_shown_again_after_a_while(tmp_path):

@@ -48,11 +48,6 @@ def test_each_frame_gets_the_pose_of_its_own_time(body, rate):
         assert np.allclose(pose.rotations[0], rotations.exp([0.0, 0.0, 2.0 * k / rate]), atol=1e-6)
 
 
-def test_a_single_pose_stays(body):
-    (only,) = at_frames([pose_given(body, 7, 1.0, 1 / 30)], 1 / 30)
-    assert only.index == 7
-
-
 def test_soles_stay_at_their_height_in_the_last_shape(body):
     tall = np.zeros(body.P)
     tall[0] = 1.5

@@ -69,38 +69,6 @@ def test_a_complete_stream_has_no_gaps_and_losses_are_found(way):
         assert [k for k, is_gap in left if is_gap] == expected
 
 
-def test_numbers_that_always_have_gaps_tell_nothing():
-    """As if an encoder counted by two."""
-    packets, extradata = packets_of("baseline")
-    numbers = FrameNumbers(extradata)
-    gaps = [numbers.has_gap(packet) for packet in packets[::2]]
-    assert all(gaps[1:16])
-    assert not any(gaps[17:])
-
-
-def test_losses_are_found_again_after_many_in_a_row():
-    packets, extradata = packets_of("baseline")
-    numbers = FrameNumbers(extradata)
-    for packet in packets[:40:2]:
-        numbers.has_gap(packet)
-    left = [numbers.has_gap(packet) for k, packet in enumerate(packets[40:]) if k != 100]
-    assert [k for k, is_gap in enumerate(left) if is_gap] == [100]
-
-
-def test_an_empty_unit_is_no_error():
-    assert not FrameNumbers().has_gap(b"\0\0\1\0\0\1")
-    assert not FrameNumbers(b"\0\0\1\0\0\1").has_picture(b"\0\0\1\0\0\1\x09")
-
-
-def test_parameters_alone_are_no_picture():
-    packets, extradata = packets_of("baseline", 3)
-    numbers = FrameNumbers(extradata)
-    assert b"\x00\x00\x01\x67" in extradata
-    assert not numbers.has_picture(extradata)
-    assert not numbers.has_gap(extradata)
-    assert numbers.has_picture(packets[0])
-
-
 @pytest.mark.parametrize("way", ["high", "in mp4", "scaling lists"])
 def test_damaged_data_is_no_error(way):
     packets, extradata = packets_of(way, 30)

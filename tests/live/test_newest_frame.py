@@ -5,9 +5,7 @@ import threading
 
 import numpy as np
 import pytest
-from scope.scope_addon.errors import VideoError
 from scope.scope_addon.live.newest_frame import DAMAGE_SAID_S, NewestFrame
-from scope.scope_addon.live.source import Picture
 
 from .fake_source import FakeClock, FakeSource
 
@@ -60,49 +58,6 @@ def test_an_interrupted_source_is_opened_again_and_numbers_and_times_continue():
     assert all(b > a for a, b in zip(times, times[1:], strict=False))
     assert said[0] == "fake has ended; connecting again in 3 s"
     assert 3.0 in clock.slept
-
-
-def test_an_interruption_that_lasts_is_said_once():
-    said = []
-    clock = FakeClock()
-    source = FakeSource([0.0])  # and then it cannot be opened any more
-    clock.stop_after = 5
-    with NewestFrame(source, clock, reconnect_s=1.0, say=said.append) as reader:
-        all_taken(reader)
-    assert source.opened > 3
-    assert said == [
-        "fake has ended; connecting again in 1 s",
-        "fake is gone; connecting again in 1 s",
-    ]
-
-
-def test_every_opened_source_is_closed():
-    source = FakeSource([0.0], ends=True)
-    with NewestFrame(source, FakeClock()) as reader:
-        all_taken(reader)
-    assert (source.opened, source.closed) == (1, 1)
-
-
-def test_without_reconnecting_the_end_of_a_stream_is_the_end():
-    with NewestFrame(FakeSource([0.0]), FakeClock()) as reader:
-        assert [p.index for p in all_taken(reader)] == [0]
-
-
-def test_a_source_that_cannot_be_opened_at_first_fails_even_if_it_could_be_tried_again():
-    with NewestFrame(FakeSource(), FakeClock(), reconnect_s=1.0) as reader:
-        with pytest.raises(VideoError, match="fake is gone"):
-            reader.take()
-
-
-def test_an_error_in_a_running_stream_is_said_and_survived():
-    said = []
-    clock = FakeClock()
-    source = FakeSource([0.0], error=VideoError("fake was interrupted (timed out)"))
-    with NewestFrame(
-        source, clock, reconnect_s=1.0, say=lambda s: (said.append(s), clock.stopped.set())
-    ) as reader:
-        all_taken(reader)
-    assert said == ["fake was interrupted (timed out); connecting again in 1 s"]
 
 
 def test_stopping_does_not_wait_for_a_source_that_is_stalled():
@@ -169,72 +124,3 @@ def test_a_source_that_is_frozen_is_said_once_each_time():
     ) as reader:
         reader._thread.join(300)
     assert said == ["fake has shown the same image for 5 s; check whether it is frozen"] * 2
-
-
-def test_a_computer_that_slept_says_so_and_shows_no_backlog():
-    """The clock leaps by an hour before the third picture, as where it counts the time asleep."""
-    said = []
-    taken = []
-    clock = FakeClock()
-
-    def before(index):
-        clock.time_s = 100.0 + index / 30 + 3600.0 * (index >= 2)
-
-    times = [k / 30 + 3600.0 * (k >= 2) for k in range(5)]
-    with NewestFrame(
-        FakeSource(times, before=before), clock, 0.0, said.append, taken.append
-    ) as reader:
-        reader._thread.join(300)
-        newest = all_taken(reader)
-    assert said == ["nothing came from fake for 3600 s, as when a computer sleeps; it goes on"]
-    assert [picture.index for picture in newest] == [4]
-    assert [picture.timestamp_s for picture in taken] == pytest.approx(times)
-
-
-class Arrivals:
-    """In the place of the reader's condition: whoever waits for a frame gets the next one, at its
-    time.
-    """
-
-    def __init__(self, clock, rate):
-        self.clock = clock
-        self.rate = rate
-        self.given = 0
-        self.reader = None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
-    def notify_all(self):
-        pass
-
-    def wait(self, _seconds=None):
-        time_s = self.given / self.rate
-        self.clock.time_s = max(self.clock.time_s, time_s)
-        self.reader._give(Picture(self.given, time_s, time_s, WIDE), is_first=self.given == 0)
-        self.given += 1
-
-    def process(self, seconds):
-        """Let time pass for the frame that was taken."""
-        end_s = self.clock.time_s + seconds
-        while self.given / self.rate <= end_s:
-            self.wait()
-        self.clock.time_s = end_s
-
-
-def test_frames_are_given_evenly_where_not_every_one_can_be_processed():
-    """Each takes 20 ms where one comes every 17; the newest ones would be 17 or 33 ms apart."""
-    clock = FakeClock()
-    taken = []
-    clock.time_s = 0.0
-    arrivals = Arrivals(clock, 60)
-    reader = arrivals.reader = NewestFrame(FakeSource(), clock)
-    reader._changed = arrivals
-    while arrivals.given < 300:
-        taken.append(reader.take().index)
-        arrivals.process(0.02)
-    assert set(np.diff([index for index in taken if index > 30])) == {2}
-    assert reader.dropped == reader.received - len(taken)

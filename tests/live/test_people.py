@@ -79,20 +79,6 @@ def test_the_largest_person_gets_the_first_session_and_a_third_one_none(followed
     assert followed({4: a, 7: b, 9: c}, {9: c, 7: b, 4: a}) == [[300, 300], [100, 100]]
 
 
-def test_who_is_found_again_gets_their_session_back(followed):
-    a = person(100, 0)
-    b = person(500, 1, 290.0)
-    seen = followed({0: a, 1: b}, {}, {5: person(490, 1), 6: person(110, 0)})
-    assert seen == [[100, None, 110], [500, None, 490]]
-
-
-def test_clothes_tell_people_apart_who_were_away_for_long(followed):
-    a = person(100, 0)
-    b = person(500, 1, 290.0)
-    seen = followed({0: a, 1: b}, *[{}] * 40, {5: person(120, 1), 6: person(480, 0)})
-    assert (seen[0][-1], seen[1][-1]) == (480, 120)
-
-
 def test_a_stranger_gets_a_session_only_when_its_person_has_been_away_for_long(followed):
     a = person(100, 0)
     b = person(500, 1, 290.0)

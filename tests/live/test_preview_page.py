@@ -6,7 +6,6 @@ this computer alone.
 from __future__ import annotations
 
 import re
-import threading
 import urllib.error
 import urllib.request
 from dataclasses import replace
@@ -16,8 +15,6 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
-from scope.scope_addon.live import preview_page
-from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.preview_page import PreviewPage
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.live.source import Picture
@@ -84,14 +81,6 @@ def test_the_page_shows_the_picture_of_the_pose_with_the_skeleton(body, pose):
     assert not drawn[far].any()
 
 
-def test_who_is_lost_is_not_drawn(body, pose):
-    with PreviewPage(body) as page:
-        image = first_picture(
-            page, replace(pose, presence=Presence.LOST), [shades(2.0 - DELAY_S, 90)]
-        ).astype(int)
-    assert np.abs(image - 90).max() < 10
-
-
 def test_another_address_shows_nothing_and_nothing_is_kept_without_a_browser(body, pose):
     with PreviewPage(body) as page:
         base = page.address.rpartition("/")[0]
@@ -103,31 +92,3 @@ def test_another_address_shows_nothing_and_nothing_is_kept_without_a_browser(bod
         assert not page._pictures
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(page.address, timeout=300)
-
-
-def test_the_end_shows_the_newest_picture(body, pose, monkeypatch):
-    monkeypatch.setattr(preview_page, "_CLOSING_S", 300)  # this computer may be busy
-    # until the next picture, unless the capture ends before
-    monkeypatch.setattr(preview_page, "INTERVAL_S", 300)
-    with (
-        PreviewPage(body) as page,
-        urllib.request.urlopen(page.address + ".mjpeg", timeout=300) as response,
-    ):
-        page.begin(SimpleNamespace(sessions=[SimpleNamespace(camera=CAMERA)]), (320, 240))
-        wait_for(lambda: page._viewers)
-        page.receive(shades(2.0 - DELAY_S, 90))
-        page.send(pose, 0.0)
-        page.__exit__(None, None, None)
-        assert abs(int(read_picture(response)[5, 5, 0]) - 90) <= 2
-        # without which browsers wait with the picture
-        assert response.read() == b"\r\n--picture--\r\n"
-
-
-def test_a_browser_that_stays_does_not_keep_the_capture_from_ending(body, pose):
-    page = PreviewPage(body)
-    with urllib.request.urlopen(page.address + ".mjpeg", timeout=300) as response:
-        ending = threading.Thread(target=page.__exit__, args=(None, None, None), daemon=True)
-        ending.start()
-        ending.join(300)
-        assert not ending.is_alive()
-        assert response.read() == b"--picture--\r\n"

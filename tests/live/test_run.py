@@ -85,13 +85,6 @@ def test_rates_are_poses_per_second_since_the_first_and_recently() -> None:
     assert statistics.recent_rate == pytest.approx(20.0)
 
 
-def test_latencies_are_the_median_and_what_one_in_twenty_exceeds() -> None:
-    statistics = Statistics()
-    for k in range(1, 101):
-        assert statistics.add(k - 0.001 * k, float(k)) == pytest.approx(k, rel=1e-9)
-    assert statistics.latency_ms() == pytest.approx((50.5, 95.05))
-
-
 def test_before_the_second_pose_there_is_no_rate() -> None:
     statistics = Statistics()
     assert (statistics.rate, statistics.recent_rate, statistics.latency_ms()) == (

@@ -91,11 +91,6 @@ def test_the_camera_of_the_list_is_opened_in_720p_and_its_pictures_are_given(sys
     assert np.array_equal(taken[0].image_rgb, BLUE)
 
 
-def test_a_camera_that_is_not_there_is_said_with_those_that_are(system):
-    with pytest.raises(VideoError, match="camera 7 does not exist; choose one of 0: .*, 1: USB"):
-        next(iter(open_source("7").pictures(Clock())))
-
-
 def test_a_camera_that_cannot_be_opened_is_said_by_its_name(system, monkeypatch):
     def refuse(*_, **__):
         raise OSError("Input/output error")

@@ -16,8 +16,6 @@ from scope.scope_addon.live.vmc import (
     LARGEST_DATAGRAM,
     VmcSender,
     parse_address,
-    unity_position,
-    unity_quaternion,
 )
 from scope.solver import rotations
 
@@ -145,31 +143,6 @@ def test_bones_turn_as_in_unity(receiver, body):
     # negative.
     assert bones["LeftUpperArm"] == pytest.approx([0, 0, -half, half], abs=1e-6)
     assert bones["Head"] == pytest.approx([half, 0, 0, half], abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("world", "unity"),
-    [
-        ((0, 0, 1), (0, 1, 0)),
-        ((0, -1, 0), (0, 0, 1)),
-        ((1, 0, 0), (-1, 0, 0)),
-        ((2, 3, 5), (-2, 5, -3)),
-    ],
-)
-def test_positions_by_hand(world, unity):
-    # Up stays up; towards the camera is forward; to the camera's right is to the person's left.
-    assert unity_position(np.array(world, float)) == pytest.approx(unity)
-
-
-def test_a_converted_rotation_turns_converted_points():
-    R = rotations.exp(np.array([0.3, -0.8, 0.5]))
-    x, y, z, w = unity_quaternion(R)
-    point = np.array([0.2, 0.7, -0.4])
-    mirror = np.array([-1.0, 1, 1])
-    axis = np.array([x, y, z])
-    p = point * mirror  # q p q* by the cross product formula, which is the same in left-handed axes
-    turned = p + 2 * np.cross(axis, np.cross(axis, p) + w * p)
-    assert turned == pytest.approx((R @ point) * mirror)
 
 
 def test_before_somebody_was_seen_no_bones_are_sent(body):
