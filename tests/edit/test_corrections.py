@@ -24,7 +24,7 @@ from scope.scope_addon.edit.corrections import (
     removed,
     to_arrays,
 )
-from scope.scope_addon.edit.edits import moved_clip, moved_motion
+from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.errors import MotionFileError, UsageError
 from scope.solver.rotations import exp
 
@@ -116,15 +116,6 @@ def test_a_new_pin_replaces_that_of_the_same_joint_and_frame():
     assert added(ALL, Pin(4, "left_wrist", pixel=(1.0, 2.0)))[:-1] == ALL
 
 
-def test_a_second_upright_line_turns_what_the_first_has_made():
-    first = np.eye(4)
-    second = np.eye(4)
-    first[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    second[:3, 3] = [1, 2, 3]
-    (both,) = added((Upright.of(first),), Upright.of(second))
-    np.testing.assert_array_equal(both.transform, second @ first)
-
-
 def test_the_same_exchange_again_undoes_the_first():
     assert added(ALL, ALL[3]) == (*ALL[:3], *ALL[4:])
 
@@ -181,14 +172,6 @@ def test_joints_move_with_the_world_and_the_image_stays(seed: int, raw: bool) ->
         for m, joints in ((MOTION, before), (moved, after))
     ]
     np.testing.assert_allclose(seen[1], seen[0], atol=5e-6)
-
-
-def test_a_clip_moves_as_its_motion_does() -> None:
-    T = transform(7)
-    found = moved_clip(clip_from_motion(BODY, MOTION, raw=False), T)
-    expected = clip_from_motion(BODY, moved_motion(MOTION, BODY, T), raw=False)
-    np.testing.assert_allclose(found.rotations, expected.rotations, atol=1e-5)
-    np.testing.assert_allclose(found.root, expected.root, atol=1e-5)
 
 
 def test_there_and_back_nothing_has_changed_and_the_given_motion_never_does() -> None:

@@ -6,16 +6,14 @@ import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.corrected_motion import (
     corrections_of,
-    distance_from_pin,
     with_corrections,
 )
-from scope.scope_addon.edit.corrections import Contact, Floor, Pin, Upright, added, world_of
+from scope.scope_addon.edit.corrections import Floor, added
 from scope.scope_addon.edit.edits import LOWER, foot_height, moved_clip, moved_motion
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.kinematics.foot_skin import foot_heights
 from scope.scope_addon.motion import Motion
-from scope.solver.rotations import exp
 
 from .walking import BODY, NAMES, angle, motion_of, walk
 
@@ -103,46 +101,6 @@ def test_a_second_floor_adds_to_the_first():
     assert len(twice) == 1
     fixed = with_corrections(once, BODY, twice)
     assert foot_heights(fixed, BODY)[35, :2].min() == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_pin_in_space_moves_along():
-    joints = clip_from_motion(BODY, MOTION, raw=False).joints(BODY, MOTION.betas)
-    pin = Pin(
-        30, "left_wrist", position=tuple(joints[30, NAMES.index("left_wrist")] + [0.1, 0.0, 0.05])
-    )
-    fixed = with_corrections(MOTION, BODY, (pin, measured(MOTION)))
-    assert distance_from_pin(fixed, pin) < 0.002
-
-
-def test_a_foot_that_stands_is_put_on_the_corrected_floor():
-    stands = Contact(18, 24, "left")
-    floor = measured(MOTION, 21, "left")
-    fixed = with_corrections(MOTION, BODY, (stands, floor))
-    soles = clip_from_motion(BODY, fixed, raw=False).soles(BODY, MOTION.betas)
-    assert np.abs(soles[18:25, :2, 2].min(axis=1)).max() < 0.005
-    alone = clip_from_motion(BODY, with_corrections(MOTION, BODY, (stands,)), raw=False).soles(
-        BODY, MOTION.betas
-    )
-    assert alone[18:25, :2, 2].min(axis=1).max() < -0.2
-
-
-def test_a_floor_and_an_upright_line_keep_each_other_in_either_order():
-    turn = np.eye(4)
-    turn[:3, :3] = exp(np.array([0.1, 0.05, 0.0]))
-    turn[:3, 3] = [0.3, 0.0, 0.1]
-    upright = Upright.of(turn)
-    floor = Floor(20, -0.25)
-    for first, second in ((upright, floor), (floor, upright)):
-        both = added(added((), first), second)
-        assert [type(c) for c in both] == [Upright, Floor]
-        assert both[1] == floor
-        np.testing.assert_allclose(world_of(both), second.transform @ first.transform, atol=1e-12)
-
-
-@pytest.mark.parametrize("height", [np.nan, np.inf, 1e4])
-def test_an_impossible_height_is_refused(height):
-    with pytest.raises(UsageError, match="frame 3"):
-        Floor(3, height)
 
 
 def test_an_unknown_foot_is_refused():

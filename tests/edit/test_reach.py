@@ -74,15 +74,6 @@ def test_a_pin_far_away_is_met_by_the_stretched_limb(
     assert within_reach(refit, limb[-1], nearly, (AT, {}), None, slack) is nearly
 
 
-def test_another_pin_of_the_limb_is_where_the_rest_of_it_turns_about(refit: PoseRefit) -> None:
-    elbow = at("left_elbow") + [0.1, 0.0, 0.3]
-    direction = np.array([0.0, 1.0, 0.0])
-    place = within_reach(refit, "left_wrist", elbow + direction, (AT, {"left_elbow": elbow}), None)
-    np.testing.assert_allclose(
-        place, elbow + (length("left_elbow", "left_wrist") + SLACK_M) * direction, atol=1e-9
-    )
-
-
 def test_a_pixel_is_moved_to_where_the_stretched_limb_is_seen(refit: PoseRefit) -> None:
     origin = at("left_shoulder")
     far = origin + [0.0, 0.0, 2.0]
@@ -94,22 +85,6 @@ def test_a_pixel_is_moved_to_where_the_stretched_limb_is_seen(refit: PoseRefit) 
     reach = length("left_shoulder", "left_elbow", "left_wrist") + SLACK_M
     met = origin + reach * (nearest - origin) / np.linalg.norm(nearest - origin)
     np.testing.assert_allclose(pixel, pixel_of(CAMERA, met), atol=0.05)
-
-
-def test_pins_that_move_the_body_are_not_limited(refit: PoseRefit) -> None:
-    target = at("pelvis") + [3.0, 0.0, 0.0]
-    for joint in ("pelvis", "left_hip"):
-        assert within_reach(refit, joint, target, (AT, {}), None) is target
-
-
-def test_a_pin_of_the_pelvis_in_the_image_keeps_its_depth(refit: PoseRefit) -> None:
-    pixel = pixel_of(CAMERA, at("pelvis")) + [0.0, 60.0]
-    place = within_reach(refit, "pelvis", pixel, (AT, {}), CAMERA)
-    assert place.shape == (3,)
-    np.testing.assert_allclose(pixel_of(CAMERA, place), pixel, atol=1e-6)
-    axis = CAMERA[0][:3, 2]
-    assert (place - at("pelvis")) @ axis == pytest.approx(0.0, abs=1e-9)
-    assert place[2] < at("pelvis")[2]
 
 
 K = np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]])
@@ -128,24 +103,6 @@ def looking(pitch, height=1.0):
     return T, K
 
 
-@pytest.mark.parametrize("pitch", [-30.0, 0.0, 40.0])
-def test_what_is_below_in_the_image_is_below_at_the_same_distance_on_the_floor(pitch):
-    camera = looking(pitch)
-    lower = POINT - [0.1, 0.0, 0.25]
-    np.testing.assert_allclose(
-        point_at_depth(camera, pixel_of(camera, lower), POINT), lower, atol=1e-9
-    )
-
-
-def test_a_camera_that_looks_steeply_down_moves_a_point_across_its_axis():
-    camera = looking(70.0, 4.0)
-    place = point_at_depth(camera, pixel_of(camera, POINT) + [30.0, 40.0], POINT)
-    np.testing.assert_allclose(
-        pixel_of(camera, place), pixel_of(camera, POINT) + [30.0, 40.0], atol=1e-6
-    )
-    assert abs((place - POINT) @ camera[0][:3, 2]) < 1e-9
-
-
 def test_a_ray_that_does_not_meet_the_plane_has_its_nearest_point():
     camera = looking(44.0)
     # more than 90 degrees from level
@@ -153,15 +110,6 @@ def test_a_ray_that_does_not_meet_the_plane_has_its_nearest_point():
     place = point_at_depth(camera, below, POINT)
     np.testing.assert_allclose(place, nearest_on_ray(camera, below, POINT))
     assert np.isfinite(place).all()
-
-
-def test_the_nearest_point_on_a_ray_is_in_front_of_the_camera():
-    camera = looking(0.0)
-    np.testing.assert_allclose(
-        nearest_on_ray(camera, np.array([320.0, 240.0]), POINT), [0.0, 3.0, 1.0], atol=1e-9
-    )
-    behind = nearest_on_ray(camera, np.array([320.0, 240.0]), -POINT)
-    assert behind[1] > 0
 
 
 TIMES = np.arange(0, 4, 0.001)

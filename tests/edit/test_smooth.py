@@ -16,7 +16,7 @@ from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.motion import Motion
 from scope.solver.rotations import exp, log
 
-from .walking import BETAS, BODY, NAMES, angle, motion_of, walk
+from .walking import BETAS, BODY, NAMES, motion_of, walk
 
 ELBOW = NAMES.index("left_elbow")
 
@@ -58,27 +58,6 @@ def test_more_strength_leaves_less_of_a_quick_movement_and_all_of_a_slow_one() -
     assert quick[3] < 0.001
     slow = [amplitude(smoothed(BODY, shaking(0.3), s)) for s in (0.0, 1.0, 3.0)]
     np.testing.assert_allclose(slow, 0.1, rtol=0.05)
-
-
-@pytest.mark.parametrize(("strength", "share"), [(0.5, 0.5), (2.0, 1.0), (3.0, 1.0)])
-def test_what_the_finished_motion_adds_stays_and_fades_out_below_strength_one(
-    strength: float, share: float
-) -> None:
-    """Here a place that differs from the raw motion's, as that of a foot that is held does."""
-    motion = motion_of(walk(2.0), noise=0.02)
-    shift = np.array([0.03, -0.02, 0.05])
-    moved = replace(motion, trans=motion.trans + shift)
-    added = smoothed(BODY, moved, strength).root - smoothed(BODY, motion, strength).root
-    # beyond, the distance from the camera is smoothed by itself
-    tolerance = 1e-6 if strength < 1 else 3e-3
-    np.testing.assert_allclose(added, np.broadcast_to(share * shift, added.shape), atol=tolerance)
-
-
-def test_beyond_the_finished_motion_it_is_calmer_however_noisy_the_raw_one_is() -> None:
-    motion = motion_of(walk(speed=0.0), noise=0.05)
-    joints = [smoothed(BODY, motion, s).joints(BODY, BETAS) for s in (1.0, 1.5, 2.5)]
-    jerks = [np.abs(np.diff(each, n=3, axis=0)).mean() for each in joints]
-    assert jerks[0] > 1.05 * jerks[1] > 1.1 * jerks[2]
 
 
 @pytest.mark.parametrize("strength", [2.5, 8.0])
@@ -135,37 +114,7 @@ def motion_joints(motion: Motion) -> np.ndarray:
     return clip_from_motion(BODY, motion, raw=False).joints(BODY, BETAS)
 
 
-def test_smoothing_has_no_delay() -> None:
-    motion = motion_of(walk(), noise=0.0)
-    found = smoothed(BODY, motion, 3.0)
-    before = clip_from_motion(BODY, motion, raw=True)
-    knee = NAMES.index("left_knee")
-    a, b = (log(c.rotations[:, knee])[:, 0] - 0.4 for c in (found, before))
-    lags = range(-5, 6)
-    best = max(lags, key=lambda lag: float((a[10:-10] * np.roll(b, lag)[10:-10]).sum()))
-    assert best == 0
-
-
-def test_noise_falls_with_the_strength() -> None:
-    true = walk()
-    motion = motion_of(true, noise=0.05)
-    errors = [
-        float(angle(smoothed(BODY, motion, s).rotations, true.rotations).mean())
-        for s in (0.0, 0.5, 1.0)
-    ]
-    assert errors[0] > errors[1] > errors[2]
-
-
 @pytest.mark.parametrize("strength", [-0.1, np.nan, np.inf])
 def test_what_is_no_strength_is_refused(strength: float) -> None:
     with pytest.raises(UsageError, match="0 or more"):
         smoothed(BODY, motion_of(walk(0.5)), strength)
-
-
-@pytest.mark.parametrize("frames", [1, 2])
-def test_a_clip_too_short_to_smooth_stays(frames: int) -> None:
-    clip = walk(1.0)
-    short = motion_of(Clip(clip.times[:frames], clip.rotations[:frames], clip.root[:frames]))
-    np.testing.assert_array_equal(
-        smoothed(BODY, short, 2.0).root, clip_from_motion(BODY, short, raw=True).root
-    )

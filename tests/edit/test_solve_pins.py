@@ -7,7 +7,6 @@ from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.edit.corrections import Contact, Pin
 from scope.scope_addon.edit.solve_pins import Shot, missed, resolve
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.kinematics.foot_skin import FootSkin
 from scope.solver.rotations import exp
 
 from ..made_motion import level_camera
@@ -116,11 +115,6 @@ def test_the_correction_begins_and_ends_without_a_jump_of_velocity():
     assert np.linalg.norm(np.diff(change, 2, axis=0), axis=1).max() * RATE < speed.max()
 
 
-def test_a_pin_at_the_joint_itself_changes_nothing():
-    still = resolve(TRUTH, BODY, BETAS, pins((45,), ("left_wrist", "right_knee", "head")), SHOT)
-    np.testing.assert_allclose(still.joints(BODY, BETAS), JOINTS, atol=2e-4)
-
-
 def standing():
     """Somebody who stands with bent knees."""
     still = Clip(
@@ -133,8 +127,8 @@ def standing():
     return Clip(still.times, still.rotations, still.root - [0.0, 0.0, lowest])
 
 
-@pytest.mark.parametrize("height", [0.3, 1.0, 2.5])
-@pytest.mark.parametrize("down", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("height", [0.3, 2.5])
+@pytest.mark.parametrize("down", [0.05, 0.2])
 @pytest.mark.parametrize("joint", ["pelvis", "left_hip"])
 def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint, down, height):
     still = standing()
@@ -168,32 +162,6 @@ def test_a_pelvis_in_the_image_stays_at_its_depth_whatever_the_camera_looks_at(p
     assert missed(moved, BODY, BETAS, pin, shot) < 0.5
     along = [0.0, 1.0, 0.0] if pitch < 45 else camera[0, :3, 2]
     assert abs((moved.joints(BODY, BETAS)[45, 0] - at) @ along) < 0.01
-
-
-def test_a_dragged_pelvis_leaves_a_standing_foot_where_it_is():
-    still = standing()
-    at = still.joints(BODY, BETAS)
-    pin = Pin(45, "pelvis", position=tuple(at[45, 0] + [0.03, 0.0, -0.06]))
-    moved = resolve(still, BODY, BETAS, [pin], SHOT)
-    assert missed(moved, BODY, BETAS, pin, SHOT) < 0.002
-    assert np.linalg.norm(moved.soles(BODY, BETAS) - still.soles(BODY, BETAS), axis=-1).max() < 0.01
-
-
-def test_several_limbs_at_once_all_meet_their_pins():
-    bad = corrupted()
-    at = bad.joints(BODY, BETAS)
-    wanted = [
-        Pin(frame, name, position=tuple(at[frame, NAMES.index(name)] + shift))
-        for frame, name, shift in (
-            (40, "left_wrist", [0.0, 0.1, 0.1]),
-            (46, "left_elbow", [0.0, 0.05, 0.0]),
-            (44, "right_wrist", [0.0, -0.1, 0.1]),
-            (44, "right_ankle", [0.0, 0.05, 0.05]),
-            (47, "head", [0.03, 0.0, 0.0]),
-        )
-    ]
-    good = resolve(bad, BODY, BETAS, wanted, SHOT)
-    assert max(missed(good, BODY, BETAS, pin, SHOT) for pin in wanted) < 0.005
 
 
 def test_a_foot_that_stands_stays_on_the_floor():
@@ -268,14 +236,6 @@ def test_what_rests_stays_in_one_place_on_the_floor(part):
     assert changed[-1] < 46 + 0.25 * RATE
 
 
-def test_what_rests_on_uneven_ground_keeps_its_height():
-    still = standing()
-    rests = resolve(still, BODY, BETAS, [Contact(40, 46, "left_hand")], SHOT, floor=-np.inf)
-    hand = NAMES.index("left_wrist")
-    moved = rests.joints(BODY, BETAS)[:, hand] - still.joints(BODY, BETAS)[:, hand]
-    assert np.linalg.norm(moved, axis=-1).max() < 0.01
-
-
 WAYS = {
     "side": (1.0, 0.0, 0.0),
     "front": (0.0, -1.0, 0.0),
@@ -322,11 +282,6 @@ def test_a_pinned_elbow_out_of_reach_and_a_wrist_beyond_it_leave_the_body():
     assert np.linalg.norm(moved[:, 0] - JOINTS[:, 0], axis=-1).max() < 0.05
 
 
-def test_a_pinned_pelvis_moves_the_body_as_far_as_it_is_dragged():
-    pin = Pin(45, "pelvis", position=tuple(JOINTS[45, 0] + [0.6, 0.0, 0.0]))
-    assert missed(resolve(TRUTH, BODY, BETAS, [pin], SHOT), BODY, BETAS, pin, SHOT) < 0.002
-
-
 def test_corrections_at_frames_without_keys_are_left_out():
     half = Clip(TRUTH.times[:40], TRUTH.rotations[:40], TRUTH.root[:40])
     same = resolve(half, BODY, BETAS, [*pins((80,)), Contact(80, 85, "right")], SHOT)
@@ -338,49 +293,7 @@ def test_an_unknown_joint_is_an_error_that_lists_the_joints():
         resolve(TRUTH, BODY, BETAS, [Pin(40, "left_paw", (1.0, 2.0))], SHOT)
 
 
-@pytest.fixture(scope="module")
-def on_floor():
-    """The walk with the lowest foot of every frame 5 mm under the floor at most."""
-    R, t = BODY.forward_kinematics(TRUTH.rotations, TRUTH.root - BODY.rest_joints(BETAS)[0], BETAS)
-    lowest = FootSkin(BODY, BETAS).heights(R, t, np.array([0, 0, 1.0])).min()
-    return Clip(TRUTH.times, TRUTH.rotations, TRUTH.root - [0, 0, lowest + 0.005])
-
-
 def depth(clip):
     """How far the lowest vertex of the whole body's skin is under the floor, metres."""
     R, t = BODY.forward_kinematics(clip.rotations, clip.root - BODY.rest_joints(BETAS)[0], BETAS)
     return -min(BODY.skin(R[k], t[k], BETAS)[:, 2].min() for k in range(FIRST, LAST + 1))
-
-
-@pytest.mark.parametrize("name", ["left_ankle", "left_knee"])
-@pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
-def test_a_leg_that_is_pinned_leaves_its_foot_above_the_floor(on_floor, name, image):
-    shift = [0.0, 0.06, -0.025]  # within the leg's reach, and the foot would go under the floor
-    if image:
-        shift = [0.03, -0.05 if name == "left_ankle" else 0.05, -0.04]
-    at = on_floor.joints(BODY, BETAS)[45, NAMES.index(name)] + shift
-    pin = Pin(
-        45, name, tuple(SHOT.project(45, at)) if image else None, None if image else tuple(at)
-    )
-    corrected = resolve(on_floor, BODY, BETAS, [pin], SHOT)
-    assert missed(corrected, BODY, BETAS, pin, SHOT) < (0.5 if image else 0.002)
-    assert depth(corrected) < 0.01
-
-
-def test_no_floor_is_like_one_far_below(on_floor):
-    """As on uneven ground."""
-    at = on_floor.joints(BODY, BETAS)[45, NAMES.index("left_ankle")] + [0.0, 0.07, -0.02]
-    pin = Pin(45, "left_ankle", None, tuple(at))
-    none, low = (
-        resolve(on_floor, BODY, BETAS, [pin], SHOT, floor=floor) for floor in (-np.inf, -10.0)
-    )
-    assert missed(none, BODY, BETAS, pin, SHOT) < 0.002
-    np.testing.assert_allclose(none.joints(BODY, BETAS), low.joints(BODY, BETAS), atol=1e-6)
-
-
-def test_a_foot_stands_on_a_kerb_on_uneven_ground():
-    above = np.median(TRUTH.soles(BODY, BETAS)[50:63, :2, 2], axis=0).min() - 0.06
-    kerb = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root - [0.0, 0.0, above])  # 6 cm high
-    for floor, expected in ((0.0, 0.0), (-np.inf, 0.06)):
-        stands = resolve(kerb, BODY, BETAS, [Contact(50, 62, "left")], SHOT, floor=floor)
-        assert stands.soles(BODY, BETAS)[50:63, :2, 2].min() == pytest.approx(expected, abs=0.003)

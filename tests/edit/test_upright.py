@@ -7,7 +7,6 @@ from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.corrected_motion import distance_from_pin, shot_of, with_corrections
 from scope.scope_addon.edit.corrections import Pin, Upright
 from scope.scope_addon.edit.edits import moved_clip, moved_motion
-from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.upright import upright_transform, upright_transform_in_view
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
@@ -67,66 +66,12 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
             np.testing.assert_array_equal(getattr(again, name), getattr(expected, name))
 
 
-@pytest.mark.parametrize("strength", [0.0, 1.0, 2.5])
-def test_an_upright_line_turns_every_smoothing_as_the_motion(strength):
-    pin = Pin(
-        30,
-        "head",
-        position=tuple(clip_from_motion(BODY, TRUTH, raw=False).joints(BODY, TRUTH.betas)[30, 15]),
-    )
-    T = np.eye(4)
-    T[:3, :3] = exp(np.array([0.1, 0.05, 0.0]))
-    T[:3, 3] = [0.3, 0.0, 0.1]
-    plain, turned = (with_corrections(TRUTH, BODY, c) for c in ((pin,), (pin, Upright.of(T))))
-    expected = moved_clip(smoothed(BODY, plain, strength), T)
-    found = smoothed(BODY, turned, strength)
-    np.testing.assert_allclose(found.root, expected.root, atol=1e-6)
-    assert angle(found.rotations, expected.rotations).max() < 1e-5
-
-
 @pytest.mark.parametrize(
     ("line", "says"), [(((10, 10), (12, 11)), "shorter"), (((10, 10), (200, 12)), "from upright")]
 )
 def test_a_line_that_cannot_be_upright_is_refused(line, says):
     with pytest.raises(UsageError, match=says):
         upright_transform(TRUTH, BODY, 20, line)
-
-
-def leaning(degrees=8.0):
-    """The truth in a world that leans towards the camera, and the post in it."""
-    tilt = np.eye(4)
-    tilt[:3, :3] = exp(np.radians([degrees, 0.0, 0.0]))
-    return moved_motion(TRUTH, BODY, tilt), POST @ tilt[:3, :3].T
-
-
-def tilt_of(motion):
-    """Degrees from the true up."""
-    up = motion.world_from_camera[0, :3, :3] @ TRUTH.world_from_camera[0, :3, :3].T
-    return np.degrees(np.arccos(min(up[2, 2], 1.0)))  # which rounding may exceed
-
-
-@pytest.mark.parametrize("direction", [(1, 0, 0), (-1, 0, 0), (1, 0, -0.09), (1, 0.3, -0.09)])
-def test_a_line_from_the_side_corrects_a_lean_that_a_line_in_the_image_does_not(direction):
-    motion, post = leaning()
-    line = tuple(tuple(shot_of(motion).project(20, point)) for point in post)
-    assert tilt_of(moved_motion(motion, BODY, upright_transform(motion, BODY, 20, line))) > 7
-    # drawn somewhere along the view's direction
-    nearer = np.array([2.0, -0.5])[:, None] * np.array(direction)
-    transform = upright_transform_in_view(motion, BODY, post + nearer, np.array(direction, float))
-    fixed = moved_motion(motion, BODY, transform)
-    # what is across is seen only from its side
-    assert tilt_of(fixed) < (0.3 if direction[1] == 0 else 3.0)
-    post = post @ transform[:3, :3].T
-    across = np.cross(direction, [0.0, 0.0, 1.0])
-    assert abs((post[1] - post[0]) @ across) < 1e-3  # upright in that view
-    feet = (
-        clip_from_motion(BODY, motion, raw=False)
-        .soles(BODY, TRUTH.betas)
-        .reshape(-1, 3)
-        .mean(axis=0)
-    )
-    # about the floor under the person
-    assert np.linalg.norm(transform[:3, :3] @ feet + transform[:3, 3] - feet) < 0.15
 
 
 @pytest.mark.parametrize(
