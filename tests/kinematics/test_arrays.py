@@ -37,12 +37,6 @@ def test_blocks_give_the_result_of_one_call(frames, monkeypatch):
     assert sum(sizes) == frames
 
 
-def test_one_array_is_enough(monkeypatch):
-    monkeypatch.setattr(frame_blocks, "BLOCK_FRAMES", 5)
-    (squares,) = frame_blocks.by_blocks(lambda x: (x**2,), np.arange(12))
-    np.testing.assert_array_equal(squares, np.arange(12) ** 2)
-
-
 def test_runs_of_every_short_mask_are_those_that_grouping_finds():
     for mask in itertools.product([False, True], repeat=7):
         expected = []
@@ -52,12 +46,6 @@ def test_runs_of_every_short_mask_are_those_that_grouping_finds():
             expected += [(row, row + length)] if value else []
             row += length
         assert runs(np.array(mask)) == expected
-
-
-@pytest.mark.parametrize("value", [False, True])
-def test_an_empty_mask_has_none_and_a_full_one_is_one(value):
-    assert runs(np.zeros(0, bool)) == []
-    assert runs(np.full(3, value)) == ([(0, 3)] if value else [])
 
 
 @pytest.mark.parametrize("barred", [0.0, 0.4])
@@ -76,10 +64,6 @@ def test_no_other_path_costs_less(count: int, states: int, barred: float) -> Non
 
         expected = min(product(range(states), repeat=count), key=cost)
         assert tuple(least_cost_path(costs, switching)) == expected
-
-
-def test_ties_are_resolved_to_lower_states() -> None:
-    assert least_cost_path(np.zeros((4, 3)), np.zeros((3, 3, 3))).tolist() == [0, 0, 0, 0]
 
 
 def test_no_frames() -> None:

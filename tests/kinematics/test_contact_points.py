@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Soles and palms lie where the mesh ends, and move with their parts."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.contact_points import (
@@ -51,12 +49,3 @@ def test_contact_points_follow_their_parts():
         np.linalg.norm(moved[:2] - hip, axis=1), np.linalg.norm(still[:2] - hip, axis=1), atol=1e-9
     )
     assert (moved[:2, 1] > still[:2, 1] + 0.1).all()
-
-
-def test_the_contact_point_of_a_part_without_vertices_is_its_joint():
-    body = load_body("scope")
-    hand, wrist = (body.joint_names.index(name) for name in ("left_hand", "left_wrist"))
-    bare = replace(body, skin_joints=np.where(body.skin_joints == hand, wrist, body.skin_joints))
-    R, t = body.forward_kinematics(np.tile(np.eye(3), (body.K + 1, 1, 1)), np.zeros(3))
-    points = contact_point_positions(with_contact_points(bare, np.zeros(body.P)), R, t)
-    np.testing.assert_allclose(points[CONTACT_POINTS.index("palm/left")], t[hand], atol=1e-12)

@@ -58,23 +58,8 @@ def test_a_depth_error_is_no_floor():
     assert lower_floors(heights, STANDING, TIMES) == [(31, 45)]
 
 
-def test_somebody_on_a_wall_is_on_an_upper_floor_but_a_jump_is_none():
-    heights = np.where(TIMES >= 1.0, 0.6, 0.0)[:, None] * np.ones(4)
-    assert upper_floors(heights, STANDING, TIMES) == [(30, 60)]
-    assert upper_floors(heights[:36], STANDING[:36], TIMES[:36]) == []
-
-
 @pytest.mark.parametrize(("height", "found"), [(0.05, 0), (0.18, 1), (-0.18, 1), (0.4, 0)])
 def test_rests_on_a_step_are_found(height, found):
     heights = np.tile([0.0, 0.0, height, 0.3], (60, 1))
     contact = np.tile([0.95, 0.95, 0.9, 0.0], (60, 1))
     assert steps(heights, contact, TIMES) == [(0, height)] * found
-
-
-def test_a_touch_of_a_step_is_no_rest():
-    heights = np.full((60, 4), 0.18)
-    contact = np.zeros((60, 4))
-    contact[30:34, 1] = 0.95  # 0.1 s
-    assert steps(heights, contact, TIMES) == []
-    contact[45:, 1] = 0.95  # 0.47 s
-    assert steps(heights, contact, TIMES) == [(45, 0.18)]

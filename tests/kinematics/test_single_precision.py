@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,29 +74,3 @@ def test_a_fit_in_single_precision_is_placed_within_a_hundredth_of_a_millimetre(
         exact.rotations, exact.root - exact.body.rest_joints(exact.betas)[0]
     )[1]
     np.testing.assert_allclose(small.joints, joints, atol=1e-5)
-
-
-def test_placing_a_long_clip_takes_few_kilobytes_per_frame() -> None:
-    body = load_body("scope")
-    count = 30_000
-    track, fitted = walk(count)
-    fitted = to_single_precision(fitted)
-    tracemalloc.start()
-    try:
-        placed = place_track(body, track, fitted, True)
-        kept, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert len(placed.joints) == count
-    assert kept / count < 1500
-    assert peak / count < 4500
-
-
-def test_a_track_without_depth() -> None:
-    track, _ = walk(5)
-    track.world_landmarks[:] = 1.0
-    flat = track.without_depth()
-    assert track.has_depth
-    assert not flat.has_depth
-    assert flat.world_landmarks.shape == (5, 33, 3)
-    assert len(flat.reference_rows) == len(flat.reference_landmarks) == 0

@@ -35,13 +35,6 @@ def test_the_gain_at_the_cutoff_is_minus_3_db_and_the_phase_zero(cutoff):
     assert np.abs(smooth - gain * wave[middle]).max() < 0.01
 
 
-def test_constants_and_slow_motion_pass():
-    times = np.arange(200) / 30
-    slow = np.sin(2 * np.pi * 0.5 * times)
-    assert np.allclose(gaussian_smooth(np.full((200, 2), 3.0), times, 6), 3)
-    assert np.abs(gaussian_smooth(slow[:, None], times, 6)[20:-20, 0] - slow[20:-20]).max() < 0.01
-
-
 def test_uneven_times_need_no_resampling():
     rng = np.random.default_rng(0)
     times = np.cumsum(rng.uniform(0.002, 0.015, 2000))
@@ -49,15 +42,6 @@ def test_uneven_times_need_no_resampling():
     smooth = gaussian_smooth(wave[:, None], times, 12.0)[200:-200, 0]
     expected = np.exp(-0.5 * np.log(2) * (3 / 12) ** 2)
     assert abs((smooth @ wave[200:-200]) / (wave[200:-200] @ wave[200:-200]) - expected) < 0.03
-
-
-def test_a_part_with_a_higher_frame_rate_is_smoothed_like_a_clip_of_that_rate():
-    """As recorded by phones: most of a clip at 24 frames per second, a part of it at 120."""
-    dense = np.arange(10, 12, 1 / 120)
-    noise = np.random.default_rng(3).normal(size=len(dense))
-    times = np.concatenate([np.arange(0, 10, 1 / 24), dense])
-    smooth = gaussian_smooth(np.concatenate([np.zeros(len(times) - len(dense)), noise]), times, 2.0)
-    assert np.allclose(smooth[-120:], gaussian_smooth(noise, dense, 2.0)[-120:], atol=1e-3)
 
 
 @pytest.mark.parametrize("count", [3, 6])
@@ -68,25 +52,6 @@ def test_a_clip_shorter_than_the_kernel_is_averaged_with_the_weights_of_the_gaus
     w = np.exp(-0.5 * ((times[:, None] - times) / sigma) ** 2)
     expected = np.einsum("st,tij->sij", w, values) / w.sum(axis=1)[:, None, None]
     assert np.allclose(gaussian_smooth(values, times, 2.0), expected, atol=1e-12)
-
-
-def test_a_clip_in_reverse_is_smoothed_to_the_reverse():
-    """Which is what no phase shift means."""
-    values = np.random.default_rng(7).normal(size=(60, 3))
-    times = np.arange(60) / 30
-    assert np.allclose(
-        gaussian_smooth(values[::-1], times, 4.0),
-        gaussian_smooth(values, times, 4.0)[::-1],
-        atol=1e-12,
-    )
-
-
-@pytest.mark.parametrize(("count", "cutoff"), [(1, 2.0), (2, 2.0), (9, 0.0), (9, -1.0)])
-def test_two_samples_or_no_cutoff_give_a_copy(count, cutoff):
-    values = np.random.default_rng(6).normal(size=(count, 3))
-    copy = gaussian_smooth(values, np.arange(count) / 30, cutoff)
-    assert np.array_equal(copy, values)
-    assert not np.shares_memory(copy, values)
 
 
 def test_quaternions_are_of_unit_length_and_have_no_jumps():
@@ -123,14 +88,6 @@ def test_the_root_keeps_its_image_position_while_depth_is_smoothed():
     assert np.allclose(smooth[:, 0] / smooth[:, 2], 0.2)
     assert np.allclose(smooth[:, 1] / smooth[:, 2], -0.1)
     assert smooth[20:-20, 2].std() < 0.35 * depth.std()
-
-
-@pytest.mark.parametrize("distance", [0.5, 4.0])
-def test_slow_motion_of_the_root_passes_near_the_camera_and_far_from_it(distance):
-    times = np.arange(120) / 30
-    slow = np.sin(2 * np.pi * 0.1 * times)
-    root = distance * np.stack([0.2 * slow, -0.3 + 0 * slow, 1 + 0.2 * slow], axis=1)
-    assert np.abs(smooth_root(root, times) - root)[20:-20].max() < 0.005 * distance
 
 
 def test_gaps_are_interpolated_in_time_and_extended_at_the_ends():

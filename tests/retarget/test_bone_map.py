@@ -13,12 +13,6 @@ from scope.solver.errors import InputError
 LEGS = {"a": "left_hip", "b": "left_knee", "c": "right_hip", "d": "right_knee"}
 
 
-def test_a_map_is_read_as_it_was_saved(tmp_path):
-    saved = BoneMap({**LEGS, "hips": "pelvis", "back": "spine1", "chest": "spine1"}, {"hips": 0.8})
-    save_bone_map(saved, tmp_path / "map.json")
-    assert load_bone_map(tmp_path / "map.json").parts == saved.parts
-
-
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
@@ -60,11 +54,6 @@ def _legs_and(pelvis):
     }
     text = json.dumps({"format": "scope bone map", "version": 1, "bones": bones})
     return text.replace("PELVIS", pelvis)
-
-
-def test_a_map_that_an_editor_has_marked_as_unicode_is_read(tmp_path):
-    (tmp_path / "map.json").write_text(_legs_and("Hüfte"), encoding="utf-8-sig")
-    assert load_bone_map(tmp_path / "map.json").bone("pelvis") == "Hüfte"
 
 
 @pytest.mark.parametrize(

@@ -82,11 +82,6 @@ def test_arkits_names_however_they_are_spelled(spelled):
     assert found.keys == {spelled(name): {name: 1.0} for name in EXPRESSIONS}
 
 
-def test_where_there_are_arkits_keys_visemes_are_left_alone():
-    found = guess_expression_map([*EXPRESSIONS, *OCULUS])
-    assert set(found.keys) == set(EXPRESSIONS)
-
-
 @pytest.mark.parametrize(
     ("names", "closed", "open_mouth", "round_mouth"),
     [
@@ -110,28 +105,6 @@ def test_blinks_and_vowels_of_other_conventions(names, closed, open_mouth, round
         assert found.values(weights(eyeBlinkLeft=1, eyeBlinkRight=1))[closed] == 1
 
 
-@pytest.mark.parametrize("key", ["Sorrow", "sad", "Face.M_F00_000_00_Fcl_BRW_Sorrow"])
-def test_sorrow_is_as_strong_as_the_brows_are_raised(key):
-    found = guess_expression_map([key])
-    assert [found.values(weights(browInnerUp=value))[key][0] for value in (0.0, 0.4, 1.0)] == [
-        0,
-        0.4,
-        1,
-    ]
-
-
-def test_one_eye_alone():
-    found = guess_expression_map(VRM0).values(weights(eyeBlinkLeft=0.9))
-    assert (found["Blink_L"], found["Blink_R"], found["Blink"]) == (0.9, 0, 0.45)
-
-
-def test_other_names_are_not_guessed():
-    assert (
-        guess_expression_map(["Basis", "Key 1", "Bell", "viseme_sil", "viseme_DD", "smirk"]).keys
-        == {}
-    )
-
-
 def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
     path = tmp_path / "face.json"
     other = tmp_path / "package.json"
@@ -145,15 +118,6 @@ def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
     with pytest.raises(OutputError, match="not an expression map, so it is not overwritten"):
         save_expression_map(written, other)
     assert other.read_text("utf-8") == '{"name": "a game"}'
-
-
-def test_controls_are_written_and_read(tmp_path):
-    written = ExpressionMap(
-        {}, {"jaw": {"pitch": {"jawOpen": 17.5}, "up": {"jawOpen": -0.5, "mouthClose": 0.5}}}
-    )
-    save_expression_map(written, tmp_path / "face.json")
-    read = load_expression_map(tmp_path / "face.json")
-    assert (read.keys, read.controls) == ({}, written.controls)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError
-from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.import_motions import import_motions
 from scope.solver.rotations import exp, shortest_turn
 
@@ -16,14 +15,11 @@ from ..edit.walking import NAMES
 from .made_bvh import (
     AT_REST,
     FRAMES,
-    JOINTS,
     PARENTS,
     TOOLS,
-    D,
     assert_is_the_motion,
     bvh,
     imported,
-    joints_of,
 )
 
 
@@ -82,77 +78,6 @@ def test_a_rest_pose_that_is_no_person(tmp_path):
     found = imported(tmp_path, bvh(TOOLS["cmu"], S))
     assert_is_the_motion(found)
     assert [note.code for note in found.notes] == ["no_rest_pose", "other_skeleton"]
-
-
-def test_somebody_who_lies_is_not_raised(tmp_path):
-    """The rest pose says what is up; that the motion contradicts is said."""
-    stands = JOINTS[0] @ R_WORLD_MODEL.T
-    lying = exp(np.array([np.pi / 2, 0.0, 0.0]))
-    original, places = D.copy(), JOINTS.copy()
-    try:
-        D[:] = lying @ original
-        JOINTS[:] = places @ lying.T
-        text = bvh(TOOLS["cmu"])
-    finally:
-        D[:] = original
-        JOINTS[:] = places
-    found = imported(tmp_path, text)
-    assert np.ptp(joints_of(found)[0, :, 2]) < 0.5 < np.ptp(stands[:, 2])
-    assert [note.code for note in found.notes] == ["unsure_up", "other_skeleton"]
-    assert_is_the_motion(imported(tmp_path, text, up="z"))
-
-
-def test_position_channels_of_all_joints_and_a_root_above_the_pelvis(tmp_path):
-    assert_is_the_motion(imported(tmp_path, bvh(TOOLS["neuron"], all_positions=True)))
-    assert_is_the_motion(imported(tmp_path, bvh(TOOLS["mixamo"], root="Reference")))
-
-
-@pytest.mark.parametrize(
-    ("step", "rate"),
-    [
-        ("0.033333", 30.0),
-        ("0.0333667", 30000 / 1001),
-        (".0083333", 120.0),
-        ("0.016667", 60.0),
-        ("0.04", 25.0),
-        ("0.0417083", 24000 / 1001),
-        ("0.03456", 1 / 0.03456),
-    ],
-)
-def test_frame_times_are_rounded_rates(tmp_path, step, rate):
-    found = imported(tmp_path, bvh(TOOLS["cmu"], step=step))
-    assert found.motion.mocap_framerate == pytest.approx(rate, rel=1e-9)
-
-
-def test_joints_that_are_missing_are_named(tmp_path):
-    names = [
-        f"cap{k}" if name.startswith(("Head", "LeftWrist", "LeftFinger")) else name
-        for k, name in enumerate(TOOLS["xsens"])
-    ]
-    skeleton, _, _ = bvh(names).partition("MOTION")
-    assert "cap20" in skeleton
-    found = imported(tmp_path, bvh(names))
-    assert_is_the_motion(found)
-    # Chains whose last joints are taken away.
-    short = bvh(TOOLS["xsens"], without=("left_wrist", "right_wrist", "head"))
-    found = imported(tmp_path, short)
-    notes = {note.code: note.values for note in found.notes}
-    assert notes["missing_joints"]["parts"] == ["head", "left wrist", "right wrist"]
-
-
-def test_everybody_of_a_file_is_imported_but_no_props(tmp_path):
-    """Two people with the same names, and a sword."""
-    first, motion, rows = bvh(TOOLS["mixamo"]).partition("MOTION")
-    sword = "ROOT sword { OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition }\n"
-    second = first.removeprefix("HIERARCHY\n")
-    head, step, frames = rows.partition("Frame Time: 0.033333\n")
-    frames = "".join(f"{row} 1 2 3 {row}\n" for row in frames.splitlines())
-    path = tmp_path / "walk.bvh"
-    path.write_text(first + sword + second + motion + head + step + frames)
-    people = import_motions(path)
-    assert len(people) == 2
-    for found in people:
-        assert_is_the_motion(found)
 
 
 WHOLE = bvh(TOOLS["cmu"])

@@ -96,26 +96,6 @@ def test_a_motion_of_our_body_is_not_changed(tmp_path):
     assert found.notes == []
 
 
-def test_our_own_files_are_read_as_they_are(tmp_path):
-    MOTION.save(tmp_path / "own.npz")
-    found = import_motion(tmp_path / "own.npz")
-    assert found.body.name == "scope"
-    assert found.notes == []
-    for name, value in vars(MOTION).items():
-        np.testing.assert_array_equal(getattr(found.motion, name), value, err_msg=name)
-
-
-def test_an_own_file_of_another_body_is_applied_to_ours(tmp_path):
-    own = motion_of(CLIP)
-    own.body_model = "smpl"
-    own.betas = np.ones(10)
-    own.save(tmp_path / "own.npz")
-    found = import_motion(tmp_path / "own.npz")
-    assert found.body.name == "scope"
-    assert any("Scope's own body" in note for note in map(str, found.notes))
-    np.testing.assert_array_equal(found.motion.betas, 0)
-
-
 @pytest.mark.parametrize("key", ["poses", "timestamps", "mocap_framerate"])
 def test_a_damaged_file_of_our_own_is_an_error(tmp_path, key):
     own = motion_of(CLIP)
@@ -161,13 +141,6 @@ def test_an_unclear_up_axis_is_said(tmp_path):
     told = import_motion(tmp_path / "lying.npz", up="z").notes
     assert any("up axis is not clear" in note for note in map(str, unsure))
     assert not any("not clear" in note for note in map(str, told))
-
-
-def test_one_frame_is_enough(tmp_path):
-    np.savez(tmp_path / "pose.npz", poses=in_file("z")["poses"][:1])
-    found = import_motion(tmp_path / "pose.npz")
-    assert len(found.motion) == 1
-    assert np.isfinite(found.motion.joints_cam).all()
 
 
 @pytest.mark.parametrize("arguments", [{"up": "x"}, {"rate": -1.0}, {"rate": np.nan}])

@@ -60,21 +60,6 @@ def test_the_knee_bends_about_the_same_axis_of_the_bones_as_before(axis, other):
     assert (bend[:, other[0], other[1]] > 0).all()  # and to the same side
 
 
-def test_a_leg_that_is_where_it_should_be_stays(legs):
-    thigh, shin, hip, knee, ankle = legs
-    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), ankle, thigh[:, :, 0])
-    np.testing.assert_allclose(new_thigh, thigh, atol=1e-6)
-    np.testing.assert_allclose(new_shin, shin, atol=1e-6)
-
-
-def test_a_goal_out_of_reach_is_pointed_at(legs):
-    thigh, shin, hip, knee, ankle = legs
-    goal = hip + [0.0, 0.0, -5.0]
-    new_thigh, new_shin = solve_leg(thigh, shin, (hip, knee, ankle), goal, thigh[:, :, 0])
-    reached = hip - 0.42 * new_thigh[:, :, 1] - 0.38 * new_shin[:, :, 1]
-    np.testing.assert_allclose(reached - hip, np.tile([0.0, 0.0, -0.8], (FRAMES, 1)), atol=1e-4)
-
-
 OFF_THE_LINE = [(0.0, 0.0), (0.005, 0.005), (-0.01, 0.005), (-0.03, 0.0)]
 
 
@@ -106,16 +91,6 @@ def lowered(fps, seconds=2.0):
     goals = np.zeros((len(times), 1, 3))
     hips[:, 0, 2] = 1.0 + needed
     return times, needed, pelvis_drop(hips, goals, np.array([1.0]), times)
-
-
-@pytest.mark.parametrize("fps", [24, 30, 60, 120, 240])
-def test_the_pelvis_is_lowered_equally_smoothly_at_any_frame_rate(fps):
-    times, needed, found = lowered(fps)
-    assert (found >= needed - 1e-9).all()
-    assert np.abs(np.gradient(found, times)).max() < 0.4
-    assert 0.6 < (found > 1e-6).sum() / fps < 0.8
-    # as what is needed: the same backwards
-    np.testing.assert_allclose(found[1:], found[:0:-1], atol=1e-12)
 
 
 def test_a_single_key_gets_its_own_drop():

@@ -61,11 +61,3 @@ def test_a_bone_that_inherits_no_rotation_still_moves_with_what_carries_it() -> 
     np.testing.assert_allclose(
         free.rotations[2] @ basis(free, wanted)[:, 2], wanted[:, 2], atol=1e-12
     )
-
-
-def test_a_rig_at_rest_has_no_channels() -> None:
-    rig = random_rig(np.random.default_rng(3))
-    np.testing.assert_allclose(
-        basis(rig, rig.rotations[None])[0], np.tile(np.eye(3), (6, 1, 1)), atol=1e-12
-    )
-    np.testing.assert_allclose(head_positions(rig, rig.rotations[None])[0], rig.heads, atol=1e-12)

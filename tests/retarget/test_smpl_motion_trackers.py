@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError
-from scope.scope_addon.retarget.import_motions import import_motions
 from scope.scope_addon.retarget.smpl_motion import read_smpl_motions
 from scope.scope_addon.untrusted import tables
 from scope.solver.rotations import exp
@@ -206,14 +205,6 @@ def test_the_motion_in_the_world_of_every_person_is_read(tmp_path: Path, name: s
         np.testing.assert_allclose(motion.trans, TRANS, atol=1e-6)
     if name == "gender.npz":
         assert found[0].gender == "male"
-
-
-def test_several_people_are_imported_on_one_body(tmp_path: Path) -> None:
-    as_pickle({0: wham(POSES), 1: wham(OTHER)}, tmp_path / "two.pkl")
-    people = import_motions(tmp_path / "two.pkl", up="z")
-    assert len(people) == 2
-    assert people[0].body is people[1].body
-    assert all(len(person.motion) == T for person in people)
 
 
 MATRICES = exp(POSES)
