@@ -89,28 +89,6 @@ def batch(folder, out, options=None, suffixes=(".npz", ".glb")):
     return Batch(folder, out, program, options or {}, suffixes)
 
 
-def test_a_report_that_takes_long_to_write_is_not_written_after_every_clip(
-    folder, tmp_path, monkeypatch
-):
-    # several clips that end while the report is written come as one outcome
-    def one_by_one(runner, tasks):
-        for task in tasks:
-            yield {task.name: runner._capture(task)}
-
-    monkeypatch.setattr(LocalRunner, "outcomes", one_by_one)
-    monkeypatch.setattr("scope.scope_addon.job.batch._QUICK_S", 0.0)
-    # the next one is due in years
-    monkeypatch.setattr("scope.scope_addon.job.batch._WRITING_SHARE", 1e-12)
-    written = []
-    text = "scope.scope_addon.job.batch.json_text"
-    monkeypatch.setattr(
-        text, lambda report, indent: written.append(len(report["files"])) or json.dumps(report)
-    )
-    report = batch(folder, tmp_path / "out").run(1)
-    assert written == [1, 5]  # after the first clip, and at the end
-    assert json.loads((tmp_path / "out" / REPORT_NAME).read_text("utf-8")) == report
-
-
 @pytest.mark.parametrize("jobs", [1, 3])
 def test_every_clip_has_its_own_outcome(folder, tmp_path, jobs):
     out = tmp_path / "out"
@@ -224,15 +202,6 @@ def test_a_link_in_the_place_of_the_report_is_not_followed(tmp_path):
     assert not (out / REPORT_NAME).is_symlink()
 
 
-def test_a_moved_folder_of_footage_is_still_finished(folder, tmp_path):
-    batch(folder, tmp_path / "out").run(1)
-    moved = tmp_path / "moved"
-    shutil.move(folder, moved)
-    calls(moved)
-    batch(moved, tmp_path / "out").run(1)
-    assert calls(moved) == ["b.mov", "d.avi"]
-
-
 def test_a_damaged_report_is_ignored(folder, tmp_path):
     for name in ("b.mov", "d.avi", "e.webm"):  # each is a process
         (folder / name).unlink()
@@ -259,16 +228,6 @@ def test_clips_of_several_people_share_no_name_with_a_persons_result(tmp_path):
     assert list(several.clips(recursive=False)) == ["walk", "walk.person2.mp4"]
 
 
-def test_results_of_clips_in_subfolders_lie_in_such_folders(tmp_path):
-    clips = tmp_path / "clips"
-    out = tmp_path / "out"
-    (clips / "below" / "deep").mkdir(parents=True)
-    (clips / "below" / "deep" / "d.mp4").write_text("x")
-    report = batch(clips, out, suffixes=(".npz",)).run(1, recursive=True)
-    assert report["exit_status"] == 0
-    assert (out / "below" / "deep" / "d.npz").is_file()
-
-
 def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp_path):
     (folder / "c.png").write_text("hangs")  # otherwise the third may end before the interrupt
 
@@ -286,60 +245,6 @@ def test_an_interrupt_stops_the_running_clips_and_keeps_the_finished(folder, tmp
     (folder / "c.png").write_text("nobody")
     batch(folder, out).run(1)
     assert "a.mp4" not in calls(folder)
-
-
-def test_a_clip_that_ends_while_the_batch_is_stopped_is_finished(folder, tmp_path):
-    """Its results were there without an entry, so that the next run captured it again."""
-    (folder / "b.mov").write_text("lingers")
-    out = tmp_path / "out"
-
-    def interrupt(stage, done, total):
-        if done == 1:
-            wait_for(lambda: (out / "b.glb").is_file())
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        batch(folder, out).run(1, progress=interrupt)
-    report = json.loads((out / REPORT_NAME).read_text("utf-8"))
-    assert {entry["file"]: entry["status"] for entry in report["files"]} == {
-        "a.mp4": "done",
-        "b.mov": "done",
-    }
-    calls(folder)
-    batch(folder, out).run(1)
-    assert calls(folder) == ["c.png", "d.avi", "e.webm"]
-
-
-@pytest.mark.skipif(os.name == "nt", reason="select() on Windows is for sockets only")
-def test_an_interrupt_while_clips_are_being_started_stops_the_first(folder, tmp_path, monkeypatch):
-    """A signal can arrive before the last clip has been submitted."""
-    begun = tmp_path / "begun"
-    ended = tmp_path / "ended"
-    code = (
-        f"import pathlib, select, sys; pathlib.Path({str(begun)!r}).touch()\n"
-        f"select.select([sys.stdin], [], [], 300)[0] or pathlib.Path({str(ended)!r}).touch()\n"
-    )
-
-    class Interrupting(dict):
-        def items(self):
-            yield next(iter(super().items()))
-            wait_for(begun.exists)
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(
-        Batch, "clips", lambda *_: Interrupting({"a": folder / "a.mp4", "b": folder / "b.mov"})
-    )
-    with pytest.raises(KeyboardInterrupt):
-        Batch(folder, tmp_path / "out", [sys.executable, "-c", code], {}, (".npz",)).run(1)
-    assert not ended.exists()
-
-
-def test_a_value_may_begin_with_a_hyphen(folder, tmp_path):
-    options = {"--rig-object": "-Rig", "--quality": "fast", "--hands": None}
-    batch(folder, tmp_path / "out", options).run(1)
-    passed = json.loads((folder / "calls.log").read_text("utf-8").splitlines()[0])
-    args = cli.build_parser().parse_args(passed)
-    assert (args.rig_object, args.quality, args.hands) == (["-Rig"], "fast", "on")
 
 
 def test_overlays_and_pages_of_a_batch_lie_next_to_the_results(folder, tmp_path):

@@ -5,12 +5,10 @@ joints and skin.
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-import scope
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.datablocks import captures_of
@@ -87,30 +85,6 @@ def test_variable_frame_rate_keeps_its_timing(body, make_motion, truth, blender,
         np.testing.assert_allclose(joints, expected.joints[t], atol=JOINT_TOLERANCE)
 
 
-@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
-def test_a_last_pose_between_whole_frames_is_reached(
-    body, make_motion, truth, blender, tmp_path, suffix
-):
-    motion = make_motion(body, timestamps=np.array([0, 1, 2, 3.9]) / 30, rate=30.0)
-    path = tmp_path / f"walk{suffix}"
-    export_motions([motion], body, path)
-    blender.go_to(read_back(path) + 4)
-    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
-    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=2e-3)
-
-
-@pytest.mark.parametrize("suffix", [".fbx", ".blend", ".bvh"])
-@pytest.mark.parametrize("rate", [25.0, 30000 / 1001])
-def test_formats_that_store_a_frame_rate_store_the_right_one(
-    body, make_motion, tmp_path, suffix, rate
-):
-    path = tmp_path / f"walk{suffix}"
-    export_motions([make_motion(body, 3, rate=rate)], body, path)
-    read_back(path, 24.0)
-    render = bpy.context.scene.render
-    assert render.fps / render.fps_base == pytest.approx(rate, rel=1e-5)
-
-
 def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_motion, tmp_path):
     build_scene([make_motion(body, 3, rate=29.97)], body, options=NEW_SCENE)
     path = tmp_path / "walk.usda"  # the text form of the same writer
@@ -125,74 +99,6 @@ def test_usd_counts_time_in_the_scenes_frames_and_lengths_in_metres(body, make_m
     ) == pytest.approx(30000 / 1001, rel=1e-6)
     assert re.search(r"metersPerUnit = 1\b", header)
     assert 'upAxis = "Z"' in header
-
-
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
-def test_materials_survive(body, make_motion, tmp_path, suffix, blender):
-    path = tmp_path / f"walk{suffix}"
-    export_motions([make_motion(body, 2)], body, path)
-    read_back(path)
-    mesh = blender.only("MESH").data
-    used = {mesh.materials[p.material_index].name for p in mesh.polygons}
-    assert used == {body.material_names[i] for i in np.unique(body.face_material)}
-    for material in mesh.materials:
-        shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
-        color = body.material_colors[body.material_names.index(material.name)]
-        np.testing.assert_allclose(shader.inputs["Base Color"].default_value, color, atol=2e-3)
-
-
-def test_glb_holds_one_animation_one_skin_and_named_morphs(body, make_motion, tmp_path):
-    motions = [make_motion(body, 5, rate=25.0), make_motion(body, 5, rate=25.0, seed=1)]
-    path = tmp_path / "pair.glb"
-    export_motions(motions, body, path)
-    gltf = glb_json(path)
-    assert len(gltf["animations"]) == 1
-    assert len(gltf["skins"]) == 2
-    for mesh in gltf["meshes"]:
-        assert mesh["extras"]["targetNames"] == [f"Shape{p:03d}" for p in range(body.P)]
-        np.testing.assert_allclose(mesh["weights"], motions[0].betas, atol=1e-6)
-        for primitive in mesh["primitives"]:
-            assert "JOINTS_0" in primitive["attributes"]
-            assert "JOINTS_1" not in primitive["attributes"]
-    times = {gltf["accessors"][s["input"]]["max"][0] for s in gltf["animations"][0]["samplers"]}
-    assert max(times) == pytest.approx(4 / 25)
-
-
-def test_glb_of_a_part_of_the_footage_begins_at_once(body, make_motion, tmp_path):
-    motion = make_motion(body, 5, rate=25.0)
-    motion.frames += 250
-    motion.timestamps += 10.0
-    path = tmp_path / "late.glb"
-    export_motions([motion, motion], body, path)
-    gltf = glb_json(path)
-    inputs = [gltf["accessors"][s["input"]] for s in gltf["animations"][0]["samplers"]]
-    assert min(i["min"][0] for i in inputs) == 0.0
-    assert max(i["max"][0] for i in inputs) == pytest.approx(4 / 25)
-
-
-def test_glb_is_upright_in_its_y_up_frame(body, make_motion, tmp_path):
-    path = tmp_path / "walk.glb"
-    export_motions([make_motion(body, 2)], body, path)
-    gltf = glb_json(path)
-    positions = [
-        gltf["accessors"][p["attributes"]["POSITION"]] for p in gltf["meshes"][0]["primitives"]
-    ]
-    low = np.min([p["min"] for p in positions], axis=0)
-    high = np.max([p["max"] for p in positions], axis=0)
-    # shaped soles lie at 0, the unshaped mesh near it
-    assert low[1] == pytest.approx(0.0, abs=0.15)
-    assert 1.4 < high[1] - low[1] < 2.2
-
-
-def test_the_footages_camera_is_exported_on_request(body, make_motion, tmp_path, blender):
-    path = tmp_path / "walk.glb"
-    motion = make_motion(body, 2)
-    export_motions([motion], body, path, export_options=ExportOptions(camera=True))
-    read_back(path)
-    camera = blender.only("CAMERA")
-    np.testing.assert_allclose(
-        camera.matrix_world.translation, motion.world_from_camera[0, :3, 3], atol=1e-5
-    )
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
@@ -279,24 +185,6 @@ def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender,
         np.testing.assert_allclose(posed, truth(body, motion).joints[1], atol=2e-3)
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".blend"])
-def test_several_people_in_one_file_all_move(body, make_motion, tmp_path, blender, truth, suffix):
-    motions = [make_motion(body, 6), make_motion(body, 6, seed=1)]
-    path = tmp_path / f"pair{suffix}"
-    export_motions(motions, body, path)
-    first = read_back(path)
-    armatures = sorted(
-        (obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: obj.name
-    )
-    for t in (0, 3, 5):
-        blender.go_to(first + t)
-        for armature, motion in zip(armatures, motions, strict=True):
-            joints = blender.joints(armature, body.joint_names)
-            np.testing.assert_allclose(
-                joints, truth(body, motion).joints[t], atol=2e-3, err_msg=armature.name
-            )
-
-
 @pytest.mark.parametrize("first_frame", [0.0, 7.0])
 def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(
     body, make_motion, tmp_path, first_frame
@@ -335,35 +223,3 @@ def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(
     assert take.props == [b"A walk"]
     span = next(e.props for e in take.elems if e.id == b"LocalTime")
     assert span == [0, pytest.approx(0.2 * second)]
-
-
-def test_several_files_at_once(body, make_motion, tmp_path):
-    paths = [tmp_path / "a.glb", tmp_path / "c.bvh"]
-    written, _ = export_motions([make_motion(body, 2)], body, paths)
-    assert sorted(written) == paths
-    assert all(p.stat().st_size for p in paths)
-
-
-def test_exporting_motions_leaves_no_trace(body, make_motion, tmp_path):
-    bpy.ops.mesh.primitive_cube_add()
-    scene = bpy.context.scene
-    window = bpy.context.window
-    kinds = "scenes collections objects meshes armatures actions cameras".split()
-    kinds += "materials shape_keys movieclips".split()
-    before = {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds}
-    sample = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"
-    export_motions(
-        [make_motion(body, 2)], body, [tmp_path / "a.glb", tmp_path / "a.usdc"], footage=sample
-    )
-    assert {kind: [b.name for b in getattr(bpy.data, kind)] for kind in kinds} == before
-    assert window.scene == scene
-    assert bpy.context.view_layer.objects.active.name == "Cube"
-
-
-def test_a_caller_without_a_window_can_export(body, make_motion, tmp_path):
-    with bpy.context.temp_override(window=None):  # as in a timer
-        assert bpy.context.window is None
-        written, _ = export_motions(
-            [make_motion(body, 2)], body, [tmp_path / "a.bvh", tmp_path / "b.glb"]
-        )
-    assert all(path.is_file() for path in written)
