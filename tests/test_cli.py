@@ -13,7 +13,6 @@ from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.footage import display_text
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.options import Place, options_at
 
 # several would wait for each other in busy loops
 BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]
@@ -182,24 +181,6 @@ def test_a_failed_write_keeps_the_earlier_result(tmp_path, capsys, monkeypatch):
     assert files_below(tmp_path) == ["out.npz", "person.png"]
 
 
-def test_outputs_that_are_the_same_file_are_written_once(tmp_path, capfd, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "out").mkdir()
-    (tmp_path / "linked").symlink_to("out")
-    names = [
-        "out/case.npz",
-        "out/../out/case.npz",
-        tmp_path / "out" / "case.npz",
-        "linked/case.npz",
-        "case.npz",
-    ]
-    options = [text for name in names for text in ("-o", name)]
-    status, out, err = run(capfd, "capture", SAMPLE, *BRIEF, "--json", *options)
-    assert status == 0, err
-    assert json.loads(out)["outputs"] == ["out/case.npz", "case.npz"]
-    assert files_below(tmp_path) == ["case.npz", "linked", "out", "out/case.npz"]
-
-
 def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
@@ -297,20 +278,6 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
     assert motion.valid.all()
     overlay = np.frombuffer((tmp_path / f"{name}.o.png").read_bytes(), np.uint8)
     assert cv2.imdecode(overlay, cv2.IMREAD_COLOR).shape == frame.shape
-
-
-def test_help_lists_every_option(capsys):
-    with pytest.raises(SystemExit) as stop:
-        cli.build_parser().parse_args(["capture", "--help"])
-    assert stop.value.code == 0
-    text = capsys.readouterr().out
-    words = text.split()
-    without_breaks = "".join(words)
-    for suffix in cli.SUFFIXES:
-        assert suffix in text
-    for each in options_at(Place.COMMAND_LINE):
-        assert each.flag in words
-        assert "".join((each.argument.help or each.help).split()) in without_breaks, each.flag
 
 
 def test_hands_need_a_body_with_fingers(tmp_path, capsys):

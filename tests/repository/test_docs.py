@@ -38,13 +38,11 @@ from scope.scope_addon.edit.corrections import (
 )
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, VIEW_KEYS, Motion
-from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.scene.export.output_paths import check_output
 from scope.solver.body_file import BUILT_IN
 
 from ..made_motion import made_face, made_motion, made_views
 
-CHOSEN = [each for each in options_at(Place.COMMAND_LINE) if each.choices]
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
@@ -163,19 +161,6 @@ def test_every_option_is_defined_once_in_the_command_line_page():
     assert elsewhere == []
 
 
-@pytest.mark.parametrize("declared", CHOSEN, ids=[each.name for each in CHOSEN])
-def test_the_command_line_page_states_the_choices_of_an_option_and_its_default(declared):
-    (meaning,) = [
-        row[1]
-        for first, rows in tables(DOCS / "command_line.md")
-        if first == "option"
-        for row in rows
-        if row[0].startswith(f"`{declared.flag} ")
-    ]
-    assert set(declared.values) <= set(re.findall(r"`([^`]+)`", meaning))
-    assert re.findall(r"`([^`]+)` \(default\)", meaning) == [declared.default]
-
-
 def test_every_key_of_the_motion_file_is_defined_once():
     keys = {field.name for field in fields(Motion)} - {"corrections", "face", "views"} | {
         *CORRECTION_KEYS,
@@ -230,14 +215,6 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
             )
 
 
-def test_every_term_of_the_glossary_is_defined_once():
-    terms = [
-        row[0] for first, rows in tables(DOCS / "glossary.md") if first == "term" for row in rows
-    ]
-    assert len(terms) > 50
-    assert [term for term, count in Counter(terms).items() if count > 1] == []
-
-
 def test_every_public_name_of_the_solver_is_shown_once():
     page = (DOCS / "solver_api.md").read_text("utf-8")
     shown = Counter(re.findall(r"^::: scope\.solver\.(\w+)$", page, re.M))
@@ -284,12 +261,6 @@ def test_every_file_that_is_named_exists(page):
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)
 def test_every_page_can_be_reached_from_the_readme(page):
     assert f"(docs/{page.name})" in (ROOT / "README.md").read_text("utf-8")
-
-
-def test_every_block_is_of_a_language_that_is_tried():
-    found = {(p.name, m[1]) for p in PAGES for m in _BLOCK.finditer(p.read_text("utf-8"))}
-    tried = {"sh", "python", "json", "toml", "text", "mermaid"}
-    assert {language for _, language in found} <= tried
 
 
 @pytest.fixture

@@ -48,8 +48,3 @@ def project(points: NDArray[np.float64]) -> NDArray[np.float64]:
     p = points @ INTRINSICS.T
     pixels: NDArray[np.float64] = p[:, :2] / p[:, 2:]
     return pixels
-
-
-def joint_error_mm(body: Body, found: NDArray[np.float64], truth: State) -> float:
-    """Mean distance of joints (K+1, 3) from the truth's, in millimetres."""
-    return float(np.linalg.norm(found - place(body, truth)[1], axis=1).mean() * 1e3)

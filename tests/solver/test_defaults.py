@@ -134,14 +134,6 @@ def test_one_weight_changes_all_default_stages():
         Options(weights=weights, stages=[Stage()])
 
 
-def test_kernels_are_widest_first():
-    widenings = [stage.widening for stage in COLD_STAGES]
-    assert widenings == sorted(widenings, reverse=True)
-    assert widenings[-1] == 1.0
-    table = Options(robust_keypoints3d=0.5).stage_table(COLD_STAGES)[0]
-    np.testing.assert_allclose(table[:, 1, 1], 1.0 / (0.5 * np.array(widenings)))
-
-
 def height(part, ints, floats):
     return part.t[1:2] - floats
 

@@ -18,14 +18,12 @@ from scope.solver import (
     Keypoints2D,
     Keypoints3D,
     Measurements,
-    MotionPrior,
     Options,
     PosePriors,
     Priors,
     ShapeError,
     Stage,
     State,
-    Status,
     Temporal,
     UnitsWarning,
     Weights,
@@ -408,15 +406,6 @@ def test_frame_numbers_or_milliseconds_for_seconds_bring_a_warning_and_a_motion(
         assert len(fit_motion(BODY, [SEEN] * 5, times, priors=Priors(), options=SHORT).states) == 5
 
 
-def test_seconds_bring_no_warning():
-    # slow: a second apart
-    usual = MotionPrior()
-    slow = MotionPrior(root_rotation=1 / 3600, root_position=30 / 3600)
-    # three: too few
-    for times, motion in ((np.arange(5) / 30, usual), (np.arange(3), usual), (np.arange(5), slow)):
-        fit_motion(BODY, [SEEN] * len(times), times, motion=motion, priors=Priors(), options=SHORT)
-
-
 def test_lengths_in_millimetres_bring_a_warning_and_a_fit():
     m = replace(SEEN, keypoints3d=replace(SEEN.keypoints3d, points=1000.0 * POINTS))
     with pytest.warns(UnitsWarning, match="Points of 3D keypoints .* divide millimetres by 1000"):
@@ -462,22 +451,6 @@ def test_what_can_be_used_passes_without_a_warning(make):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         make()
-
-
-def test_a_state_that_is_not_finite_is_reported_by_the_status():
-    """Unlike a rotation, which has no nearest one: a position is a measured value, and those are
-    never refused.
-    """
-    found = fit(BODY, SEEN, init=state(t_camera_root=np.full(3, NAN)), options=SHORT)
-    assert found.status is Status.NON_FINITE
-
-
-def test_every_rotation_passes_and_every_reflection_is_refused():
-    R = rotations.exp(3.0 * np.random.default_rng(4).standard_normal((200, 3)))
-    validation.check_rotations(R, "R")
-    for k, mirrored in enumerate(R * [1, 1, -1]):
-        with pytest.raises(InvalidValueError, match="number 1 is"):
-            validation.check_rotations(np.stack([R[k], mirrored]), "R")
 
 
 def test_random_information_is_refused_exactly_where_an_eigenvalue_is_negative():

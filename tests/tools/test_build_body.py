@@ -7,9 +7,8 @@ import zipfile
 
 import numpy as np
 import pytest
-from scope.solver.body_file import BUILT_IN, CHILDREN, GROWTH, growth_of, load_body
+from scope.solver.body_file import BUILT_IN, CHILDREN, growth_of, load_body
 from scope.tools.build_body.build import rig_body
-from scope.tools.build_body.geometry import growth
 from scope.tools.build_body.geometry.expressions import build_expressions
 from scope.tools.build_body.geometry.materials import mirror_faces
 from scope.tools.build_body.joints import make_skeleton, other_side
@@ -112,15 +111,6 @@ def test_the_expressions_are_those_of_the_source(shaped):
             np.testing.assert_allclose(
                 1e-4 * built["moves"][rows], [truth[v] for v in sources], atol=1e-7
             )
-
-
-def test_growth_is_that_of_the_source(shaped, targets, grown, monkeypatch):
-    monkeypatch.setattr(growth, "with_growth", lambda *_: grown)
-    built = growth.build_growth(shaped, targets)
-    with np.load(GROWTH) as file:
-        assert set(file.files) == set(built)
-        for key, value in built.items():
-            np.testing.assert_allclose(file[key], value, atol=5e-5, err_msg=key)
 
 
 def test_files_are_small_and_carry_their_licence(body):
@@ -253,25 +243,6 @@ def test_trunks_and_legs_vary_against_each_other_as_in_surveys(body):
     assert -0.5 < np.corrcoef(ratio, stature)[0, 1] < -0.1
 
 
-def test_the_rest_pose_is_a_t(body):
-    at = {name: body.J_template[i] for i, name in enumerate(body.joint_names)}
-    for name in ("left_elbow", "left_wrist"):
-        np.testing.assert_allclose(at[name][1:], at["left_shoulder"][1:], atol=1e-5)
-    assert at["left_ankle"][0] == pytest.approx(at["left_hip"][0], abs=1e-5)
-    assert at["left_wrist"][0] > at["left_elbow"][0] > at["left_shoulder"][0] > 0.0
-    assert at["left_foot"][2] > at["left_ankle"][2] + 0.05
-    np.testing.assert_allclose(at["pelvis"], 0.0, atol=1e-6)
-    np.testing.assert_allclose(body.J_shapedirs[0], 0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("first", [-2.0, 0.0, 2.0])
-def test_joints_lie_inside_the_mesh(body, first):
-    betas = np.eye(body.P)[0] * first
-    inside = winding_number(body.rest_joints(betas), body.rest_vertices(betas), body.triangles())
-    outside = [name for name, number in zip(body.joint_names, inside, strict=True) if number < 0.8]
-    assert outside == []
-
-
 def test_bone_lengths_are_those_of_the_source_pose_for_every_shape(body, shaped):
     """Rotations keep lengths: this fails if the T-pose were only approximately linear in β."""
     skeleton = make_skeleton(shaped.source, with_hands=body.name == "scope_h")
@@ -326,23 +297,6 @@ def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
 
 # Keypoints
 # --------------------------------------------------------------------------------------------------
-
-
-def test_keypoint_sets_are_complete(body):
-    assert len(body.keypoint_set("blazepose")) == 33
-    assert len(body.keypoint_set("coco")) == 23
-    assert len(body.keypoint_set("hand")) == 42
-    for prefix in ("blazepose", "coco"):
-        found = body.keypoint_set(prefix)
-        for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"):
-            for side in ("left", "right"):
-                index = found[f"{side}_{joint}"]
-                part = body.joint_names.index(f"{side}_{joint}")
-                assert body.keypoint_part[index] == part
-                np.testing.assert_array_equal(body.keypoint_template[index], body.J_template[part])
-                np.testing.assert_array_equal(
-                    body.keypoint_shapedirs[index], body.J_shapedirs[part]
-                )
 
 
 def test_keypoints_lie_where_their_names_say(body):

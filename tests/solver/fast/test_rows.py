@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The functions in SIMD against those in plain numba, for every width of the shape up to 40."""
+"""The functions in SIMD against those in plain numba, for widths of the shape up to 40."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from scope.solver.gauss_newton import plain_rows as plain
 from scope.solver.kernel import kernel
 from scope.solver.residuals import joint_flow
 
-WIDTHS = range(0, 44, 4)
+WIDTHS = (0, 4, 8, 12, 40)
 
 
 def numbers(rng, count):

@@ -36,7 +36,6 @@ UNGUARDED = Options(
 )
 BODIES = {
     "P0": (23, 0, Options()),
-    "K51": (51, 10, Options()),
     "P100": (23, 100, Options()),
     "one joint": (1, 0, Options()),
     "without priors and kernels": (23, 10, UNGUARDED),

@@ -36,13 +36,6 @@ def test_valid_frames_of_the_universal_joints_in_metres(tmp_path):
         assert np.allclose(truth.intrinsics, K)  # from the joints of true size
 
 
-def replace(path, key, value):
-    with h5py.File(path, "r+") as file:
-        del file[key]
-        if value is not None:
-            file[key] = value
-
-
 def test_an_array_that_claims_more_than_memory_is_not_read(tmp_path):
     write_3dhp(tmp_path, JOINTS, VALID)
     with h5py.File(tmp_path / FILE, "r+") as file:
