@@ -7,21 +7,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ...solver.body import Body
-from ..arrays import Float64Array, Uint8Array
+from ..arrays import Float64Array
 from ..errors import NoPersonError
 from ..machine_code.kernel_count import kernel_count
 from ..notices import Notice, notice
 from ..options.capture import AUTO, LARGEST, OFF
-from .camera.background_record import BackgroundRecord, CameraMotion
-from .camera.camera_rotation import BackgroundTracker
+from .camera.background_record import CameraMotion
 from .camera.given_path import GivenPath, read_camera_path
 from .camera.intrinsics import Camera, choose_camera
 from .camera.line_segments import Lines
@@ -29,20 +26,18 @@ from .camera.zoom import Zoom
 from .clock import COMPILING, FINDING, Progress, StageClock
 from .fitting.focal_length import BackgroundEstimators, FocalFits
 from .fitting.live_body import LiveBody
-from .media.frame import AutoExposure, Frame
+from .frame_observer import FrameObserver, Observed, Trackers
+from .media.frame import Frame
 from .media.video import Video, no_frames_error, opencv_in_one_thread
 from .options import CaptureOptions, most_people
 from .perception.adapters.description import description_path
 from .perception.landmark_network import EstimateMemory
 from .perception.observation import Observation
 from .perception.sessions import Execution
-from .tracking.chosen_person import ChosenPerson, find_chosen, needed_turn, place_of
+from .tracking.chosen_person import ChosenPerson, needed_turn
 from .tracking.face_tracker import FaceTracker
 from .tracking.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
-from .tracking.people import people_of
-from .tracking.scene_cuts import SCENE_GAP_S, SceneCuts
-from .tracking.search_schedule import MaskSchedule
-from .tracking.track import Track, Tracklet, make_track
+from .tracking.track import Track
 from .tracking.tracker import MAX_PEOPLE, PeopleTracker
 
 LENGTH_TOLERANCE_S = 1.0  # by which a container may say that footage is too long
@@ -88,14 +83,6 @@ def given_camera(video: Video, options: CaptureOptions) -> Camera:
         metadata_focal_mm=video.focal_35mm,
         view=video.wanted.view,
     )
-
-
-class Trackers(NamedTuple):
-    """The trackers of people, and of what is captured only on request."""
-
-    people: PeopleTracker
-    hands: HandTracker | None
-    faces: FaceTracker | None
 
 
 def network_threads(wanted: int, execution: Execution) -> int:
@@ -160,150 +147,8 @@ class ObservationJob:
     background: BackgroundEstimators
 
 
-@dataclass(frozen=True)
-class Observed:
-    """What was observed in the T frames of a clip, before it is decided who is who."""
-
-    frames: list[int]  # (T,) source frame index
-    timestamps: list[float]  # (T,) seconds
-    cut_rows: list[int]  # of the frames that begin another scene
-    tracklets: list[Tracklet]
-    background: BackgroundRecord
-    execution: str  # what the networks ran on, for the report
-    warnings: list[Notice]
-
-    def tracks(
-        self, most: int, chosen: ChosenPerson | None = None
-    ) -> tuple[list[Track], list[ChosenPerson]]:
-        """Return the tracks of at most ``most`` people, and where others are, who are left out.
-
-        :param chosen: who comes first; None: the most prominent one.
-        :raises UsageError: the chosen person was not found.
-        """
-        cuts = np.zeros(len(self.timestamps))
-        cuts[self.cut_rows] = 1.0
-        times = np.array(self.timestamps) + SCENE_GAP_S * np.cumsum(cuts)
-        seen = [tracklet for tracklet in self.tracklets if tracklet.rows]
-        in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
-        people = people_of(times.tolist(), in_order)
-        if chosen is not None and people:
-            people.insert(0, people.pop(find_chosen(chosen, people, self.timestamps)))
-        tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]
-        return tracks, [place_of(person, self.timestamps) for person in people[most:]]
-
-
-# Observes all frames of a clip. The plain one is `observe_frames`; `long_clips` has another.
+# Observes all frames of a clip. The plain one is `observe_in_one_pass`; `long_clips` has another.
 ObserveFrames = Callable[[ObservationJob], Observed]
-
-
-class FrameObserver:
-    """Takes the frames of a clip in order; none is kept.
-
-    :param trackers: that have seen nothing, as ``masks`` and ``background``.
-    :param pool: in which the background is followed while the networks run on the next frame.
-    """
-
-    def __init__(
-        self,
-        trackers: Trackers,
-        masks: MaskSchedule,
-        background: BackgroundTracker,
-        pool: ThreadPoolExecutor,
-        clock: StageClock,
-    ) -> None:
-        self.frames: list[int] = []
-        self.timestamps: list[float] = []
-        self.cut_rows: list[int] = []
-        self.tracklets: dict[int, Tracklet] = {}
-        self.background = background
-        self._trackers = trackers
-        self._masks = masks
-        self._pool = pool
-        self._clock = clock
-        self._cuts = SceneCuts()
-        self._exposure = AutoExposure()
-        # The next frame in the brightness that the networks are given.
-        self._upcoming_lit: Uint8Array | None = None
-        self._following: Future[None] | None = None
-
-    def add(
-        self,
-        frame: Frame,
-        upcoming: Frame | None,
-        counts: bool = True,
-        is_sampled: bool = False,
-        is_shared: bool = False,
-    ) -> list[tuple[int, Observation]]:
-        """Observe the next frame, and return tracklet number and observation of each person.
-
-        :param upcoming: the frame after it; None at the end of the clip.
-        :param counts: whether the frame counts in the schedule of the masks and among the cuts.
-        :param is_sampled: whether the camera's rotation has to be estimated in this frame.
-        :param is_shared: whether another window has the frame as well.
-        """
-        time_s = frame.timestamp_s
-        row = len(self.timestamps)
-        with self._clock.stage("decode"):
-            lit = self._upcoming_lit
-            if lit is None:
-                lit = self._exposure.brighten(frame.image_rgb)
-            upcoming_rgb = None if upcoming is None else upcoming.image_rgb
-            self._upcoming_lit = (
-                None if upcoming_rgb is None else self._exposure.brighten(upcoming_rgb)
-            )
-        with self._clock.stage("networks"):
-            is_cut = self._cuts.is_cut(frame.image_rgb, upcoming_rgb)
-        if is_cut:
-            self._trackers.people.forget()
-            if counts:
-                self.cut_rows.append(row)
-        observations = self._track(lit, time_s, counts)
-        self.frames.append(frame.index)
-        self.timestamps.append(time_s)
-        for number, observation in observations:
-            self.tracklets.setdefault(number, Tracklet()).add(row, observation)
-        people_px = [observation.keypoints_px for _, observation in observations]
-        with self._clock.stage("background"):
-            self._wait_for_background()
-            self._following = self._pool.submit(
-                self.background.add,
-                frame.image_rgb,
-                time_s,
-                people_px,
-                is_cut,
-                is_sampled,
-                is_shared,
-            )
-        return observations
-
-    def finish(self) -> None:
-        """Wait for the background and the reference network."""
-        self._wait_for_background()
-        for tracklet in self.tracklets.values():
-            for _, call in tracklet.references:
-                call.result()
-
-    def _track(
-        self, lit: Uint8Array, time_s: float, with_masks: bool
-    ) -> list[tuple[int, Observation]]:
-        """Return tracklet number and observation of each person in a frame (H, W, 3)."""
-        trackers = self._trackers
-        with self._clock.stage("networks"):
-            masks_are_due = with_masks and self._masks.upcoming_is_due
-            observations = trackers.people.step(lit, self._upcoming_lit, time_s, masks_are_due)
-            if with_masks:
-                observations = self._masks.add(lit, observations)
-        if trackers.hands is not None:
-            with self._clock.stage("hands"):
-                observations = trackers.hands.step(lit, observations, time_s)
-        if trackers.faces is not None:
-            with self._clock.stage("face"):
-                observations = trackers.faces.step(lit, observations, time_s)
-        return observations
-
-    def _wait_for_background(self) -> None:
-        if self._following is not None:
-            self._following.result()
 
 
 def observe(
@@ -379,41 +224,15 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
     execution = Execution(job.options.provider)
     threads = network_threads(job.options.threads, execution)
     trackers = open_trackers(job.options, threads, execution, memory)
-    observer = new_observer(video, trackers, job.camera, job.background.pool, job.clock)
+    observer = FrameObserver(video, trackers, job.camera, job.background.pool, job.clock)
     for done, (frame, upcoming) in enumerate(frame_pairs(iter(video), job.clock), start=1):
-        people = largest_first(observer.add(frame, upcoming))
+        people = observer.add(frame, upcoming)
         with job.clock.stage("background"):
             largest = people[0] if people else None
             job.background.add(frame.timestamp_s, largest, observer.background)
         job.listeners.watch(frame, people, job.live)
         job.listeners.progress(FINDING, done, max(expected, done))
-    observer.finish()
-    return Observed(
-        observer.frames,
-        observer.timestamps,
-        observer.cut_rows,
-        list(observer.tracklets.values()),
-        observer.background.record(),
-        execution.describe(threads),
-        execution.warnings + video.warnings,
-    )
-
-
-def new_observer(
-    video: Video, trackers: Trackers, camera: Camera, pool: ThreadPoolExecutor, clock: StageClock
-) -> FrameObserver:
-    """Return an observer of a clip's frames, or of some of them, by trackers that have seen
-    nothing.
-    """
-    masks = MaskSchedule(trackers.people.mask_network, video.expected_frames)
-    background = BackgroundTracker(camera, video.width, video.height)
-    return FrameObserver(trackers, masks, background, pool, clock)
-
-
-def largest_first(observations: list[tuple[int, Observation]]) -> list[Observation]:
-    """Return the people of a frame, the largest first."""
-    people = [observation for _, observation in observations]
-    return sorted(people, key=lambda observation: -observation.region.side_px)
+    return observer.observed(execution.describe(threads), execution.warnings + video.warnings)
 
 
 def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Frame, Frame | None]]:

@@ -22,7 +22,7 @@ from ...solver.body_file import BUILT_IN, CHOICE, as_path, scope_body
 from ...solver.body_file import load_body as load_trusted_body
 from ...solver.errors import ModelFileError
 from ...solver.smpl_family import REQUIRED, smpl_body
-from .files import npz_keys, read_members, read_npz
+from .files import npz_keys, read_npz
 from .pickles import read_pickle, to_array
 
 # SMPL-X: 10475, 55, 576125
@@ -132,7 +132,9 @@ def load_model(path: str | Path) -> Body:
 
 def _read_tables(path: Path) -> dict[str, NDArray[Any]]:
     if zipfile.is_zipfile(path):
-        arrays, posedirs = read_members(path, (*_NUMERIC, *_TEXT), shape_of="posedirs")
+        wanted = (*_NUMERIC, *_TEXT, "posedirs")
+        arrays = read_npz(path, ModelFileError, "body file", wanted=wanted)
+        posedirs = arrays.pop("posedirs", np.zeros(())).shape
     else:
         content = read_pickle(path)
         try:

@@ -9,7 +9,6 @@ of what is read is bounded: official SMPL-X files also carry pickled tables, whi
 from __future__ import annotations
 
 import io
-import math
 import stat
 import struct
 import tokenize
@@ -55,8 +54,6 @@ def check_regular(path: Path, error: type[InputError], what: str, largest_bytes:
         )
 
 
-LARGEST_ARRAY = 1 << 28  # bytes unpacked; SMPL-X's 400 shape directions in float64 have 100 million
-
 # What zipfile, zlib and numpy raise on damaged or hostile files.
 UNREADABLE: tuple[type[Exception], ...] = (
     OSError,
@@ -85,41 +82,6 @@ def npz_keys(path: Path) -> set[str]:
         return set()
 
 
-def read_members(
-    path: Path, wanted: Collection[str], shape_of: str
-) -> tuple[dict[str, NDArray[Any]], tuple[int, ...]]:
-    """Read the arrays of a .npz file that are wanted and present.
-
-    :param shape_of: an array of which only the shape is returned, () when absent.
-    :raises ModelFileError: damaged, too large, or a wanted array holds Python objects.
-    """
-    arrays: dict[str, NDArray[Any]] = {}
-    shape: tuple[int, ...] = ()
-    try:
-        with zipfile.ZipFile(path) as archive:
-            for entry in archive.infolist():
-                key = entry.filename.removesuffix(".npy")
-                if key not in wanted and key != shape_of:
-                    continue
-                if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                    raise ModelFileError(
-                        f"{key} is compressed in a way that numpy does not use; save it with numpy"
-                    )
-                if key in wanted:
-                    with archive.open(entry) as file:
-                        arrays[key] = _read_array(file, entry.file_size, key)
-                else:
-                    with archive.open(entry) as file:
-                        shape, _, _ = read_header(file, key)
-    except ModelFileError as cause:
-        raise ModelFileError(f"{path} cannot be used as a body: {cause}") from None
-    except UNREADABLE as cause:
-        raise ModelFileError(
-            f"{path} is not a readable body file ({in_one_line(cause)}); download it again"
-        ) from cause
-    return arrays, shape
-
-
 def read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """Return the shape of an array in numpy's format, whether it is in the order of Fortran, and
     its type.
@@ -134,27 +96,6 @@ def read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dt
         )
     header: tuple[tuple[int, ...], bool, np.dtype[Any]] = _HEADER_READERS[version](file)
     return header
-
-
-def _read_array(file: IO[bytes], size: int, key: str) -> NDArray[Any]:
-    shape, fortran, dtype = read_header(file, key)
-    if dtype.hasobject:
-        raise ModelFileError(
-            f"{key} is stored as a Python object; use the publisher's own .npz or .pkl file"
-        )
-    count = math.prod(shape) * dtype.itemsize
-    if any(n < 0 for n in shape) or count > min(size, LARGEST_ARRAY):
-        raise ModelFileError(
-            f"{key} claims shape {shape}, more than a body needs or the file holds; choose another"
-        )
-    raw = file.read(count)
-    if len(raw) != count:
-        raise ModelFileError(f"{key} ends too early; download it again")
-    return (
-        np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C")
-        if count
-        else np.zeros(shape, dtype)
-    )
 
 
 LARGEST_BYTES = 4 << 30  # unpacked; an hour of SMPL+H motion at 60 fps takes a quarter of this
@@ -187,7 +128,11 @@ def read_npz(
         if size > LARGEST_BYTES:
             raise error(f"{path} would unpack to {size >> 20} MiB, too large for a {what}")
         with np.load(source, allow_pickle=False) as file:
-            return {key: file[key] for key in file.files if wanted is None or key in wanted}
+            keys = [key for key in file.files if wanted is None or key in wanted]
+            arrays = {key: file[key] for key in keys}
+        if any(isinstance(array, bytes) for array in arrays.values()):
+            raise ValueError("a member is not in numpy's format")
+        return arrays
     except FileNotFoundError as cause:
         raise error(f"{path} does not exist; choose an existing {what}") from cause
     except UNREADABLE as cause:

@@ -119,16 +119,13 @@ def find_estimates(path: Path) -> None:
 
 
 def load_window(path: Path) -> None:
+    from scope.scope_addon.capture.frame_observer import Window
     from scope.scope_addon.capture.long_clips import window_file
-    from scope.scope_addon.capture.long_clips.windows import Window
 
     folder = path.with_name("windows")
     folder.mkdir(exist_ok=True)
     shutil.copy(path, folder / window_file.window_name(1))
-    record = window_file.load_window(folder, Window(1, 1.0, 2.0, 4.0), (64, 48))
-    if record is not None:
-        rows = [row for tracklet in record.tracklets.values() for row in tracklet.rows]
-        assert 0 <= min(rows, default=0) <= max(rows, default=0) < max(len(record), 1)
+    window_file.load_window(folder, Window(1, 1.0, 2.0, 4.0))
 
 
 def find_capture(path: Path) -> None:
@@ -279,8 +276,8 @@ def descriptions(_: Path) -> list[bytes]:
 
 def windows(folder: Path) -> list[bytes]:
     from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+    from scope.scope_addon.capture.frame_observer import Observed, Window
     from scope.scope_addon.capture.long_clips.window_file import save_window
-    from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord
     from scope.scope_addon.capture.perception.region import Region
     from scope.scope_addon.capture.tracking.track import Tracklet
 
@@ -289,13 +286,19 @@ def windows(folder: Path) -> list[bytes]:
     values = [np.ones((33, 6), np.float32)] * 6
     centers = [np.ones(2)] * 6
     people = {0: Tracklet(list(range(6)), values, centers, [9.0] * 6)}
-    regions = {0: Region((1.0, 2.0), 9.0, 0.0)}
-    sums = np.ones(6, np.uint32)
-    indices = np.arange(6)
-    record = WindowRecord(
-        Window(1, 1.0, 2.0, 4.0), indices, times, sums, 2, 5, people, regions, [], background
+    observed = Observed(
+        list(range(6)),
+        times.tolist(),
+        [],
+        people,
+        background,
+        window=Window(1, 1.0, 2.0, 4.0),
+        first=2,
+        anchor=5,
+        checksums=[1] * 6,
+        anchor_regions=[Region((1.0, 2.0), 9.0, 0.0)],
     )
-    return [save_window(folder, record, (64, 48)).read_bytes()]
+    return [save_window(folder, observed).read_bytes()]
 
 
 def estimates(folder: Path) -> list[bytes]:

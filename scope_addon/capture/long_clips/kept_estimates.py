@@ -15,13 +15,15 @@ import threading
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ....solver.errors import ScopeError
+from ....solver.errors import ModelFileError, ScopeError
 from ...arrays import Float64Array, Uint8Array
 from ...atomic_write import write_npz
-from ...untrusted.files import read_members
+from ...untrusted.files import read_npz
 from ..perception.region import Region
 
 INTERVAL_S = 20.0  # between two files: the work that a kill can cost
@@ -110,14 +112,14 @@ class KeptEstimates:
 
     def _read_keys(self, path: Path) -> None:
         with suppress(ScopeError, OSError, KeyError):
-            keys = read_members(path, ("keys",), "values")[0]["keys"]
+            keys = _read(path, "keys")["keys"]
             self._bytes += path.stat().st_size
             if keys.dtype == np.uint8 and keys.ndim == 2 and keys.shape[1] == _KEY_BYTES:
                 self._places |= {row.tobytes(): (path, index) for index, row in enumerate(keys)}
 
     def _load(self, path: Path) -> None:
         with suppress(ScopeError, OSError, KeyError):
-            arrays = read_members(path, ("keys", "values"), "")[0]
+            arrays = _read(path, "keys", "values")
             values = arrays["values"]
             rows = len(arrays["keys"])
             if (
@@ -131,3 +133,7 @@ class KeptEstimates:
                 self._loaded[path] = values
                 return
         self._places = {key: place for key, place in self._places.items() if place[0] != path}
+
+
+def _read(path: Path, *names: str) -> dict[str, NDArray[Any]]:
+    return read_npz(path, ModelFileError, "file of estimates", wanted=names)

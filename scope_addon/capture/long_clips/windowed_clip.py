@@ -24,17 +24,15 @@ import numpy as np
 
 from ...errors import UsageError
 from ..clock import FINDING, Progress, StageClock
+from ..frame_observer import FrameObserver, Observed, Trackers, Window
 from ..media.frame import Frame
 from ..media.video import Video, no_frames_error, open_video, opencv_in_one_thread
 from ..observe import (
     ObservationJob,
-    Observed,
     ObserveFrames,
-    Trackers,
     frame_pairs,
     given_camera,
     network_threads,
-    new_observer,
     observe_in_one_pass,
     open_trackers,
 )
@@ -44,11 +42,12 @@ from ..perception.region import Region
 from ..perception.sessions import Execution
 from .kept_estimates import KeptEstimates
 from .window_file import KeptWindows, load_window, save_window
-from .windows import JoinedWindows, Window, WindowRecord, WindowRun, plan_windows
+from .windows import JoinedWindows, largest_people, plan_windows
 
 # Called when a window has ended, with its run and that of the next window; returns the run to go on
 # with.
-Seam = Callable[[WindowRun, WindowRun | None], WindowRun | None]
+Seam = Callable[[FrameObserver, FrameObserver | None], FrameObserver | None]
+FramePairs = Iterator[tuple[Frame, Frame | None]]  # see `frame_pairs`
 _THREADS = 2  # in which backgrounds are followed by `observe_windows`
 
 
@@ -96,7 +95,7 @@ class WindowedClip:
         self._options = options
         self._clock = clock
         self._memory = KeptEstimates(unfinished)
-        self._kept_windows = KeptWindows(unfinished, options, (video.width, video.height))
+        self._kept_windows = KeptWindows(unfinished, options)
         self._camera = given_camera(video, options)
         self._pool = pool
         self._execution = Execution(options.provider)
@@ -121,7 +120,7 @@ class WindowedClip:
         observed = self._joined.observed(execution, warnings)
         edge_frames = observed.background.edge_frames
         if edge_frames:
-            for time_s, largest in self._joined.largest_people(edge_frames[0].row):
+            for time_s, largest in largest_people(observed, edge_frames[0].row):
                 job.background.add(time_s, largest, observed.background)
         return observed
 
@@ -134,11 +133,11 @@ class WindowedClip:
         files: list[Path] = []
         frames = 0
 
-        def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
+        def seam(ended: FrameObserver, following: FrameObserver | None) -> FrameObserver | None:
             nonlocal frames
             record = self._record(ended)
             frames += len(record) - record.first
-            files.append(save_window(folder, record, (self._video.width, self._video.height)))
+            files.append(save_window(folder, record))
             progress(FINDING, frames, 0)
             return following
 
@@ -162,7 +161,7 @@ class WindowedClip:
         if known == len(self._windows):
             return
 
-        def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
+        def seam(ended: FrameObserver, following: FrameObserver | None) -> FrameObserver | None:
             record = self._record(ended)
             self._joined.add(record)
             is_last = ended.window.number + 1 == len(self._windows)
@@ -171,7 +170,7 @@ class WindowedClip:
                 self._kept_windows.save(record)
             if following is None:
                 return None
-            regions = self._joined.missed(following.record())
+            regions = self._joined.missed(following.observed())
             return self._warmed_up(following, regions) if regions else following
 
         def watch(frame: Frame, people: Sequence[Observation]) -> None:
@@ -200,7 +199,7 @@ class WindowedClip:
             self._joined.add(record)
         return len(self._windows)
 
-    def _first_run(self, window: Window) -> tuple[WindowRun, Iterator[tuple[Frame, Frame | None]]]:
+    def _first_run(self, window: Window) -> tuple[FrameObserver, FramePairs]:
         """Return the run of the first window that is observed, and the frames from its own first
         one on.
 
@@ -213,19 +212,19 @@ class WindowedClip:
             if not window.number:
                 break
             pairs = _up_to_begin(run, pairs)
-            if self._joined.accepts(run.record()):
+            if self._joined.accepts(run.observed()):
                 break
-        regions = self._joined.missed(run.record()) if window.number else []
+        regions = self._joined.missed(run.observed()) if window.number else []
         return (self._warmed_up(run, regions) if regions else run), pairs
 
-    def _warmed_up(self, run: WindowRun, regions: list[Region]) -> WindowRun:
+    def _warmed_up(self, run: FrameObserver, regions: list[Region]) -> FrameObserver:
         """Return another run of a window, with people in given regions, up to the frame that the
         first one reached.
         """
         for exact in (False, True):
             other = self._begin(run.window, regions)
             _up_to_begin(other, frame_pairs(self._frames(run.window, exact), self._clock))
-            if np.array_equal(other.record().checksums, run.record().checksums):
+            if np.array_equal(other.observed().checksums, run.observed().checksums):
                 break
         return other
 
@@ -233,9 +232,8 @@ class WindowedClip:
         """Join windows from their files; those that are missing, or do not fit, are observed
         here.
         """
-        size = self._video.width, self._video.height
         for window in self._windows:
-            record = load_window(folder, window, size) or self._single(window)
+            record = load_window(folder, window) or self._single(window)
             if not self._joined.accepts(record):
                 record = self._single(window, exact=True)
             if len(record) > record.first and (regions := self._joined.missed(record)):
@@ -249,7 +247,7 @@ class WindowedClip:
 
     def _single(
         self, window: Window, regions: Sequence[Region] = (), exact: bool = False
-    ) -> WindowRecord:
+    ) -> Observed:
         """Observe one window alone.
 
         :param regions: in which people are in its first frame.
@@ -276,7 +274,7 @@ class WindowedClip:
         else:
             yield from video.frames_from(window.anchor_s)
 
-    def _begin(self, window: Window, regions: Sequence[Region] = ()) -> WindowRun:
+    def _begin(self, window: Window, regions: Sequence[Region] = ()) -> FrameObserver:
         """Return a run of a window with trackers that have seen nothing."""
         if self._trackers is None:
             self._trackers = open_trackers(
@@ -286,19 +284,18 @@ class WindowedClip:
         afresh = Trackers(
             people.restarted(regions), hands and hands.restarted(), faces and faces.restarted()
         )
-        observer = new_observer(self._video, afresh, self._camera, self._pool, self._clock)
         number = window.number + 1
         following = self._windows[number] if number < len(self._windows) else None
-        return WindowRun(window, following, observer)
+        return FrameObserver(
+            self._video, afresh, self._camera, self._pool, self._clock, window, following
+        )
 
-    def _record(self, run: WindowRun) -> WindowRecord:
+    def _record(self, run: FrameObserver) -> Observed:
         warnings = self._execution.warnings + self._video.warnings
-        return run.record(self._execution.describe(self._threads), warnings)
+        return run.observed(self._execution.describe(self._threads), warnings)
 
 
-def _up_to_begin(
-    run: WindowRun, pairs: Iterator[tuple[Frame, Frame | None]]
-) -> Iterator[tuple[Frame, Frame | None]]:
+def _up_to_begin(run: FrameObserver, pairs: FramePairs) -> FramePairs:
     """Observe the frames before a window's own first one, and return the pairs from that one on."""
     for pair in pairs:
         if run.window.has_begun(pair[0].timestamp_s):
@@ -309,8 +306,8 @@ def _up_to_begin(
 
 def run_windows(
     windows: Sequence[Window],
-    begin: Callable[[Window], WindowRun],
-    pairs: Iterator[tuple[Frame, Frame | None]],
+    begin: Callable[[Window], FrameObserver],
+    pairs: FramePairs,
     seam: Seam,
     watch: Callable[[Frame, Sequence[Observation]], None],
 ) -> None:
@@ -321,8 +318,8 @@ def run_windows(
     :param watch: called with each frame and its people, the largest first.
     """
     left = deque(windows)
-    current: WindowRun | None = begin(left.popleft())
-    following: WindowRun | None = None
+    current: FrameObserver | None = begin(left.popleft())
+    following: FrameObserver | None = None
     for frame, upcoming in pairs:
         while current is not None and current.window.has_ended(frame.timestamp_s):
             if following is None and left:

@@ -11,22 +11,16 @@ common frames, with keypoints in the same places over the last of them.
 from __future__ import annotations
 
 import math
-import zlib
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Float32Array, Float64Array
+from ...arrays import Float32Array
 from ...notices import Notice
-from ..camera.background_record import BackgroundRecord, joined_backgrounds
-from ..media.frame import Frame
+from ..camera.background_record import joined_backgrounds
+from ..frame_observer import Observed, Window
 from ..media.video import Video
-from ..observe import FrameObserver, Observed, largest_first
-from ..perception.observation import Observation, PendingReference
+from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.people import cheapest_links
 from ..tracking.track import Tracklet, trunk_px
@@ -35,31 +29,6 @@ WARM_UP_S = 1.5
 MAX_WINDOWS = 10_000
 # In a window, on average: otherwise frames far apart would have a window, and a file, each.
 _LEAST_FRAMES = 4
-_TOLERANCE_S = 1e-6  # of a frame's time, as in decoding
-
-
-@dataclass(frozen=True)
-class Window:
-    """Frames from ``begin_s`` on, before ``end_s``; the trackers begin at ``anchor_s``."""
-
-    number: int
-    anchor_s: float
-    begin_s: float
-    end_s: float
-
-    def has_begun(self, time_s: float) -> bool:
-        """Return whether a frame at this time is not before the window's first one, as none of the
-        first window is.
-        """
-        return not self.number or time_s >= self.begin_s - _TOLERANCE_S
-
-    def warms_up(self, time_s: float) -> bool:
-        """Return whether a frame at this time is not before the one in which the trackers begin."""
-        return time_s >= self.anchor_s - _TOLERANCE_S
-
-    def has_ended(self, time_s: float) -> bool:
-        """Return whether a frame at this time comes after the window's last one."""
-        return time_s >= self.end_s - _TOLERANCE_S
 
 
 def plan_windows(video: Video, window_s: float) -> list[Window]:
@@ -80,119 +49,6 @@ def plan_windows(video: Video, window_s: float) -> list[Window]:
     return [Window(k, *times) for k, times in enumerate(zip(anchors, begins, ends, strict=True))]
 
 
-@dataclass
-class WindowRecord:
-    """N frames from the one in which the trackers began; the first ``first`` of them belong to the
-    window before.
-
-    ``checksums`` are those of the images in the frames that two windows share, and 0 elsewhere.
-    ``anchor`` is the row in which the trackers of the next window begin, N if there is none, and
-    ``anchor_regions`` holds the regions of the people in it, by tracklet. The rows of
-    ``tracklets``, whose references are not pending, count from 0. ``cut_rows`` are those of the
-    window's own frames that begin another scene. ``execution``: what the networks ran on.
-    """
-
-    window: Window
-    indices: NDArray[np.int64]  # (N,) of the frames in the source
-    timestamps: Float64Array  # (N,) seconds
-    checksums: NDArray[np.uint32]  # (N,)
-    first: int
-    anchor: int
-    tracklets: dict[int, Tracklet]
-    anchor_regions: dict[int, Region]
-    cut_rows: list[int]
-    background: BackgroundRecord
-    execution: str = ""
-    warnings: Sequence[Notice] = ()
-
-    def __len__(self) -> int:
-        return len(self.timestamps)
-
-    def continues(self, before: WindowRecord) -> bool:
-        """Return whether the frames that this window shares with the one before are the same images
-        there.
-        """
-        same_times = np.array_equal(
-            before.timestamps[before.anchor :], self.timestamps[: self.first]
-        )
-        return same_times and np.array_equal(
-            before.checksums[before.anchor :], self.checksums[: self.first]
-        )
-
-
-class WindowRun:
-    """Observes the frames of one window in order, from that in which its trackers begin.
-
-    :param following: the next window; None: there is none.
-    :param observer: that has seen nothing.
-    """
-
-    def __init__(self, window: Window, following: Window | None, observer: FrameObserver) -> None:
-        self.window = window
-        self._following = following
-        self._observer = observer
-        self._first = 0
-        self._anchor: int | None = None
-        self._anchor_regions: dict[int, Region] = {}
-        self._checksums: list[int] = []
-
-    def add(self, frame: Frame, upcoming: Frame | None) -> list[Observation]:
-        """Observe the next frame, and return its people, the largest first.
-
-        :param upcoming: the frame after it, also if that is in the next window; None at the end of
-            the clip.
-        """
-        time_s = frame.timestamp_s
-        is_own = self.window.has_begun(time_s)
-        is_anchor = (
-            self._anchor is None
-            and self._following is not None
-            and self._following.warms_up(time_s)
-        )
-        if is_anchor:
-            self._anchor = len(self._checksums)
-        is_shared = not is_own or self._anchor is not None
-        image = np.ascontiguousarray(frame.image_rgb)
-        self._checksums.append(zlib.crc32(image.data) if is_shared else 0)
-        self._first += not is_own
-        observations = self._observer.add(
-            frame, upcoming, counts=is_own, is_sampled=is_anchor, is_shared=is_shared
-        )
-        if is_anchor:
-            self._anchor_regions = {number: each.region for number, each in observations}
-        return largest_first(observations)
-
-    def record(self, execution: str = "", warnings: Sequence[Notice] = ()) -> WindowRecord:
-        """Return what was found so far."""
-        observer = self._observer
-        observer.finish()
-        frames = len(self._checksums)
-        return WindowRecord(
-            self.window,
-            np.array(observer.frames, np.int64),
-            np.array(observer.timestamps, float),
-            np.array(self._checksums, np.uint32),
-            self._first,
-            frames if self._anchor is None else self._anchor,
-            observer.tracklets,
-            self._anchor_regions,
-            list(observer.cut_rows),
-            observer.background.record(),
-            execution,
-            tuple(warnings),
-        )
-
-
-def known_reference(landmarks: NDArray[Any] | None) -> PendingReference:
-    """Return the result of the reference network as if it had been pending.
-
-    :param landmarks: (33, 3) metres; None: it found no body.
-    """
-    call: PendingReference = Future()
-    call.set_result(landmarks)
-    return call
-
-
 _NOWHERE = Region((0.0, 0.0), 1.0, 0.0)
 # Two tracklets whose keypoints are closer in the mean, in sides of the region, are one person.
 SAME_PERSON = 0.15
@@ -202,56 +58,43 @@ SAME_POSE = 0.04
 
 
 class JoinedWindows:
-    """Takes the records of a clip's windows in order."""
+    """Takes what was observed in a clip's windows, in order."""
 
     def __init__(self) -> None:
-        self._frames: list[int] = []
-        self.timestamps: list[float] = []
-        self._cut_rows: list[int] = []
+        self._parts: list[Observed] = []  # without those that have no frame of their own
         self._people: list[Tracklet] = []
         self._numbers: dict[int, int] = {}  # place in `_people` by the tracklet of the last window
-        self._last: WindowRecord | None = None
-        self._backgrounds: list[BackgroundRecord] = []
-        self._firsts: list[int] = []
-        self.warnings: list[Notice] = []
-        self.execution = ""
+        self._execution = ""
 
     def __len__(self) -> int:
-        return len(self.timestamps)
+        return sum(len(part) - part.first for part in self._parts)
 
-    def accepts(self, record: WindowRecord) -> bool:
-        """Return whether a record surely follows the last one frame by frame, however its frames
+    def accepts(self, part: Observed) -> bool:
+        """Return whether a window surely follows the last one frame by frame, however its frames
         were decoded.
 
         Without common frames that is not known.
         """
-        return self._last is None or (record.first > 0 and record.continues(self._last))
+        return not self._parts or (part.first > 0 and part.continues(self._parts[-1]))
 
-    def missed(self, record: WindowRecord) -> list[Region]:
+    def missed(self, part: Observed) -> list[Region]:
         """Return the regions in which the next window has to begin, where it has lost somebody;
         else none.
         """
-        if self._last is None or not record.first or not missed_people(self._last, record):
+        if not self._parts or not part.first or not missed_people(self._parts[-1], part):
             return []
-        return list(self._last.anchor_regions.values())
+        return self._parts[-1].anchor_regions
 
-    def add(self, record: WindowRecord) -> None:
+    def add(self, part: Observed) -> None:
         """Append the next window; one without frames of its own changes nothing."""
-        self.execution = self.execution or record.execution
-        if len(record) == record.first:
+        self._execution = self._execution or part.execution
+        first = part.first
+        if len(part) == first:
             return
-        self.warnings += [each for each in record.warnings if each not in self.warnings]
-        first = record.first
-        base = len(self._frames)
-        shift = self._frames[base - first] - int(record.indices[0]) if 0 < first <= base else 0
-        self._frames += (record.indices[first:] + shift).tolist()
-        self.timestamps += record.timestamps[first:].tolist()
-        self._cut_rows += [base + row - first for row in record.cut_rows]
-        self._backgrounds.append(record.background)
-        self._firsts.append(first)
-        before = same_people(self._last, record) if self._last is not None else {}
+        before = same_people(self._parts[-1], part) if self._parts else {}
+        base = len(self)
         numbers: dict[int, int] = {}
-        for number, tracklet in record.tracklets.items():
+        for number, tracklet in part.tracklets.items():
             own = tracklet.since(first, base - first)
             if number in before:
                 numbers[number] = self._numbers[before[number]]
@@ -260,7 +103,7 @@ class JoinedWindows:
                 numbers[number] = len(self._people)
                 self._people.append(own)
         self._numbers = numbers
-        self._last = record
+        self._parts.append(part)
 
     def observed(self, execution: str, warnings: list[Notice]) -> Observed:
         """Return what was observed in the whole clip; there must be a frame.
@@ -268,35 +111,25 @@ class JoinedWindows:
         :param execution: what the networks of this process ran on; empty: it has run none.
         :param warnings: of this process.
         """
-        more = [each for each in self.warnings if each not in warnings]
-        return Observed(
-            self._frames,
-            self.timestamps,
-            self._cut_rows,
-            self._people,
-            joined_backgrounds(self._backgrounds, self._firsts),
-            execution or self.execution,
-            warnings + more,
+        frames: list[int] = []
+        timestamps: list[float] = []
+        cut_rows: list[int] = []
+        notices = list(warnings)
+        for part in self._parts:
+            first = part.first
+            base = len(frames)
+            shift = frames[base - first] - part.frames[0] if 0 < first <= base else 0
+            frames += [index + shift for index in part.frames[first:]]
+            timestamps += part.timestamps[first:]
+            cut_rows += [base + row - first for row in part.cut_rows]
+            notices += [each for each in part.warnings if each not in notices]
+        background = joined_backgrounds(
+            [part.background for part in self._parts], [part.first for part in self._parts]
         )
-
-    def largest_people(self, first_row: int) -> Iterator[tuple[float, Observation]]:
-        """Yield the time and the largest person of each frame from a row on in which somebody was
-        seen.
-
-        The observations contain what a fit of their frames needs.
-        """
-        largest: dict[int, tuple[float, Tracklet, int]] = {}
-        for tracklet in self._people:
-            for k, (row, side_px) in enumerate(zip(tracklet.rows, tracklet.sides_px, strict=True)):
-                if row >= first_row and (row not in largest or side_px > largest[row][0]):
-                    largest[row] = side_px, tracklet, k
-        for row in sorted(largest):
-            _, tracklet, k = largest[row]
-            px, confidence, world = np.split(tracklet.values[k].astype(float), (2, 3), axis=1)
-            yield (
-                self.timestamps[row],
-                Observation(px, confidence[:, 0], world, 1.0, _NOWHERE, acquired=True),
-            )
+        people = dict(enumerate(self._people))
+        return Observed(
+            frames, timestamps, cut_rows, people, background, execution or self._execution, notices
+        )
 
     def _continue(
         self, place: int, number: int, tracklet: Tracklet, own: Tracklet, overlap: int
@@ -304,18 +137,37 @@ class JoinedWindows:
         """Append a tracklet's own frames to the one that it continues, and fade it in over the
         frames before.
         """
-        assert self._last is not None
+        before = self._parts[-1]
         joined = self._people[place]
-        last = self._last.tracklets[number]
-        behind = len(joined.rows) - len([row for row in last.rows if row >= self._last.first])
-        skipped = len([row for row in last.rows if row < self._last.first])
-        for k, value in faded(last, tracklet, self._last.anchor, overlap).items():
+        last = before.tracklets[number]
+        behind = len(joined.rows) - len([row for row in last.rows if row >= before.first])
+        skipped = len([row for row in last.rows if row < before.first])
+        for k, value in faded(last, tracklet, before.anchor, overlap).items():
             joined.values[behind + k - skipped] = value
             joined.centers_px[behind + k - skipped] = trunk_px(value[:, :2])
         joined.extend(own)
 
 
-def same_people(before: WindowRecord, after: WindowRecord) -> dict[int, int]:
+def largest_people(observed: Observed, first_row: int) -> Iterator[tuple[float, Observation]]:
+    """Yield the time and the largest person of each frame from a row on in which somebody was seen.
+
+    The observations contain what a fit of their frames needs.
+    """
+    largest: dict[int, tuple[float, Tracklet, int]] = {}
+    for tracklet in observed.tracklets.values():
+        for k, (row, side_px) in enumerate(zip(tracklet.rows, tracklet.sides_px, strict=True)):
+            if row >= first_row and (row not in largest or side_px > largest[row][0]):
+                largest[row] = side_px, tracklet, k
+    for row in sorted(largest):
+        _, tracklet, k = largest[row]
+        px, confidence, world = np.split(tracklet.values[k].astype(float), (2, 3), axis=1)
+        yield (
+            observed.timestamps[row],
+            Observation(px, confidence[:, 0], world, 1.0, _NOWHERE, acquired=True),
+        )
+
+
+def same_people(before: Observed, after: Observed) -> dict[int, int]:
     """Return for each tracklet of the later window that continues one of the earlier window, the
     number of that one.
     """
@@ -334,7 +186,7 @@ def same_people(before: WindowRecord, after: WindowRecord) -> dict[int, int]:
     return {new[i]: old[j] for i, j in links.items()}
 
 
-def missed_people(before: WindowRecord, after: WindowRecord) -> bool:
+def missed_people(before: Observed, after: Observed) -> bool:
     """Return whether somebody who was followed throughout the shared frames was not found there
     again.
     """
@@ -393,6 +245,6 @@ def faded(earlier: Tracklet, later: Tracklet, offset: int, overlap: int) -> dict
     return values
 
 
-def _lasting(record: WindowRecord, row: int) -> list[int]:
+def _lasting(part: Observed, row: int) -> list[int]:
     """Return the tracklets that were seen in a row."""
-    return [number for number, tracklet in record.tracklets.items() if row in tracklet.rows]
+    return [number for number, tracklet in part.tracklets.items() if row in tracklet.rows]

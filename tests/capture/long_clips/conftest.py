@@ -16,8 +16,8 @@ from scope.scope_addon.capture import observe as observe_module
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.clock import StageClock
 from scope.scope_addon.capture.fitting.focal_length import FocalFits
+from scope.scope_addon.capture.frame_observer import FrameObserver
 from scope.scope_addon.capture.long_clips.windowed_clip import lasting
-from scope.scope_addon.capture.long_clips.windows import WindowRun
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
 from scope.scope_addon.capture.observe import Listeners, observe
@@ -148,13 +148,13 @@ def undisturbed(
 def observed_times(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The times of all frames that were observed, in order."""
     times: list[float] = []
-    add = WindowRun.add
+    add = FrameObserver.add
 
-    def recorded(run: WindowRun, frame: Frame, upcoming: Frame | None) -> Any:
+    def recorded(run: FrameObserver, frame: Frame, upcoming: Frame | None) -> Any:
         times.append(frame.timestamp_s)
         return add(run, frame, upcoming)
 
-    monkeypatch.setattr(WindowRun, "add", recorded)
+    monkeypatch.setattr(FrameObserver, "add", recorded)
     return times
 
 

@@ -8,13 +8,11 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 from scope.scope_addon.capture.camera.background_record import joined_backgrounds
-from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.clock import StageClock
+from scope.scope_addon.capture.frame_observer import FrameObserver, Observed, Trackers, Window
 from scope.scope_addon.capture.long_clips.windowed_clip import run_windows
-from scope.scope_addon.capture.long_clips.windows import Window, WindowRecord, WindowRun
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.observe import FrameObserver, Trackers
 
 WIDTH, HEIGHT = 480, 270
 FOCAL_PX = 400.0
@@ -46,24 +44,23 @@ def frames() -> Iterator[Frame]:
 
 
 def no_people() -> Trackers:
-    people = SimpleNamespace(step=lambda *_: [], forget=lambda: None)
+    people = SimpleNamespace(step=lambda *_: [], forget=lambda: None, mask_network=None)
     return Trackers(people, None, None)  # type: ignore[arg-type]
 
 
 def test_a_camera_has_one_path_over_both_windows():
     camera = Camera(pinhole(WIDTH, HEIGHT, FOCAL_PX), np.zeros(5), "given")
-    masks = SimpleNamespace(upcoming_is_due=False, add=lambda image, observations: observations)
-    records: list[WindowRecord] = []
+    video = SimpleNamespace(width=WIDTH, height=HEIGHT, expected_frames=FRAMES)
+    records: list[Observed] = []
 
     with ThreadPoolExecutor(1) as pool:
 
-        def begin(window: Window) -> WindowRun:
-            background = BackgroundTracker(camera, WIDTH, HEIGHT)
-            observer = FrameObserver(no_people(), masks, background, pool, StageClock())
-            return WindowRun(window, WINDOWS[1] if window.number == 0 else None, observer)
+        def begin(window: Window) -> FrameObserver:
+            following = WINDOWS[1] if window.number == 0 else None
+            return FrameObserver(video, no_people(), camera, pool, StageClock(), window, following)
 
-        def seam(ended: WindowRun, following: WindowRun | None) -> WindowRun | None:
-            records.append(ended.record())
+        def seam(ended: FrameObserver, following: FrameObserver | None) -> FrameObserver | None:
+            records.append(ended.observed())
             return following
 
         whole = list(frames())

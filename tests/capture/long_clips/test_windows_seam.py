@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+from scope.scope_addon.capture.frame_observer import Observed
 from scope.scope_addon.capture.long_clips.windows import (
-    Window,
-    WindowRecord,
     distance,
     faded,
     missed_people,
@@ -30,21 +29,17 @@ def tracklet(rows: range, x: float, side: float = SIDE, speed: float = 0.0) -> T
     return Tracklet(list(rows), values, [np.full(2, x)] * len(rows), [side] * len(rows))
 
 
-def record(count: int, first: int, anchor: int, tracklets: dict[int, Tracklet]) -> WindowRecord:
+def record(count: int, first: int, anchor: int, tracklets: dict[int, Tracklet]) -> Observed:
     times = np.arange(count) / 30
     background = BackgroundRecord(
         times, np.tile(np.eye(3), (count, 1, 1)), np.ones(count, bool), []
     )
-    frames = np.arange(count)
-    sums = np.zeros(count, np.uint32)
-    return WindowRecord(
-        Window(1, 0.0, 0.0, 1.0), frames, times, sums, first, anchor, tracklets, {}, [], background
+    return Observed(
+        list(range(count)), times.tolist(), [], tracklets, background, first=first, anchor=anchor
     )
 
 
-def windows(
-    before: dict[int, Tracklet], after: dict[int, Tracklet]
-) -> tuple[WindowRecord, WindowRecord]:
+def windows(before: dict[int, Tracklet], after: dict[int, Tracklet]) -> tuple[Observed, Observed]:
     """Return two windows, of which the first OVERLAP frames of the second are the last ones of the
     first.
     """
