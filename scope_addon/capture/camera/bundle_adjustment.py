@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ....solver.rotations import exp
+from ....solver.rotations import exp, hat
 from ...arrays import Float64Array, IndexArray
 
 STEPS = 8
@@ -111,7 +111,7 @@ def _step(bundle: Bundle, fixed: int, scale: float, damping: float) -> Bundle | 
     residuals = projected(points) - bundle.rays
     weight = 1.0 / (1.0 + (residuals**2).sum(axis=1) / scale**2)
     by_point = projection_jacobian(points)  # (n, 2, 3)
-    by_pose = np.concatenate([-by_point @ cross_matrices(points), by_point], axis=2)  # (n, 2, 6)
+    by_pose = pose_jacobian(points, by_point)  # (n, 2, 6)
     by_place = by_point @ bundle.R[bundle.frame]  # (n, 2, 3)
     weighted_pose = by_pose * weight[:, None, None]
     weighted_place = by_place * weight[:, None, None]
@@ -168,11 +168,8 @@ def refine_pose(
         points = places @ R.T + t
         residuals = projected(points) - rays
         weight = narrowing_weights(residuals, scale, step) * (points[:, 2] > _NEAREST)
-        by_point = projection_jacobian(points)
-        by_pose = np.concatenate([-by_point @ cross_matrices(points), by_point], axis=2)
-        weighted = by_pose * weight[:, None, None]
-        H = np.einsum("nki,nkj->ij", weighted, by_pose)
-        g = np.einsum("nki,nk->i", weighted, residuals)
+        by_pose = pose_jacobian(points, projection_jacobian(points))
+        H, g = normal_equations(by_pose, residuals, weight)
         H[np.arange(6), np.arange(6)] *= 1.0 + 1e-6
         H[np.arange(6), np.arange(6)] += 1e-9
         change = -np.linalg.solve(H, g)
@@ -206,13 +203,25 @@ def projection_jacobian(points: Float64Array) -> Float64Array:
     return np.stack(rows, axis=1)
 
 
-def cross_matrices(points: Float64Array) -> Float64Array:
-    """Return the (n, 3, 3) matrices [p]× of points (n, 3)."""
-    x, y, z = points.T
-    zero = np.zeros(len(points))
-    return np.stack(
-        [np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], axis=1
-    )
+def pose_jacobian(points: Float64Array, by_point: Float64Array) -> Float64Array:
+    """Return the (n, 2, 6) derivatives with respect to a step of the pose: rotation, then position.
+
+    :param points: (n, 3) in the camera's axes, which the rotation moves by w x p.
+    :param by_point: (n, 2, 3) derivatives with respect to them.
+    """
+    return np.concatenate([-by_point @ hat(points), by_point], axis=2)
+
+
+def normal_equations(
+    J: Float64Array, residuals: Float64Array, weight: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return Jᵀ W J (m, m) and Jᵀ W r (m,), of derivatives (n, 2, m), residuals (n, 2) and weights
+    (n,).
+    """
+    weighted = J * weight[:, None, None]
+    H: Float64Array = np.einsum("nki,nkj->ij", weighted, J)
+    g: Float64Array = np.einsum("nki,nk->i", weighted, residuals)
+    return H, g
 
 
 def _cost(residuals: Float64Array, scale: float) -> float:

@@ -24,7 +24,14 @@ import numpy as np
 from ....solver.rotations import exp, log, nearest_rotation
 from ...arrays import BoolArray, Float64Array, IndexArray
 from ...kinematics.smoothing import interpolated_places, interpolated_rotations
-from .bundle_adjustment import Bundle, adjust, narrowing_weights, projected, refine_pose
+from .bundle_adjustment import (
+    Bundle,
+    adjust,
+    narrowing_weights,
+    normal_equations,
+    projected,
+    refine_pose,
+)
 from .corner_tracks import CornerTracks
 from .intrinsics import Camera
 
@@ -443,9 +450,8 @@ class Turn:
                 J[..., k] = (turn.moved(direction).residuals(rays_a, rays_b) - residuals) / (
                     _DIFFERENCE
                 )
-            weighted = J * weight[:, None, None]
-            normal = np.einsum("nki,nkj->ij", weighted, J) + np.diag(TURN_PRIOR)
-            change = np.linalg.solve(normal, -np.einsum("nki,nk->i", weighted, residuals))
+            H, g = normal_equations(J, residuals, weight)
+            change = np.linalg.solve(H + np.diag(TURN_PRIOR), -g)
             turn = turn.moved(np.clip(change, -0.2, 0.2))
         return turn
 

@@ -32,8 +32,8 @@ import numpy as np
 from ....solver.rotations import exp
 from ...arrays import BoolArray, Float64Array
 from ..camera.bundle_adjustment import (
-    cross_matrices,
     damped_steps,
+    pose_jacobian,
     projected,
     projection_jacobian,
 )
@@ -494,16 +494,12 @@ def image_residual(
 def _derivatives(
     place: CameraPlace, points: Float64Array, speed: Float64Array, since_mean_s: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Return the derivatives of the residuals by the points (M, 2, 3) and by the camera (M, 2, 9).
-
-    A step w of the rotation moves a point y in the camera's axes to exp(w) y, so it adds w x y.
-    """
+    """Return the derivatives of the residuals by points (M, 2, 3), and by the camera (M, 2, 9)."""
     seen = place.of(points)
     scale = np.exp(place.log_focal)
     J_seen = scale * projection_jacobian(seen)
     J_camera = np.zeros((len(points), 2, _UNKNOWNS))
-    J_camera[:, :, :3] = -J_seen @ cross_matrices(seen)
-    J_camera[:, :, 3:6] = J_seen
+    J_camera[:, :, :6] = pose_jacobian(seen, J_seen)
     J_camera[:, :, _FOCAL] = scale * projected(seen)
     J_camera[:, :, _CLOCK] = -speed
     J_camera[:, :, _DRIFT] = -speed * since_mean_s[:, None]
