@@ -33,7 +33,7 @@ from ..scope_addon.capture.fitting.prepared_track import Stance
 from ..scope_addon.capture.fitting.stature import FIXED, with_population
 from ..scope_addon.capture.fitting.weights import WEIGHTS
 from ..scope_addon.capture.media.video import open_video
-from ..scope_addon.capture.observe import Listeners, observe
+from ..scope_addon.capture.observe import observe
 from ..scope_addon.capture.options import CaptureOptions
 from ..scope_addon.capture.overlay_video import camera_vertices
 from ..scope_addon.capture.perception.lifter import Lifted, default_lifter, windows_around
@@ -205,7 +205,7 @@ def observe_clip(
     with open_video(path, options.wanted) as video:
         try:
             footage, tracks = observe(
-                video, body, options, StageClock(), Listeners(lambda *_: None, lambda *_: None)
+                video, body, options, StageClock(), lambda *_: None, lambda *_: None
             )
         except NoPersonError:
             return None

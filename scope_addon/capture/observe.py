@@ -48,14 +48,6 @@ Watch = Callable[[Frame, Sequence[Observation], LiveBody], None]
 
 
 @dataclass(frozen=True)
-class Listeners:
-    """Callbacks that report the work in progress."""
-
-    progress: Progress
-    watch: Watch
-
-
-@dataclass(frozen=True)
 class Footage:
     """What is known of the footage once all frames were observed, apart from its people."""
 
@@ -140,9 +132,9 @@ class ObservationJob:
     video: Video
     options: CaptureOptions
     clock: StageClock
-    listeners: Listeners
+    progress: Progress
+    watch: Watch
     camera: Camera  # as options and footage describe it
-    path: GivenPath | None  # of the camera, where the user gives it
     live: LiveBody
     background: BackgroundEstimators
 
@@ -156,7 +148,8 @@ def observe(
     body: Body,
     options: CaptureOptions,
     clock: StageClock,
-    listeners: Listeners,
+    progress: Progress,
+    watch: Watch,
     observe_frames: ObserveFrames | None = None,
 ) -> tuple[Footage, list[Track]]:
     """Detect and track the people of all frames, the most prominent one first.
@@ -166,7 +159,7 @@ def observe(
     :raises UsageError: the part of the picture reaches beyond it.
     :raises InputError: the given path of the camera cannot be used, or leaves frames out.
     :raises NoPersonError: nobody was found.
-    :raises CancelledError: raised by ``listeners.progress`` itself, passed on.
+    :raises CancelledError: raised by ``progress`` itself, passed on.
     """
     camera = given_camera(video, options)
     path = _given_path(video, options)
@@ -179,15 +172,15 @@ def observe(
         ) as background,
         opencv_in_one_thread(),
     ):
-        job = ObservationJob(video, options, clock, listeners, camera, path, live, background)
+        job = ObservationJob(video, options, clock, progress, watch, camera, live, background)
         observed = (observe_frames or observe_in_one_pass)(job)
         if not observed.timestamps:
             raise no_frames_error(video)
         background.wait_for_solver(
-            lambda done: listeners.progress(COMPILING, min(done, kernel_count()), kernel_count())
+            lambda done: progress(COMPILING, min(done, kernel_count()), kernel_count())
         )
         with clock.stage("solver"):
-            footage = _footage(job, observed)
+            footage = _footage(job, path, observed)
             tracks, left_out = observed.tracks(most_people(options.people), options.chosen)
     if not tracks:
         raise _no_person_error(video, options, len(observed.timestamps))
@@ -220,7 +213,7 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
     """
     video = job.video
     expected = video.expected_frames
-    job.listeners.progress(FINDING, 0, expected)
+    job.progress(FINDING, 0, expected)
     execution = Execution(job.options.provider)
     threads = network_threads(job.options.threads, execution)
     trackers = open_trackers(job.options, threads, execution, memory)
@@ -230,8 +223,8 @@ def observe_in_one_pass(job: ObservationJob, memory: EstimateMemory | None = Non
         with job.clock.stage("background"):
             largest = people[0] if people else None
             job.background.add(frame.timestamp_s, largest, observer.background)
-        job.listeners.watch(frame, people, job.live)
-        job.listeners.progress(FINDING, done, max(expected, done))
+        job.watch(frame, people, job.live)
+        job.progress(FINDING, done, max(expected, done))
     return observer.observed(execution.describe(threads), execution.warnings + video.warnings)
 
 
@@ -248,18 +241,18 @@ def frame_pairs(frames: Iterator[Frame], clock: StageClock) -> Iterator[tuple[Fr
         yield frame, upcoming
 
 
-def _footage(job: ObservationJob, observed: Observed) -> Footage:
+def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) -> Footage:
     """Return what is known of the footage apart from its people."""
     record = observed.background
     image_size = (job.video.width, job.video.height)
     zoom = None
-    if job.path is None:
+    if path is None:
         record, zoom = record.steadied(job.camera, image_size)
     camera = job.background.camera(observed.background, zoom)
     times_s = np.array(observed.timestamps)
     given = None
-    if job.path is not None:
-        given = job.path.at(times_s)
+    if path is not None:
+        given = path.at(times_s)
         motion = CameraMotion.given(given)
     else:
         motion = record.motion(job.camera, camera, image_size)

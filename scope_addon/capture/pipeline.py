@@ -15,7 +15,7 @@ from ..footage import display_text
 from ..motion import Motion
 from .clock import Progress, StageClock
 from .media.video import Video, open_video
-from .observe import Footage, Listeners, ObserveFrames, Watch, observe
+from .observe import Footage, ObserveFrames, Watch, observe
 from .options import CaptureOptions, check_options
 from .repair import repair
 from .reporting import make_report
@@ -55,9 +55,7 @@ def capture(
     check_options(body, options)
     clock = StageClock()
     with open_video(Path(path), options.wanted) as video:
-        footage, tracks = observe(
-            video, body, options, clock, Listeners(progress, watch), observe_frames
-        )
+        footage, tracks = observe(video, body, options, clock, progress, watch, observe_frames)
     with clock.stage("solver"):
         shot = shot_of(video, body, options, footage)
         solved = solve(shot, repaired(shot, tracks), progress, options.heights_m)

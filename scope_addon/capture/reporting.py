@@ -116,8 +116,8 @@ def _plausibility_warnings(name: str, person: int, motion: Motion) -> list[Notic
     """List when a person does what nobody can do; see `review_spans`."""
     warnings = []
     for reason, frames in implausible(motion).items():
-        begins = np.flatnonzero(np.diff(np.concatenate([[0], frames.astype(int)])) == 1)
-        if len(begins):
+        begins = [first for first, _ in runs(frames)]
+        if begins:
             times = motion.footage_times_s[begins].tolist()
             warnings.append(
                 notice("implausible", footage=name, person=person, reason=reason, times=times)

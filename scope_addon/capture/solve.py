@@ -21,7 +21,7 @@ from .fitting.prepared_track import PreparedTrack, prepare_track
 from .fitting.track_fit import fit_each_frame, fit_track, ground
 from .tracking.track import Track
 from .world.above_floor import raise_body
-from .world.assemble import FittedPerson, Shot, assemble_motion
+from .world.assemble import Shot, assemble_motion
 from .world.camera_path import CameraPath, camera_travel
 from .world.clip_fit import fit_clip
 from .world.placement import PlacedTrack, RawMotion, place_track
@@ -162,13 +162,15 @@ class Person:
         the world.
         """
         placed = self.placed
-        fitted = FittedPerson(self.track, self.raw, self.body)
+        raw = self.raw
         del self.placed, self.raw
         contact = placed.contact(world.up)
         if not shot.uneven_ground and (shot.smoothing or shot.is_still):
             placed = raise_body(placed, contact, world.floor_from_camera(number))
         return_freed_memory()
-        return assemble_motion(shot, fitted, placed, contact, world.T_world_camera)
+        return assemble_motion(
+            shot, self.track, self.body, raw, placed, contact, world.T_world_camera
+        )
 
 
 def solve(

@@ -28,7 +28,7 @@ from ..capture.camera.line_segments import Lines
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.perception.landmark_network import KEYPOINT_COUNT
 from ..capture.tracking.track import Track
-from ..capture.world.assemble import FittedPerson, Shot, assemble_motion
+from ..capture.world.assemble import Shot, assemble_motion
 from ..capture.world.camera_path import CameraPath
 from ..capture.world.placement import RawMotion, place_track
 from ..errors import NoPersonError, OutputError, UsageError
@@ -141,8 +141,10 @@ class Recording:
         shot = Shot(
             self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name
         )
-        person = FittedPerson(track, RawMotion.of(track, raw, path), self._body)
-        return assemble_motion(shot, person, placed, contact, T_world_frame[0])
+        raw_motion = RawMotion.of(track, raw, path)
+        return assemble_motion(
+            shot, track, self._body, raw_motion, placed, contact, T_world_frame[0]
+        )
 
     def _track(self, poses: list[LivePose], rows: NDArray[np.intp], T: int) -> Track:
         first = poses[0].index

@@ -23,7 +23,7 @@ import numpy as np
 
 from ....solver.rotations import exp, log
 from ...arrays import Float64Array
-from ...kinematics.smoothing import gaussian_smooth
+from ...kinematics.smoothing import gaussian_smooth, interpolated_places
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
 from .manhattan import Edges, line_normal_equations
@@ -96,7 +96,7 @@ def remove_heading_drift(
         return R_first_camera
     rows = np.array([first.row, *(row for row, _ in known)])
     vectors = np.array([np.zeros(3), *(vector for _, vector in known)])
-    drifts = np.stack([np.interp(times, times[rows], vectors[:, k]) for k in range(3)], axis=1)
+    drifts = interpolated_places(vectors, times[rows], times)
     corrected: Float64Array = exp(gaussian_smooth(drifts, times, DRIFT_CUTOFF_HZ)) @ R_first_camera
     aligned: Float64Array = corrected[0].T @ corrected
     return aligned

@@ -112,7 +112,7 @@ class WindowedClip:
         if folder is None:
             self._observe_all(job)
         else:
-            self._gather(folder, job.listeners.progress)
+            self._gather(folder, job.progress)
         if not len(self._joined):
             raise no_frames_error(self._video)
         execution = self._execution.describe(self._threads) if self._trackers else ""
@@ -157,7 +157,7 @@ class WindowedClip:
         known = self._join_kept()
         done = len(self._joined)
         expected = self._video.expected_frames
-        job.listeners.progress(FINDING, done, max(expected, done))
+        job.progress(FINDING, done, max(expected, done))
         if known == len(self._windows):
             return
 
@@ -176,8 +176,8 @@ class WindowedClip:
         def watch(frame: Frame, people: Sequence[Observation]) -> None:
             nonlocal done
             done += 1
-            job.listeners.watch(frame, people, job.live)
-            job.listeners.progress(FINDING, done, max(expected, done))
+            job.watch(frame, people, job.live)
+            job.progress(FINDING, done, max(expected, done))
 
         run, pairs = self._first_run(self._windows[known])
         run_windows(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.names import BLAZEPOSE
-from ...arrays import Float32Array, Float64Array, Uint8Array
+from ...arrays import Float32Array, Float64Array, FloatArray, Uint8Array
 from .region import MARGIN, Region, region_from_points
 from .sessions import Execution, network_path, open_session
 
@@ -210,7 +210,12 @@ class LandmarkNetwork:
 
 def _probability(logits: Float32Array) -> Float32Array:
     """Return the mask (256, 256) of the network's output (1, 1, 256, 256)."""
-    probability: Float32Array = 1.0 / (1.0 + np.exp(-np.clip(logits[0, 0], -50.0, 50.0)))
+    probability: Float32Array = _sigmoid(logits[0, 0])
+    return probability
+
+
+def _sigmoid(logits: FloatArray) -> FloatArray:
+    probability: FloatArray = 1.0 / (1.0 + np.exp(-np.clip(logits, -50.0, 50.0)))
     return probability
 
 
@@ -258,7 +263,7 @@ def interpret(
     """
     rows = landmarks.reshape(_POINTS, 5).astype(float)
     points_px = region.image_from_crop(refine(rows[:, :2] / INPUT_SIZE, heatmaps))
-    visibility, in_frame = 1.0 / (1.0 + np.exp(-np.clip(rows[:KEYPOINT_COUNT, 3:].T, -50.0, 50.0)))
+    visibility, in_frame = _sigmoid(rows[:KEYPOINT_COUNT, 3:].T)
     body = region.rotate_to_camera(world.reshape(_POINTS, 3)[:KEYPOINT_COUNT].astype(float))
     return PoseEstimate(
         keypoints_px=points_px[:KEYPOINT_COUNT],
@@ -289,7 +294,7 @@ def refine(points: Float64Array, heatmaps: Float32Array) -> Float64Array:
     nearest_y = np.clip(y, 0, rows - 1)[:, :, None]
     nearest_x = np.clip(x, 0, columns - 1)[:, None]
     logits = heatmaps[np.arange(count)[:, None, None], nearest_y, nearest_x]
-    heat = 1.0 / (1.0 + np.exp(-np.clip(logits.astype(float), -50.0, 50.0)))
+    heat = _sigmoid(logits.astype(float))
     heat *= ((y >= 0) & (y < rows))[:, :, None] & ((x >= 0) & (x < columns))[:, None]
     hot = inside & (heat.max(axis=(1, 2)) >= _HEAT_THRESHOLD)
     moments = np.stack(

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....solver.errors import ModelFileError, ShapeError
+from ....solver.errors import ModelFileError
 from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray, round_array
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
@@ -198,9 +198,8 @@ class Lifter:
         :param world: (T, 33, 3) world landmarks in metres, hip-centred, or None to lift without
             them.
         :param windows: of the frames around each; None if every frame is a still.
-        :raises ShapeError: an array has the wrong shape.
         """
-        around = _windows(rays, confidence, windows)
+        around = windows or single_frame_windows(len(rays))
 
         def lift(rows: IndexArray) -> tuple[FloatArray, ...]:
             lifted = self._lift(*_window_input(rows, rays, confidence, world, around))
@@ -224,9 +223,8 @@ class Lifter:
         :param world: (T, 33, 3) world landmarks in metres, hip-centred.
         :param windows: of the frames around each; None if every frame is a still.
         :param rows: (n,) the frames to lift, ascending; None: all.
-        :raises ShapeError: an array has the wrong shape.
         """
-        around = _windows(rays, confidence, windows)
+        around = windows or single_frame_windows(len(rays))
 
         def lift(rows: IndexArray) -> tuple[FloatArray, ...]:
             x, R = _window_input(rows, rays, confidence, world, around)
@@ -257,15 +255,6 @@ class Lifter:
         ]
         points, log_sigma = (np.concatenate([r[i] for r in runs]).astype(float) for i in (0, 1))
         return points, log_sigma
-
-
-def _windows(rays: FloatArray, confidence: FloatArray, windows: Windows | None) -> Windows:
-    """Check the shapes of the arrays; default to one still per frame."""
-    T = len(rays)
-    for name, value, shape in (("rays", rays, (T, 33, 2)), ("confidence", confidence, (T, 33))):
-        if value.shape != shape:
-            raise ShapeError(f"{name} must have shape {shape}, but has {value.shape}")
-    return single_frame_windows(T) if windows is None else windows
 
 
 def _window_input(

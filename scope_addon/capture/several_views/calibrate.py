@@ -62,51 +62,47 @@ class Clock(StrEnum):
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """What the cameras say about each other. V cameras, the first one included."""
+class Match:
+    """A camera's place by the first camera's most prominent person."""
 
-    places: list[CameraPlace | None]  # (V,); None: the camera could not be placed
-    # (V,) the number of the first camera's most prominent person in each camera
-    main: list[int | None]
-    is_offset_certain: list[bool]  # (V,)
-    clocks: list[Clock]  # (V,)
+    place: CameraPlace
+    cost: float  # per keypoint that was seen
+    number: int  # of the person in this camera
+    clock: Clock
+    is_offset_certain: bool = True
 
 
 def calibrate(
     people: Sequence[Sequence[SeenPerson]],
     given: Sequence[Given],
     mean_lengths: Float64Array,
-) -> Calibration:
+) -> list[Match | None]:
     """Find clocks and places of all cameras, as far as they are not given.
 
     :param people: (V,) of each camera, the people that it shows, the most prominent one first.
     :param given: (V,) what is known of each camera.
     :param mean_lengths: (B,) bones of the mean body, metres.
+    :return: (V,) of each camera, the first one included; None: it could not be placed.
     """
     first = people[0][0]
-    places: list[CameraPlace | None] = [CameraPlace.first()]
-    main: list[int | None] = [0]
-    certain = [True]
-    clocks = [Clock.GIVEN]
-    for v in range(1, len(people)):
-        best = _best_pair(first, people[v], (given[0], given[v]), mean_lengths)
-        places.append(best.place if best is not None else None)
-        main.append(best.number if best is not None else None)
-        certain.append(best.is_offset_certain if best is not None else False)
-        clocks.append(best.clock if best is not None else Clock.MOTION)
-    used = [v for v, place in enumerate(places) if place is not None]
+    matches: list[Match | None] = [Match(CameraPlace.first(), 0.0, 0, Clock.GIVEN)]
+    matches += [
+        _best_match(first, seen, (given[0], known), mean_lengths)
+        for seen, known in zip(people[1:], given[1:], strict=True)
+    ]
+    used = [(v, match) for v, match in enumerate(matches) if match is not None]
     if len(used) < 2:
-        return Calibration(places, main, certain, clocks)
+        return matches
     bundle = adjust(
-        [people[v][main[v] or 0] for v in used],
-        [place for place in places if place is not None],
+        [people[v][match.number] for v, match in used],
+        [match.place for _, match in used],
         _times(first, _ALL_FRAMES),
-        [given[v].without_clock if clocks[v] == Clock.MOTION else given[v] for v in used],
+        [given[v].without_clock if match.clock == Clock.MOTION else given[v] for v, match in used],
         mean_lengths,
     )
-    for v, place in zip(used, bundle.cameras, strict=True):
-        places[v] = place
-    return Calibration(places, main, certain, clocks)
+    for (v, match), place in zip(used, bundle.cameras, strict=True):
+        matches[v] = replace(match, place=place)
+    return matches
 
 
 @dataclass(frozen=True)
@@ -117,17 +113,6 @@ class _Guess:
     given: tuple[Given, Given]  # of both cameras
     offset_s: float
     clock: Clock
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """Another camera's place from one person, and the cost per keypoint that was seen."""
-
-    place: CameraPlace
-    cost: float
-    number: int  # of the person
-    clock: Clock
-    is_offset_certain: bool = True
 
 
 def _guesses(
@@ -150,18 +135,18 @@ def _guesses(
     return guesses
 
 
-def _best_pair(
+def _best_match(
     first: SeenPerson,
     people: Sequence[SeenPerson],
     given: tuple[Given, Given],
     mean_lengths: Float64Array,
-) -> _Pair | None:
+) -> Match | None:
     """Return another camera's place by the one of its people who is the first camera's person; None
     if nobody may be them.
     """
     guesses = everything = _guesses(first, people, given)
 
-    def tried(guess: _Guess, frames: int, turns: Float64Array) -> _Pair | None:
+    def tried(guess: _Guess, frames: int, turns: Float64Array) -> Match | None:
         return _adjusted_pair(first, people[guess.number], guess, frames, turns, mean_lengths)
 
     if len(guesses) > 1:
@@ -171,7 +156,7 @@ def _best_pair(
         guesses = [guesses[k] for k in order if costs[k] < _ROUGHLY * min(costs)]
     pairs = [pair for guess in guesses if (pair := tried(guess, _PAIR_FRAMES, _TURNS)) is not None]
 
-    def dearness(pair: _Pair) -> float:
+    def dearness(pair: Match) -> float:
         return pair.cost * (_DUBBED if pair.clock == Clock.MOTION else 1.0)
 
     best = min(pairs, key=dearness, default=None)
@@ -197,7 +182,7 @@ def _adjusted_pair(
     frames: int,
     turns: Float64Array,
     mean_lengths: Float64Array,
-) -> _Pair | None:
+) -> Match | None:
     """Return the second camera's place if a guess is right; None if both hardly see the person at
     once then.
 
@@ -215,7 +200,7 @@ def _adjusted_pair(
         for start in starts
     ]
     best = min(adjusted, key=lambda bundle: bundle.cost)
-    return _Pair(best.cameras[1], best.cost / max(best.known, 1), guess.number, guess.clock)
+    return Match(best.cameras[1], best.cost / max(best.known, 1), guess.number, guess.clock)
 
 
 def _starts(
@@ -260,7 +245,7 @@ def _shared_times(
 
 
 def same_people(
-    people: Sequence[Sequence[SeenPerson]], calibration: Calibration
+    people: Sequence[Sequence[SeenPerson]], matches: Sequence[Match | None]
 ) -> list[list[int | None]]:
     """Return, for each person of the first camera, the same person's number in each camera.
 
@@ -269,17 +254,15 @@ def same_people(
     V = len(people)
     found: list[list[int | None]] = [[k] + [None] * (V - 1) for k in range(len(people[0]))]
     for v in range(1, V):
-        place = calibration.places[v]
-        if place is None:
+        match = matches[v]
+        if match is None:
             continue
         distances = np.array(
-            [[apart(one, other, place) for other in people[v]] for one in people[0]]
+            [[apart(one, other, match.place) for other in people[v]] for one in people[0]]
         ).reshape(len(people[0]), len(people[v]))
-        main = calibration.main[v]
-        if main is not None:
-            distances[0, :] = np.inf
-            distances[:, main] = np.inf
-            distances[0, main] = 0.0
+        distances[0, :] = np.inf
+        distances[:, match.number] = np.inf
+        distances[0, match.number] = 0.0
         while distances.size and distances.min() < MOST_APART:
             k, number = np.unravel_index(int(distances.argmin()), distances.shape)
             found[int(k)][v] = int(number)

@@ -25,7 +25,7 @@ from ..fitting.keypoint_offsets import with_keypoint_offsets
 from ..fitting.prepared_track import prepare_track
 from ..media.sound import loudness
 from ..media.video import Video, open_video
-from ..observe import Footage, Listeners, Watch, observe
+from ..observe import Footage, Watch, observe
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
@@ -35,7 +35,7 @@ from ..tracking.track import Track
 from ..world.assemble import Shot
 from .bundle import CameraPlace, Given
 from .calibrate import (
-    Calibration,
+    Match,
     calibrate,
     contradicting_spans,
     contradicts,
@@ -108,26 +108,27 @@ def capture_views(
     with clock.stage("solver"):
         progress(PLACING, 0, 0)
         given = _given(views, options, [T for _, T in files])
-        calibration = calibrate(
+        matches = calibrate(
             [view.people for view in views], given, bone_lengths(_rest_keypoints(body, options))
         )
-        doubts = _doubts_about_file(views, given, calibration, options)
+        doubts = _doubts_about_file(views, given, matches, options)
+        places = [None if match is None else match.place for match in matches]
         first = views[0]
-        camera = with_focal_scale(first.camera, calibration.places[0] or CameraPlace.first())
+        camera = with_focal_scale(first.camera, places[0] or CameraPlace.first())
         footage = replace(first.footage, camera=camera)
         shot = shot_of(first.video, body, options, footage)
-        everyone = same_people([view.people for view in views], calibration)
-        people, notices = _people_in_views(shot, views, calibration, everyone, options, progress)
+        everyone = same_people([view.people for view in views], matches)
+        people, notices = _people_in_views(shot, views, places, everyone, options, progress)
         solved = solve_people(shot, people, 0)
         times_s = footage.timestamps / shot.speed
-        further = _further_cameras(views, calibration)
+        further = _further_cameras(views, places)
         motions = [replace(motion, timestamps=times_s, views=further) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     report = make_report(
         first.video, body, options, footage, replace(solved, motions=motions), rates
     )
-    warnings = [*_about_cameras(views, calibration), *doubts, *notices, *report.warnings]
-    about = [_about_view(view, k, calibration) for k, view in enumerate(views)]
+    warnings = [*_about_cameras(views, matches), *doubts, *notices, *report.warnings]
+    about = [_about_view(view, match) for view, match in zip(views, matches, strict=True)]
     return Capture(motions, replace(report, views=about, warnings=warnings))
 
 
@@ -163,12 +164,10 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
 
 def _progress_of_view(progress: Progress, number: int, count: int) -> Progress:
     """Return the progress of observing one of several videos, as part of that of all of them."""
+    finding = progress_of_person(progress, number, count)
 
     def report(stage: str, done: int, total: int) -> None:
-        if stage == FINDING:
-            progress(stage, number * total + done, count * total)
-        else:
-            progress(stage, done, total)
+        (finding if stage == FINDING else progress)(stage, done, total)
 
     return report
 
@@ -245,7 +244,7 @@ def _sound_of(view: _View) -> Float32Array | None:
 def _doubts_about_file(
     views: Sequence[_View],
     given: Sequence[Given],
-    calibration: Calibration,
+    matches: Sequence[Match | None],
     options: CaptureOptions,
 ) -> list[Notice]:
     """Compare given places of cameras with the people whom they show; return warnings.
@@ -255,18 +254,17 @@ def _doubts_about_file(
     doubts = []
     first = views[0].people[0]
     for v in range(1, len(views)):
-        place = calibration.places[v]
-        number = calibration.main[v]
-        if given[v].T_camera_first is None or place is None or number is None:
+        match = matches[v]
+        if given[v].T_camera_first is None or match is None:
             continue
-        person = views[v].people[number]
-        size = relative_distance(first, person, place)
+        person = views[v].people[match.number]
+        size = relative_distance(first, person, match.place)
         if not 1.0 / MOST_RELATIVE_DISTANCE < abs(size) < MOST_RELATIVE_DISTANCE:
             raise UsageError(
                 f"{options.calibration} makes people {size:.3g} times as large as people are; its "
                 "translations must be in metres"
             )
-        if contradicts(first, person, place):
+        if contradicts(first, person, match.place):
             name = display_text(Path(str(options.calibration)).name)
             doubts.append(
                 notice(
@@ -279,11 +277,13 @@ def _doubts_about_file(
     return doubts
 
 
-def _further_cameras(views: Sequence[_View], calibration: Calibration) -> dict[str, NDArray[Any]]:
+def _further_cameras(
+    views: Sequence[_View], places: Sequence[CameraPlace | None]
+) -> dict[str, NDArray[Any]]:
     """Return `Motion.views`: the cameras that could be placed, without the first one."""
     placed = [
         (view, place)
-        for view, place in zip(views[1:], calibration.places[1:], strict=True)
+        for view, place in zip(views[1:], places[1:], strict=True)
         if place is not None
     ]
     if not placed:
@@ -313,7 +313,7 @@ def _observe_view(
 ) -> _View:
     """Observe one video, as a capture of it alone does."""
     with open_video(path, options.wanted) as video:
-        footage, tracks = observe(video, body, options, clock, Listeners(progress, watch))
+        footage, tracks = observe(video, body, options, clock, progress, watch)
     name = display_text(path.name)
     if len(footage.timestamps) < 2:
         raise UsageError(f"{name} is a still image; several cameras need videos")
@@ -355,7 +355,7 @@ def _rest_keypoints(body: Body, options: CaptureOptions) -> Float64Array:
 def _people_in_views(
     shot: Shot,
     views: Sequence[_View],
-    calibration: Calibration,
+    places: Sequence[CameraPlace | None],
     everyone: Sequence[Sequence[int | None]],
     options: CaptureOptions,
     progress: Progress,
@@ -371,11 +371,11 @@ def _people_in_views(
             view.people[number] if number is not None else None
             for view, number in zip(views, numbers, strict=True)
         ]
-        spans = contradicting_spans(seen, calibration.places)
+        spans = contradicting_spans(seen, places)
         others = []
         for v in range(1, len(views)):
             number = numbers[v]
-            place = calibration.places[v]
+            place = places[v]
             person = 0 if len(everyone) == 1 else k + 1
             if number is None or place is None:
                 if place is not None:
@@ -420,34 +420,35 @@ def _without(track: Track, spans: Sequence[tuple[float, float]], place: CameraPl
     return replace(track, confidence=confidence, seen=track.seen & ~wrong)
 
 
-def _about_cameras(views: Sequence[_View], calibration: Calibration) -> list[Notice]:
+def _about_cameras(views: Sequence[_View], matches: Sequence[Match | None]) -> list[Notice]:
     """Warn of cameras that could not be placed, or hardly."""
     warnings = []
-    for v in range(1, len(views)):
-        place = calibration.places[v]
-        name = views[v].name
-        if views[v].footage.cuts_s:
-            warnings.append(notice("cuts", footage=name, times=views[v].footage.cuts_s))
-        if place is None:
+    for view, match in zip(views[1:], matches[1:], strict=True):
+        name = view.name
+        if view.footage.cuts_s:
+            warnings.append(notice("cuts", footage=name, times=view.footage.cuts_s))
+        if match is None:
             warnings.append(notice("view_without_place", footage=name))
             continue
-        if not calibration.is_offset_certain[v]:
-            warnings.append(notice("uncertain_offset", footage=name, offset_s=place.offset_s))
-        if place.rotation_sigma > WEAK_ROTATION:
-            degrees = float(np.degrees(place.rotation_sigma))
+        if not match.is_offset_certain:
+            offset_s = match.place.offset_s
+            warnings.append(notice("uncertain_offset", footage=name, offset_s=offset_s))
+        if match.place.rotation_sigma > WEAK_ROTATION:
+            degrees = float(np.degrees(match.place.rotation_sigma))
             warnings.append(notice("weak_place", footage=name, degrees=degrees))
     return warnings
 
 
-def _about_view(view: _View, number: int, calibration: Calibration) -> dict[str, Any]:
+def _about_view(view: _View, match: Match | None) -> dict[str, Any]:
     """Return what the report says about one camera."""
-    about: dict[str, Any] = {"source": str(view.video.path)}
-    place = calibration.places[number]
-    if place is None:
-        return about | {"is_used": False}
-    about |= {
+    source = str(view.video.path)
+    if match is None:
+        return {"source": source, "is_used": False}
+    place = match.place
+    return {
+        "source": source,
         "is_used": True,
-        "clock": str(calibration.clocks[number]),
+        "clock": str(match.clock),
         "offset_s": round(place.offset_s, 4),
         "offset_sigma_s": round(place.offset_sigma_s, 4),
         "clock_drift": round(place.drift, 7),
@@ -458,4 +459,3 @@ def _about_view(view: _View, number: int, calibration: Calibration) -> dict[str,
         "rotation_sigma_deg": round(float(np.degrees(place.rotation_sigma)), 2),
         "position_sigma_m": round(place.position_sigma_m, 3),
     }
-    return about

@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ....solver.errors import ShapeError
 from ...arrays import Uint8Array
 from ..perception.adapters.keypoint_network import KeypointNetwork
 from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
@@ -187,10 +186,7 @@ class PeopleTracker:
         """The network that gives person masks; only the largest one, whose preset is not made for
         speed.
         """
-        largest = self._networks.prefetches and isinstance(
-            self._networks.landmarks, LandmarkNetwork
-        )
-        return self._networks.begins_early if largest else None
+        return self._networks.begins_early if self._networks.prefetches else None
 
     def step(
         self,
@@ -212,12 +208,7 @@ class PeopleTracker:
         :param upcoming_with_masks: whether the people of the frame after it need masks; only
             `mask_network` gives them, and not to people whom it was not already following.
         :return: tracklet number and observation of each person.
-        :raises ShapeError: the frame is not (H, W, 3) uint8.
         """
-        if image_rgb.ndim != 3 or image_rgb.shape[2] != 3 or image_rgb.dtype != np.uint8:
-            raise ShapeError(
-                f"A frame must be (H, W, 3) uint8 RGB, but got {image_rgb.shape} {image_rgb.dtype}."
-            )
         if self._crop is not None:
             image_rgb = self._crop.cut(image_rgb)
             upcoming_rgb = None if upcoming_rgb is None else self._crop.cut(upcoming_rgb)

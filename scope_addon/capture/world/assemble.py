@@ -34,7 +34,9 @@ MIN_DEPTH_M = 1e-3
 
 def assemble_motion(
     shot: Shot,
-    person: FittedPerson,
+    track: Track,
+    body: Body,
+    raw: RawMotion,
     placed: PlacedTrack,
     contact: FloatArray,
     T_world_camera: Float64Array,
@@ -44,15 +46,15 @@ def assemble_motion(
     Rotations relative to the parent do not depend on the world; R_world_root = R_world_camera
     R_camera_root and trans = T_world_camera t_camera_root − J_0(β).
 
+    :param body: with its keypoints where the network places them, for the reprojection error.
+    :param raw: the motion of which every frame was fitted alone.
     :param placed: the final motion: its rotations and root, in the first frame's camera axes.
     :param contact: (T, 6) probability that each sole point and palm rests on something.
     :param T_world_camera: (4, 4) the first frame's camera to the world that all people share.
     """
-    track = person.track
     betas = placed.betas
     path = shot.path
     J0 = shot.body.rest_joints(placed.betas)[0]
-    raw = person.raw
     poses_raw, trans_raw = _to_world(
         T_world_camera, J0, raw.R_first_root, raw.t_first_root, raw.joints
     )
@@ -98,7 +100,7 @@ def assemble_motion(
         joint_confidence=raw.joint_confidence,
         world_from_camera=path.world_from_frames(T_world_camera),
         foot_contact=contact[:, : len(SOLES)],
-        residual_px=reprojection_error(shot, person, placed),
+        residual_px=reprojection_error(shot, track, body, placed),
         image_size=np.array(shot.image_size),
         source=shot.source,
         joint_sigma_m=None
@@ -139,15 +141,13 @@ def _to_world(
     return poses, trans
 
 
-def reprojection_error(shot: Shot, person: FittedPerson, placed: PlacedTrack) -> Float64Array:
+def reprojection_error(shot: Shot, track: Track, body: Body, placed: PlacedTrack) -> Float64Array:
     """Return the (T,) median reprojection error of confident keypoints, in pixels; 0 where the
     person was not seen.
 
     :param placed: the motion: its rotations and root, in the first frame's camera axes.
     """
-    body = person.body
     betas = placed.betas
-    track = person.track
     camera = shot.camera
     at = body.keypoint_set("blazepose")
     order = [at[name] for name in KEYPOINT_NAMES]
@@ -209,12 +209,3 @@ class Shot:
     def is_still(self) -> bool:
         """Whether there is only one frame."""
         return len(self.path) == 1
-
-
-@dataclass(frozen=True)
-class FittedPerson:
-    """One person's track and the body fitted to each of its frames."""
-
-    track: Track
-    raw: RawMotion
-    body: Body  # with its keypoints where the network places them, for the reprojection error

@@ -20,7 +20,7 @@ from scope.scope_addon.capture.frame_observer import FrameObserver
 from scope.scope_addon.capture.long_clips.windowed_clip import lasting
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
-from scope.scope_addon.capture.observe import Listeners, observe
+from scope.scope_addon.capture.observe import observe
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.tracking import landmark_estimator
@@ -98,10 +98,15 @@ def windows_of(
                 raise CancelledError("cancelled")
 
         fitted.clear()
-        listeners = Listeners(progress, lambda *_: None)
         with open_video(folder) as video:
             return observe(
-                video, BODY, options, StageClock(), listeners, lasting(unfinished, parts)
+                video,
+                BODY,
+                options,
+                StageClock(),
+                progress,
+                lambda *_: None,
+                lasting(unfinished, parts),
             )[1]
 
     return observed
