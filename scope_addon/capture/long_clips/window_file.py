@@ -35,6 +35,7 @@ from ..perception.adapters.description import description_path
 from ..perception.observation import PendingReference, PersonMask
 from ..perception.region import Region
 from ..tracking.track import Tracklet
+from .kept_folder import KeptFolder
 
 # The records of which an observation consists; no other class is made of a file.
 _RECORDS = {
@@ -54,7 +55,6 @@ _RECORDS = {
 }
 _JSON = "json"  # the array with the text
 Arrays = dict[str, NDArray[Any]]
-LARGEST = 1 << 30  # bytes of the windows that are kept of one capture
 _MOST_BYTES = 1 << 28  # of a network; a larger one is sampled
 _UNIMPORTANT = ("threads",)  # options with which the result is the same, bit for bit
 
@@ -142,35 +142,27 @@ class KeptWindows:
     """The files of finished windows, after which a capture that was killed goes on.
 
     They depend on the footage, the program and the options: within the caller's folder, which is
-    one of this footage and this program, each set of options has a folder of its own. What cannot
-    be read or written is not kept.
+    one of this footage and this program, each set of options has a folder of its own.
 
     :param unfinished: folder of the capture, need not exist; None: nothing is kept.
     """
 
     def __init__(self, unfinished: Path | None, options: CaptureOptions) -> None:
-        self._folder = None if unfinished is None else unfinished / f"windows-{_digest(options)}"
-        self._bytes = 0
+        self._kept: KeptFolder | None = None
+        if unfinished is not None:
+            self._kept = KeptFolder(unfinished / f"windows-{_digest(options)}")
 
     def load(self, window: Window) -> Observed | None:
         """Return what was observed in a window; None if that is not known."""
-        if self._folder is None:
+        if self._kept is None:
             return None
-        with suppress(OSError):
-            self._bytes += (self._folder / window_name(window.number)).stat().st_size
-        return load_window(self._folder, window)
+        self._kept.count(self._kept.path / window_name(window.number))
+        return load_window(self._kept.path, window)
 
     def save(self, record: Observed) -> None:
         """Keep a window; after a failure, or when there is too much, none any more."""
-        if self._folder is None:
-            return
-        try:
-            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            self._bytes += save_window(self._folder, record).stat().st_size
-        except (OSError, ScopeError):
-            self._folder = None
-        if self._bytes > LARGEST:
-            self._folder = None
+        if self._kept is not None:
+            self._kept.write(lambda folder: save_window(folder, record))
 
 
 def _digest(options: CaptureOptions) -> str:

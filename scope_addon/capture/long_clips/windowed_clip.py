@@ -64,13 +64,17 @@ def lasting(unfinished: Path | None = None, folder: Path | None = None) -> Obser
     def observe_frames(job: ObservationJob) -> Observed:
         windows = plan_windows(job.video, job.options.window_s)
         if len(windows) == 1:
-            return observe_in_one_pass(job, KeptEstimates(unfinished))
+            return observe_in_one_pass(job, _memory(unfinished))
         clip = WindowedClip(
             job.video, windows, job.options, job.clock, job.background.pool, unfinished
         )
         return clip.observe(job, folder)
 
     return observe_frames
+
+
+def _memory(unfinished: Path | None) -> KeptEstimates | None:
+    return None if unfinished is None else KeptEstimates(unfinished)
 
 
 class WindowedClip:
@@ -94,7 +98,7 @@ class WindowedClip:
         self._windows = windows
         self._options = options
         self._clock = clock
-        self._memory = KeptEstimates(unfinished)
+        self._memory = _memory(unfinished)
         self._kept_windows = KeptWindows(unfinished, options)
         self._camera = given_camera(video, options)
         self._pool = pool

@@ -192,19 +192,18 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
     return bool(a * d < b * c)
 
 
-def decode_items(path: Path, numbers: Collection[int], max_pixels: int) -> dict[int, Uint8Array]:
+def decode_items(path: Path, numbers: Collection[int]) -> dict[int, Uint8Array]:
     """Decode items of a HEIF file (see `heif`).
 
     PyAV's stream ids are the item numbers. Of several streams with one id, the first is the item;
     the others belong to an animation.
 
-    :param max_pixels: the limit for all items together, beyond which nothing is returned.
     :return: (h, w, 3) uint8 RGB by item number; for a damaged file, the items that could be
-        decoded.
+        decoded; nothing where all together have more than `MAX_PIXELS`.
     :raises VideoError: PyAV is not installed.
     """
     pictures: dict[int, Uint8Array] = {}
-    pixels_left = max_pixels
+    pixels_left = MAX_PIXELS
     failure, container = open_with_pyav(path)
     if container is None:
         return pictures

@@ -130,7 +130,7 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
     layout = read_layout(data)
     if layout is None:
         return None
-    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist()), MAX_PIXELS))
+    whole = assemble(layout, decode_items(path, set(layout.tiles.ravel().tolist())))
     if whole is None:
         return None
     check_size(path, whole.shape[1], whole.shape[0])

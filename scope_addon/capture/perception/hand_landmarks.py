@@ -109,8 +109,8 @@ class HandNetwork:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("hand_landmark"), threads, execution)
+    def __init__(self, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("hand_landmark"), 1, execution)
 
     def estimate(self, image_rgb: Uint8Array, region: Region) -> HandEstimate:
         """Estimate the hand in a region of an (H, W, 3) uint8 RGB image."""
@@ -134,8 +134,8 @@ class PalmDetector:
     :raises ModelFileError: its file is damaged.
     """
 
-    def __init__(self, threads: int, execution: Execution | None = None) -> None:
-        self._session = open_session(network_path("palm_detection"), threads, execution)
+    def __init__(self, execution: Execution | None = None) -> None:
+        self._session = open_session(network_path("palm_detection"), 1, execution)
         self._anchors = make_anchors(PALM_INPUT_SIZE, _LAYERS)
 
     def detect(

@@ -102,16 +102,16 @@ def disagreement(keypoints_px: Float64Array, world_landmarks: Float64Array) -> f
 class EstimateMemory(Protocol):
     """Estimates by what the network was given, so that an earlier capture's are found again."""
 
-    def key(self, network: str, crop_rgb: Uint8Array, region: Region) -> bytes | None:
-        """Return the key of an estimate; None if it cannot be kept.
+    def key(self, network: str, crop_rgb: Uint8Array, region: Region) -> bytes:
+        """Return the key of an estimate.
 
         :param crop_rgb: (H, W, 3), the network's input.
         """
 
-    def find(self, key: bytes | None) -> Float64Array | None:
+    def find(self, key: bytes) -> Float64Array | None:
         """Return the values (m,) that were added with a key; None if there are none."""
 
-    def add(self, key: bytes | None, values: Float64Array) -> None:
+    def add(self, key: bytes, values: Float64Array) -> None:
         """Keep the values (m,) of a key."""
 
 
@@ -188,24 +188,20 @@ class LandmarkNetwork:
     ) -> PoseEstimate:
         crop_rgb = region.cut(image_rgb, INPUT_SIZE)
         memory = None if with_mask else self.memory
-        key = None if memory is None else memory.key(self._name, crop_rgb, region)
-        values = None if memory is None else memory.find(key)
-        if values is not None and len(values) == _VALUES:
-            return _unpacked(values, region)
-        outputs = list(_OUTPUTS)
-        inputs = {"input": _blob(crop_rgb)}
-        if with_mask:
-            outputs = [*outputs, "mask"]
-            inputs = inputs | _WITH_MASK
+        if memory is not None:
+            key = memory.key(self._name, crop_rgb, region)
+            values = memory.find(key)
+            if values is not None and len(values) == _VALUES:
+                return _unpacked(values, region)
+        outputs = [*_OUTPUTS, "mask"] if with_mask else _OUTPUTS
+        inputs = {"input": _blob(crop_rgb)} | (_WITH_MASK if with_mask else {})
         landmarks, presence, heatmap, world, *logits = session.run(outputs, inputs)
         estimate = interpret(landmarks[0], float(presence[0, 0]), heatmap[0], world[0], region)
         if memory is not None:
             memory.add(key, _packed(estimate))
-        return (
-            replace(estimate, mask=_probability(logits[0]).astype(np.float16))
-            if with_mask
-            else estimate
-        )
+        if not with_mask:
+            return estimate
+        return replace(estimate, mask=_probability(logits[0]).astype(np.float16))
 
 
 def _probability(logits: Float32Array) -> Float32Array:

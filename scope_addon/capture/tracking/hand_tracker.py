@@ -106,8 +106,8 @@ class HandTracker:
         self, threads: int, execution: Execution | None = None, least_px: float = SMALLEST_HAND_PX
     ) -> None:
         self._least_px = least_px
-        self._network = HandNetwork(1, execution)
-        self._palms = PalmDetector(1, execution)
+        self._network = HandNetwork(execution)
+        self._palms = PalmDetector(execution)
         self._pool = ThreadPoolExecutor(threads, "scope-hands")
         self._hands: dict[Key, _Hand] = {}
         self._missed: dict[Key, list[_Missed]] = {}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.long_clips import kept_estimates
+from scope.scope_addon.capture.long_clips import kept_estimates, kept_folder
 from scope.scope_addon.capture.long_clips.kept_estimates import KeptEstimates
 from scope.scope_addon.capture.perception.region import Region
 
@@ -92,15 +92,9 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
 
 
 def test_no_more_than_so_much_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept_estimates, "LARGEST", 1000)
+    monkeypatch.setattr(kept_folder, "LARGEST", 1000)
     keep(tmp_path, rows=9)
     assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 2000
-
-
-def test_nothing_is_kept_without_a_folder():
-    kept = KeptEstimates()
-    assert kept.key("net", CROP, REGION) is None
-    assert kept.find(None) is None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
@@ -120,6 +114,5 @@ def test_on_a_full_disk_nothing_is_kept_and_nothing_is_said(
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     gc.collect()
-    assert kept.key("net", CROP, REGION) is None
     assert list(tmp_path.iterdir()) == []
     assert unraisable == []

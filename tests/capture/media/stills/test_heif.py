@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.media import frame_readers
 from scope.scope_addon.capture.media.frame_readers import decode_items
 from scope.scope_addon.capture.media.heif import assemble, read_layout
 from scope.scope_addon.capture.media.still_images import read_picture
@@ -150,11 +151,15 @@ def test_a_small_file_cannot_request_much_memory() -> None:
         assert read_layout(patched(whole, b"iloc", content)) is None
 
 
-def test_decoding_stops_at_the_maximum_number_of_pixels(tmp_path: Path) -> None:
+def test_decoding_stops_at_the_maximum_number_of_pixels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "a.heic"
     path.write_bytes(heic(slopes(), 64))
-    assert len(decode_items(path, {2, 3, 4}, 3 * 64 * 64)) == 3
-    assert decode_items(path, {2, 3, 4}, 3 * 64 * 64 - 1) == {}
+    monkeypatch.setattr(frame_readers, "MAX_PIXELS", 3 * 64 * 64)
+    assert len(decode_items(path, {2, 3, 4})) == 3
+    monkeypatch.setattr(frame_readers, "MAX_PIXELS", 3 * 64 * 64 - 1)
+    assert decode_items(path, {2, 3, 4}) == {}
 
 
 def test_surplus_tiles_are_refused() -> None:
