@@ -34,7 +34,7 @@ from .files import in_one_line
 LARGEST_DENSE = 5_000_000
 DEEPEST = 8  # matrices and chumpy expressions within each other; real files have two
 
-_DTYPE = re.compile(r"([<>|=]?)(\?|[biufSU][1-9][0-9]{0,3})")
+_DTYPE = re.compile(r"([<>|=]?)(\?|O8?|[biufSU][1-9][0-9]{0,3})")
 
 
 class Global:
@@ -65,14 +65,12 @@ class Discarded:
 
 
 class PickledDtype:
-    """``numpy.dtype(text)`` for plain numbers and text; structures and Python objects are
-    refused.
-    """
+    """``numpy.dtype(text)`` for plain numbers, text and Python objects; structures are refused."""
 
     def __init__(self, text: object, *_: object) -> None:
         """Parse a type as numpy writes it, for instance "<f8".
 
-        :raises ModelFileError: it is none of plain numbers or text.
+        :raises ModelFileError: it is none of these.
         """
         text = text.decode("latin1") if isinstance(text, bytes) else text
         if not isinstance(text, str) or _DTYPE.fullmatch(text) is None:
@@ -98,16 +96,22 @@ class PickledDtype:
 
 class PickledArray:
     """A numpy array whose bytes lie in the file itself, so that it can never be larger than the
-    file.
+    file; or (``items``) one of Python objects.
     """
 
     array: NDArray[Any] | None = None
+    items: list[Any] | None = None
 
     def __setstate__(self, state: object) -> None:
         """State as numpy writes it: (version,) shape, dtype, is_fortran, bytes."""
         if not isinstance(state, tuple) or len(state) not in (4, 5):
             raise ModelFileError("it holds a numpy array in an unknown form")
         shape, dtype, is_fortran, raw = state[-4:]
+        if isinstance(dtype, PickledDtype) and dtype.dtype.hasobject:
+            if not isinstance(raw, list):
+                raise ModelFileError("it holds an array of objects in an unknown form")
+            self.items = raw
+            return
         self.array = _from_bytes(raw, dtype, shape, bool(is_fortran))
 
 
@@ -134,11 +138,6 @@ def _refuse(*_: object) -> NoReturn:
 
 _NDARRAY = Global(_refuse)
 _OBJECT = Global(_refuse)
-
-
-def is_array_class(kind: object) -> bool:
-    """Return whether a value is the stand-in of numpy's array class."""
-    return kind is _NDARRAY
 
 
 def _reconstruct(kind: object, *_: object) -> PickledArray:
@@ -189,8 +188,8 @@ def stand_in(dotted: str) -> Any:
 
 def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> NDArray[Any]:
     """Return a read-only array over ``raw``; the byte count must agree with the shape exactly."""
-    if not isinstance(dtype, PickledDtype):
-        raise ModelFileError("it holds a numpy array without a type")
+    if not isinstance(dtype, PickledDtype) or dtype.dtype.hasobject:
+        raise ModelFileError("it holds a numpy array without a type of numbers or text")
     if not isinstance(raw, bytes):
         raise ModelFileError("it holds an array of Python objects; only numbers and text are read")
     if not is_shape(shape):
@@ -235,6 +234,8 @@ def to_array(value: object, depth: int = 0) -> NDArray[Any]:
             if kind == "Select"
             else to_array(value.state.get("x"), deeper)
         )
+    if isinstance(value, PickledArray) and value.items is not None:
+        raise ModelFileError("it holds an array of Python objects; only numbers and text are read")
     raise ModelFileError(
         f"an array was expected, but a {type(value).__name__} was found, or an unfinished array"
     )

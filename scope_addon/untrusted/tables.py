@@ -3,8 +3,8 @@
 dictionaries, .pkl of pickle or joblib, and PyTorch's .pt.
 
 They are read by the inert unpickler of `pickles`: nothing that a file names is imported or run.
-Arrays of Python objects, joblib's arrays and PyTorch's tensors have stand-ins here, which hold no
-more than the bytes in the file.
+Joblib's arrays and PyTorch's tensors have stand-ins here, which hold no more than the bytes in the
+file.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from .pickles import (
     PickledDtype,
     _BodyUnpickler,
     _Handlers,
-    is_array_class,
     is_shape,
     to_array,
 )
@@ -176,32 +175,6 @@ def _unpickled(data: bytes, storage_bytes: Any = None) -> Any:
     return _TableUnpickler(data, storage_bytes).load()
 
 
-class _TableDtype(PickledDtype):
-    """A dtype that may also be that of Python objects."""
-
-    def __init__(self, text: object, *rest: object) -> None:
-        if text in ("O", "O8", b"O", b"O8"):
-            self.dtype = np.dtype(object)
-        else:
-            super().__init__(text, *rest)
-
-
-class _TableArray(PickledArray):
-    """A numpy array of numbers, text, or (``items``) Python objects."""
-
-    items: list[Any] | None = None
-
-    def __setstate__(self, state: object) -> None:
-        if isinstance(state, tuple) and len(state) in (4, 5):
-            dtype, _, raw = state[-3:]
-            if isinstance(dtype, PickledDtype) and dtype.dtype.hasobject:
-                if not isinstance(raw, list):
-                    raise ModelFileError("it holds an array of objects in an unknown form")
-                self.items = raw
-                return
-        super().__setstate__(state)
-
-
 class _JoblibArray(PickledArray):
     """joblib's NumpyArrayWrapper: the bytes of the array follow it in the file."""
 
@@ -278,10 +251,6 @@ class _TableUnpickler(_BodyUnpickler):
 
         :raises ModelFileError: the name is not allowed.
         """
-        if module in ("numpy.core.multiarray", "numpy._core.multiarray") and name == "_reconstruct":
-            return Global(_array_of)
-        if (module, name) == ("numpy", "dtype"):
-            return _TableDtype
         if (module, name) == ("joblib.numpy_pickle", "NumpyArrayWrapper"):
             return _JoblibArray
         if (module, name) == ("collections", "OrderedDict"):
@@ -318,12 +287,6 @@ class _TableUnpickler(_BodyUnpickler):
         self.append(self._storages[key])
 
 
-def _array_of(kind: object, *_: object) -> PickledArray:
-    if not is_array_class(kind):
-        raise ModelFileError("it makes an object in a way that such files do not")
-    return _TableArray()
-
-
 class _Plain:
     """Converts unpickled values to arrays and tables; it stops at a file whose parts refer to each
     other so often that they would never end.
@@ -339,7 +302,7 @@ class _Plain:
             raise ModelFileError("its tables are nested too deeply, or too many")
         if isinstance(value, dict):
             return dict(self._entries(value.items(), depth))
-        if isinstance(value, _TableArray) and value.items is not None:
+        if isinstance(value, PickledArray) and value.items is not None:
             items = value.items
             return self.convert(items[0] if len(items) == 1 else items, depth + 1)
         if isinstance(value, list | tuple):
