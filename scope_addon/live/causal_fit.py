@@ -209,7 +209,7 @@ class CausalFit:
         world = np.array([o.world_landmarks for o in seen])
         windows = windows_around(times, np.ones(len(times), bool))
         rays = self._measurer.rays(pixels)
-        lifted = default_lifter().lift_mixture(
+        lifted = default_lifter().lift(
             rays, confidence, world, windows, rows=np.array([len(seen) - 1])
         )
         return self._measurer.measure(

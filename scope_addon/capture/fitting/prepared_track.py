@@ -284,6 +284,5 @@ def lift(measurer: Measurer, track: Track, pixels: FloatArray) -> Lifted:
     """
     rays = measurer.rays(pixels)
     windows = windows_around(track.times, track.seen)
-    if not track.has_depth:
-        return default_lifter().lift(rays, track.confidence, None, windows)
-    return default_lifter().lift_mixture(rays, track.confidence, track.world_landmarks, windows)
+    world = track.world_landmarks if track.has_depth else None
+    return default_lifter().lift(rays, track.confidence, world, windows)

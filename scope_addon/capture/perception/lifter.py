@@ -190,50 +190,31 @@ class Lifter:
         confidence: FloatArray,
         world: FloatArray | None,
         windows: Windows | None = None,
+        rows: IndexArray | None = None,
     ) -> Lifted:
-        """Lift T frames.
+        """Lift T frames; with world landmarks, mix the estimates with and without them, which is
+        more accurate on real clips than either.
 
         :param rays: (T, 33, 2) normalized image coordinates without lens distortion.
         :param confidence: (T, 33) 0..1.
         :param world: (T, 33, 3) world landmarks in metres, hip-centred, or None to lift without
             them.
         :param windows: of the frames around each; None if every frame is a still.
-        """
-        around = windows or single_frame_windows(len(rays))
-
-        def lift(rows: IndexArray) -> tuple[FloatArray, ...]:
-            lifted = self._lift(*_window_input(rows, rays, confidence, world, around))
-            return lifted.points, lifted.sigma_across, lifted.sigma_along
-
-        return Lifted(*by_blocks(lift, np.arange(len(rays))))
-
-    def lift_mixture(
-        self,
-        rays: FloatArray,
-        confidence: FloatArray,
-        world: FloatArray,
-        windows: Windows | None = None,
-        rows: IndexArray | None = None,
-    ) -> Lifted:
-        """Mix the estimates with and without world landmarks, which is more accurate on real clips
-        than either.
-
-        :param rays: (T, 33, 2), see `lift`.
-        :param confidence: (T, 33) 0..1.
-        :param world: (T, 33, 3) world landmarks in metres, hip-centred.
-        :param windows: of the frames around each; None if every frame is a still.
         :param rows: (n,) the frames to lift, ascending; None: all.
         """
-        around = windows or single_frame_windows(len(rays))
+        T = len(rays)
+        # Stills are frames far apart.
+        around = windows or windows_around(2 * LONGEST_GAP_S * np.arange(T), np.ones(T, bool))
 
         def lift(rows: IndexArray) -> tuple[FloatArray, ...]:
             x, R = _window_input(rows, rays, confidence, world, around)
-            with_world = self._lift(x, R)
-            x[..., _WORLD_AND_KNOWN] = 0.0
-            mixed = mixture([with_world, self._lift(x, R)], [WORLD_SHARE, 1 - WORLD_SHARE], R)
-            return mixed.points, mixed.sigma_across, mixed.sigma_along
+            lifted = self._lift(x, R)
+            if world is not None:
+                x[..., _WORLD_AND_KNOWN] = 0.0
+                lifted = mixture([lifted, self._lift(x, R)], [WORLD_SHARE, 1 - WORLD_SHARE], R)
+            return lifted.points, lifted.sigma_across, lifted.sigma_along
 
-        return Lifted(*by_blocks(lift, np.arange(len(rays)) if rows is None else rows))
+        return Lifted(*by_blocks(lift, np.arange(T) if rows is None else rows))
 
     def _lift(self, x: Float32Array, R_virtual_camera: FloatArray) -> Lifted:
         points, log_sigma = self.run(x)
@@ -339,9 +320,3 @@ def ends_of_runs(numbers: NDArray[Any]) -> tuple[IndexArray, IndexArray]:
     numbers (n,).
     """
     return np.searchsorted(numbers, numbers), np.searchsorted(numbers, numbers, side="right") - 1
-
-
-def single_frame_windows(count: int) -> Windows:
-    """Build the windows of unrelated stills."""
-    rows = np.repeat(np.arange(count)[:, None], WINDOW, axis=1)
-    return Windows(rows, rows, np.zeros((count, WINDOW), np.float32))

@@ -143,7 +143,7 @@ class PersonDetector:
         Searches some thirty to fifty squares of an (H, W, 3) uint8 RGB image, and takes as many
         times as long as `detect` takes for the whole image.
         """
-        return self._detect_in_squares(image_rgb, small_squares(*image_rgb.shape[:2]))
+        return self._detect_in_squares(image_rgb, _SMALL_SIDE, _SMALL_STEP)
 
     def detect_in_parts(self, image_rgb: Uint8Array) -> list[Detection]:
         """Detect people of about a fifth to two fifths of the shorter side, whom `detect` misses,
@@ -153,17 +153,18 @@ class PersonDetector:
         Searches some four to eight squares of an (H, W, 3) uint8 RGB image, and takes as many times
         as long as `detect` takes for the whole image.
         """
-        return self._detect_in_squares(image_rgb, parts(*image_rgb.shape[:2]))
+        return self._detect_in_squares(image_rgb, _PART_SIDE, _PART_STEP)
 
     def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:
         """Return nothing for any (H, W, 3) image: `detect` finds people at any turn."""
         return []
 
     def _detect_in_squares(
-        self, image_rgb: Uint8Array, within: list[tuple[int, int, int]]
+        self, image_rgb: Uint8Array, share: float, step: float
     ) -> list[Detection]:
         found: list[Detection] = []
-        for left, top, side in within:
+        height, width = image_rgb.shape[:2]
+        for left, top, side in grid_of_squares(height, width, share, step):
             found += self._detect_in(
                 image_rgb[top : top + side, left : left + side], _SMALL_SCORE, (left, top)
             )
@@ -196,25 +197,15 @@ def squares(height: int, width: int) -> list[tuple[int, int, int]]:
     return [(start, 0, side) if width > height else (0, start, side) for start in starts]
 
 
-def small_squares(height: int, width: int) -> list[tuple[int, int, int]]:
-    """Calculate (left, top, side) of the squares in which small people are looked for, row by row.
+def grid_of_squares(
+    height: int, width: int, share: float, step: float
+) -> list[tuple[int, int, int]]:
+    """Calculate (left, top, side) of squares that cover an image, row by row.
 
-    They overlap so far that a person of two fifths of their side is entirely in one of them.
+    :param share: their side, in shorter sides of the image.
+    :param step: the largest from one to the next, in sides.
     """
-    return _grid(height, width, max(1, round(min(height, width) * _SMALL_SIDE)), _SMALL_STEP)
-
-
-def parts(height: int, width: int) -> list[tuple[int, int, int]]:
-    """Calculate (left, top, side) of the squares in which people are looked for beside larger ones,
-    row by row.
-    """
-    return _grid(height, width, max(1, round(min(height, width) * _PART_SIDE)), _PART_STEP)
-
-
-def _grid(height: int, width: int, side: int, step: float) -> list[tuple[int, int, int]]:
-    """Calculate (left, top, side) of squares that cover an image; one begins ``step`` sides after
-    another at most.
-    """
+    side = max(1, round(min(height, width) * share))
     starts = [
         np.linspace(0, length - side, math.ceil((length - side) / (side * step)) + 1)
         .astype(int)

@@ -99,13 +99,13 @@ def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
     track = _standing_track(body, camera)
     lifts = []
 
-    lift_mixture = Lifter.lift_mixture
+    lift = Lifter.lift
 
     def counted(self, *arguments):
         lifts.append(1)
-        return lift_mixture(self, *arguments)
+        return lift(self, *arguments)
 
-    monkeypatch.setattr(Lifter, "lift_mixture", counted)
+    monkeypatch.setattr(Lifter, "lift", counted)
     prepared = prepare_track(body, track, camera)
     first = track_fit.fit_track(prepared, lambda *_: None)
     second = _refit(prepared, first, _stance(first))

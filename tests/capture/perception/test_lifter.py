@@ -158,7 +158,7 @@ def real_people(estimates):
 
 def test_lifting_real_people_is_more_accurate_than_their_world_landmarks(lifter, real_people):
     (rays, confidence, world, truth), limbs = real_people
-    lifted = lifter.lift_mixture(rays, confidence, world)
+    lifted = lifter.lift(rays, confidence, world)
     ours, theirs = (
         np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world)
     )
@@ -172,7 +172,7 @@ def test_errors_on_real_people_match_their_standard_deviations(lifter, real_peop
     cameras.
     """
     (rays, confidence, world, truth), limbs = real_people
-    lifted = lifter.lift_mixture(rays, confidence, world)
+    lifted = lifter.lift(rays, confidence, world)
     error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
     across = error[..., :2] / lifted.sigma_across[:, limbs, None]
     along = error[..., 2] / lifted.sigma_along[:, limbs]

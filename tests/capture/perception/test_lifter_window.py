@@ -6,8 +6,6 @@ from scope.scope_addon.capture.perception.lifter import (
     LONGEST_GAP_S,
     MIDDLE,
     OFFSETS_S,
-    WINDOW,
-    single_frame_windows,
     windows_around,
 )
 
@@ -68,9 +66,6 @@ def test_windows_of_sparse_frames_and_stills_repeat_one_frame():
     assert np.allclose(samples(np.zeros(1), np.ones(1, bool)), 0)
     # no frame was seen: all are used
     assert np.allclose(samples(times, np.zeros(5, bool))[:, MIDDLE], times)
-    still = single_frame_windows(3)
-    x = np.arange(3.0)[:, None]
-    assert np.array_equal(still.gather(x, np.arange(3), 0)[..., 0], np.repeat(x, WINDOW, axis=1))
 
 
 def test_a_block_of_frames_needs_only_the_rows_around_it():

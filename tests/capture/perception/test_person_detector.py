@@ -16,12 +16,11 @@ from scope.scope_addon.capture.perception.person_detector import (
     Detection,
     PersonDetector,
     decode,
+    grid_of_squares,
     make_anchors,
     merge_overlapping,
     overlap_clusters,
-    parts,
     possible_regions,
-    small_squares,
     squares,
     unique,
 )
@@ -144,12 +143,11 @@ def test_squares_cover_an_oblong_image() -> None:
 
 
 @pytest.mark.parametrize(("height", "width"), [(480, 640), (1920, 1080), (31, 29), (1, 500)])
-@pytest.mark.parametrize(("within", "share"), [(small_squares, 0.4 / 3), (parts, 0.2)])
+@pytest.mark.parametrize(("side", "step", "share"), [(1 / 3, 0.6, 0.4 / 3), (0.6, 2 / 3, 0.2)])
 def test_every_small_person_is_entirely_in_a_square(
-    height: int, width: int, within: Callable[[int, int], list[tuple[int, int, int]]], share: float
+    height: int, width: int, side: float, step: float, share: float
 ) -> None:
-    corners = np.array(within(height, width))
-    left, top, side = corners.T
+    left, top, side = np.array(grid_of_squares(height, width, side, step)).T
     assert min(left.min(), top.min()) == 0
     assert [(left + side).max(), (top + side).max()] == [width, height]
     person = int(share * min(height, width) - 1)  # corners of squares are whole pixels
