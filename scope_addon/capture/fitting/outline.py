@@ -208,13 +208,17 @@ def usable_masks(prepared: PreparedTrack) -> list[tuple[int, PersonMask]]:
     """Return masks of the track, evenly spread over it, each with its row; none where there are too
     few.
     """
-    if prepared.camera is None:
-        return []
     seen = [(row, mask) for row, mask in prepared.track.masks if prepared.track.seen[row]]
     if len(seen) < MIN_MASKS:
         return []
-    chosen = np.unique(np.linspace(0, len(seen) - 1, min(MAX_MASKS, len(seen))).round().astype(int))
-    return [seen[k] for k in chosen]
+    return [seen[k] for k in spread(np.arange(len(seen)), MAX_MASKS)]
+
+
+def spread(indices: IndexArray, count: int) -> IndexArray:
+    """Return at most ``count`` of indices (n,), evenly spread."""
+    rows = np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
+    chosen: IndexArray = indices[rows]
+    return chosen
 
 
 def fit_shape_to_outline(
@@ -229,7 +233,6 @@ def fit_shape_to_outline(
     :param masks: each with its row.
     :param root_cam: (T, 3) known positions of the pelvis, camera frame, metres.
     """
-    assert prepared.camera is not None
     outline = OutlineMeasurer(prepared.body, prepared.camera)
     measurer = Measurer(outline.body, prepared.measurer.intrinsics)
     extended = replace(prepared, body=outline.body, measurer=measurer)

@@ -93,6 +93,7 @@ class PreparedTrack:
     body: Body  # that is fitted, with keypoints where the network places them
     whole_body: Body  # the same with fingers, also where no hand is seen and they are not fitted
     track: Track
+    camera: Camera
     measurer: Measurer
     pixels: FloatArray  # (T, J, 2) keypoints without lens distortion
     lifted: Lifted
@@ -103,7 +104,6 @@ class PreparedTrack:
     hands: FloatArray | None = None
     # (T, 4) direction across it, certainty; None: no face looked for
     head: FloatArray | None = None
-    camera: Camera | None = None  # of the masks; None where the track has none
     is_stature_given: bool = False  # by the user
     is_stature_known: bool = False  # from the user or from a floor that several people share
     # In each frame's camera; the body's last keypoints are then its contact points.
@@ -252,12 +252,12 @@ def prepare_track(
         body,
         whole_body,
         track,
+        camera,
         measurer,
         pixels,
         lifted,
         priors,
         WEIGHTS,
-        camera=camera,
         is_stature_given=height_m is not None,
         is_stature_known=height_m is not None,
     )

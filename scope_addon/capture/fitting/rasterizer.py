@@ -94,7 +94,7 @@ def rasterize(
         coefficients = np.ravel(dist)[:5]
         lens[: len(coefficients)] = coefficients
     K = np.ascontiguousarray(intrinsics, np.float64)
-    screen, where = _project(vertices, K, lens, _largest_radius2(lens))
+    screen, where = _project(vertices, shading, K, lens, _largest_radius2(lens))
     alpha = np.uint8(round(255 * min(max(opacity, 0.0), 1.0)))
     _draw(
         canvas.rgba, canvas.depth, vertices, screen, where, shading, corners, colors, K, lens, alpha
@@ -218,12 +218,16 @@ def _pixel(x: float, y: float, K: Float64Array, lens: Float64Array) -> tuple[flo
 @cached
 @njit(nogil=True)
 def _project(
-    vertices: Float64Array, K: Float64Array, lens: Float64Array, largest: float
+    vertices: Float64Array,
+    shading: Float64Array,
+    K: Float64Array,
+    lens: Float64Array,
+    largest: float,
 ) -> tuple[Float64Array, Uint8Array]:
-    """Project the vertices: (V, 3) pixels and 1/z, and (V,) whether they are in front, behind or
-    outside.
+    """Project the vertices: (V, 5) pixels, 1/z and shading, and (V,) whether they are in front,
+    behind or outside.
     """
-    screen = np.zeros((len(vertices), 3))
+    screen = np.zeros((len(vertices), 5))
     where = np.zeros(len(vertices), np.uint8)
     for i in range(len(vertices)):
         x, y, z = vertices[i]
@@ -234,6 +238,8 @@ def _project(
         else:
             screen[i, 0], screen[i, 1] = _pixel(x / z, y / z, K, lens)
             screen[i, 2] = 1.0 / z
+            screen[i, 3] = shading[i, 0]
+            screen[i, 4] = shading[i, 1]
     return screen, where
 
 
@@ -259,25 +265,11 @@ def _draw(
         if behind == 3 or where[a] == _OUTSIDE or where[b] == _OUTSIDE or where[c] == _OUTSIDE:
             continue
         if behind == 0:
-            _fill(
-                rgba,
-                depth,
-                screen[a],
-                screen[b],
-                screen[c],
-                shading[a],
-                shading[b],
-                shading[c],
-                colors[f],
-                alpha,
-            )
+            _fill(rgba, depth, screen[a], screen[b], screen[c], colors[f], alpha)
             continue
         n = _clip_at_near(cut, vertices, shading, triangles[f], K, lens)
         for k in range(1, n - 1):
-            p = cut[0]
-            q = cut[k]
-            r = cut[k + 1]
-            _fill(rgba, depth, p[:3], q[:3], r[:3], p[3:], q[3:], r[3:], colors[f], alpha)
+            _fill(rgba, depth, cut[0], cut[k], cut[k + 1], colors[f], alpha)
 
 
 @cached
@@ -325,14 +317,11 @@ def _fill(
     a: Float64Array,
     b: Float64Array,
     c: Float64Array,
-    shade_a: Float64Array,
-    shade_b: Float64Array,
-    shade_c: Float64Array,
     color: Float32Array,
     alpha: np.uint8,
 ) -> None:
-    """Fill one triangle with corners (u, v, 1/z): the pixels whose centres it covers and that pass
-    the depth test.
+    """Fill one triangle with corners (u, v, 1/z, shading): the pixels whose centres it covers and
+    that pass the depth test.
     """
     height, width = depth.shape
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -360,8 +349,8 @@ def _fill(
                 z = 1.0 / (wa + wb + wc)
                 if z < depth[v, u]:
                     depth[v, u] = z
-                    gain = (wa * shade_a[0] + wb * shade_b[0] + wc * shade_c[0]) * z * 255
-                    rim = (wa * shade_a[1] + wb * shade_b[1] + wc * shade_c[1]) * z * 255
+                    gain = (wa * a[3] + wb * b[3] + wc * c[3]) * z * 255
+                    rim = (wa * a[4] + wb * b[4] + wc * c[4]) * z * 255
                     for k in range(3):
                         rgba[v, u, k] = np.uint8(min(255.0, gain * color[k] + rim))
                     rgba[v, u, 3] = alpha

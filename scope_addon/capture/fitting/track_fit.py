@@ -18,9 +18,9 @@ from dataclasses import replace
 import numpy as np
 
 from ....solver import ClipFit, Fit, State, fit_clip
-from ...arrays import FloatArray, IndexArray, round_array
+from ...arrays import FloatArray, round_array
 from .frame_sequence import FittedTrack, FrameSequence, is_usable
-from .outline import fit_shape_to_outline, usable_masks
+from .outline import fit_shape_to_outline, spread, usable_masks
 from .prepared_track import PreparedTrack, Stance
 from .stature import stature_sigma, with_population
 from .weights import ROBUST, clip_weights, cold_stages
@@ -137,10 +137,3 @@ def _height_sigma(prepared: PreparedTrack, shape: ClipFit) -> float:
     """Return the standard deviation of the stature of a shape of `_fit_shape`, metres."""
     information = shape.beta_information / (len(shape.frames) * prepared.weights.shape)
     return stature_sigma(prepared.body, shape.beta, information, prepared.is_stature_given)
-
-
-def spread(indices: IndexArray, count: int) -> IndexArray:
-    """Return at most ``count`` of indices (n,), evenly spread."""
-    rows = np.unique(np.linspace(0, len(indices) - 1, min(count, len(indices))).round().astype(int))
-    chosen: IndexArray = indices[rows]
-    return chosen

@@ -65,19 +65,13 @@ def tiff_size(data: bytes) -> tuple[int, int, int]:
     found = {_WIDTH: 0, _HEIGHT: 0, _BITS: 1}
     try:
         at = struct.unpack_from(endian + "I", data, 4)[0]
-        for i in range(struct.unpack_from(endian + "H", data, at)[0]):
-            entry = at + 2 + 12 * i
-            tag, kind, count = struct.unpack_from(endian + "HHI", data, entry)
+        for tag, kind, count, place in _entries(data, at, endian):
             if tag not in found:
                 continue
             value = _DEEPEST if tag == _BITS else 0
             if kind in _INTEGER and count > 0:
-                size = struct.calcsize(_INTEGER[kind])
-                place = (
-                    entry + 8
-                    if count * size <= 4
-                    else struct.unpack_from(endian + "I", data, entry + 8)[0]
-                )
+                if count * struct.calcsize(_INTEGER[kind]) > 4:
+                    place = struct.unpack_from(endian + "I", data, place)[0]
                 value = struct.unpack_from(endian + _INTEGER[kind], data, place)[0]
             found[tag] = max(found[tag], value)
     except struct.error:
@@ -143,12 +137,19 @@ def _parse(tiff: bytes) -> Exif:
 
 
 def _directory(tiff: bytes, at: int, endian: str) -> dict[int, int]:
-    """Read the integer tags of one TIFF directory, whose entries are 12 bytes: tag, type, count,
-    value.
+    """Read the integer tags of one TIFF directory."""
+    return {
+        tag: struct.unpack_from(endian + _INTEGER[kind], tiff, place)[0]
+        for tag, kind, count, place in _entries(tiff, at, endian)
+        if kind in _INTEGER and count == 1
+    }
+
+
+def _entries(tiff: bytes, at: int, endian: str) -> Iterator[tuple[int, int, int, int]]:
+    """Iterate over the entries of a TIFF directory, which are 12 bytes: tag, type, count, value;
+    yield the first three, and where the value is.
     """
-    tags = {}
     for i in range(struct.unpack_from(endian + "H", tiff, at)[0]):
-        tag, kind, count = struct.unpack_from(endian + "HHI", tiff, at + 2 + 12 * i)
-        if kind in _INTEGER and count == 1:
-            tags[tag] = struct.unpack_from(endian + _INTEGER[kind], tiff, at + 2 + 12 * i + 8)[0]
-    return tags
+        entry = at + 2 + 12 * i
+        tag, kind, count = struct.unpack_from(endian + "HHI", tiff, entry)
+        yield tag, kind, count, entry + 8

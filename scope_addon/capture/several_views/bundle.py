@@ -369,8 +369,7 @@ class _Problem:
             between = np.swapaxes(weighted_camera, 1, 2) @ J_point
             coupling[:, own] += np.swapaxes(between.reshape(N, n, _UNKNOWNS, 3), 1, 2)
         known = (confidence > 0).any(axis=0)
-        self._add_bones(now, known, H_global, g_global)
-        self._add_bones_to_points(now, known, H_points, g_points, coupling)
+        self._add_bones(now, known, H_global, g_global, H_points, g_points, coupling)
         self._add_priors(now, H_global, g_global)
         return _System(
             H_global,
@@ -391,36 +390,26 @@ class _Problem:
         stretch = mean * np.log(length / now.lengths[BONE_OF_ROW])
         return stretch, mean[:, None] * bones / np.square(length)[..., None]
 
-    def _bone_weight(self, stretch: Float64Array, known: BoolArray) -> Float64Array:
-        both = known[:, BONE_STARTS] & known[:, BONE_ENDS]
-        weight: Float64Array = both / (1.0 + np.square(stretch / BONE_SIGMA_M)) / BONE_SIGMA_M**2
-        return weight
-
     def _add_bones(
-        self, now: _Unknowns, known: BoolArray, H_global: Float64Array, g_global: Float64Array
-    ) -> None:
-        """Add what bones say about their lengths."""
-        stretch, _ = self._stretch(now)
-        weight = self._bone_weight(stretch, known)
-        at = len(now.cameras) * _UNKNOWNS + BONE_OF_ROW
-        mean = self.mean_lengths[BONE_OF_ROW]
-        np.add.at(H_global, (at, at), weight.sum(axis=0) * mean**2)
-        np.add.at(g_global, at, -(weight * stretch).sum(axis=0) * mean)
-
-    def _add_bones_to_points(
         self,
         now: _Unknowns,
         known: BoolArray,
+        H_global: Float64Array,
+        g_global: Float64Array,
         H_points: Float64Array,
         g_points: Float64Array,
         coupling: Float64Array,
     ) -> None:
-        """Add what bones say about the points at their ends."""
+        """Add what bones say about their lengths, and about the points at their ends."""
         stretch, gradient = self._stretch(now)
-        weight = self._bone_weight(stretch, known)
+        both = known[:, BONE_STARTS] & known[:, BONE_ENDS]
+        weight = both / (1.0 + np.square(stretch / BONE_SIGMA_M)) / BONE_SIGMA_M**2
+        lengths = len(now.cameras) * _UNKNOWNS + BONE_OF_ROW
+        mean = self.mean_lengths[BONE_OF_ROW]
+        np.add.at(H_global, (lengths, lengths), weight.sum(axis=0) * mean**2)
+        np.add.at(g_global, lengths, -(weight * stretch).sum(axis=0) * mean)
         for row, (start, end) in enumerate(zip(BONE_STARTS, BONE_ENDS, strict=True)):
             u = gradient[:, row]
-            mean = self.mean_lengths[BONE_OF_ROW[row]]
             w = weight[:, row, None]
             block = w[..., None] * u[:, :, None] * u[:, None, :]
             H_points[:, start, :, start] += block
@@ -430,9 +419,8 @@ class _Problem:
             pull = w * stretch[:, row, None] * u
             g_points[:, end] += pull
             g_points[:, start] -= pull
-            at = len(now.cameras) * _UNKNOWNS + BONE_OF_ROW[row]
-            coupling[:, at, end] -= mean * w * u
-            coupling[:, at, start] += mean * w * u
+            coupling[:, lengths[row], end] -= mean[row] * w * u
+            coupling[:, lengths[row], start] += mean[row] * w * u
 
     def _add_priors(self, now: _Unknowns, H_global: Float64Array, g_global: Float64Array) -> None:
         diagonal = np.zeros(len(g_global))

@@ -19,7 +19,7 @@ import numpy as np
 from ....solver.rotations import exp, log, nearest_rotation
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.sequences import runs
-from ..fitting.track_fit import spread
+from ..fitting.outline import spread
 from .bundle import KEYPOINT_SIGMA, CameraPlace, Given, adjust, image_residual, triangulate
 from .seen_person import BONE_ENDS, BONE_STARTS, SeenPerson
 from .synchronize import APART_S, MOST_LIKELY, likely_offsets
