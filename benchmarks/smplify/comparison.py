@@ -261,7 +261,9 @@ def _draw(
             colors = [body_colors(body, person)]
             for ground, shape in ((image, skin), (np.full_like(image, 236), turned(skin))):
                 pictures.append(
-                    draw_overlay(ground, [shape], body.faces, motion.intrinsics, None, colors, 1.0)
+                    draw_overlay(
+                        ground, [shape], body.faces, motion.intrinsics, None, colors, [1.0]
+                    )
                 )
         strips.append(
             np.hstack([_cropped(picture, project(ours, motion.intrinsics)) for picture in pictures])

@@ -51,7 +51,7 @@ Progress = Callable[[int, int], None]
 def write_overlay(
     path: str | Path,
     video_path: str | Path,
-    motions: Motion | Sequence[Motion],
+    motions: Sequence[Motion],
     body: Body,
     *,
     progress: Progress | None = None,
@@ -71,18 +71,17 @@ def write_overlay(
     :raises ShapeError: a motion does not have the joints of the body.
     """
     path = Path(path)
-    people = [motions] if isinstance(motions, Motion) else list(motions)
     suffix = path.suffix.lower()
     if suffix not in VIDEO_SUFFIXES + STILL_SUFFIXES:
         known = ", ".join(VIDEO_SUFFIXES + STILL_SUFFIXES)
         raise OutputError(f"cannot write the overlay {path}: its suffix must be one of {known}")
     with open_video(video_path, wanted) as video:
-        painter = _Painter(people, body, video, even=suffix in VIDEO_SUFFIXES)
+        painter = _Painter(motions, body, video, even=suffix in VIDEO_SUFFIXES)
         try:
             with atomic_path(path) as temporary:
                 if suffix in STILL_SUFFIXES:
                     first = min(
-                        (int(m.frames[m.valid][0]) for m in people if m.valid.any()), default=0
+                        (int(m.frames[m.valid][0]) for m in motions if m.valid.any()), default=0
                     )
                     _write_still(temporary, painter, video, first)
                 else:
@@ -108,7 +107,7 @@ def painted_frames(
     """
     remaining = set(indices)
     with open_video(video_path, wanted) as video:
-        painter = _Painter(list(motions), body, video, even=False)
+        painter = _Painter(motions, body, video, even=False)
         for frame in video:
             if frame.index in remaining:
                 remaining.remove(frame.index)
@@ -119,44 +118,26 @@ def painted_frames(
 
 def draw_overlay(
     image_rgb: Uint8Array,
-    vertices_cam: FloatArray | Sequence[FloatArray],
+    vertices_cam: Sequence[FloatArray],
     faces: NDArray[np.integer[Any]],
     intrinsics: Float64Array,
-    dist: Float64Array | None = None,
-    colors: ArrayLike | Sequence[ArrayLike] | None = None,
-    opacity: float | Sequence[float] = 0.6,
+    dist: Float64Array | None,
+    colors: Sequence[ArrayLike],
+    opacities: Sequence[float],
 ) -> Uint8Array:
     """Draw shaded bodies over one image, with occlusion between them.
 
     :param image_rgb: (H, W, 3) uint8.
-    :param vertices_cam: (V, 3), or one such array per person: metres, camera axes (OpenCV's).
+    :param vertices_cam: of each person (V, 3) metres, camera axes (OpenCV's).
     :param faces: (F, 3) or (F, 4), counter-clockwise seen from outside.
     :param intrinsics: (3, 3) K in pixels of the image.
     :param dist: up to (5,) distortion coefficients; None for none.
-    :param colors: per person (3,) or (F, 3) sRGB in 0..1; None: a tint each.
-    :param opacity: 0..1, one for all or one per person.
+    :param colors: of each person (3,) or (F, 3) sRGB in 0..1.
+    :param opacities: of each person, 0..1.
     :return: a new image of the same size.
     """
-    people = (
-        [np.asarray(vertices_cam)]
-        if np.ndim(vertices_cam) == 2
-        else [np.asarray(v) for v in vertices_cam]
-    )
-    if colors is None:
-        colors = [tint(i) for i in range(len(people))]
-    elif isinstance(colors, np.ndarray) and len(people) == 1 and colors.ndim <= 2:
-        colors = [colors]
-    opacities = np.broadcast_to(np.asarray(opacity, float), (len(people),)).tolist()
     canvas = Canvas.blank(image_rgb.shape[1], image_rgb.shape[0])
-    _draw_bodies(
-        canvas,
-        people,
-        faces,
-        intrinsics,
-        dist,
-        list(cast("Sequence[ArrayLike]", colors)),
-        opacities,
-    )
+    _draw_bodies(canvas, vertices_cam, faces, intrinsics, dist, colors, opacities)
     return blended(image_rgb, canvas)
 
 
@@ -169,9 +150,7 @@ def _draw_bodies(
     colors: Sequence[ArrayLike],
     opacities: Sequence[float],
 ) -> None:
-    """Draw the bodies of several people into a canvas; as `draw_overlay`, but with a list element
-    per person.
-    """
+    """Draw the bodies of several people into a canvas; see `draw_overlay`."""
     triangles = (
         faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     )
@@ -244,7 +223,7 @@ def _blend(image: Uint8Array, rgba: Uint8Array) -> None:
 class _Painter:
     """Draws the overlay of the frames of one clip; scales the intrinsics with the image."""
 
-    def __init__(self, people: list[Motion], body: Body, video: Video, even: bool) -> None:
+    def __init__(self, people: Sequence[Motion], body: Body, video: Video, even: bool) -> None:
         for motion in people:
             if motion.joint_count != body.K + 1:
                 raise ShapeError(

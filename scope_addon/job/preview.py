@@ -25,7 +25,7 @@ from ..atomic_write import atomic_path
 from ..capture.camera.intrinsics import scaled_intrinsics
 from ..capture.fitting.live_body import LiveBody, LivePose
 from ..capture.media.frame import Frame
-from ..capture.overlay_video import body_colors, draw_overlay
+from ..capture.overlay_video import body_colors, draw_overlay, tint
 from ..capture.perception.landmark_network import KEYPOINT_NAMES
 from ..capture.perception.observation import Observation
 from ..temporary import remove
@@ -125,10 +125,12 @@ def load_rasterizer() -> None:
     corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
     draw_overlay(
         np.zeros((8, 8, 3), np.uint8),
-        corners,
+        [corners],
         np.array([[0, 1, 2]]),
         np.diag([4.0, 4.0, 1.0]),
         np.zeros(5),
+        [tint(0)],
+        [1.0],
     )
 
 
@@ -174,7 +176,13 @@ def _with_body(image: NDArray[np.uint8], pose: LivePose, scale: float) -> NDArra
     intrinsics = scaled_intrinsics(pose.camera.intrinsics, scale)
     colors = body_colors(pose.body, 0)
     return draw_overlay(
-        image, pose.vertices_cam, pose.body.faces, intrinsics, pose.camera.dist, colors, OPACITY
+        image,
+        [pose.vertices_cam],
+        pose.body.faces,
+        intrinsics,
+        pose.camera.dist,
+        [colors],
+        [OPACITY],
     )
 
 

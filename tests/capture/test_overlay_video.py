@@ -20,6 +20,7 @@ from scope.scope_addon.capture.overlay_video import (
     camera_vertices,
     draw_overlay,
     painted_frames,
+    tint,
     write_overlay,
 )
 from scope.scope_addon.errors import CancelledError, OutputError, VideoError
@@ -124,7 +125,7 @@ def test_the_video_shows_the_body_where_it_is_and_nothing_elsewhere(
     motion = standing(body, [2, 3, 4, 5, 6], x=0.3)
     motion.valid[2] = False
     write_overlay(
-        out, footage, motion, body, progress=lambda done, total: seen.append((done, total))
+        out, footage, [motion], body, progress=lambda done, total: seen.append((done, total))
     )
     with open_video(out) as video:
         images = [f.image_rgb for f in video]
@@ -146,19 +147,18 @@ def test_two_people_have_different_colours_and_the_nearer_occludes_the_other(bod
     near, far = (
         camera_vertices(standing(body, [0], x, y), body, 0) for x, y in ((0.0, 2.5), (0.2, 4.0))
     )
-    out = draw_overlay(image, [far, near], body.faces, K, opacity=1.0)
-    other = draw_overlay(
-        image, [near, far], body.faces, K, colors=[(0.2, 0.75, 1.0), (1.0, 0.55, 0.15)], opacity=1.0
-    )
+    orange, blue = tint(0), tint(1)
+    out = draw_overlay(image, [far, near], body.faces, K, None, [orange, blue], [1.0, 1.0])
+    other = draw_overlay(image, [near, far], body.faces, K, None, [blue, orange], [1.0, 1.0])
     np.testing.assert_array_equal(out, other)
     in_front = silhouette(body, 0.0, 2.5)
     behind = silhouette(body, 0.2, 4.0)
     inside, only_far = (
         cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for m in (in_front, behind & ~in_front)
     )
-    blue = out[..., 2].astype(int) > out[..., 0]
-    assert blue[inside].mean() > 0.98  # the second tint; an eye may be of its own colour
-    assert blue[only_far].mean() < 0.02  # the first is orange
+    is_blue = out[..., 2].astype(int) > out[..., 0]
+    assert is_blue[inside].mean() > 0.98  # the second tint; an eye may be of its own colour
+    assert is_blue[only_far].mean() < 0.02  # the first is orange
 
 
 def test_opacity_blends_and_the_input_image_is_not_changed(body):
@@ -167,7 +167,7 @@ def test_opacity_blends_and_the_input_image_is_not_changed(body):
     colors = body_colors(body, 0)
     assert colors.shape == (len(body.faces), 3)
     none, half, full = (
-        draw_overlay(image, vertices, body.faces, K, None, colors, a) for a in (0.0, 0.5, 1.0)
+        draw_overlay(image, [vertices], body.faces, K, None, [colors], [a]) for a in (0.0, 0.5, 1.0)
     )
     np.testing.assert_array_equal(none, image)
     assert np.abs(half.astype(int) - (full.astype(int) + GREY) / 2).max() <= 2
@@ -178,7 +178,7 @@ def test_a_picture_suffix_gives_the_first_frame_with_a_person(tmp_path, footage,
     motion = standing(body, [0, 1, 2])
     motion.valid[:] = (False, False, True)
     for name in ("still.png", "still.JPG", "still.webp"):
-        write_overlay(tmp_path / name, footage, motion, body)
+        write_overlay(tmp_path / name, footage, [motion], body)
         image = cv2.cvtColor(cv2.imread(str(tmp_path / name)), cv2.COLOR_BGR2RGB)
         assert intersection_over_union(changed(image), silhouette(body)) > 0.8
 
@@ -189,7 +189,7 @@ def test_confident_keypoints_are_drawn_as_dots(tmp_path, footage, body):
         [[[20, 30, 0.9], [20, 90, 0.1], [np.nan, 5, 0.9], [1e9, 5, 0.9]]], np.float32
     )
     motion.keypoints2d_names = np.array(list("abcd"))
-    write_overlay(tmp_path / "a.png", footage, motion, body)
+    write_overlay(tmp_path / "a.png", footage, [motion], body)
     marks = changed(cv2.imread(str(tmp_path / "a.png")))
     assert marks[30, 20]
     assert not marks[85:95, 15:25].any()
@@ -207,7 +207,7 @@ def test_the_video_has_the_times_of_footage_with_a_variable_rate(tmp_path, foota
     """Its frames followed each other at the footage's nominal rate."""
     with_time_table(footage, 1000, steps)
     out = tmp_path / "overlay.mp4"
-    write_overlay(out, footage, standing(body, list(range(10))), body)
+    write_overlay(out, footage, [standing(body, list(range(10)))], body)
     np.testing.assert_allclose(times_of(out), times_of(footage), atol=2e-5)
 
 
@@ -223,7 +223,7 @@ def test_the_video_of_footage_with_a_constant_rate_has_exactly_that(tmp_path, bo
     for _ in range(10):
         writer.write(np.full((H, W, 3), GREY, np.uint8))
     writer.close()
-    write_overlay(out, footage, standing(body, list(range(10))), body)
+    write_overlay(out, footage, [standing(body, list(range(10)))], body)
     with av.open(str(out)) as container:
         assert container.streams.video[0].average_rate == rate
     np.testing.assert_allclose(times_of(out), [float(k / rate) for k in range(10)], atol=1e-9)
@@ -234,7 +234,7 @@ def test_odd_sizes_are_cropped_and_large_ones_are_limited(tmp_path, body):
     (tmp_path / "wide.mjpeg").write_bytes(picture * 3)
     camera = np.array([[60.0, 0, 1200], [0, 60.0, 60.0], [0, 0, 1]])
     motion = standing(body, [0, 1, 2], size=(2401, 121), intrinsics=camera)
-    write_overlay(tmp_path / "a.mp4", tmp_path / "wide.mjpeg", motion, body)
+    write_overlay(tmp_path / "a.mp4", tmp_path / "wide.mjpeg", [motion], body)
     with open_video(tmp_path / "a.mp4") as video:
         image = next(iter(video)).image_rgb
     assert (video.width, video.height) == (1920, 96)
@@ -245,7 +245,7 @@ def test_odd_sizes_are_cropped_and_large_ones_are_limited(tmp_path, body):
 @pytest.mark.parametrize("name", ["overlay.gif", "overlay", "no/such/folder/overlay.mp4"])
 def test_unwritable_outputs_are_errors(tmp_path, footage, body, name):
     with pytest.raises(OutputError, match="cannot write"):
-        write_overlay(tmp_path / name, footage, standing(body, [0]), body)
+        write_overlay(tmp_path / name, footage, [standing(body, [0])], body)
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
@@ -263,7 +263,7 @@ def test_a_full_disk_is_an_error_and_leaves_no_file(tmp_path, footage, body, nam
     resource.setrlimit(resource.RLIMIT_FSIZE, (500, before[1]))
     try:
         with pytest.raises(OutputError, match=f"{failed} .*{name}.*free some space"):
-            write_overlay(tmp_path / name, footage, standing(body, [0]), body)
+            write_overlay(tmp_path / name, footage, [standing(body, [0])], body)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
@@ -277,7 +277,9 @@ def test_cancelling_leaves_no_file_and_keeps_an_existing_one(tmp_path, footage, 
             raise CancelledError("stopped")
 
     with pytest.raises(CancelledError):
-        write_overlay(tmp_path / "overlay.mp4", footage, standing(body, [0]), body, progress=cancel)
+        write_overlay(
+            tmp_path / "overlay.mp4", footage, [standing(body, [0])], body, progress=cancel
+        )
     assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
     assert (tmp_path / "overlay.mp4").read_bytes() == b"the last one"
 
@@ -290,18 +292,18 @@ def test_a_range_without_frames_is_an_error_and_leaves_no_file(tmp_path, footage
         r"end",
     ):
         write_overlay(
-            tmp_path / name, footage, standing(body, [0]), body, wanted=VideoRange(start_s=1.0)
+            tmp_path / name, footage, [standing(body, [0])], body, wanted=VideoRange(start_s=1.0)
         )
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 
 def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
     with pytest.raises(VideoError):
-        write_overlay(tmp_path / "a.mp4", tmp_path / "gone.mp4", standing(body, [0]), body)
+        write_overlay(tmp_path / "a.mp4", tmp_path / "gone.mp4", [standing(body, [0])], body)
     motion = standing(body, [0])
     motion.joints_cam = np.zeros((1, 52, 3), np.float32)
     with pytest.raises(ShapeError, match="52 joints"):
-        write_overlay(tmp_path / "a.mp4", footage, motion, body)
+        write_overlay(tmp_path / "a.mp4", footage, [motion], body)
     assert [p.name for p in tmp_path.iterdir()] == ["footage.mp4"]
 
 

@@ -58,5 +58,5 @@ def cropped(
         body = body or default_body()
         vertices = posed_in_camera(motion, body, row)
         K = crop @ motion.intrinsics
-        larger = draw_overlay(larger, vertices, body.faces, K, colors=colors, opacity=_OPACITY)
+        larger = draw_overlay(larger, [vertices], body.faces, K, None, [colors], [_OPACITY])
     return cv2.resize(larger, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)

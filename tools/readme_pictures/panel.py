@@ -58,7 +58,7 @@ class Panel:
         seen = self.view.to_camera(vertices)
         colors = np.array(color) if np.ndim(color) == 1 else np.tile(color, (2, 1))
         self.image = draw_overlay(
-            self.image, seen, triangles, self.view.intrinsics, colors=colors, opacity=1
+            self.image, [seen], triangles, self.view.intrinsics, None, [colors], [1.0]
         )
         self._depth = np.minimum(self._depth, self._rasterized(seen, triangles, OURS).depth)
 

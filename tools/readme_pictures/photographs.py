@@ -134,5 +134,5 @@ def _head(motion: Motion, part: NDArray[np.float64]) -> NDArray[np.uint8]:
     vertices = posed_in_camera(motion, body, 0)
     colors = colors_with_face(body, OURS)
     return draw_overlay(
-        blank, vertices, body.faces, part @ motion.intrinsics, colors=colors, opacity=1
+        blank, [vertices], body.faces, part @ motion.intrinsics, None, [colors], [1.0]
     )

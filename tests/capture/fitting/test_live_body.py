@@ -40,7 +40,9 @@ def watched(body):
 def silhouette(image, vertices, body, camera) -> np.ndarray:
     black = np.zeros_like(image)
     white = np.ones((len(body.faces), 3))
-    drawn = draw_overlay(black, vertices, body.faces, camera.intrinsics, camera.dist, white, 1.0)
+    drawn = draw_overlay(
+        black, [vertices], body.faces, camera.intrinsics, camera.dist, [white], [1.0]
+    )
     return drawn.max(axis=2) > 60
 
 
