@@ -35,7 +35,7 @@ WRITES = {
     "scope_addon/job/unfinished.py",
     "scope_addon/job/batch.py",
     "scope_addon/job/clip_task.py",
-    "scope_addon/capture/long_clips/kept_folder.py",
+    "scope_addon/capture/long_clips/kept_estimates.py",
     "scope_addon/capture/long_clips/windowed_clip.py",
     "scope_addon/cluster/runner.py",
     "scope_addon/cluster/remote.py",

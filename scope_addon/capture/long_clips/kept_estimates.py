@@ -13,6 +13,7 @@ import hashlib
 import os
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -25,14 +26,45 @@ from ...arrays import Float64Array, Uint8Array
 from ...atomic_write import write_npz
 from ...untrusted.files import read_npz
 from ..perception.region import Region
-from .kept_folder import KeptFolder
 
 INTERVAL_S = 20.0  # between two files: the work that a kill can cost
+LARGEST = 1 << 30  # bytes of one capture's files of a kind; some five hours of estimates
 _KEY_BYTES = 16
 _PIXEL_STEP = 4  # rows of the crop between those in the key
 # Files whose values are in memory; a capture asks in the order in which they were written.
 _LOADED = 2
 Values = Float64Array
+
+
+class KeptFolder:
+    """What cannot be written is not kept: nothing depends on it but time.
+
+    :param folder: need not exist.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder
+        self.is_open = True
+        self._bytes = 0
+
+    def write(self, write_file: Callable[[Path], Path]) -> None:
+        """Write a file; after a failure, or when there is too much, nothing any more.
+
+        :param write_file: takes the folder, and returns the file that it has written there.
+        """
+        if not self.is_open:
+            return
+        try:
+            self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self.count(write_file(self.path))
+        except (OSError, ScopeError):
+            self.is_open = False
+
+    def count(self, file: Path) -> None:
+        """Count a file that may be there as kept."""
+        with suppress(OSError):
+            self._bytes += file.stat().st_size
+        self.is_open &= self._bytes <= LARGEST
 
 
 class KeptEstimates:

@@ -35,7 +35,7 @@ from ..perception.adapters.description import description_path
 from ..perception.observation import PendingReference, PersonMask
 from ..perception.region import Region
 from ..tracking.track import Tracklet
-from .kept_folder import KeptFolder
+from .kept_estimates import KeptFolder
 
 # The records of which an observation consists; no other class is made of a file.
 _RECORDS = {

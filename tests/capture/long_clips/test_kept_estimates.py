@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.long_clips import kept_estimates, kept_folder
+from scope.scope_addon.capture.long_clips import kept_estimates
 from scope.scope_addon.capture.long_clips.kept_estimates import KeptEstimates
 from scope.scope_addon.capture.perception.region import Region
 
@@ -92,7 +92,7 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
 
 
 def test_no_more_than_so_much_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept_folder, "LARGEST", 1000)
+    monkeypatch.setattr(kept_estimates, "LARGEST", 1000)
     keep(tmp_path, rows=9)
     assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 2000
 

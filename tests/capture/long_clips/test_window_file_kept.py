@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.long_clips import kept_folder
+from scope.scope_addon.capture.long_clips import kept_estimates
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video
 from scope.scope_addon.capture.options import CaptureOptions
@@ -165,7 +165,7 @@ def test_windows_are_kept_within_bounds(
 ) -> None:
     sizes = [file.stat().st_size for file in sorted(all_kept.glob("windows-*/*"))]
     assert len(sizes) == 3
-    monkeypatch.setattr(kept_folder, "LARGEST", sizes[0] + sizes[1] // 2)
+    monkeypatch.setattr(kept_estimates, "LARGEST", sizes[0] + sizes[1] // 2)
     windows_of(options(), None, tmp_path / "small")
     assert [file.stat().st_size for file in sorted(tmp_path.glob("small/windows-*/*"))] == sizes[:2]
     (tmp_path / "file").write_text("in the way")
