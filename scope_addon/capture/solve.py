@@ -268,18 +268,17 @@ def with_camera_path(shot: Shot, first: Person) -> Shot:
         return shot
     placed = first.fitted_places(shot)
     up = world_of(shot, [placed]).up
-    if shot.treadmill and shot.travel is None:
+    if shot.travel is not None:
+        scaled = scaled_travel(placed.soles, placed.valid, up, placed.times, shot.travel)
+        shot = replace(shot, floor_up=scaled.floor_up, has_scale=scaled.is_known)
+        center = scaled.center
+        if shot.belt_m_s:
+            center = center + belt_travel(placed, up, shot.belt_m_s)
+    elif shot.treadmill:
         center = belt_travel(placed, up, shot.belt_m_s)
-        return replace(shot, path=replace(shot.path, center=center))
-    if shot.travel is None:
+    else:
         center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
-        return replace(shot, path=replace(shot.path, center=center))
-    scaled = scaled_travel(placed.soles, placed.valid, up, placed.times, shot.travel)
-    center = scaled.center
-    if shot.belt_m_s:
-        center = center + belt_travel(placed, up, shot.belt_m_s)
-    path = replace(shot.path, center=center)
-    return replace(shot, path=path, floor_up=scaled.floor_up, has_scale=scaled.is_known)
+    return replace(shot, path=replace(shot.path, center=center))
 
 
 def world_of(

@@ -170,6 +170,16 @@ def is_rotated(R: Float64Array) -> bool:
     return bool(np.degrees(np.linalg.norm(log(R))) >= STATIC_DEG)
 
 
+def best_rotation(products: Float64Array) -> Float64Array:
+    """Return the rotations (..., 3, 3) that best take directions a to b, from the sums (..., 3, 3)
+    of b aᵀ (Kabsch 1976).
+    """
+    U, _, Vt = np.linalg.svd(products)
+    U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
+    R: Float64Array = U @ Vt
+    return R
+
+
 def joined_backgrounds(
     parts: Sequence[BackgroundRecord], firsts: Sequence[int]
 ) -> BackgroundRecord:
@@ -254,7 +264,4 @@ def _link(before: BackgroundRecord, part: BackgroundRecord, first: int) -> Float
     else:
         seen = np.flatnonzero(before.known)
         total = before.R_first_camera[seen[-1]] if len(seen) else np.eye(3)
-    U, _, Vt = np.linalg.svd(total)
-    U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
-    link: Float64Array = U @ Vt
-    return link
+    return best_rotation(total)

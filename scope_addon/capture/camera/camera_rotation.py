@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray, Uint8Array
 from ..perception.region import inside, surroundings
-from .background_record import REVEALING_S, BackgroundRecord, is_rotated
+from .background_record import REVEALING_S, BackgroundRecord, best_rotation, is_rotated
 from .bars import find_bars
 from .corner_tracks import SAMPLES_HZ, CornerFollower, background_mask, follow_corners
 from .heading_drift import EDGE_INTERVAL_S, EDGE_SIDE_PX, FrameEdges
@@ -254,7 +254,7 @@ def consensus_rotation(
     """
     pairs = random.integers(0, len(a), (HYPOTHESES, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    R = _kabsch(a[pairs], b[pairs])
+    R = best_rotation(np.swapaxes(b[pairs], 1, 2) @ a[pairs])
     # |R a − b|² = 2 − 2 bᵀ R a, for all hypotheses and directions in one matrix product
     near = (
         R.reshape(-1, 9) @ (b[:, :, None] * a[:, None]).reshape(-1, 9).T > 1.0 - 0.5 * tolerance**2
@@ -264,18 +264,9 @@ def consensus_rotation(
     for _ in range(3):
         if agree.sum() < 2:
             break
-        best = _kabsch(a[agree][None], b[agree][None])[0]
+        best = best_rotation(b[agree].T @ a[agree])
         agree = np.linalg.norm(a @ best.T - b, axis=1) < tolerance
     return best, agree
-
-
-def _kabsch(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return the (..., 3, 3) rotations that best take directions a (..., n, 3) to b."""
-    U, _, Vt = np.linalg.svd(np.swapaxes(b, -1, -2) @ a)
-    sign = np.sign(np.linalg.det(U @ Vt))
-    U[..., :, 2] *= sign[..., None]
-    R: Float64Array = U @ Vt
-    return R
 
 
 class HiddenBackground:

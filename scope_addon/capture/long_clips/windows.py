@@ -211,16 +211,25 @@ def distance(earlier: Tracklet, later: Tracklet, offset: int, rows: tuple[int, i
     :param rows: the first and the end of the rows of the later window that are compared.
     :return: inf if there are none.
     """
-    places = {row - offset: k for k, row in enumerate(earlier.rows)}
     found = []
-    for k, row in enumerate(later.rows):
-        if rows[0] <= row < rows[1] and row in places:
-            other = places[row]
-            apart = np.linalg.norm(
-                later.values[k][:, :2] - earlier.values[other][:, :2], axis=1
-            ).mean()
-            found.append(float(apart) / min(later.sides_px[k], earlier.sides_px[other]))
+    for k, other in _shared_frames(earlier, later, offset, rows):
+        apart = np.linalg.norm(later.values[k][:, :2] - earlier.values[other][:, :2], axis=1).mean()
+        found.append(float(apart) / min(later.sides_px[k], earlier.sides_px[other]))
     return float(np.mean(found)) if found else np.inf
+
+
+def _shared_frames(
+    earlier: Tracklet, later: Tracklet, offset: int, rows: tuple[int, int]
+) -> list[tuple[int, int]]:
+    """Return the places of the frames that two tracklets share in the later and in the earlier one;
+    see `distance`.
+    """
+    places = {row - offset: k for k, row in enumerate(earlier.rows)}
+    return [
+        (k, places[row])
+        for k, row in enumerate(later.rows)
+        if rows[0] <= row < rows[1] and row in places
+    ]
 
 
 def faded(earlier: Tracklet, later: Tracklet, offset: int, overlap: int) -> dict[int, Float32Array]:
@@ -236,12 +245,10 @@ def faded(earlier: Tracklet, later: Tracklet, offset: int, overlap: int) -> dict
     """
     if distance(earlier, later, offset, (0, overlap)) > SAME_POSE:
         return {}
-    places = {row - offset: k for k, row in enumerate(earlier.rows)}
     values: dict[int, Float32Array] = {}
-    for k, row in enumerate(later.rows):
-        if row < overlap and row in places:
-            a = np.float32((row + 1) / (overlap + 1))
-            values[places[row]] = (1 - a) * earlier.values[places[row]] + a * later.values[k]
+    for k, other in _shared_frames(earlier, later, offset, (0, overlap)):
+        a = np.float32((later.rows[k] + 1) / (overlap + 1))
+        values[other] = (1 - a) * earlier.values[other] + a * later.values[k]
     return values
 
 

@@ -85,10 +85,16 @@ def suppress(boxes: Boxes, threshold: float) -> Boxes:
 
 
 def _is_yolox(graph: Graph) -> bool:
-    if len(graph.shapes) != 1 or len(graph.shapes[0]) != 3:
-        return False
-    _, rows, columns = graph.shapes[0]
+    rows, columns = _table_of(graph)
     return rows == len(cells(graph.width, graph.height)) and columns >= 6
+
+
+def _table_of(graph: Graph) -> tuple[int, int]:
+    """Return the rows and columns of the only output; zeros if it is no table."""
+    if len(graph.shapes) != 1 or len(graph.shapes[0]) != 3:
+        return 0, 0
+    _, rows, columns = graph.shapes[0]
+    return rows, columns
 
 
 def _yolox(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
@@ -126,9 +132,7 @@ def cells(width: int, height: int) -> Float64Array:
 
 
 def _is_yolov8(graph: Graph) -> bool:
-    if len(graph.shapes) != 1 or len(graph.shapes[0]) != 3:
-        return False
-    _, numbers, boxes = graph.shapes[0]
+    numbers, boxes = _table_of(graph)
     return numbers >= 5 and boxes == sum(
         (graph.width // s) * (graph.height // s) for s in _CELL_SIDES
     )
@@ -171,7 +175,7 @@ def _is_boxes(shape: tuple[int, ...]) -> bool:
 
 
 def _is_end_to_end(graph: Graph) -> bool:
-    return len(graph.shapes) == 1 and len(graph.shapes[0]) == 3 and graph.shapes[0][2] == 6
+    return _table_of(graph)[1] == 6
 
 
 def _end_to_end(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
