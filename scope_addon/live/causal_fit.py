@@ -26,8 +26,8 @@ from ..capture.fitting.frame_measurements import Measurer
 from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
 from ..capture.fitting.prepared_track import prepare_track
 from ..capture.fitting.weights import ROBUST, cold_stages, warm_stages
-from ..capture.perception.landmark_network import KEYPOINT_NAMES
-from ..capture.perception.lifter import KEYPOINT_COUNT, OFFSETS_S, default_lifter, windows_around
+from ..capture.perception.landmark_network import KEYPOINT_COUNT, KEYPOINT_NAMES
+from ..capture.perception.lifter import OFFSETS_S, default_lifter, windows_around
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import single_frame_track
 from ..kinematics.contact_points import CONTACT_POINTS, with_contact_points

@@ -7,8 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scope.benchmarks.scenes.garments import Garment
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.perception.lifter import HIPS
+from scope.scope_addon.capture.perception.landmark_network import HIPS, KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.track import Track

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from ...scope_addon.atomic_write import atomic_path
-from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT, WINDOW
+from ...scope_addon.capture.perception.landmark_network import KEYPOINT_COUNT
+from ...scope_addon.capture.perception.lifter import INPUT_SIZE, WINDOW
 from .network import LOG_SIGMA_RANGE, MERGES, LiftingNetwork
 
 OPSET = 17

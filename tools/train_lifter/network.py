@@ -6,7 +6,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from ...scope_addon.capture.perception.lifter import INPUT_SIZE, KEYPOINT_COUNT, WINDOW
+from ...scope_addon.capture.perception.landmark_network import KEYPOINT_COUNT
+from ...scope_addon.capture.perception.lifter import INPUT_SIZE, WINDOW
 
 WIDTH = 512
 BLOCKS = 6

@@ -213,7 +213,7 @@ def _in_metres(cameras: Tables) -> Tables:
         except (KeyError, ValueError, TypeError):
             continue
         if is_place(vector, translation / _MM):
-            places.append(_center(vector, translation))
+            places.append(-exp(vector).T @ translation)
     if not places or np.ptp(places, axis=0).max() <= _FAR_APART:
         return cameras
     return {
@@ -231,12 +231,6 @@ def is_place(rotation: Float64Array, translation: Float64Array) -> bool:
     # False for what is not a number.
     turns_little = np.linalg.norm(rotation) <= _LARGEST_TURN
     return bool(turns_little and (np.abs(translation) <= _FARTHEST_M).all())
-
-
-def _center(rotation: Float64Array, translation: Float64Array) -> Float64Array:
-    """Return where a camera is in the world, in the file's unit."""
-    center: Float64Array = -exp(rotation).T @ translation
-    return center
 
 
 def _text(path: Path) -> str:

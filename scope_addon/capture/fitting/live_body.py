@@ -15,8 +15,7 @@ import numpy as np
 from ....solver import Body, Measurements, Stage, StandingPoints, State, View, fit_motion
 from ...arrays import FloatArray
 from ..camera.intrinsics import Camera
-from ..perception.landmark_network import KEYPOINT_NAMES
-from ..perception.lifter import HIPS
+from ..perception.landmark_network import HIPS, KEYPOINT_NAMES
 from ..perception.observation import Observation
 from ..perception.region import Region
 from ..tracking.track import single_frame_track

@@ -23,11 +23,14 @@ if TYPE_CHECKING:
 INPUT_SIZE = 256
 KEYPOINT_NAMES = BLAZEPOSE  # the network's order
 KEYPOINT_COUNT = 33
+SHOULDERS = [11, 12]
+HIPS = [23, 24]
+TRUNK = SHOULDERS + HIPS
+LEGS = [[23, 25, 27], [24, 26, 28]]  # hip, knee, ankle
 _POINTS = 39  # the keypoints, two auxiliary points and four unused ones
 # Auxiliary points: hip centre; a point on the body circle around it.
 _HIP_CENTER = 33
 _BODY_CIRCLE = 34
-_HIPS = (23, 24)
 _WINDOW = 7  # side in heatmap cells of the window that refines a keypoint
 _HEAT_THRESHOLD = 0.5
 _WORKERS = 2  # regions processed in parallel
@@ -264,7 +267,7 @@ def interpret(
     return PoseEstimate(
         keypoints_px=points_px[:KEYPOINT_COUNT],
         keypoints_confidence=visibility * in_frame,
-        world_landmarks=body - body[_HIPS, :].mean(axis=0),
+        world_landmarks=body - body[HIPS].mean(axis=0),
         presence=presence,
         region=region,
         next_region=region_from_points(points_px[_HIP_CENTER], points_px[_BODY_CIRCLE]),

@@ -31,14 +31,12 @@ from ....solver.errors import ModelFileError
 from ...arrays import BoolArray, Float32Array, FloatArray, IndexArray, round_array
 from ...errors import SetupError
 from ...kinematics.frame_blocks import by_blocks
+from .landmark_network import HIPS, KEYPOINT_COUNT, TRUNK
 from .sessions import open_session
 
 LIFTER_FILE = Path(__file__).resolve().parents[3] / "assets" / "lifter" / "lifter.onnx"
-KEYPOINT_COUNT = 33
 INPUT_SIZE = KEYPOINT_COUNT * 6 + 2
 WORLD_UNIT_M = 0.5
-TORSO = np.array([11, 12, 23, 24])  # shoulders and hips
-HIPS = np.array([23, 24])
 # Nose, arms and legs determine the size in the image.
 LIMBS = np.array([0, *range(11, 17), *range(23, 29)])
 # Calibration of the network's standard deviations across and along the line of sight. They are
@@ -79,7 +77,7 @@ def virtual_camera(rays: FloatArray) -> FloatArray:
     :param rays: (T, 33, 2) normalized image coordinates.
     :return: (T, 3, 3) R_virtual_camera, see the module's equation.
     """
-    return camera_towards(rays[:, TORSO].mean(axis=1))
+    return camera_towards(rays[:, TRUNK].mean(axis=1))
 
 
 def camera_towards(center: FloatArray) -> FloatArray:

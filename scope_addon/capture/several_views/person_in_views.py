@@ -23,7 +23,7 @@ from ..fitting.outline import fit_shape_to_outline, usable_masks
 from ..fitting.prepared_track import OtherView, PreparedTrack, lift
 from ..fitting.stature import mean_shape, stature_sigma
 from ..fitting.weights import ROBUST, clip_stages, motion_priors
-from ..perception.landmark_network import KEYPOINT_NAMES
+from ..perception.landmark_network import HIPS
 from ..solve import Person
 from ..tracking.track import Track
 from ..world.assemble import Shot
@@ -37,7 +37,6 @@ from .seen_person import Between
 LENGTH_SIGMA_M = 0.003
 FITTED_SIGMA_M = 0.02  # of the depth of a fitted point
 STEP = 1e-3  # of a coefficient, for derivatives
-HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
 
 
 def with_focal_scale(camera: Camera, place: CameraPlace) -> Camera:

@@ -9,13 +9,8 @@ import cv2
 import numpy as np
 
 from ...arrays import Float64Array, FloatArray, Uint8Array
-from ..perception.landmark_network import KEYPOINT_NAMES
+from ..perception.landmark_network import LEGS, TRUNK
 
-_INDEX = {name: i for i, name in enumerate(KEYPOINT_NAMES)}
-_TORSO = [_INDEX[name] for name in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
-_LEGS = [
-    [_INDEX[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle")] for side in ("left", "right")
-]
 # The outline of the torso is background as often as not.
 _TORSO_FRACTIONS = np.linspace(0.15, 0.85, 9)
 _LEG_FRACTIONS = np.linspace(0.1, 0.9, 12)
@@ -36,13 +31,13 @@ def appearance(image_rgb: Uint8Array, keypoints_px: FloatArray) -> Float64Array:
     :return: (36,) square roots of two normalized histograms, torso and legs, each of 12 hues and 6
         grey levels; zeros for a part that is outside the image.
     """
-    left_top, right_top, left_low, right_low = keypoints_px[_TORSO]
+    left_top, right_top, left_low, right_low = keypoints_px[TRUNK]
     across, down = np.meshgrid(_TORSO_FRACTIONS, _TORSO_FRACTIONS)
     top = left_top + across[..., None] * (right_top - left_top)
     low = left_low + across[..., None] * (right_low - left_low)
     torso = (top + down[..., None] * (low - top)).reshape(-1, 2)
     legs = []
-    for hip, knee, ankle in _LEGS:
+    for hip, knee, ankle in LEGS:
         for a, b in ((hip, knee), (knee, ankle)):
             legs.append(
                 keypoints_px[a] + _LEG_FRACTIONS[:, None] * (keypoints_px[b] - keypoints_px[a])

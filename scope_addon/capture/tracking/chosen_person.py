@@ -10,6 +10,7 @@ import numpy as np
 
 from ...arrays import Float64Array
 from ...errors import UsageError
+from ..perception.landmark_network import HIPS, SHOULDERS, TRUNK
 from .track import Track, Tracklet
 
 MAX_DISTANCE = 0.2  # from the nearest keypoint, in sides of the region
@@ -83,8 +84,6 @@ def _nearest_frame(
     return person[number], k
 
 
-_SHOULDERS = [11, 12]
-_HIPS = [23, 24]
 MIN_CONFIDENCE = 0.5  # of shoulders and hips that count
 MAX_DEVIATION_DEG = 35.0  # of the trunk from a quarter turn
 MIN_SHARE = 0.9  # of the frames in which the trunk has this direction
@@ -95,9 +94,9 @@ def needed_turn(track: Track) -> int:
     """Return by how many degrees clockwise a picture has to be turned for the person's trunk to be
     upright: a multiple of 90; 0 also where the trunk's direction changes.
     """
-    confidence = track.confidence[:, _SHOULDERS + _HIPS].min(axis=1)
-    shoulders = track.keypoints_px[:, _SHOULDERS].mean(axis=1)
-    hips = track.keypoints_px[:, _HIPS].mean(axis=1)
+    confidence = track.confidence[:, TRUNK].min(axis=1)
+    shoulders = track.keypoints_px[:, SHOULDERS].mean(axis=1)
+    hips = track.keypoints_px[:, HIPS].mean(axis=1)
     trunk = (shoulders - hips)[track.seen & (confidence > MIN_CONFIDENCE)].astype(float)
     if len(trunk) < MIN_FRAMES:
         return 0

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from ...arrays import BoolArray, Float32Array, Float64Array, FloatArray
 from ..camera.intrinsics import Camera
 from ..perception.face_record import RECORD
-from ..perception.landmark_network import KEYPOINT_COUNT
+from ..perception.landmark_network import KEYPOINT_COUNT, TRUNK
 from ..perception.observation import Observation, PendingReference, PersonMask
 from .appearance import SIZE as APPEARANCE_SIZE
 
-_TRUNK = [11, 12, 23, 24]  # shoulders and hips
 # Lists of a tracklet with one entry for each row; the last two may be empty.
 _FOR_EACH_ROW = ("rows", "values", "centers_px", "sides_px", "hands", "faces")
 
@@ -180,7 +179,7 @@ class Tracklet:
 
 def trunk_px(keypoints_px: FloatArray) -> FloatArray:
     """Return the middle (2,) of the trunk, of keypoints (33, 2) in the image."""
-    center: FloatArray = keypoints_px[_TRUNK].mean(axis=0)
+    center: FloatArray = keypoints_px[TRUNK].mean(axis=0)
     return center
 
 

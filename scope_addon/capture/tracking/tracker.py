@@ -20,7 +20,7 @@ import numpy as np
 
 from ...arrays import Uint8Array
 from ..perception.adapters.keypoint_network import KeypointNetwork
-from ..perception.landmark_network import EstimateMemory, LandmarkNetwork, PoseEstimate
+from ..perception.landmark_network import SHOULDERS, EstimateMemory, LandmarkNetwork, PoseEstimate
 from ..perception.observation import Observation, PendingReference, PersonMask
 from ..perception.person_detector import Detection, possible_regions
 from ..perception.region import MARGIN, Crop, Region, bounds
@@ -87,7 +87,6 @@ _MAX_HIDDEN_INNOVATION = 0.15
 # A second region of a detection counts if it shows the shoulders nearer to the detected ones by so
 # much, in sides. Where there is only one person, both show the same.
 _CLEARLY_NEARER = 0.015
-_SHOULDERS = [11, 12]  # keypoints
 LEAVING_SHARE = 0.8  # a lost person with fewer of the keypoints in the image has left it
 
 
@@ -603,7 +602,7 @@ class PeopleTracker:
 
 def _shoulders_off(detection: Detection, estimate: PoseEstimate) -> float:
     """Return how far a body's shoulders are from the detected ones, in sides of the region."""
-    off_px = math.dist(detection.points_px[2], estimate.keypoints_px[_SHOULDERS].mean(axis=0))
+    off_px = math.dist(detection.points_px[2], estimate.keypoints_px[SHOULDERS].mean(axis=0))
     return off_px / detection.region.side_px
 
 
@@ -612,7 +611,7 @@ def _detection_of(estimate: PoseEstimate) -> Detection:
     region = estimate.next_region
     hips_px = np.array(region.center_px)
     top_px = hips_px + region.R_image_crop @ [0.0, -region.side_px / (2 * MARGIN)]
-    shoulders_px = estimate.keypoints_px[_SHOULDERS].mean(axis=0)
+    shoulders_px = estimate.keypoints_px[SHOULDERS].mean(axis=0)
     points_px = np.stack([hips_px, top_px, shoulders_px, top_px])
     return Detection(estimate.presence, bounds(estimate.keypoints_px), points_px)
 

@@ -5,9 +5,12 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES, LandmarkNetwork
-from scope.scope_addon.capture.perception.lifter import (
+from scope.scope_addon.capture.perception.landmark_network import (
     HIPS,
+    KEYPOINT_NAMES,
+    LandmarkNetwork,
+)
+from scope.scope_addon.capture.perception.lifter import (
     LIFTER_FILE,
     Lifted,
     Lifter,

@@ -32,7 +32,7 @@ import numpy as np
 
 from .....solver.errors import ModelFileError
 from ....arrays import BoolArray, Float64Array, Uint8Array
-from ..landmark_network import KEYPOINT_NAMES, PoseEstimate
+from ..landmark_network import HIPS, KEYPOINT_NAMES, LEGS, SHOULDERS, TRUNK, PoseEstimate
 from ..region import Region, box_along
 from ..sessions import Execution
 from .description import (
@@ -53,12 +53,6 @@ MIN_STATURE = 1.6  # least side in lengths of trunk and leg: a person who crouch
 MAX_SHRINK = 0.97  # from one frame to the next: legs that are briefly occluded must stay inside
 MIN_KEYPOINTS = 4  # to predict the next region
 _BODY = np.array([KEYPOINT_NAMES.index(name) for name in COCO_17])
-_SHOULDERS = np.array([KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")])
-_HIPS = np.array([KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")])
-_LEGS = [
-    [KEYPOINT_NAMES.index(f"{side}_{joint}") for joint in ("hip", "knee", "ankle")]
-    for side in ("left", "right")
-]
 _BLUR = 11  # cells; suits the Gaussians of 2 to 3 cells that these networks are trained with
 _MIN_HEAT = 1e-10
 
@@ -222,9 +216,9 @@ class KeypointNetwork:
         seen = confidence >= UNSURE * self._threshold
         if seen.sum() < MIN_KEYPOINTS:
             return region
-        trunk = points[_SHOULDERS].mean(axis=0) - points[_HIPS].mean(axis=0)
+        trunk = points[SHOULDERS].mean(axis=0) - points[HIPS].mean(axis=0)
         upright = math.atan2(float(trunk[0]), float(-trunk[1]))
-        rotation = upright if seen[[*_SHOULDERS, *_HIPS]].all() else region.rotation
+        rotation = upright if seen[TRUNK].all() else region.rotation
         (x, y), sides = box_along(points[seen], rotation)
         shape = np.array([self._graph.width, self._graph.height]) / self._side
         around = MARGIN * float((sides / shape).max())
@@ -236,13 +230,13 @@ def _stature(points: Float64Array, seen: BoolArray) -> float:
     """Add the lengths in pixels of trunk, thigh and lower leg, regardless of the pose; 0 for those
     not seen.
     """
-    ends = [points[pair].mean(axis=0) for pair in (_SHOULDERS, _HIPS)]
-    trunk = math.dist(*ends) if seen[[*_SHOULDERS, *_HIPS]].all() else 0.0
+    ends = [points[pair].mean(axis=0) for pair in (SHOULDERS, HIPS)]
+    trunk = math.dist(*ends) if seen[TRUNK].all() else 0.0
     legs = [
         sum(math.dist(points[a], points[b]) for a, b in zip(leg, leg[1:], strict=False))
         if seen[leg].all()
         else 0.0
-        for leg in _LEGS
+        for leg in LEGS
     ]
     return trunk + max(legs)
 
