@@ -18,7 +18,7 @@ from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.frame_observer import Observed, Window
 from scope.scope_addon.capture.long_clips.window_file import (
-    KeptWindows,
+    _digest,
     known_reference,
     load_window,
     save_window,
@@ -161,8 +161,8 @@ def test_windows_of_another_calibration_are_not_continued(tmp_path: Path, name: 
     """Also where the camera is named after its file."""
     file = tmp_path / "cameras.toml"
     options = CaptureOptions(calibration=tmp_path / name)
-    folders = []
+    digests = []
     for content in ("one", "one", "two"):
         file.write_text(content)
-        folders.append(KeptWindows(tmp_path, options, (640, 480))._folder)
-    assert folders[0] == folders[1] != folders[2]
+        digests.append(_digest(options))
+    assert digests[0] == digests[1] != digests[2]
