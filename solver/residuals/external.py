@@ -2,9 +2,9 @@
 """Residuals that other programs register: compiled ones, and plain Python ones with finite
 differences.
 
-The solver's machine code calls them through their address, with plain pointers and sizes, in the
-order of `_PROTOTYPE`. So it stays as it is on disk whatever is registered, and without rows of such
-a residual it makes no call.
+The solver's machine code calls them through their address, as `f(values, weight)` with the sizes
+and the addresses of arrays that `VALUES` lists. So it stays as it is on disk whatever is
+registered, and without rows of such a residual it makes no call.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import ctypes
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -20,8 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from llvmlite import ir
 from numba import carray, cfunc, types  # type: ignore[attr-defined]
+from numba.core import cgutils as _cgutils
 from numba.core.errors import NumbaError
-from numba.extending import intrinsic
+from numba.extending import intrinsic as _intrinsic
 
 from ..errors import InvalidValueError, ShapeError
 from ..kernel import inlined_kernel
@@ -33,23 +34,17 @@ from ..tree import Tree
 MAX_EXTERNAL = 16  # external residuals; each has a column of the weights
 INDEXES = ("points", "parts", "joints")
 
-_I = types.int64
-_F = types.float64
-_PI, _PF = types.CPointer(_I), types.CPointer(_F)  # type: ignore[no-untyped-call]
-_PROTOTYPE = _F(
-    _PI, _I, _PF, _F,  # ints, how many rows, floats, weight
-    _I, _I, _I, _I, _I, _I,  # parts, points, W, and keypoints, shape and globals of `Tree`
-    _PI, _PF, _PF, _PI, _PF, _PF,  # the arrays of `Tree`
-    _PF, _PF, _PF, _PF, _PF, _PF,  # of `Pose`
-    _PF, _PF, _PF, _PF, _PF, _PI,  # of `Blocks`
-)  # fmt: skip
-_C_TYPES: dict[Any, Any] = {
-    _I: ctypes.c_int64,
-    _F: ctypes.c_double,
-    _PI: ctypes.c_void_p,
-    _PF: ctypes.c_void_p,
-}
-_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, *(_C_TYPES[kind] for kind in _PROTOTYPE.args))
+intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
+cgutils: Any = _cgutils  # untyped
+# What a residual from outside is given, as int64: sizes, and of arrays their addresses.
+SIZES = ("rows", "parts", "points", "W")
+VALUES = (*SIZES, "ints", "floats", *Tree._fields, *Pose._fields, *Blocks._fields)
+COUNT = len(VALUES)
+_TREE = len(SIZES) + 2  # where those of `Tree` begin
+_POSE = _TREE + len(Tree._fields)
+_BLOCKS = _POSE + len(Pose._fields)
+_PROTOTYPE = types.float64(types.CPointer(types.int64), types.float64)  # type: ignore[no-untyped-call]
+_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_double)
 
 
 class External(NamedTuple):
@@ -95,65 +90,44 @@ class Registered:
         given: Any = self.kernel
         accumulate = given if hasattr(given, "signatures") else inlined_kernel(given)
 
-        def entry(  # type: ignore[no-untyped-def]
-            i,
-            rows,
-            f,
-            weight,
-            n,
-            points,
-            W,
-            keypoints,
-            shape,
-            globals_,
-            parents,
-            S,
-            l,
-            point_part,
-            v_bar,
-            V,
-            Omega,
-            R,
-            t,
-            D,
-            beta,
-            log_focal,
-            A,
-            H_u,
-            H_uu,
-            C,
-            c,
-            cross,
-        ):
+        def entry(values, weight):  # type: ignore[no-untyped-def]
+            at = carray(values, (COUNT,))
+            rows = at[0]
+            n = at[1]
+            points = at[2]
+            W = at[3]
+            t = at[_TREE:]
+            p = at[_POSE:]
+            b = at[_BLOCKS:]
             tree = Tree(
-                carray(parents, (n,)),
-                carray(S, (n, 3, W)),
-                carray(l, (n, 3)),
-                carray(point_part, (points,)),
-                carray(v_bar, (points, 3)),
-                carray(V, (points, 3, W)),
-                keypoints,
-                shape,
-                globals_,
+                carray(_pointer(t[0]), (n,), np.int64),
+                carray(_pointer(t[1]), (n, 3, W), np.float64),
+                carray(_pointer(t[2]), (n, 3), np.float64),
+                carray(_pointer(t[3]), (points,), np.int64),
+                carray(_pointer(t[4]), (points, 3), np.float64),
+                carray(_pointer(t[5]), (points, 3, W), np.float64),
+                t[6],
+                t[7],
+                t[8],
             )
             pose = Pose(
-                carray(Omega, (n, 3, 3)),
-                carray(R, (n, 3, 3)),
-                carray(t, (n, 3)),
-                carray(D, (n, 3, W)),
-                carray(beta, (W,)),
-                carray(log_focal, (1,)),
+                carray(_pointer(p[0]), (n, 3, 3), np.float64),
+                carray(_pointer(p[1]), (n, 3, 3), np.float64),
+                carray(_pointer(p[2]), (n, 3), np.float64),
+                carray(_pointer(p[3]), (n, 3, W), np.float64),
+                carray(_pointer(p[4]), (W,), np.float64),
+                carray(_pointer(p[5]), (1,), np.float64),
             )
             blocks = Blocks(
-                carray(A, (n, 6, 8 + W)),
-                carray(H_u, (n, 3, 8 + W)),
-                carray(H_uu, (n, 3, 3)),
-                carray(C, (W, W)),
-                carray(c, (W,)),
-                carray(cross, (1,)),
+                carray(_pointer(b[0]), (n, 6, SHAPE + W), np.float64),
+                carray(_pointer(b[1]), (n, 3, SHAPE + W), np.float64),
+                carray(_pointer(b[2]), (n, 3, 3), np.float64),
+                carray(_pointer(b[3]), (W, W), np.float64),
+                carray(_pointer(b[4]), (W,), np.float64),
+                carray(_pointer(b[5]), (1,), np.int64),
             )
-            table = carray(i, (rows, ints))
-            numbers = carray(f, (rows, floats))
+            table = carray(_pointer(at[4]), (rows, ints), np.int64)
+            numbers = carray(_pointer(at[5]), (rows, floats), np.float64)
             return accumulate(tree, table, numbers, weight, pose, blocks)
 
         try:
@@ -175,12 +149,12 @@ class Registered:
         ints = self.INTS
         floats = self.FLOATS
 
-        def call(i: int, rows: int, f: int, weight: float, *sizes_and_arrays: int) -> float:
+        def call(address: int, weight: float) -> float:
             try:
                 assert function is not None
-                return accumulate_function(
-                    function, (i, f), (rows, ints, floats), weight, sizes_and_arrays
-                )
+                values = _view(address, COUNT, whole=True).tolist()
+                values = dict(zip(VALUES, values, strict=True))
+                return accumulate_function(function, ints, floats, weight, values)
             # it cannot pass through machine code: `raise_failure` does it
             except Exception as error:
                 _failure.error = name, error
@@ -227,22 +201,41 @@ def pack_external(tables: list[tuple[Registered, Array, Array]], first_column: i
 
 
 @intrinsic
-def _call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
-    """Call the function at an address; of arrays among the arguments, a tuple, it gets the pointer
-    to their data.
+def _pointer(typingctx, address):  # type: ignore[no-untyped-def]
+    """Return an address as a pointer."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.int64), generate
+
+
+@intrinsic
+def _call(typingctx, address, weight, values):  # type: ignore[no-untyped-def]
+    """Call the function at an address with `values`, nested tuples of whole numbers and arrays, of
+    which it gets the addresses.
     """
 
-    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        values = []
-        for k, kind in enumerate(signature.args[1].types):
-            value = builder.extract_value(args[1], k)
-            if isinstance(kind, types.Array):
-                value = context.make_array(kind)(context, builder, value).data
-            values.append(value)
-        prototype = ir.FunctionType(ir.DoubleType(), [value.type for value in values])
-        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), values)
+    def flat(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
+        if isinstance(kind, types.Array):
+            data = context.make_array(kind)(context, builder, value).data
+            return [builder.ptrtoint(data, ir.IntType(64))]
+        if not isinstance(kind, types.BaseTuple):
+            return [value]
+        found = []
+        for k, one in enumerate(kind.types):  # type: ignore[attr-defined]
+            found += flat(context, builder, one, builder.extract_value(value, k))
+        return found
 
-    return types.float64(types.int64, arguments), generate
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        numbers = flat(context, builder, signature.args[2], args[2])
+        memory = cgutils.pack_array(builder, numbers, ir.IntType(64))
+        pointer = cgutils.alloca_once_value(builder, memory)
+        pointer = builder.bitcast(pointer, ir.IntType(64).as_pointer())
+        prototype = ir.FunctionType(ir.DoubleType(), [pointer.type, args[1].type])
+        return builder.call(builder.inttoptr(args[0], prototype.as_pointer()), [pointer, args[1]])
+
+    return types.float64(types.int64, types.float64, values), generate
 
 
 @compiled
@@ -254,37 +247,9 @@ def accumulate_external(tree, external, weights, pose, blocks):  # type: ignore[
     W = tree.S.shape[2]
     for k in range(external.calls.shape[0]):
         address, rows, i, f, column = external.calls[k]
-        arguments = (
-            external.ints[i:],
-            rows,
-            external.floats[f:],
-            weights[column],
-            n,
-            points,
-            W,
-            tree.keypoints,
-            tree.shape,
-            tree.globals,
-            tree.parents,
-            tree.S,
-            tree.l,
-            tree.point_part,
-            tree.v_bar,
-            tree.V,
-            pose.Omega,
-            pose.R,
-            pose.t,
-            pose.D,
-            pose.beta,
-            pose.log_focal,
-            blocks.A,
-            blocks.H_u,
-            blocks.H_uu,
-            blocks.C,
-            blocks.c,
-            blocks.cross,
-        )
-        cost += _call(address, arguments)  # type: ignore[call-arg]
+        sizes = (rows, n, points, W)
+        values = (sizes, external.ints[i:], external.floats[f:], tree, pose, blocks)
+        cost += _call(address, weights[column], values)
     return cost
 
 
@@ -327,41 +292,38 @@ def differentiate(function: Callable[[Part], Any], part: Part) -> Linearization:
 
 def accumulate_function(
     function: Callable[..., Any],
-    tables: tuple[int, int],
-    extent: tuple[int, int, int],
+    columns_of_ints: int,
+    columns_of_floats: int,
     weight: float,
-    sizes_and_arrays: tuple[int, ...],
+    values: Mapping[str, int],
 ) -> float:
     """Add every row's JᵀJ and Jᵀr to the blocks and return the cost, 1/2 weight |r|^2.
 
-    :param tables: addresses of ints and floats. :param extent: how many rows, columns of ints,
-        columns of floats.
-    :param sizes_and_arrays: as the prototype has them from the sizes on, arrays as
-        addresses.
+    :param values: sizes and addresses by their names in `VALUES`.
     :raises ShapeError: the function does not return numbers (n,).
     :raises InvalidValueError: they are not finite.
     """
-    n, _, W, _, P, _ = sizes_and_arrays[:6]
-    parents, _, _, _, _, _, Omega, R, t, D, beta, _, A, H_u, H_uu, C, c, cross = sizes_and_arrays[
-        6:
-    ]
-    ints = _view(tables[0], extent[0], extent[1], whole=True)
-    floats = _view(tables[1], extent[0], extent[2])
-    up = _view(parents, n, whole=True)
-    rotation = _view(R, n, 3, 3)
-    position = _view(t, n, 3)
-    state = _view(Omega, n, 3, 3)
-    by_shape = _view(D, n, 3, W)
-    shape = _view(beta, W)
-    blocks_A = _view(A, n, 6, SHAPE + W)
-    blocks_Hu = _view(H_u, n, 3, SHAPE + W)
-    blocks_Huu = _view(H_uu, n, 3, 3)
-    blocks_C = _view(C, W, W)
-    blocks_c = _view(c, W)
-    crossed = _view(cross, 1, whole=True)
+    rows = values["rows"]
+    n = values["parts"]
+    W = values["W"]
+    P = values["shape"]
+    ints = _view(values["ints"], rows, columns_of_ints, whole=True)
+    floats = _view(values["floats"], rows, columns_of_floats)
+    up = _view(values["parents"], n, whole=True)
+    rotation = _view(values["R"], n, 3, 3)
+    position = _view(values["t"], n, 3)
+    state = _view(values["Omega"], n, 3, 3)
+    by_shape = _view(values["D"], n, 3, W)
+    shape = _view(values["beta"], W)
+    blocks_A = _view(values["A"], n, 6, SHAPE + W)
+    blocks_Hu = _view(values["H_u"], n, 3, SHAPE + W)
+    blocks_Huu = _view(values["H_uu"], n, 3, 3)
+    blocks_C = _view(values["C"], W, W)
+    blocks_c = _view(values["c"], W)
+    crossed = _view(values["cross"], 1, whole=True)
     cost = 0.0
     s = math.sqrt(weight)
-    for k in range(extent[0] if weight > 0.0 else 0):
+    for k in range(rows if weight > 0.0 else 0):
         i = int(ints[k, 0])
         parent = np.eye(3) if up[i] < 0 else rotation[up[i]].copy()
         part = Part(
