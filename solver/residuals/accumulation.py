@@ -17,9 +17,21 @@ and one of a joint's state adds its Hessian and gradient, turned from the parent
 camera's. Source: section 3 of the paper.
 """
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from ..kernel import kernel
-from ..part import GRADIENT, SHAPE
+from ..part import GRADIENT, SHAPE, Array
 from ..rotations import log3
+
+
+def rows_of(indices: ArrayLike, *columns: ArrayLike) -> tuple[Array, Array]:
+    """Return the tables of a residual of one whole number a row: int64 (n, 1) and float64 (n, .).
+
+    :param indices: (n,). :param columns: (n,) or (n, m), from left to right.
+    """
+    floats = np.ascontiguousarray(np.column_stack(columns), dtype=np.float64)
+    return np.reshape(indices, (len(floats), 1)).astype(np.int64), floats
 
 
 @kernel

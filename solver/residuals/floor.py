@@ -14,7 +14,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import Array
-from .accumulation import add_to_point, lever
+from .accumulation import add_to_point, lever, rows_of
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 6  # n (3), a unit vector, d, w_below, w_above
@@ -40,24 +40,8 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         if w <= 0.0:
             continue
         cost += 0.5 * w * h * h
-        add_to_point(
-            tree,
-            pose,
-            blocks,
-            j,
-            x,
-            y,
-            z,
-            w * a * a,
-            w * a * b,
-            w * a * c,
-            w * b * b,
-            w * b * c,
-            w * c * c,
-            w * h * a,
-            w * h * b,
-            w * h * c,
-        )
+        W = (w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c)
+        add_to_point(tree, pose, blocks, j, x, y, z, *W, w * h * a, w * h * b, w * h * c)
     return cost
 
 
@@ -73,9 +57,5 @@ def pack(
         above.
     """
     n = len(points)
-    floats = np.empty((n, 6))
-    floats[:, :3] = normal
-    floats[:, 3] = offset
-    floats[:, 4] = w_below
-    floats[:, 5] = w_above
-    return np.reshape(points, (n, 1)).astype(np.int64), floats
+    planes = np.broadcast_to(normal, (n, 3)), np.broadcast_to(offset, (n,))
+    return rows_of(points, *planes, w_below, w_above)

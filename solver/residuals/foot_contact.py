@@ -9,11 +9,9 @@ w, not through outliers. Source: velocity terms whose last frame is a constant k
 r_i(T_i, beta) of section 3 of the paper.
 """
 
-import numpy as np
-
 from ..kernel import kernel
 from ..part import Array
-from .accumulation import add_to_point, lever
+from .accumulation import add_to_point, lever, rows_of
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 4  # p_stand (3), w
@@ -44,8 +42,4 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
 
 def pack(points: Array, p_stand: Array, weights: Array) -> tuple[Array, Array]:
     """Return the tables of `accumulate` from points (n,), positions (n, 3) and weights (n,)."""
-    n = len(points)
-    floats = np.empty((n, 4))
-    floats[:, :3] = p_stand
-    floats[:, 3] = weights
-    return np.reshape(points, (n, 1)).astype(np.int64), floats
+    return rows_of(points, p_stand, weights)

@@ -13,7 +13,7 @@ import numpy as np
 from ..kernel import kernel
 from ..part import Array
 from ..rotations import left_jacobian_inverse3
-from .accumulation import add_to_joint, relative_log
+from .accumulation import add_to_joint, relative_log, rows_of
 
 INTS = 1  # joint
 FLOATS = 10  # Omega_mean (9) by rows, w
@@ -60,8 +60,4 @@ def pack(joints: Array, Omega_mean: Array, weights: Array) -> tuple[Array, Array
     """Return the tables of `accumulate` from joints (n,) in 1..K, means (n, 3, 3) and weights
     (n,).
     """
-    n = len(joints)
-    floats = np.empty((n, 10))
-    floats[:, :9] = np.reshape(Omega_mean, (n, 9))
-    floats[:, 9] = weights
-    return np.reshape(joints, (n, 1)).astype(np.int64), floats
+    return rows_of(joints, np.reshape(Omega_mean, (len(joints), 9)), weights)

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import Array
-from .accumulation import add_to_point, geman_mcclure, lever
+from .accumulation import add_to_point, geman_mcclure, lever, rows_of
 from .keypoint2d import Z_MIN
 
 INTS = 1  # point, numbered as in the measurements
@@ -58,24 +58,8 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         a = f[5] / z
         b = f[6] / z
         c = -(f[5] * u + f[6] * v) / z
-        add_to_point(
-            tree,
-            pose,
-            blocks,
-            j,
-            lx,
-            ly,
-            lz,
-            w * a * a,
-            w * a * b,
-            w * a * c,
-            w * b * b,
-            w * b * c,
-            w * c * c,
-            w * d * a,
-            w * d * b,
-            w * d * c,
-        )
+        W = (w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c)
+        add_to_point(tree, pose, blocks, j, lx, ly, lz, *W, w * d * a, w * d * b, w * d * c)
     return cost
 
 
@@ -96,7 +80,5 @@ def pack(
     :param weights, sigmas: (n,) each outside and inside the mask; sigma is the square of a
         distance.
     """
-    floats = np.column_stack(
-        [delta, contour, normal, *weights, *(1.0 / np.asarray(sigma) for sigma in sigmas)]
-    )
-    return np.reshape(points, (len(floats), 1)).astype(np.int64), floats
+    inverse = [1.0 / np.asarray(sigma) for sigma in sigmas]
+    return rows_of(points, delta, contour, normal, *weights, *inverse)

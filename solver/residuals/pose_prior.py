@@ -13,7 +13,7 @@ import numpy as np
 from ..kernel import kernel
 from ..part import GRADIENT, Array
 from ..rotations import left_jacobian_inverse3
-from .accumulation import add_to_point, relative_log
+from .accumulation import add_to_point, relative_log, rows_of
 
 INTS = 1  # part
 FLOATS = 14  # R^ (9) by rows, t^ (3), w_R, w_t
@@ -70,10 +70,4 @@ def pack(
     :param R_camera_part, t_camera_part: (n, 3, 3), (n, 3) the expected poses, metres, camera frame.
     :param w_R, w_t: (n,), (n,) weights per radian^2 and per metre^2.
     """
-    n = len(parts)
-    floats = np.empty((n, 14))
-    floats[:, :9] = np.reshape(R_camera_part, (n, 9))
-    floats[:, 9:12] = t_camera_part
-    floats[:, 12] = w_R
-    floats[:, 13] = w_t
-    return np.reshape(parts, (n, 1)).astype(np.int64), floats
+    return rows_of(parts, np.reshape(R_camera_part, (len(parts), 9)), t_camera_part, w_R, w_t)
