@@ -363,15 +363,8 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
                 continue
             e = state[lane::LANES]
             cost += 0.5 * w * e[9]
-            h00 = w * e[0]
-            h01 = w * e[1]
-            h02 = w * e[2]
-            h11 = w * e[3]
-            h12 = w * e[4]
-            h22 = w * e[5]
-            g0 = w * e[6]
-            g1 = w * e[7]
-            g2 = w * e[8]
+            H = (w * e[0], w * e[1], w * e[2], w * e[3], w * e[4], w * e[5])
+            g = (w * e[6], w * e[7], w * e[8])
             if h > 0.0:
                 a = (
                     floats[k, BOUND * LANES + lane]
@@ -386,16 +379,12 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
                 y = -slope * e[14]
                 z = -slope * e[15]
                 v = 0.5 * w * h / half
-                h00 = h00 + v * x * x
-                h01 = h01 + v * x * y
-                h02 = h02 + v * x * z
-                h11 = h11 + v * y * y
-                h12 = h12 + v * y * z
-                h22 = h22 + v * z * z
-                g0 = g0 + w * h * x
-                g1 = g1 + w * h * y
-                g2 = g2 + w * h * z
-            add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2)
+                H = (
+                    H[0] + v * x * x, H[1] + v * x * y, H[2] + v * x * z,
+                    H[3] + v * y * y, H[4] + v * y * z, H[5] + v * z * z,
+                )  # fmt: skip
+                g = (g[0] + w * h * x, g[1] + w * h * y, g[2] + w * h * z)
+            add_to_joint(tree, pose, blocks, i, *H, *g)
     return cost
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from ..kernel import kernel
 from ..part import Array
 from ..rotations import left_jacobian_inverse3, log3
-from .accumulation import add_to_joint
+from .accumulation import add_to_joint, rows_of
 
 INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
@@ -63,29 +63,15 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         if not hinged and not swung:
             continue
         J = left_jacobian_inverse3(x, y, z)
-        h00 = 0.0
-        h01 = 0.0
-        h02 = 0.0
-        h11 = 0.0
-        h12 = 0.0
-        h22 = 0.0
-        g0 = 0.0
-        g1 = 0.0
-        g2 = 0.0
+        H = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        g = (0.0, 0.0, 0.0)
         a0 = f[0] * J[0] + f[1] * J[3] + f[2] * J[6]
         a1 = f[0] * J[1] + f[1] * J[4] + f[2] * J[7]
         a2 = f[0] * J[2] + f[1] * J[5] + f[2] * J[8]
         if hinged:
             cost += 0.5 * w * r * r
-            h00 = w * a0 * a0
-            h01 = w * a0 * a1
-            h02 = w * a0 * a2
-            h11 = w * a1 * a1
-            h12 = w * a1 * a2
-            h22 = w * a2 * a2
-            g0 = w * r * a0
-            g1 = w * r * a1
-            g2 = w * r * a2
+            H = (w * a0 * a0, w * a0 * a1, w * a0 * a2, w * a1 * a1, w * a1 * a2, w * a2 * a2)
+            g = (w * r * a0, w * r * a1, w * r * a2)
         if swung:
             share = 1.0 - f[5] / swing
             cost += 0.5 * v * share * share * swing * swing
@@ -95,17 +81,17 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
             b2 = (sx * J[2] + sy * J[5] + sz * J[8]) / swing
             p = v * share * share
             q = v * (1.0 - share * share)
-            h00 += p * (J[0] * J[0] + J[3] * J[3] + J[6] * J[6] - a0 * a0) + q * b0 * b0
-            h01 += p * (J[0] * J[1] + J[3] * J[4] + J[6] * J[7] - a0 * a1) + q * b0 * b1
-            h02 += p * (J[0] * J[2] + J[3] * J[5] + J[6] * J[8] - a0 * a2) + q * b0 * b2
-            h11 += p * (J[1] * J[1] + J[4] * J[4] + J[7] * J[7] - a1 * a1) + q * b1 * b1
-            h12 += p * (J[1] * J[2] + J[4] * J[5] + J[7] * J[8] - a1 * a2) + q * b1 * b2
-            h22 += p * (J[2] * J[2] + J[5] * J[5] + J[8] * J[8] - a2 * a2) + q * b2 * b2
-            g = v * share * swing
-            g0 = g0 + g * b0
-            g1 = g1 + g * b1
-            g2 = g2 + g * b2
-        add_to_joint(tree, pose, blocks, i, h00, h01, h02, h11, h12, h22, g0, g1, g2)
+            H = (
+                H[0] + p * (J[0] * J[0] + J[3] * J[3] + J[6] * J[6] - a0 * a0) + q * b0 * b0,
+                H[1] + p * (J[0] * J[1] + J[3] * J[4] + J[6] * J[7] - a0 * a1) + q * b0 * b1,
+                H[2] + p * (J[0] * J[2] + J[3] * J[5] + J[6] * J[8] - a0 * a2) + q * b0 * b2,
+                H[3] + p * (J[1] * J[1] + J[4] * J[4] + J[7] * J[7] - a1 * a1) + q * b1 * b1,
+                H[4] + p * (J[1] * J[2] + J[4] * J[5] + J[7] * J[8] - a1 * a2) + q * b1 * b2,
+                H[5] + p * (J[2] * J[2] + J[5] * J[5] + J[8] * J[8] - a2 * a2) + q * b2 * b2,
+            )
+            force = v * share * swing
+            g = (g[0] + force * b0, g[1] + force * b1, g[2] + force * b2)
+        add_to_joint(tree, pose, blocks, i, *H, *g)
     return cost
 
 
@@ -126,9 +112,7 @@ def pack(
     :param swing_limit: (n,) bound of the turn of the axis itself, radians.
     :param w, w_swing: (n,), (n,) weights of the two.
     """
-    n = len(joints)
-    floats = np.column_stack([np.reshape(axes, (n, 3)), lower, upper, swing_limit, w, w_swing])
-    return np.reshape(joints, (n, 1)).astype(np.int64), floats.astype(np.float64)
+    return rows_of(joints, axes, lower, upper, swing_limit, w, w_swing)
 
 
 def hinges_of(joint_names: Sequence[str]) -> tuple[Array, Array]:
