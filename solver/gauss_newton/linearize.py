@@ -34,6 +34,9 @@ from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
 
 # Of each entry of a symmetric matrix, its number in the upper triangle by rows.
 _UPPER = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
+_ZERO3 = (0.0, 0.0, 0.0)
+_ZERO6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_ZERO9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def make_scratch(tree: Tree) -> Array:
@@ -236,28 +239,6 @@ def point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
 
 
 @expanded_kernel
-def _add_keypoint3d(q, p, weight, inv_sigma, triggs, cost, w, g):  # type: ignore[no-untyped-def]
-    """Add the term of a point p (3) measured at q (4) to the cost, W = GᵀG (6) and Gᵀr (3)."""
-    more, w3d, k, x, y, z = keypoint3d.term(
-        p[0], p[1], p[2], q[0], q[1], q[2], weight * q[3], inv_sigma, triggs
-    )
-    w = (
-        w[0] + w3d - k * x * x, w[1] - k * x * y, w[2] - k * x * z,
-        w[3] + w3d - k * y * y, w[4] - k * y * z, w[5] + w3d - k * z * z,
-    )  # fmt: skip
-    return cost + more, w, _add3(g, (x, y, z))
-
-
-@expanded_kernel
-def _add_direction(q, e, weight, inv_sigma, triggs, cost, w, g):  # type: ignore[no-untyped-def]
-    """Add the term of a lever e (3) measured along q (4) to the cost, W = GᵀG (6) and Gᵀr (3)."""
-    more, d00, d01, d02, d11, d12, d22, x, y, z = orientation_field.term(
-        e[0], e[1], e[2], q[0], q[1], q[2], weight * q[3], inv_sigma, triggs
-    )
-    return cost + more, _add6(w, (d00, d01, d02, d11, d12, d22)), _add3(g, (x, y, z))
-
-
-@expanded_kernel
 def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
     """Evaluate what was measured of slot j, at e (3) from the origin t (3) of its part.
 
@@ -266,52 +247,36 @@ def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def
     direction, W, [e]x W and Gᵀr of all; and Gᵀg (3), gᵀg and gᵀr of the focal length, g = dr/dlog
     f.
     """
-    # Scalars rather than tuples wherever a branch sets them: LLVM would sum in another order, with
-    # other roundings.
     w2, k2, w3, k3, wd, kd, focal, triggs = settings
     flags = terms.flags[j]
-    ex, ey, ez = e
-    tx, ty, tz = t
-    w00 = 0.0
-    w01 = 0.0
-    w02 = 0.0
-    w11 = 0.0
-    w12 = 0.0
-    w22 = 0.0
-    gx = 0.0
-    gy = 0.0
-    gz = 0.0
-    hx = 0.0
-    hy = 0.0
-    hz = 0.0
+    p = _add3(e, t)
+    w = _ZERO6
+    f = _ZERO3
+    h = _ZERO3
     ff = 0.0
     fr = 0.0
     if flags & HAS_2D:
         q = terms.image[j]
-        more, w00, w01, w02, w11, w12, w22, gx, gy, gz, hx, hy, hz, ff, fr = keypoint2d.term(
-            ex + tx, ey + ty, ez + tz, q[0], q[1], focal, w2 * q[2], k2, triggs
-        )
+        more, w, f, h, ff, fr = keypoint2d.term(p, (q[0], q[1]), focal, w2 * q[2], k2, triggs)
         cost += more
     if flags & HAS_3D:
         q = terms.point[j]
-        p = (ex + tx, ey + ty, ez + tz)
-        w = (w00, w01, w02, w11, w12, w22)
-        cost, w, (gx, gy, gz) = _add_keypoint3d(q, p, w3, k3, triggs, cost, w, (gx, gy, gz))
-        w00, w01, w02, w11, w12, w22 = w
-    position = (w00, w01, w02, w11, w12, w22)
-    b00, b01, b02, b10, b11, b12, b20, b21, b22 = _cross_symmetric(e, position)
-    moments = (b00, b01, b02, b10, b11, b12, b20, b21, b22)
-    force = (gx, gy, gz)
+        more, w_more, f_more = keypoint3d.term(p, (q[0], q[1], q[2]), w3 * q[3], k3, triggs)
+        cost += more
+        w = _add6(w, w_more)
+        f = _add3(f, f_more)
+    b = _cross_symmetric(e, w)
+    w_all = w
+    b_all = b
+    f_all = f
     if flags & HAS_DIRECTION:
-        w = (w00, w01, w02, w11, w12, w22)
-        cost, w, (gx, gy, gz) = _add_direction(
-            terms.direction[j], e, wd, kd, triggs, cost, w, (gx, gy, gz)
-        )
-        w00, w01, w02, w11, w12, w22 = w
-        b00, b01, b02, b10, b11, b12, b20, b21, b22 = _cross_symmetric(e, w)
-    w = (w00, w01, w02, w11, w12, w22)
-    b = (b00, b01, b02, b10, b11, b12, b20, b21, b22)
-    return cost, position, moments, force, w, b, (gx, gy, gz), (hx, hy, hz), ff, fr
+        q = terms.direction[j]
+        more, w_more, f_more = orientation_field.term(e, (q[0], q[1], q[2]), wd * q[3], kd, triggs)
+        cost += more
+        w_all = _add6(w, w_more)
+        f_all = _add3(f, f_more)
+        b_all = _cross_symmetric(e, w_all)
+    return cost, w, b, f, w_all, b_all, f_all, h, ff, fr
 
 
 @expanded_kernel
@@ -330,68 +295,35 @@ def _add_points(  # type: ignore[no-untyped-def]
     fit_focal = tree.globals > P
     R = pose.R[i]
     r = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
-    a00 = 0.0
-    a01 = 0.0
-    a02 = 0.0
-    a11 = 0.0
-    a12 = 0.0
-    a22 = 0.0
-    x00 = 0.0
-    x01 = 0.0
-    x02 = 0.0
-    x10 = 0.0
-    x11 = 0.0
-    x12 = 0.0
-    x20 = 0.0
-    x21 = 0.0
-    x22 = 0.0
-    y00 = 0.0
-    y01 = 0.0
-    y02 = 0.0
-    y11 = 0.0
-    y12 = 0.0
-    y22 = 0.0
-    fx = 0.0
-    fy = 0.0
-    fz = 0.0
-    mx = 0.0
-    my = 0.0
-    mz = 0.0
-    hx = 0.0
-    hy = 0.0
-    hz = 0.0
-    nx = 0.0
-    ny = 0.0
-    nz = 0.0
+    a = _ZERO6
+    x = _ZERO9
+    y = _ZERO6
+    force = _ZERO3
+    moment = _ZERO3
+    focal_force = _ZERO3
+    focal_moment = _ZERO3
     for j in range(terms.starts[i], terms.starts[i + 1]):
         flags = terms.flags[j]
         if flags <= HAS_SHAPE:
             continue
         e = _rotate(r, point_at_rest(terms, pose.beta, j, P))
-        cost, w, b, f, w_all, b_all, g, h, ff, fr = _point_terms(terms, j, e, t, settings, cost)
+        cost, w, b, f, w_all, b_all, f_all, h, ff, fr = _point_terms(terms, j, e, t, settings, cost)
         if fit_focal and flags & HAS_2D:
             C[P, P] += ff
             c[P] += fr
-            hx, hy, hz = _add3((hx, hy, hz), h)
-            nx, ny, nz = _add_cross((nx, ny, nz), e, h)
-        a00, a01, a02, a11, a12, a22 = _add6((a00, a01, a02, a11, a12, a22), w)
-        x00, x01, x02, x10, x11, x12, x20, x21, x22 = _add9(
-            (x00, x01, x02, x10, x11, x12, x20, x21, x22), b
-        )
-        fx, fy, fz = _add3((fx, fy, fz), f)
-        y00, y01, y02, y11, y12, y22 = _add6((y00, y01, y02, y11, y12, y22), _cross_both(e, b_all))
-        mx, my, mz = _add_cross((mx, my, mz), e, g)
+            focal_force = _add3(focal_force, h)
+            focal_moment = _add_cross(focal_moment, e, h)
+        a = _add6(a, w)
+        x = _add9(x, b)
+        y = _add6(y, _cross_both(e, b_all))
+        force = _add3(force, f)
+        moment = _add_cross(moment, e, f_all)
         if flags & HAS_SHAPE:
-            add_point(terms.V[j], r, w, w_all, b_all, g, blocks.A[i], C, c, scratch)
+            add_point(terms.V[j], r, w, w_all, b_all, f_all, blocks.A[i], C, c, scratch)
             if fit_focal and flags & HAS_2D:
                 for n in range(P):
                     C[n, P] += scratch[0, n] * h[0] + scratch[1, n] * h[1] + scratch[2, n] * h[2]
-    a = (a00, a01, a02, a11, a12, a22)
-    x = (x00, x01, x02, x10, x11, x12, x20, x21, x22)
-    y = (y00, y01, y02, y11, y12, y22)
-    f = (fx, fy, fz)
-    m = (mx, my, mz)
-    return cost, (a, x, y, f, m, (hx, hy, hz), (nx, ny, nz))
+    return cost, (a, x, y, force, moment, focal_force, focal_moment)
 
 
 @expanded_kernel

@@ -22,10 +22,12 @@ Z_MIN = 0.1  # metres
 
 
 @kernel
-def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
-    """Return (cost, 6 of w GᵀG by rows of its upper triangle, 3 of w Gᵀr, 3 of w Gᵀg, w gᵀg, w
-    gᵀr), g = dr/dlog f.
+def term(p, uv, focal, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+    """Return (cost, w GᵀG by rows of its upper triangle (6), w Gᵀr (3), w Gᵀg (3), w gᵀg, w gᵀr) of
+    p (3) seen at uv (2), with g = dr/dlog f.
     """
+    x, y, z = p
+    u, v = uv
     front = z > Z_MIN
     iz = 1.0 / (z if front else Z_MIN)
     gx = focal * x * iz
@@ -56,28 +58,11 @@ def term(x, y, z, u, v, focal, weight, inv_sigma, triggs):  # type: ignore[no-un
         w11 = w11 - k * fy * fy
         w12 = w12 - k * fy * fz
         w22 = w22 - k * fz * fz
-    hx = aw * gx
-    hy = aw * gy
-    hz = w * (bx * gx + by * gy)
+    h = (aw * gx, aw * gy, w * (bx * gx + by * gy))
     if not front:
         depth = (Z_MIN - z) / Z_MIN
         cost += 0.5 * weight * depth * depth
         w22 += weight / (Z_MIN * Z_MIN)
         fz -= weight * depth / Z_MIN
-    return (
-        cost,
-        w00,
-        w01,
-        w02,
-        w11,
-        w12,
-        w22,
-        fx,
-        fy,
-        fz,
-        hx,
-        hy,
-        hz,
-        w * (gx * gx + gy * gy),
-        w * (gx * rx + gy * ry),
-    )
+    W = (w00, w01, w02, w11, w12, w22)
+    return cost, W, (fx, fy, fz), h, w * (gx * gx + gy * gy), w * (gx * rx + gy * ry)

@@ -12,15 +12,19 @@ from .accumulation import geman_mcclure, triggs_share
 
 
 @kernel
-def term(x, y, z, mx, my, mz, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
-    """Return (cost, w, kappa, 3 of w r): the second-order matrix is w I - kappa (w r)(w r)ᵀ."""
-    rx = x - mx
-    ry = y - my
-    rz = z - mz
+def term(p, measured, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+    """Return (cost, w GᵀG by rows of its upper triangle (6), w Gᵀr (3)) of two points (3)."""
+    rx = p[0] - measured[0]
+    ry = p[1] - measured[1]
+    rz = p[2] - measured[2]
     s = rx * rx + ry * ry + rz * rz
     rho, w = geman_mcclure(s, inv_sigma)
     w *= weight
-    kappa = 0.0
+    x = w * rx
+    y = w * ry
+    z = w * rz
+    k = 0.0
     if triggs > 0.0 and s > 0.0 and w > 0.0:
-        kappa = triggs_share(s, inv_sigma, triggs) / (s * w)
-    return 0.5 * weight * rho, w, kappa, w * rx, w * ry, w * rz
+        k = triggs_share(s, inv_sigma, triggs) / (s * w)
+    W = (w - k * x * x, -k * x * y, -k * x * z, w - k * y * y, -k * y * z, w - k * z * z)
+    return 0.5 * weight * rho, W, (x, y, z)

@@ -19,11 +19,15 @@ SHORTEST = 1e-4  # metres
 
 
 @kernel
-def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
-    """Return (cost, 6 of w GᵀG by rows of its upper triangle, 3 of w Gᵀr)."""
+def term(d, n, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+    """Return (cost, w GᵀG by rows of its upper triangle (6), w Gᵀr (3)) of a lever d (3) measured
+    along n (3).
+    """
+    dx, dy, dz = d
+    nx, ny, nz = n
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if length < SHORTEST:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     il = 1.0 / length
     hx = dx * il
     hy = dy * il
@@ -54,4 +58,4 @@ def term(dx, dy, dz, nx, ny, nz, weight, inv_sigma, triggs):  # type: ignore[no-
         w11 = w11 - k * fy * fy
         w12 = w12 - k * fy * fz
         w22 = w22 - k * fz * fz
-    return 0.5 * weight * rho, w00, w01, w02, w11, w12, w22, fx, fy, fz
+    return 0.5 * weight * rho, (w00, w01, w02, w11, w12, w22), (fx, fy, fz)

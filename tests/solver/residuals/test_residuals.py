@@ -365,20 +365,17 @@ def test_triggs_correction_is_the_second_derivative_along_the_residual(way):
     w = 2.0
     if way == "image":
         uv = (0.15, 0.1)
-        out = keypoint2d.term(*p, *uv, 1.0, w, inv_sigma, 0.99)
-        W = out[1:7]
+        W = keypoint2d.term(tuple(p), uv, 1.0, w, inv_sigma, 0.99)[1]
         G = np.array([[1, 0, -p[0] / p[2]], [0, 1, -p[1] / p[2]]]) / p[2]
         r = p[:2] / p[2] - uv
     elif way == "space":
         m = p + 0.1 * rng.standard_normal(3)
-        _, scale, kappa, *f = keypoint3d.term(*p, *m, w, inv_sigma, 0.99)
-        full = scale * np.eye(3) - kappa * np.outer(f, f)
-        W = full[np.triu_indices(3)]
+        W = keypoint3d.term(tuple(p), tuple(m), w, inv_sigma, 0.99)[1]
         G = np.eye(3)
         r = p - m
     else:
         n = np.array([0.2, -0.1, 1.0]) / np.linalg.norm([0.2, -0.1, 1.0])
-        W = orientation_field.term(*p, *n, w, inv_sigma, 0.99)[1:7]
+        W = orientation_field.term(tuple(p), tuple(n), w, inv_sigma, 0.99)[1]
         unit = p / np.linalg.norm(p)
         G = (np.eye(3) - np.outer(unit, unit)) / np.linalg.norm(p)
         r = unit - n
