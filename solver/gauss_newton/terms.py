@@ -3,13 +3,13 @@
 body part.
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..arrays import as_table
 from ..errors import ShapeError
-from ..kernel import allocating_kernel, kernel
+from ..kernel import kernel
 from ..measurements import LARGEST, Measurements
 from ..part import Array
 from ..residuals.external import NONE, External, pack_external
@@ -59,111 +59,17 @@ class Terms(NamedTuple):
     external: External  # rows of residuals that were registered from outside
 
 
-@kernel
-def _common_part(tree: Tree, a: int, b: int) -> tuple[int, int, int]:
-    """Return (part, start joint or -1, end joint or -1): a part that two points are both fixed to.
+def _places(tree: Tree, point: int) -> list[tuple[int, int]]:
+    """Return the parts that a point is fixed to, and its row among all points, which the joints
+    follow once more as points of their parents.
 
     A joint belongs to its own part, as its origin, and to its parent, where it sits at S beta + l.
-    -1 if none.
     """
-    M = tree.keypoints
-    for p in range(2):
-        for q in range(2):
-            i = tree.point_part[a] if p == 0 else (tree.parents[a - M] if a >= M else -1)
-            j = tree.point_part[b] if q == 0 else (tree.parents[b - M] if b >= M else -1)
-            if i == j and i >= 0:
-                return i, (a - M if p else -1), (b - M if q else -1)
-    return -1, -1, -1
-
-
-@allocating_kernel
-def _lay_out(tree: Tree, i2, i3, i_start, i_end) -> tuple[Any, ...]:  # type: ignore[no-untyped-def]
-    """Return (starts, shaped, rest, V, slots of 2D, of 3D, of directions, first direction without a
-    common part or -1).
-
-    Points with several kinds of measurement share one slot, unless one kind repeats. `shaped` is
-    HAS_SHAPE where V is not zero.
-    """
-    n_points = tree.V.shape[0]
-    W = tree.S.shape[2]
-    n_parts = tree.parents.shape[0]
-    counts = (i2.shape[0], i3.shape[0], i_end.shape[0])
-    most = counts[0] + counts[1] + counts[2]
-    # after the points: joints as points of their parents
-    of_point = np.full(n_points + n_parts, -1, np.int64)
-    part = np.empty(most, np.int64)
-    listed = np.zeros(most, np.int64)
-    # numbered as of_point
-    point = np.empty(most, np.int64)
-    minus = np.full(most, -1, np.int64)
-    slots = np.empty(most, np.int64)
-    n = 0
-    term = 0
-    bad = -1
-    for kind in range(3):
-        for k in range(counts[kind]):
-            first = -1
-            last = -1
-            if kind < 2:
-                end = i2[k] if kind == 0 else i3[k]
-                i = tree.point_part[end]
-            else:
-                end = i_end[k]
-                i, first, last = _common_part(tree, i_start[k], end)
-                if i < 0:
-                    i = 0
-                    if bad < 0:
-                        bad = k
-            key = end if last < 0 else n_points + last
-            from_origin = kind < 2 or (first < 0 and i_start[k] == tree.keypoints + i)
-            slot = of_point[key] if from_origin else -1
-            bit = HAS_2D if kind == 0 else (HAS_3D if kind == 1 else HAS_DIRECTION)
-            if slot < 0 or listed[slot] & bit:
-                slot = n
-                n += 1
-                part[slot] = i
-                point[slot] = key
-                if from_origin:
-                    of_point[key] = slot
-                else:
-                    minus[slot] = i_start[k] if first < 0 else n_points + first
-            listed[slot] |= bit
-            slots[term] = slot
-            term += 1
-    starts = np.zeros(n_parts + 1, np.int64)
-    for k in range(n):
-        starts[part[k] + 1] += 1
-    for i in range(n_parts):
-        starts[i + 1] += starts[i]
-    shaped = np.zeros(n, np.int64)
-    rest = np.zeros((n, 3))
-    V = np.zeros((n, 3, W))
-    place = np.empty(n, np.int64)
-    free = starts[:-1].copy()
-    for k in range(n):
-        at = free[part[k]]
-        free[part[k]] += 1
-        place[k] = at
-        for sign, key in ((1.0, point[k]), (-1.0, minus[k])):
-            if key < 0:
-                continue
-            for r in range(3):
-                rest[at, r] += sign * (
-                    tree.v_bar[key, r] if key < n_points else tree.l[key - n_points, r]
-                )
-                for c in range(W):
-                    V[at, r, c] += sign * (
-                        tree.V[key, r, c] if key < n_points else tree.S[key - n_points, r, c]
-                    )
-        for r in range(3):
-            for c in range(W):
-                if V[at, r, c] != 0.0:
-                    shaped[at] = HAS_SHAPE
-    for k in range(most):
-        slots[k] = place[slots[k]]
-    a = counts[0]
-    b = counts[0] + counts[1]
-    return starts, shaped, rest, V, slots[:a], slots[a:b], slots[b:], bad
+    places = [(int(tree.point_part[point]), point)]
+    joint = point - tree.keypoints
+    if joint > 0:
+        places.append((int(tree.parents[joint]), len(tree.point_part) + joint))
+    return places
 
 
 @kernel
@@ -229,27 +135,76 @@ class Layout:
     """
 
     def __init__(self, tree: Tree, indices: tuple[Array, ...]) -> None:
-        """Lay out the slots.
+        """Lay out the slots. Points with several kinds of measurement share one slot, unless one
+        kind repeats.
 
         :param indices: four arrays (n,): indices of 2D and of 3D keypoints, starts and ends of
             directions.
         :raises ShapeError: the two ends of a direction are not fixed to one part.
         """
         self.indices = tuple(index.copy() for index in indices)
-        self.starts, self.shaped, self.rest, self.V, *slots, bad = _lay_out(tree, *self.indices)
-        self.slots = tuple(slots)
-        if bad >= 0:
-            raise ShapeError(
-                f"Orientation {bad} goes from point {indices[2][bad]} to point {indices[3][bad]}, "
-                "which no body part "
-                f"has in common; both ends must be fixed to one part."
-            )
-        n = len(self.rest)
+        i2, i3, i_start, i_end = self.indices
+        # Of each measurement its part, and the rows of its point and of the point it starts from,
+        # -1 for the part's origin.
+        points = [(*_places(tree, k)[0], -1) for k in [*i2.tolist(), *i3.tolist()]]
+        for k in range(len(i_end)):
+            points.append(_direction(tree, k, int(i_start[k]), int(i_end[k])))
+        kinds = [HAS_2D] * len(i2) + [HAS_3D] * len(i3) + [HAS_DIRECTION] * len(i_end)
+        rows: list[tuple[int, int, int]] = []  # of each slot
+        has: list[int] = []
+        slot_of: dict[tuple[int, int, int], int] = {}
+        slots = np.zeros(len(points), np.int64)
+        for k, (row, kind) in enumerate(zip(points, kinds, strict=True)):
+            slot = slot_of.get(row, -1) if row[2] < 0 else -1
+            if slot < 0 or has[slot] & kind:
+                slot = len(rows)
+                rows.append(row)
+                has.append(0)
+                slot_of[row] = slot
+            has[slot] |= kind
+            slots[k] = slot
+        part, point, start = np.array(rows, np.int64).reshape(-1, 3).T
+        order = np.argsort(part, kind="stable")
+        n = len(order)
+        place = np.empty(n, np.int64)
+        place[order] = np.arange(n)
+        self.slots = np.split(place[slots], np.cumsum([len(i2), len(i3)]))
+        self.starts = np.searchsorted(part[order], np.arange(len(tree.parents) + 1))
+        self.rest = _rows(tree.v_bar, tree.l, point[order])
+        self.V = _rows(tree.V, tree.S, point[order])
+        differ = start[order] >= 0
+        self.rest[differ] -= _rows(tree.v_bar, tree.l, start[order][differ])
+        self.V[differ] -= _rows(tree.V, tree.S, start[order][differ])
+        self.shaped = HAS_SHAPE * self.V.any(axis=(1, 2)).astype(np.int64)
         self.values = np.zeros(n, np.int64), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4))
 
     def fits(self, indices: tuple[Array, ...]) -> bool:
         """Whether it is the layout of these indices, four arrays (n,) as of `__init__`."""
         return all(_same(a, b) for a, b in zip(self.indices, indices, strict=True))
+
+
+def _rows(of_points: Array, of_joints: Array, rows: Array) -> Array:
+    """Return the rows (n, ...) of all points, which the joints follow once more."""
+    n = len(of_points)
+    found: Array = of_points[np.minimum(rows, n - 1)]
+    found[rows >= n] = of_joints[rows[rows >= n] - n]
+    return found
+
+
+def _direction(tree: Tree, number: int, start: int, end: int) -> tuple[int, int, int]:
+    """Return a part that both ends of a direction are fixed to, the row of its end, and that of its
+    start, or -1 for the part's origin.
+
+    :raises ShapeError: there is none.
+    """
+    for part, first in _places(tree, start):
+        for other, last in _places(tree, end):
+            if part == other:
+                return part, last, -1 if first == tree.keypoints + part else first
+    raise ShapeError(
+        f"Orientation {number} goes from point {start} to point {end}, which no body part has in "
+        "common; both ends must be fixed to one part."
+    )
 
 
 class PackedPriors(NamedTuple):
