@@ -68,14 +68,23 @@ class State:
         :raises InvalidValueError: R_camera_root, or a matrix of Omega, is not a rotation.
         """
         check_type(tree, Tree, "tree")
-        R, t, Omega, beta = self.arrays(tree)
         pose = make_pose(tree)
+        self.write_to(tree, pose)
+        place_parts(tree, pose)
+        return pose
+
+    def write_to(self, tree: Tree, pose: Pose) -> None:
+        """Write the unknowns to a pose of the kernels; its other parts are left to `place_parts`.
+
+        :raises ShapeError: an array does not fit the tree.
+        :raises InvalidValueError: R_camera_root, or a matrix of Omega, is not a rotation.
+        """
+        R, t, Omega, beta = self.arrays(tree)
         pose.R[0] = nearest_rotation(R)
         pose.t[0] = t
         pose.Omega[1:] = nearest_rotation(Omega)
         pose.beta[: tree.shape] = beta
-        place_parts(tree, pose)
-        return pose
+        pose.log_focal[0] = 0.0
 
     def arrays(self, tree: Tree) -> tuple[Array, Array, Array, Array]:
         """Return R_camera_root (3, 3), t_camera_root (3,), Omega (K, 3, 3) and beta (P,), checked.
