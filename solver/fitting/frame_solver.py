@@ -15,21 +15,13 @@ from ..gauss_newton.linearize import linearize, make_blocks, make_pose
 from ..gauss_newton.optimizer import Memory, Settings, make_settings, optimize
 from ..gauss_newton.recursion import make_workspace
 from ..gauss_newton.terms import Layout, PackedPriors, Terms, fill_terms, pack_priors, usable
-from ..kernel import announce_compilation, kernel
+from ..kernel import announce_compilation
 from ..measurements import Measurements
 from ..options import Options, Priors, Stage, default_priors
 from ..part import Blocks, Pose
 from ..points import numbered
 from ..residuals.external import external_residuals, raise_failure
-from ..residuals.registry import (
-    KEYPOINT2D,
-    KEYPOINT3D,
-    ORIENTATION_FIELD,
-    RESIDUALS,
-    SHAPE_PRIOR,
-    column_of,
-)
-from ..rotations import nearest_rotation, orthonormalize
+from ..residuals.registry import NAMES, SHAPE_PRIOR, column_of
 from ..state import MULTI, Fit, State, Status
 from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type
@@ -159,7 +151,7 @@ class FrameSolver:
             shape = packed.shape_mean[:P]
             starts = initial_states(tree, terms, mean, shape, several=multi and count > 0)
         for start in starts:
-            self._enter(start)
+            start.write_to(tree, memory.poses[0])
             cost, code, iterations, rejected, which = optimize(
                 tree, terms, count > 0, settings, memory
             )
@@ -209,45 +201,8 @@ class FrameSolver:
             return self._rest
         return np.asarray(priors.joint_mean, dtype=np.float64)
 
-    def _enter(self, state: State) -> None:
-        """Put `state` into the first pose, with rotations made orthonormal."""
-        pose = self._memory.poses[0]
-        R, t, Omega, beta = state.arrays(self.tree)
-        if not _enter(R, t, Omega, beta, pose):
-            pose.R[0] = nearest_rotation(R)
-            pose.Omega[1:] = nearest_rotation(Omega)
-
 
 _last = threading.local()
-
-
-@kernel
-def _enter(R, t, Omega, beta, pose):  # type: ignore[no-untyped-def]
-    """Copy a state to `pose`; return whether its rotations are orthonormal now, which fails for
-    singular ones.
-    """
-    for r in range(3):
-        pose.t[0, r] = t[r]
-        for c in range(3):
-            pose.R[0, r, c] = R[r, c]
-    for i in range(Omega.shape[0]):
-        for r in range(3):
-            for c in range(3):
-                pose.Omega[i + 1, r, c] = Omega[i, r, c]
-    for a in range(beta.shape[0]):
-        pose.beta[a] = beta[a]
-    pose.log_focal[0] = 0.0
-    return orthonormalize(pose.R[:1]) and orthonormalize(pose.Omega)
-
-
-# Columns of a stage's weights by name, in their order.
-COLUMNS = {
-    "keypoints2d": KEYPOINT2D,
-    "keypoints3d": KEYPOINT3D,
-    "orientation_field": ORIENTATION_FIELD,
-    "shape_prior": SHAPE_PRIOR,
-    **{name: column_of(name) for name in RESIDUALS},
-}
 
 
 def cost_by_term(
@@ -271,10 +226,9 @@ def cost_by_term(
     """
     found = {}
     measured = terms.external.calls[:, 4]  # columns of external residuals that have rows
-    external = {
-        name: column_of(name) for name in external_residuals() if column_of(name) in measured
-    }
-    for name, column in {**COLUMNS, **external}.items():
+    external = [name for name in external_residuals() if column_of(name) in measured]
+    for name in (*NAMES, *external):
+        column = column_of(name)
         if stage[0, column] > 0.0:
             alone = stage.copy()
             alone[0] = np.where(np.arange(len(stage[0])) == column, stage[0], 0.0)

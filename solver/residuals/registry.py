@@ -46,6 +46,7 @@ RESIDUALS = {
 # Columns of a stage's weights: the measurements, the shape prior, then RESIDUALS in order, then
 # external ones.
 KEYPOINT2D, KEYPOINT3D, ORIENTATION_FIELD, SHAPE_PRIOR, FIRST_TABLE = range(5)
+NAMES = ("keypoints2d", "keypoints3d", "orientation_field", "shape_prior", *RESIDUALS)
 FIRST_EXTERNAL = FIRST_TABLE + len(RESIDUALS)
 COLUMNS = FIRST_EXTERNAL + MAX_EXTERNAL
 
@@ -95,9 +96,9 @@ def registered(name: str) -> Any:
 
 
 def column_of(name: str) -> int:
-    """Return the column of a stage's weights of a registered residual."""
-    if name in RESIDUALS:
-        return FIRST_TABLE + list(RESIDUALS).index(name)
+    """Return the column of a stage's weights of one of `NAMES` or of a residual from outside."""
+    if name in NAMES:
+        return NAMES.index(name)
     return FIRST_EXTERNAL + external_residuals()[name].slot
 
 
@@ -133,14 +134,7 @@ def register_residual(
         unknown or "points" with a `function`, or too many are registered.
     """
     external = external_residuals()
-    own = [
-        *RESIDUALS,
-        "keypoints2d",
-        "keypoints3d",
-        "orientation_field",
-        "shape_prior",
-        "focal_prior",
-    ]
+    own = [*RESIDUALS, *NAMES[:FIRST_TABLE], "focal_prior"]
     if not isinstance(name, str) or not name or name in own:
         raise InvalidValueError(
             f"A residual of your own needs a name other than {', '.join(own)}, but got {name!r}."

@@ -19,7 +19,7 @@ from scope.solver import (
     fit_clip,
     load_body,
 )
-from scope.solver.fitting.frame_solver import COLUMNS
+from scope.solver.residuals.registry import NAMES
 
 from ..residuals.test_foot_contact import BODY, FEET, INTRINSICS, points, seen, standing
 from .test_frame_solver import measured, scene
@@ -31,7 +31,7 @@ def test_the_shares_add_up_to_the_cost_and_name_what_was_measured():
     body, state = scene(2)
     found = fit(body, measured(body, state, noise=1.0), options=REPORT)
     assert sum(found.cost_by_term.values()) == pytest.approx(found.cost, rel=1e-10)
-    assert set(found.cost_by_term) <= set(COLUMNS)
+    assert set(found.cost_by_term) <= set(NAMES)
     used = {name for name, cost in found.cost_by_term.items() if cost > 0.0}
     assert {"keypoints2d", "keypoints3d", "orientation_field", "joint_prior", "shape_prior"} <= used
     assert not used & {"pose_prior", "foot_contact", "floor"}
