@@ -29,13 +29,12 @@ from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..part import Array
 from ..points import numbered
-from ..residuals.registry import SHAPE_PRIOR, column_of, registered
+from ..residuals.registry import NAMES, SHAPE_PRIOR, column_of, registered
 from ..rotations import hat
 from ..state import State
 from ..tree import BodyArrays, Tree
 from ..validation import check_finite, check_list, check_type
-from .frame_solver import COLUMNS
-from .normal_equations import gradient, moved, preconditioner, problem_of
+from .normal_equations import gradient, motion_of_parts, moved, preconditioner, problem_of
 
 _STEP = 1e-5  # of the unknowns, radians, metres and shape
 _SHARE = 1e-6  # by which a measured number is changed, of a standard deviation its share
@@ -240,10 +239,9 @@ class _Problem:
         """Return dg/dw (n,): g is linear in each weight."""
         if kind == "shape":
             column = SHAPE_PRIOR
-        elif kind in COLUMNS:
-            column = COLUMNS[kind]
         else:
-            registered(kind)
+            if kind not in NAMES:
+                registered(kind)
             column = column_of(kind)
         alone = np.zeros_like(self.stage)
         alone[1] = self.stage[1]
@@ -268,22 +266,12 @@ class _Problem:
 
 
 def _motion_of_joints(tree: Tree, state: State) -> Array:
-    """Return the derivatives (K+1, 3, n) of the joints' positions by the unknowns.
-
-    A joint moves with the twist (w, v) of its part about the pelvis, v + w x (t_i - t_0), and with
-    the shape by D_i. The twist is the root's, plus each joint's rotation on the way, which turns
-    about that joint.
+    """Return the derivatives (K+1, 3, n) of the joints' positions by the unknowns: a joint moves
+    with the twist (w, v) of its part about the pelvis, v + w x (t_i - t_0), and with the shape by
+    D_i.
     """
     pose = state.pose(tree)
-    parts = len(tree.parents)
-    first_shape = 3 + 3 * parts
-    motion = np.zeros((parts, 3, first_shape + tree.shape))
-    for i in range(parts):
-        motion[i, :, :3] = -hat(pose.t[i] - pose.t[0])
-        motion[i, :, 3:6] = np.eye(3)
-        motion[i, :, first_shape:] = pose.D[i, :, : tree.shape]
-        j = i
-        while j > 0:
-            motion[i, :, 3 + 3 * j : 6 + 3 * j] = -hat(pose.t[i] - pose.t[j])
-            j = tree.parents[j]
+    X = motion_of_parts(tree, pose)
+    motion: Array = X[:, 3:] - hat(pose.t - pose.t[0]) @ X[:, :3]
+    motion[:, :, X.shape[2] - tree.shape :] += pose.D[:, :, : tree.shape]
     return motion

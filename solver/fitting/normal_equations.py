@@ -184,15 +184,11 @@ def _dense(tree: Tree, pose: Pose, blocks: Blocks) -> tuple[Array, Array]:
     end = SHAPE + P
     g = np.zeros(n)
     H = np.zeros((n, n))
-    X = np.zeros((len(tree.parents), 6, n))
+    X = motion_of_parts(tree, pose)
     beta = np.eye(n)[n - P :]
-    for i, parent in enumerate(tree.parents):
-        if i == 0:
-            X[0] = np.eye(6, n)
-        else:
+    for i in range(len(tree.parents)):
+        if i > 0:
             u = np.eye(n)[3 + 3 * i : 6 + 3 * i]
-            U = np.vstack([np.eye(3), hat(pose.t[i] - pose.t[0])])
-            X[i] = X[parent] + U @ u
             H_u = blocks.H_u[i]
             g += u.T @ H_u[:, GRADIENT]
             mixed = u.T @ (H_u[:, :6] @ X[i] + H_u[:, SHAPE:end] @ beta)
@@ -205,6 +201,18 @@ def _dense(tree: Tree, pose: Pose, blocks: Blocks) -> tuple[Array, Array]:
     g += beta.T @ blocks.c[:P]
     H += beta.T @ (C + np.triu(C, 1).T) @ beta
     return g, H
+
+
+def motion_of_parts(tree: Tree, pose: Pose) -> Array:
+    """Return X (K+1, 6, n): the twist of each part about the pelvis is x_i = X_i d."""
+    n = 3 + 3 * len(tree.parents) + tree.shape
+    X = np.zeros((len(tree.parents), 6, n))
+    X[0] = np.eye(6, n)
+    for i, parent in enumerate(tree.parents[1:], start=1):
+        X[i] = X[parent]
+        X[i, :3, 3 + 3 * i : 6 + 3 * i] = np.eye(3)
+        X[i, 3:, 3 + 3 * i : 6 + 3 * i] = hat(pose.t[i] - pose.t[0])
+    return X
 
 
 def moved(tree: Tree, state: State, d: Array) -> State:
