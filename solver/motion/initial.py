@@ -113,18 +113,16 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
     np.add.at(b, indices, (weight * value)[:, None] * row)
 
 
-def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]]) -> None:
+def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]], points: int) -> None:
     """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
     R_camera_world is transposed, its place replaced by t_camera_world, its whole pose inverted, or
     its pixels are mirrored or swapped; with `ScopeWarning`.
+
+    :param points: how many points the body has, joints included.
     """
     views = next((v for v in frames if not isinstance(v, Measurements) and len(v) > 1), None)
     if views is None or any(view.measurements.keypoints2d is None for view in views):
         return
-    points = 1 + max(
-        int(np.max(np.asarray(view.measurements.keypoints2d.indices), initial=0))  # type: ignore[union-attr]
-        for view in views
-    )
     given = _median_error(views, points)
     if not given > _LARGEST_ERROR:
         return

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Points that several cameras see, triangulated against where they are."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from scope.solver import (
     make_tree,
     rotations,
 )
-from scope.solver.motion.initial import initial_states, triangulated
+from scope.solver.motion.initial import initial_states, triangulated, warn_of_cameras
 from scope.solver.motion.views import View
 
 from .. import person
@@ -173,3 +174,15 @@ def test_cameras_in_one_place_say_as_much_as_one_of_them() -> None:
     np.testing.assert_allclose(
         started([filmed(f, 1, 1) for f in range(2)]), started([filmed(f, 1) for f in range(2)])
     )
+
+
+def test_cameras_may_have_joints_in_space_besides_points_in_the_image() -> None:
+    """Points in the image have lower numbers than joints, which were taken for too high ones."""
+    (first, second), joints = filmed(0, 0, 1)
+    M = len(BODY.keypoint_names)
+    in_camera = joints @ np.asarray(first.R_camera_world).T + np.asarray(first.t_camera_world)
+    space = Keypoints3D(M + np.arange(len(joints)), in_camera)
+    first = replace(first, measurements=replace(first.measurements, keypoints3d=space))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_cameras([[first, second]], M + len(joints))
