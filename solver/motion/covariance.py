@@ -24,7 +24,7 @@ from ..kernel import kernel
 from ..part import Array, Pose
 from ..tree import Tree
 from .band import Factor, eliminate_clip, middle_of, run_both
-from .system import GLOBALS, ClipSystem
+from .system import GLOBALS, ClipSystem, write_turn
 
 
 class ClipCovariance(NamedTuple):
@@ -173,20 +173,10 @@ def _write_joints(  # type: ignore[no-untyped-def]
         count = 0
         k = tree.parents[i]
         while k >= 0:
-            x = t[i, 0] - t[k, 0]
-            y = t[i, 1] - t[k, 1]
-            z = t[i, 2] - t[k, 2]
             for r in range(3):
                 columns[count + r] = r if k == 0 else 3 + 3 * k + r
-            J[0, 0, count] = 0.0
-            J[0, 0, count + 1] = z
-            J[0, 0, count + 2] = -y
-            J[0, 1, count] = -z
-            J[0, 1, count + 1] = 0.0
-            J[0, 1, count + 2] = x
-            J[0, 2, count] = y
-            J[0, 2, count + 1] = -x
-            J[0, 2, count + 2] = 0.0
+            e = (t[i, 0] - t[k, 0], t[i, 1] - t[k, 1], t[i, 2] - t[k, 2])
+            write_turn(*e, J[0], count)
             count += 3
             k = tree.parents[k]
         for a in range(tree.shape):

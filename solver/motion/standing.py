@@ -11,7 +11,7 @@ docs/solver_mathematics.md, "A whole clip", has the objective.
 
 from ..kernel import kernel
 from ..residuals.accumulation import lever
-from .system import GLOBALS, pose_of
+from .system import GLOBALS, pose_of, write_turn
 
 
 @kernel
@@ -30,19 +30,8 @@ def _jacobian(tree, poses, f, j, count, p, J) -> None:  # type: ignore[no-untype
     while k >= 0:
         if k == 0:
             at = 0
-        ex = p[0] - pose.t[k, 0]
-        ey = p[1] - pose.t[k, 1]
-        ez = p[2] - pose.t[k, 2]
-        # u x e: column r is the unit vector r crossed with e
-        J[0, at] = 0.0
-        J[0, at + 1] = ez
-        J[0, at + 2] = -ey
-        J[1, at] = -ez
-        J[1, at + 1] = 0.0
-        J[1, at + 2] = ex
-        J[2, at] = ey
-        J[2, at + 1] = -ex
-        J[2, at + 2] = 0.0
+        e = (p[0] - pose.t[k, 0], p[1] - pose.t[k, 1], p[2] - pose.t[k, 2])
+        write_turn(*e, J, at)
         at -= 3
         k = tree.parents[k]
     for r in range(3):

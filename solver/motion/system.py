@@ -102,6 +102,20 @@ def pose_of(poses: Pose, f: int) -> Pose:
 
 
 @kernel
+def write_turn(ex, ey, ez, J, at) -> None:  # type: ignore[no-untyped-def]
+    """Write the derivative of u x e by u to the columns of J (3, .) from `at` on."""
+    J[0, at] = 0.0
+    J[0, at + 1] = ez
+    J[0, at + 2] = -ey
+    J[1, at] = -ez
+    J[1, at + 1] = 0.0
+    J[1, at + 2] = ex
+    J[2, at] = ey
+    J[2, at + 1] = -ex
+    J[2, at + 2] = 0.0
+
+
+@kernel
 def add_turned(turn, source: Blocks, sums: Blocks) -> None:  # type: ignore[no-untyped-def]
     """Add blocks of a camera whose axes are turn (3, 3) times those of `sums`: x' = (R w, R nu), u'
     = R u.
