@@ -139,16 +139,70 @@ def pack_frames(
     :raises InvalidValueError: a value that no fit can use, or a frame that is neither measurements
         nor views.
     """
-    packer = _Packer(tree)
     without = PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information)
+    layout: Layout | None = None
     of_frame = [0]
     counts = np.zeros(len(frames), np.int64)
+    seen: list[Terms] = []
+    cameras = []
     for f, frame in enumerate(frames):
-        name = f"frames[{first + f}]"
-        for k, view in enumerate(views_of(frame, name) or [View(Measurements())]):
-            counts[f] += packer.add(view, without if k else priors)
-        of_frame.append(len(packer.starts))
-    return packer.packed(of_frame, priors), counts
+        views = views_of(frame, f"frames[{first + f}]") or [View(Measurements())]
+        for k, view in enumerate(views):
+            terms, slots, layout = fill_terms(
+                tree, view.measurements, without if k else priors, layout
+            )
+            counts[f] += usable(terms, slots)[1]
+            # The next view with this layout overwrites them.
+            kept = {name: getattr(terms, name).copy() for name in _VALUES}
+            seen.append(terms._replace(**kept))
+            cameras.append(_camera_of(view))
+        of_frame.append(len(seen))
+    return _packed(seen, cameras, np.array(of_frame)), counts
+
+
+_VALUES = ("flags", "image", "point", "direction")
+
+
+def _packed(
+    views: Sequence[Terms], cameras: Sequence[tuple[Array, Array, bool]], of_frame: Array
+) -> PackedViews:
+    """Lay out the terms of all views one after the other."""
+    layouts = _Shared()
+    tables = [_Shared() for _ in RESIDUALS]
+    places = [layouts.add(terms.rest, terms.V)[0] for terms in views]
+    firsts = np.cumsum([0, *(len(terms.flags) for terms in views[:-1])])
+    rows = [
+        [table.add(terms.ints[k], terms.floats[k]) for terms in views]
+        for k, table in enumerate(tables)
+    ]
+    flags, image, point, direction = (
+        np.concatenate([getattr(terms, name) for terms in views]) for name in _VALUES
+    )
+    R, t, own_axes = (np.array(some) for some in zip(*cameras, strict=True))
+    rest, V = layouts.joined()
+    ints, floats = zip(*(table.joined() for table in tables), strict=True)
+    calls, external = _joined([terms.external for terms in views])
+    return PackedViews(
+        of_frame,
+        np.array([terms.starts for terms in views]),
+        np.array(list(zip(firsts, places, strict=True))),
+        flags,
+        image,
+        point,
+        direction,
+        rest,
+        V,
+        np.array(rows),
+        ints,
+        floats,
+        calls,
+        external,
+        views[0].shape_mean,
+        views[0].shape_information,
+        R,
+        t,
+        own_axes,
+    )
 
 
 def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
@@ -216,98 +270,31 @@ def _numbered_frame(body: object, frame: Any) -> Any:
     ]
 
 
-class _Packer:
-    """Collects the terms of views."""
-
-    def __init__(self, tree: Tree) -> None:
-        self._tree = tree
-        self._layout = Layout(tree, (np.zeros(0, np.int64),) * 4)
-        self.starts: list[Array] = []
-        self._slots: list[tuple[int, int]] = []
-        self._values: list[tuple[Array, ...]] = []
-        self._layouts = [self._layout]
-        self._tables = [_Tables() for _ in RESIDUALS]
-        self._external: list[External] = []
-        self._cameras: list[tuple[Array, Array, bool]] = []
-        self._size = self._shared = 0
-
-    def add(self, view: View, priors: PackedPriors) -> int:
-        """Add a view, as `views_of` has checked it, and return how many measurements are usable."""
-        terms, slots, layout = fill_terms(self._tree, view.measurements, priors, self._layout)
-        if layout is not self._layout:
-            self._shared += len(self._layout.rest)
-            self._layouts.append(layout)
-            self._layout = layout
-        self.starts.append(terms.starts)
-        self._slots.append((self._size, self._shared))
-        # the next view with this layout overwrites them
-        self._values.append(
-            tuple(a.copy() for a in (terms.flags, terms.image, terms.point, terms.direction))
-        )
-        for table, ints, floats in zip(self._tables, terms.ints, terms.floats, strict=True):
-            table.add(ints, floats)
-        self._external.append(terms.external)
-        self._cameras.append(_camera_of(view))
-        self._size += len(terms.flags)
-        return usable(terms, slots)[1]
-
-    def packed(self, of_frame: list[int], priors: PackedPriors) -> PackedViews:
-        """Return what has been added."""
-        flags, image, point, direction = (
-            np.concatenate(some) for some in zip(*self._values, strict=True)
-        )
-        R, t, own_axes = (np.array(some) for some in zip(*self._cameras, strict=True))
-        calls, external = _joined(self._external)
-        return PackedViews(
-            np.array(of_frame),
-            np.array(self.starts),
-            np.array(self._slots),
-            flags,
-            image,
-            point,
-            direction,
-            np.concatenate([layout.rest for layout in self._layouts]),
-            np.concatenate([layout.V for layout in self._layouts]),
-            np.array([table.rows for table in self._tables]),
-            tuple(table.ints() for table in self._tables),
-            tuple(table.floats() for table in self._tables),
-            calls,
-            external,
-            priors.shape_mean,
-            priors.shape_information,
-            R,
-            t,
-            own_axes,
-        )
-
-
-class _Tables:
-    """The rows of one residual; views with the same arrays, as those of priors, share their
-    rows.
+class _Shared:
+    """Rows of pairs of arrays, one after the other; the same pair again, as of priors or of a
+    layout, shares its rows.
     """
 
     def __init__(self) -> None:
-        self.rows: list[tuple[int, int]] = []
-        self._parts: list[tuple[Array, Array]] = []
+        self._pairs: list[tuple[Array, Array]] = []
         self._known: dict[tuple[int, int], tuple[int, int]] = {}
         self._size = 0
 
-    def add(self, ints: Array, floats: Array) -> None:
-        """Add the rows of a view."""
-        key = id(ints), id(floats)
+    def add(self, a: Array, b: Array) -> tuple[int, int]:
+        """Return where the rows of a pair begin and end."""
+        key = id(a), id(b)
         if key not in self._known:
-            self._known[key] = self._size, self._size + len(ints)
-            self._parts.append((ints, floats))  # so that no other arrays get these ids
-            self._size += len(ints)
-        self.rows.append(self._known[key])
+            self._known[key] = self._size, self._size + len(a)
+            self._pairs.append((a, b))  # so that no other arrays get these ids
+            self._size += len(a)
+        return self._known[key]
 
-    def ints(self) -> Array:
-        """Return the whole numbers (n, INTS)."""
-        return np.concatenate([ints for ints, _ in self._parts])
-
-    def floats(self) -> Array:
-        """Return the numbers (n, FLOATS)."""
-        return np.concatenate([floats for _, floats in self._parts])
+    def joined(self) -> tuple[Array, Array]:
+        """Return all rows."""
+        return (
+            np.concatenate([a for a, _ in self._pairs]),
+            np.concatenate([b for _, b in self._pairs]),
+        )
 
 
 def _camera_of(view: View) -> tuple[Array, Array, bool]:
