@@ -82,7 +82,7 @@ def make_clip(
     settings = make_settings(Options(stages=[stage]), [stage])
     P = tree.shape
     return ClipProblem(
-        tree, views, motion, SharedPriors(np.zeros(P), np.eye(P), 0.0), settings, pool
+        tree, views, motion, SharedPriors(np.zeros(P), np.eye(P), None), settings, pool
     ), poses
 
 

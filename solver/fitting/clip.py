@@ -123,16 +123,18 @@ def fit_clip(
         measurements = [measurements[0], *pulled]
     clip_tree = make_tree(body, focal)
     packed = pack_priors(clip_tree, priors)
-    frames = [
-        _Frame(clip_tree, fill_terms(clip_tree, m, packed, None)[0], s)
-        for m, s in zip(measurements, states, strict=True)
-    ]
-    seen = [k for k, frame in enumerate(frames) if frame.counts[1]]
+    terms = [fill_terms(clip_tree, m, packed, None)[0] for m in measurements]
+    seen = [k for k, its in enumerate(terms) if usable(its)[1]]
     chosen = seen
     if len(seen) > shape_frames:
         chosen = [seen[k] for k in np.linspace(0, len(seen) - 1, shape_frames).round().astype(int)]
     joint = _Joint(
-        clip_tree, [frames[k] for k in chosen], priors, options, focal_weight if focal else 0.0
+        clip_tree,
+        [terms[k] for k in chosen],
+        [states[k] for k in chosen],
+        priors,
+        options,
+        focal_weight if focal else None,
     )
     joint.optimize()
     beta = joint.beta[: tree.shape].copy()
@@ -143,7 +145,7 @@ def fit_clip(
         together[k]
         if k in together
         else _fit_with_shape(fixed, measurements[k], states[k], beta, scale, priors, options)
-        for k in range(len(frames))
+        for k in range(len(terms))
     ]
     if by_default:
         warn_of_mirrored_clip(
@@ -244,25 +246,10 @@ def _fit_with_shape(
 
 
 @dataclass
-class _Frame:
-    """One frame's terms and where it starts."""
-
-    tree: Tree
-    terms: Terms
-    init: State
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """Usable measurements, as of `usable`."""
-        return usable(self.terms)
-
-
-@dataclass
 class _Active:
     """A frame that takes part in the joint optimization, with its buffers."""
 
     terms: Terms
-    counts: tuple[int, int]
     pose: Pose
     trial: Pose
     blocks: Blocks
@@ -276,10 +263,11 @@ class _Joint(SeveralFrames):
     def __init__(
         self,
         tree: Tree,
-        frames: list[_Frame],
+        terms: Sequence[Terms],
+        states: Sequence[State],
         priors: Priors,
         options: Options,
-        focal_weight: float,
+        focal_weight: float | None,
     ) -> None:
         super().__init__()
         self.tree = tree
@@ -294,18 +282,14 @@ class _Joint(SeveralFrames):
         self.log_focal = 0.0
         self.status = Status.NO_MEASUREMENTS
         # the last frame's shape has seen most, when the frames were fitted in order
-        first = (
-            as_array(frames[-1].init.beta, (self.P,), "beta") if frames else self.shared.shape_mean
-        )
+        first = as_array(states[-1].beta, (self.P,), "beta") if states else self.shared.shape_mean
         self.beta[: self.P] = first
         shared = make_workspace(tree)
         self.frames: list[_Active] = []
-        for f in frames:
+        for its, state in zip(terms, states, strict=True):
             work = make_workspace(tree)._replace(A=shared.A, scratch=shared.scratch)
-            pose = replace(f.init, beta=self.beta[: self.P]).pose(tree)
-            self.frames.append(
-                _Active(f.terms, f.counts, pose, make_pose(tree), make_blocks(tree), work)
-            )
+            pose = replace(state, beta=self.beta[: self.P]).pose(tree)
+            self.frames.append(_Active(its, pose, make_pose(tree), make_blocks(tree), work))
 
     def optimize(self) -> None:
         """Optimize through the stages."""
@@ -328,17 +312,6 @@ class _Joint(SeveralFrames):
         self.beta = self.frames[0].pose.beta.copy()
         self.log_focal = float(self.frames[0].pose.log_focal[0])
 
-    def _priors(
-        self, s: int, pose: Pose | None = None
-    ) -> tuple[float, NDArray[np.float64], float, bool]:
-        """Return the arguments of `SharedPriors` in stage s, at another point than the current one
-        if there is one.
-        """
-        beta, log_focal = (
-            (self.beta, self.log_focal) if pose is None else (pose.beta, float(pose.log_focal[0]))
-        )
-        return float(self.shape_weights[s]), beta, log_focal, self.tree.globals > self.P
-
     def _linearize(self, s: int, trial: bool) -> float:
         """Linearize every frame at its pose or its trial pose and return the clip's cost."""
         total: float = 0.0
@@ -356,7 +329,8 @@ class _Joint(SeveralFrames):
             total += f.cost
         raise_failure()
         at = self.frames[0].trial if trial else self.frames[0].pose
-        return total + sum(self.shared.costs(*self._priors(s, at)).values())
+        shared = self.shared.costs(self.shape_weights[s], at.beta, float(at.log_focal[0]))
+        return total + sum(shared.values())
 
     def _reduced(
         self, s: int, damping: float
@@ -373,7 +347,7 @@ class _Joint(SeveralFrames):
             )
             C += f.work.C
             c += f.work.c
-        self.shared.add(*self._priors(s), (C, c))
+        self.shared.add(self.shape_weights[s], self.beta, self.log_focal, C, c)
         return C, c, squares
 
     def _step(self, s: int, damping: float) -> float:
@@ -397,7 +371,7 @@ class _Joint(SeveralFrames):
             f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
             eliminate(self.tree, f.pose, f.blocks, MIN_DAMPING, self.settings.root_scale, f.work)
             shares = self._shares(f) if self.report else {}
-            seen, measurements = f.counts
+            seen, measurements = usable(f.terms)
             out.append(
                 Fit(
                     state=State.from_pose(self.tree, f.pose),
@@ -434,7 +408,7 @@ class _Joint(SeveralFrames):
         for f in self.frames:
             for name, cost in self._shares(f).items():
                 total[name] = total.get(name, 0.0) + cost
-        return total | self.shared.costs(*self._priors(-1))
+        return total | self.shared.costs(self.shape_weights[-1], self.beta, self.log_focal)
 
     def information(self) -> NDArray[np.float64]:
         """Return the information matrix of beta (P, P), prior included, poses and focal length

@@ -204,25 +204,22 @@ class SharedPriors(NamedTuple):
 
     shape_mean: Array  # (P,)
     shape_information: Array  # (P, P), over the shape's weight
-    focal_weight: float
+    focal_weight: float | None  # None: the length is known
 
-    def costs(self, weight: float, beta: Array, log_focal: float, focal: bool) -> dict[str, float]:
-        """Return the cost of each at beta (W,), with a weight of the shape's prior; `focal`: the
-        length is unknown.
-        """
+    def costs(self, weight: float, beta: Array, log_focal: float) -> dict[str, float]:
+        """Return the cost of each at beta (W,), with a weight of the shape's prior."""
         offset = beta[: len(self.shape_mean)] - self.shape_mean
-        shape = {"shape_prior": float(0.5 * weight * (offset @ self.shape_information @ offset))}
-        return shape | {"focal_prior": 0.5 * self.focal_weight * log_focal**2} if focal else shape
+        costs = {"shape_prior": float(0.5 * weight * (offset @ self.shape_information @ offset))}
+        if self.focal_weight is not None:
+            costs["focal_prior"] = 0.5 * self.focal_weight * log_focal**2
+        return costs
 
-    def add(
-        self, weight: float, beta: Array, log_focal: float, focal: bool, system: tuple[Array, Array]
-    ) -> None:
-        """Add their Hessian and gradient to C (W, W) and c (W,) of `system`."""
-        (C, c) = system
+    def add(self, weight: float, beta: Array, log_focal: float, C: Array, c: Array) -> None:
+        """Add their Hessian and gradient to C (W, W) and c (W,)."""
         P = len(self.shape_mean)
         C[:P, :P] += weight * self.shape_information
         c[:P] += weight * (self.shape_information @ (beta[:P] - self.shape_mean))
-        if focal:
+        if self.focal_weight is not None:
             C[P, P] += self.focal_weight
             c[P] += self.focal_weight * log_focal
 

@@ -136,7 +136,6 @@ def fit_motion(
         )
     for f, frame in enumerate(frames):
         views_of(frame, f"frames[{f}]")
-    warn_of_cameras(frames)
     check_type(motion, MotionPrior, "motion")
     # weights of their own are given by those who know how far apart their frames are
     if _weighs_by_default(motion):
@@ -151,6 +150,7 @@ def fit_motion(
     check_type(options, Options, "options")
     announce_compilation(linearize_half, optimize)
     tree = make_tree(body)
+    warn_of_cameras(frames, len(tree.point_part))
     if stands is not None and has_names(stands.indices):
         stands = replace(
             stands,
@@ -324,7 +324,8 @@ class _Clip:
         poses.Omega[:, 1:] = self.Omega[window.frames]
         poses.beta[:P] = self.beta[:P]
         poses.log_focal[:] = self.log_focal
-        shared = SharedPriors(*priors.packed_shape(P), settings.focal_weight)
+        focal_weight = settings.focal_weight if tree.globals > P else None
+        shared = SharedPriors(*priors.packed_shape(P), focal_weight)
         options = settings.options
         problem = ClipProblem(
             tree, views, self.motion.part(window.frames), shared,

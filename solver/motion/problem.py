@@ -237,13 +237,8 @@ class ClipProblem:
         for memory in self._memories:
             system.C[:] += memory.C
             system.c[:] += memory.c
-        shared = (
-            self.shape_weights[s],
-            poses.beta,
-            float(poses.log_focal[0]),
-            self.tree.globals > self.tree.shape,
-        )
-        self.shared.add(*shared, (system.C, system.c))
+        shared = self.shape_weights[s], poses.beta, float(poses.log_focal[0])
+        self.shared.add(*shared, system.C, system.c)
         self.costs = {
             "acceleration": float(costs[:, 1].sum()),
             "contact": float(costs[:, 2].sum()),

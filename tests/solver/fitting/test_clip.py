@@ -25,7 +25,7 @@ from scope.solver import (
     rotations,
     with_previous,
 )
-from scope.solver.fitting.clip import _Frame, _Joint
+from scope.solver.fitting.clip import _Joint
 from scope.solver.gauss_newton.terms import make_terms
 
 from .. import person
@@ -140,10 +140,8 @@ def test_joint_step_is_the_dense_step_of_the_whole_clip():
     flat = Options(stages=[Stage(Weights(joint_prior=0.0, joint_limits=0.0))])
     joint = _Joint(
         tree,
-        [
-            _Frame(tree, make_terms(tree, m, Priors()), s)
-            for m, s in zip(measurements, starts, strict=True)
-        ],
+        [make_terms(tree, m, Priors()) for m in measurements],
+        starts,
         Priors(),
         flat,
         7.0,

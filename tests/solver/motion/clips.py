@@ -93,7 +93,7 @@ class Clip:
         views, _ = pack_frames(tree, self.frames(), packed)
         motion = MotionTerms.make(tree, self.times, prior, self.stands)
         settings = make_settings(FLAT, FLAT.schedule(cold=False))
-        shared = SharedPriors(np.zeros(P), np.eye(P), FOCAL_WEIGHT if focal else 0.0)
+        shared = SharedPriors(np.zeros(P), np.eye(P), FOCAL_WEIGHT if focal else None)
         problem = ClipProblem(tree, views, motion, shared, settings, pool)
         poses = make_poses(tree, problem.frames)
         for f, s in enumerate(self.starts):
