@@ -235,33 +235,9 @@ def warn_of_pixels(K: Array, pixels: Array, normalized: Array) -> None:
     :param normalized: (n, 3) of normalized image coordinates and confidence.
     """
     fault = _fault_of_pixels(K, pixels, normalized)
-    if fault == 1:
-        _warn(
-            UnitsWarning,
-            "Pixels of 2D keypoints all lie in -1..1, as those of a normalized image; convert them "
-            "to pixels by its size.",
-        )
-    elif fault == 2:
-        _warn(
-            ScopeWarning,
-            "Pixels of 2D keypoints are (0, 0) or (-1, -1), as of keypoints that are missing; give "
-            "these a confidence of 0.",
-        )
-    elif fault == 3:
-        _warn(
-            UnitsWarning,
-            f"Focal lengths of {K[0, 0]:.6g} and {K[1, 1]:.6g} pixels are too short for these "
-            "pixels; multiply millimetres by the image's width in pixels over the sensor's in "
-            "millimetres.",
-        )
-    elif fault == 4:
-        _warn(ScopeWarning, f"Confidence of 2D keypoints {_TOO_CONFIDENT}")
-    elif fault == 5:
-        _warn(
-            ScopeWarning,
-            "The principal point of the intrinsics is (0, 0), the image's corner; it is mostly "
-            "half of the image's size.",
-        )
+    if fault:
+        kind, message = _OF_PIXELS[fault]
+        _warn(kind, message.format(fx=K[0, 0], fy=K[1, 1]))
 
 
 def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
@@ -274,33 +250,50 @@ def warn_of_points(points: Array, has_camera: bool, are_weights: bool) -> None:
     """
     warn_of_units(points, "Points of 3D keypoints")
     fault = _fault_of_points(points)
-    if fault == 1 and has_camera:
-        _warn(
-            ScopeWarning,
-            "Points of 3D keypoints all lie behind the camera, z < 0; camera axes are x right, y "
-            "down, z forward: negate y and z of points whose y is up.",
-        )
-    elif fault == 2 and not are_weights:
-        _warn(ScopeWarning, f"Confidence of 3D keypoints {_TOO_CONFIDENT}")
-    elif fault == 3:
-        _warn(
-            ScopeWarning,
-            "Points of 3D keypoints are (0, 0, 0), as of keypoints that are missing; give these a "
-            "confidence of 0.",
-        )
-    elif fault == 4 and has_camera:
-        _warn(
-            ScopeWarning,
-            "Points of 3D keypoints lie partly behind the camera, as those that are relative to "
-            "the pelvis; add its position in the camera frame, or leave out intrinsics and 2D "
-            "keypoints.",
-        )
+    if fault and (has_camera or fault not in _OF_CAMERA) and not (fault == 2 and are_weights):
+        _warn(ScopeWarning, _OF_POINTS[fault])
 
 
 _TOO_CONFIDENT = (
     "is far above 1 on average; divide percentages by 100, or give standard deviations as sigma_px "
     "or sigma_m."
 )
+
+
+# What to tell of the faults that `_fault_of_pixels` finds, and `_fault_of_points`.
+_OF_PIXELS = {
+    1: (
+        UnitsWarning,
+        "Pixels of 2D keypoints all lie in -1..1, as those of a normalized image; convert them to "
+        "pixels by its size.",
+    ),
+    2: (
+        ScopeWarning,
+        "Pixels of 2D keypoints are (0, 0) or (-1, -1), as of keypoints that are missing; give "
+        "these a confidence of 0.",
+    ),
+    3: (
+        UnitsWarning,
+        "Focal lengths of {fx:.6g} and {fy:.6g} pixels are too short for these pixels; multiply "
+        "millimetres by the image's width in pixels over the sensor's in millimetres.",
+    ),
+    4: (ScopeWarning, f"Confidence of 2D keypoints {_TOO_CONFIDENT}"),
+    5: (
+        ScopeWarning,
+        "The principal point of the intrinsics is (0, 0), the image's corner; it is mostly half "
+        "of the image's size.",
+    ),
+}
+_OF_POINTS = {
+    1: "Points of 3D keypoints all lie behind the camera, z < 0; camera axes are x right, y down, "
+    "z forward: negate y and z of points whose y is up.",
+    2: f"Confidence of 3D keypoints {_TOO_CONFIDENT}",
+    3: "Points of 3D keypoints are (0, 0, 0), as of keypoints that are missing; give these a "
+    "confidence of 0.",
+    4: "Points of 3D keypoints lie partly behind the camera, as those that are relative to the "
+    "pelvis; add its position in the camera frame, or leave out intrinsics and 2D keypoints.",
+}
+_OF_CAMERA = (1, 4)  # without one, points may lie anywhere
 
 
 def _warn(kind: type[ScopeWarning], message: str) -> None:

@@ -184,10 +184,6 @@ MEASURED_REFUSED = {
         seen(pose_priors=pose_prior(w_R=-1.0)),
         "Rotation weights of pose priors .* number 0 is -1",
     ),
-    "pose prior w_t": (
-        seen(pose_priors=pose_prior(w_t=-2.0)),
-        "Translation weights of pose priors .* -2",
-    ),
     "contact": (
         seen(foot_contacts=FootContacts([0, 1], np.zeros((2, 3)), [1.0, -0.5])),
         "Probability of foot contacts must not be negative, but number 1 is -0.5",
@@ -216,10 +212,6 @@ MEASURED_REFUSED = {
     "frames for the shape": (
         lambda: fit_clip(BODY, [SEEN], shape_frames=0),
         "shape_frames must be a whole number of at least 1, but is 0",
-    ),
-    "a truth value for the shape": (
-        lambda: fit_clip(BODY, [SEEN], shape_frames=True),
-        "shape_frames must be a whole number of at least 1, but is True",
     ),
     "focal weight": (
         lambda: fit_clip(BODY, [SEEN], focal=True, focal_weight=-1.0),
@@ -262,11 +254,6 @@ SETTINGS_REFUSED = {
         known(shape_information=INDEFINITE),
         "Priors.shape_information.* has the eigenvalue -1",
     ),
-    "negative definite": (known(shape_information=-np.eye(P)), "must be positive semidefinite"),
-    "slightly indefinite": (
-        known(shape_information=np.array([[1.0, 1.1, 0.0], [1.1, 1.0, 0.0], [0.0, 0.0, 1.0]])),
-        "has the eigenvalue -0.1",
-    ),
     "not symmetric": (
         known(shape_information=np.eye(P) + 0.1 * np.eye(P, k=1)),
         "must be symmetric",
@@ -275,14 +262,9 @@ SETTINGS_REFUSED = {
         known(shape_information=np.full((P, P), NAN)),
         "Information of the shape prior must be finite",
     ),
-    "mean NaN": (known(shape_mean=np.full(P, NAN)), "Mean of the shape prior must be finite"),
     "joint weight": (
         known(joint_weights=[1.0, 1.0, -1.0, 1.0]),
         "Weights of the joint prior .* number 2 is -1",
-    ),
-    "joint weight NaN": (
-        known(joint_weights=np.full(K, NAN)),
-        "Weights of the joint prior must be finite",
     ),
     "joint mean": (
         known(joint_mean=np.tile(2.0 * np.eye(3), (K, 1, 1))),
@@ -292,14 +274,6 @@ SETTINGS_REFUSED = {
         lambda: Temporal(joints=-1.0),
         "Temporal.joints must be finite and not negative, but is -1",
     ),
-    "Temporal.root_rotation": (
-        lambda: Temporal(root_rotation=NAN),
-        "Temporal.root_rotation must be finite",
-    ),
-    "Temporal.root_position": (
-        lambda: Temporal(root_position=INF),
-        "Temporal.root_position must be finite",
-    ),
     "previous": (
         lambda: with_previous(SEEN, state(Omega=np.zeros((K, 3, 3))), Temporal()),
         "Omega of the previous state must be rotation matrices",
@@ -308,7 +282,6 @@ SETTINGS_REFUSED = {
         lambda: Weights(keypoints3d=-1.0),
         "Weights.keypoints3d must be finite and not negative, but is -1",
     ),
-    "weight NaN": (lambda: Weights(shape=NAN), "Weights.shape must be finite"),
     "weight of a table": (
         lambda: Weights(tables={"floor": -1.0}),
         r"Weights.tables\['floor'\] must be finite",
@@ -317,10 +290,6 @@ SETTINGS_REFUSED = {
         lambda: Stage(tolerance=-1e-6),
         "Stage.tolerance must be a number of at least 0, but is -1e-06",
     ),
-    "tolerance NaN": (
-        lambda: Stage(tolerance=NAN),
-        "Stage.tolerance must be a number of at least 0, but is nan",
-    ),
     "iterations": (
         lambda: Stage(max_iterations=-1),
         "Stage.max_iterations must be a whole number of at least 0",
@@ -328,10 +297,6 @@ SETTINGS_REFUSED = {
     "robust": (
         lambda: Options(robust_keypoints2d=0.0),
         "Options.robust_keypoints2d must be positive",
-    ),
-    "robust NaN": (
-        lambda: Options(robust_orientation_field=NAN),
-        "Options.robust_orientation_field must be positive",
     ),
     "a joint of the prior": (
         lambda: load_joint_prior().of("tail"),
@@ -364,16 +329,6 @@ BODIES_REFUSED = {
         "before their children",
     ),
     "S NaN": (body(S=SPOILED_S), InvalidValueError, "The body's S must be finite"),
-    "l infinite": (
-        body(l=np.full((K + 1, 3), INF)),
-        InvalidValueError,
-        "The body's l must be finite",
-    ),
-    "v_bar NaN": (
-        body(v_bar=np.full((M, 3), NAN)),
-        InvalidValueError,
-        "The body's v_bar must be finite",
-    ),
     "V NaN": (body(V=np.full((M, 3, P), NAN)), InvalidValueError, "The body's V must be finite"),
     "V of another P": (
         body(V=np.zeros((M, 3, P + 1))),
