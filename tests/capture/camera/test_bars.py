@@ -11,8 +11,7 @@ import pytest
 from scope.scope_addon.capture.camera.bars import find_bars, longer_content_side
 from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
-from scope.scope_addon.capture.fitting.focal_length import camera_by_edges
+from scope.scope_addon.capture.camera.line_segments import find_segments
 
 WIDTH = 960
 HEIGHT = 540
@@ -82,13 +81,6 @@ def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
 def test_other_pictures_have_no_bars(picture: np.ndarray) -> None:
     assert find_bars(picture) == []
     assert longer_content_side([], WIDTH, HEIGHT) == WIDTH
-
-
-def test_the_assumed_field_of_view_is_that_of_the_content() -> None:
-    found = camera_by_edges(Segments.none(), WIDTH, HEIGHT, float(HEIGHT))
-    assert found.intrinsics[0, 0] == pytest.approx(choose_camera(HEIGHT, 300).intrinsics[0, 0])
-    assert found.intrinsics[:2, 2] == pytest.approx([WIDTH / 2, HEIGHT / 2])
-    assert "between the bars" in found.source
 
 
 def test_edges_of_bars_are_neither_lines_nor_corners() -> None:

@@ -4,7 +4,6 @@ as such.
 """
 
 import threading
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,27 +29,6 @@ class SlowBody:
     def load(self):
         assert self.may_end.wait(300)
         self.is_ready = True
-
-
-@pytest.mark.parametrize("compiled", [0, 7])
-def test_only_compiling_is_reported(monkeypatch, compiled):
-    live = SlowBody()
-    reported = []
-    asked = []
-
-    def count():
-        asked.append(compiled)
-        if len(asked) == 3:
-            live.may_end.set()
-        return compiled
-
-    monkeypatch.setattr(focal_length, "compiled_kernels", count)
-    monkeypatch.setattr(focal_length, "_POLLING_INTERVAL_S", 0.01)
-    with BackgroundEstimators(assumed_camera(64, 48, 64.0), 64, 48, live, None) as background:
-        background.wait_for_solver(reported.append)
-    assert live.is_ready
-    assert len(asked) >= 3
-    assert reported == [compiled] * len(asked) * bool(compiled)
 
 
 def test_a_cancel_while_compiling_is_passed_on(monkeypatch):
@@ -143,15 +121,3 @@ def test_the_focal_length_is_the_same_from_frames_that_were_added_and_from_peopl
     assert alone.intrinsics[0, 0] > 1.2 * assumed.intrinsics[0, 0]
     for camera in alone_fits.cameras + both_fits.cameras:
         np.testing.assert_array_equal(camera.intrinsics, assumed.intrinsics)
-
-
-@pytest.mark.parametrize("lag", [0, 1])
-def test_all_frames_that_were_added_need_nobody_at_the_end(lag):
-    assert estimate(len(TIMES), lag=lag)[1].times == FITTED
-
-
-def test_a_known_focal_length_is_kept_without_a_fit():
-    given = replace(assumed_camera(64, 48, 64.0), focal_deviation=0.0)
-    camera, fits = estimate(len(TIMES), PEOPLE, given=given)
-    assert camera is given
-    assert not fits.times

@@ -176,17 +176,6 @@ def test_opencvs_ffmpeg_decodes_the_same(tmp_path):
     reader.close()
 
 
-def test_odd_sizes(tmp_path):
-    jpeg = cv2.imencode(".jpg", cv2.cvtColor(corner_image(65, 49), cv2.COLOR_RGB2BGR))[1].tobytes()
-    path = tmp_path / "odd.mjpeg"
-    path.write_bytes(jpeg * 5)
-    video = open_video(path)
-    frames = list(video)
-    assert (video.width, video.height, len(frames)) == (65, 49, 5)
-    assert corners(frames[0].image_rgb) == "rgbw"
-    assert (np.diff([f.timestamp_s for f in frames]) > 0).all()
-
-
 def test_ending_an_iteration_early_ends_the_decoding_thread(tmp_path):
     path = write_video(tmp_path / "a.mp4", ramp(50))
     before = threading.enumerate()

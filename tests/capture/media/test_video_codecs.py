@@ -110,19 +110,6 @@ def test_av1_range(encoded):
         list(video)
 
 
-def test_a_video_without_its_decoder_is_refused_with_advice(encoded, monkeypatch):
-    path = encoded[0] / "av1.mp4"
-    if not path.is_file() or not path.stat().st_size:
-        pytest.skip(f"this Blender does not encode AV1: {encoded[1][-200:]}")
-    monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(VideoError, match=r"is a video.*'av'.*JPEG"):
-        colours(path)
-
-
-def test_h264_is_never_skipped(encoded):
-    assert (encoded[0] / "h264.mp4").stat().st_size > 0, encoded[1]
-
-
 def gif(frames, delays):
     """Build a GIF of (T, H, W) images with up to 128 grey levels; delays in hundredths of a second.
     Not compressed: the table of codes is cleared before it could grow.

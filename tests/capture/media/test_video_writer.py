@@ -38,24 +38,6 @@ def test_another_ffmpeg_reads_what_is_written(tmp_path, suffix, fps):
     assert levels == pytest.approx([90, 120, 150, 180], abs=3)
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
-@pytest.mark.parametrize(
-    "times_s",
-    [[0.0, 0.04, 0.5, 1.0], [*np.arange(50) / 25, *(2.0 + 0.5 * np.arange(6))]],
-    ids=["few", "slower"],
-)
-def test_a_variable_rate_keeps_its_times_and_duration(tmp_path, suffix, times_s):
-    path = tmp_path / f"a{suffix}"
-    with VideoWriter(path, Fraction(25), 64, 48, path) as writer:
-        for k, time_s in enumerate(times_s):
-            writer.write(GREY + np.uint8(k), time_s)
-    with av.open(str(path)) as container:
-        duration_s = container.duration / 1e6
-        read_s = [frame.time for frame in container.decode(video=0)]
-    assert read_s == pytest.approx(times_s, abs=1e-3)
-    assert duration_s == pytest.approx(times_s[-1] + 0.04, abs=0.01)
-
-
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="only Linux has this device")
 def test_a_full_disk_is_an_error(tmp_path):
     (tmp_path / "a.mkv").symlink_to("/dev/full")
@@ -65,12 +47,6 @@ def test_a_full_disk_is_an_error(tmp_path):
         r"space",
     ):
         write(VideoWriter(tmp_path / "a.mkv", Fraction(30), 64, 48, tmp_path / "shown.mkv"), 2)
-
-
-def test_a_missing_folder_is_an_error(tmp_path):
-    path = tmp_path / "none" / "a.mp4"
-    with pytest.raises((OutputError, OSError)):
-        VideoWriter(path, Fraction(30), 64, 48, path)
 
 
 def test_without_pyav_a_picture_is_advised(tmp_path, monkeypatch):

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,16 +10,13 @@ from types import SimpleNamespace
 import pytest
 from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.sessions import (
-    CHOICES,
     CPU,
     PROVIDERS,
     Execution,
     SerializedSession,
-    network_path,
     open_session,
 )
 from scope.scope_addon.errors import UsageError
-from scope.scope_addon.options import option
 
 CPU_NAME = "CPUExecutionProvider"
 
@@ -144,21 +140,3 @@ def test_description_of_the_providers() -> None:
     assert Execution("auto", used=["cpu"]).describe(1) == "CPU, 1 thread"
     with pytest.raises(UsageError, match="auto, cpu"):
         Execution("gpu")
-
-
-def test_the_command_line_offers_the_same_choices() -> None:
-    assert sorted(option("provider").values) == sorted(CHOICES)
-
-
-@pytest.mark.usefixtures("networks")
-def test_the_real_cpu(tmp_path: Path) -> None:
-    # A copy, because the tests open Scope's own networks with one thread.
-    path = tmp_path / "detection.onnx"
-    shutil.copy(network_path("pose_detection"), path)
-    execution = Execution("tensorrt")
-    session = open_session(path, 2, execution)
-    if PROVIDERS["tensorrt"][0] in session.get_providers():
-        pytest.skip("this machine has TensorRT")
-    assert session.get_session_options().intra_op_num_threads == 2
-    assert execution.used == [CPU]
-    assert "TensorRT was requested" in str(execution.warnings[0])

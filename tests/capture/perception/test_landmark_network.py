@@ -80,15 +80,6 @@ def test_refine_takes_the_centroid_of_hot_cells_only() -> None:
     np.testing.assert_array_equal(refined[1:], points[1:])
 
 
-def test_refine_at_the_edge_sees_only_its_own_cells() -> None:
-    heatmaps = np.full((1, 64, 64), -30.0, np.float32)
-    heatmaps[0, 2, 63] = 30
-    heatmaps[0, :, 0] = 30  # what wrapping round would see
-    np.testing.assert_allclose(
-        refine(np.array([[0.999, 0.01]]), heatmaps), [[63 / 64, 2 / 64]], atol=1e-9
-    )
-
-
 @pytest.mark.parametrize("camera", [1, 2, 3, 4])
 def test_agrees_with_measured_ground_truth(
     network: LandmarkNetwork, first_frame: Callable[..., np.ndarray], shared: Path, camera: int

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.region import fit_in, halved
+from scope.scope_addon.capture.perception.region import fit_in
 
 
 @pytest.mark.parametrize("shape", [(120, 60), (60, 120), (40, 40), (333, 500)])
@@ -32,15 +32,3 @@ def test_the_border_is_where_the_image_is_not():
     assert (centered == np.where((rows >= 10) & (rows < 30), 200, 7)).all()
     assert (corner == np.where(rows < 20, 200, 7)).all()
     assert (fit_in(image, 40, 40, border=7, stretched=True).picture_rgb == 200).all()
-
-
-def test_small_copies_are_averages_and_have_no_moire():
-    rng = np.random.default_rng(0)
-    noise = rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)
-    averaged = noise.reshape(32, 2, 32, 2, 3).mean(axis=(1, 3))
-    assert np.abs(halved(noise).astype(float) - averaged).max() <= 1
-    stripes = np.zeros((640, 640, 3), np.uint8)
-    stripes[:, ::2] = 255
-    small = fit_in(stripes, 50, 50, border=0).picture_rgb
-    assert np.ptp(small.astype(int)) <= 6
-    assert abs(float(small.mean()) - 127.5) < 3

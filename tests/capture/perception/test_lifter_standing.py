@@ -12,8 +12,6 @@ from scope.solver.body_file import load_body
 
 from ..standing_views import DISTANCE_M, knee_flexion, standing_views
 
-SHAPES = 3  # drawn people besides the mean one
-
 
 @pytest.fixture(scope="module")
 def body():
@@ -42,12 +40,6 @@ def test_straight_legs_stay_straight(body, with_world):
     found = errors(body, 0.0, with_world)
     assert found.mean() < 7.0
     assert np.abs(found).max() < 11.0
-
-
-def test_straight_legs_of_other_proportions_stay_straight(body):
-    rng = np.random.default_rng(3)
-    found = [errors(body, 0.0, False, rng.normal(size=body.P)) for _ in range(SHAPES)]
-    assert np.mean(found) < 8.0
 
 
 def test_bent_legs_stay_bent(body):

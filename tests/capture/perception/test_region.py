@@ -28,14 +28,6 @@ def test_region_rotates_the_top_point_upright(
     np.testing.assert_allclose(region.crop_from_image(np.array(top, float)), [0.5, 0.1])
 
 
-def test_quarter_turn_by_hand() -> None:
-    region = Region((10.0, 20.0), 4.0, math.pi / 2)
-    # the crop's right is down
-    np.testing.assert_allclose(region.image_from_crop(np.array([1.0, 0.5])), [10, 22])
-    corners = region.image_from_crop(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]))
-    np.testing.assert_allclose(corners, [[12, 18], [12, 22], [8, 22], [8, 18]], atol=1e-12)
-
-
 def test_maps_are_inverse() -> None:
     points = np.random.default_rng(1).uniform(-50, 700, (20, 2))
     np.testing.assert_allclose(

@@ -14,8 +14,6 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 
-from ..composites import beside, distant_view
-
 Frames = Callable[..., Iterator[np.ndarray]]
 
 
@@ -186,33 +184,6 @@ def _person_shown(tracker: PeopleTracker, image: np.ndarray, region: Region) -> 
     return cv2.warpAffine(probability, A, image.shape[1::-1]) > 0.5
 
 
-def test_a_small_person_is_tracked_where_there_is_nobody_else(
-    tracker: PeopleTracker, frames: Frames
-) -> None:
-    near = [largest(tracker, image) for image in frames("clips/squats_5fps", stop=4)]
-    tracker.reset()
-    for image, expected in zip(frames("clips/squats_5fps", stop=4), near, strict=True):
-        (entry,) = tracker.step(distant_view(image))
-        assert expected is not None
-        assert entry[0] == 0
-        off = entry[1].keypoints_px - ((expected[1].keypoints_px + 0.5) / 8 - 0.5 + [400, 200])
-        assert np.linalg.norm(off, axis=1).mean() < 0.03 * entry[1].region.side_px
-
-
-def test_a_small_person_beside_a_larger_one_is_tracked_where_two_are_wanted(frames: Frames) -> None:
-    large, small = (
-        [*frames(f"clips/{clip}", stop=4)] for clip in ("gesture_square", "squats_5fps")
-    )
-    tracker = PeopleTracker("fast", threads=2, people=2)
-    for near, distant in zip(large, small, strict=True):
-        found = dict(tracker.step(beside(near, distant)))
-        assert sorted(found) == [0, 1]
-        assert found[0].region.center_px[0] < 576
-        x, y = found[1].keypoints_px.T
-        # where the small image is
-        assert ((x > 800) & (x < 902) & (y > 200) & (y < 380)).mean() > 0.9
-
-
 def test_masks_come_with_the_frame_for_which_they_were_requested(
     tracker: PeopleTracker, frames: Frames
 ) -> None:
@@ -238,11 +209,6 @@ def test_masks_come_with_the_frame_for_which_they_were_requested(
     assert np.median(mask.probability[at[:, 1], at[:, 0]]) > 0.9
 
 
-def test_a_hand_is_not_a_person(tracker: PeopleTracker, frames: Frames) -> None:
-    seen = [tracker.step(image) for image in frames("clips/hand_closeup", every=18)]
-    assert sum(len(observations) > 0 for observations in seen) <= 0.1 * len(seen)
-
-
 def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
     images = list(frames("clips/run_moving_camera", stop=6))
     blank = np.zeros_like(images[0])
@@ -257,18 +223,6 @@ def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
     assert first[1].acquired
     assert first[0] != last[0]
     assert first[1].region.resembles(last[1].region, 0.1)
-
-
-def test_reset_forgets(tracker: PeopleTracker, frames: Frames) -> None:
-    (image,) = frames("clips/gesture_square", stop=1)
-    first = largest(tracker, image)
-    tracker.step(image)
-    tracker.reset()
-    again = largest(tracker, image)
-    assert first is not None
-    assert again is not None
-    assert again[1].acquired
-    np.testing.assert_array_equal(again[1].keypoints_px, first[1].keypoints_px)
 
 
 def test_odd_images(tracker: PeopleTracker) -> None:

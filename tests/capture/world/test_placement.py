@@ -16,7 +16,7 @@ from scope.scope_addon.kinematics.contact_points import contact_point_positions,
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
-from .clip.waving_person import BODY, FRAMES, person
+from .clip.waving_person import FRAMES, person
 
 UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
 
@@ -73,13 +73,3 @@ def test_it_has_the_rotations_of_the_fit_in_the_first_frames_axes_without_gaps()
     found = np.concatenate([raw.R_first_root[:, None], exp(raw.joints)], axis=1)
     np.testing.assert_allclose(found, true.rotations, atol=0.02)  # the gap is filled along an arc
     np.testing.assert_allclose(raw.t_first_root, true.t_camera_root, atol=1e-3)
-
-
-def test_an_hour_of_it_takes_a_third_of_the_memory_of_rotation_matrices():
-    track, true = person()
-    single = replace(true, rotations=true.rotations.astype(np.float32))
-    raw = RawMotion.of(track, single, CameraPath.static(FRAMES))
-    kept = raw.R_first_root.nbytes + raw.joints.nbytes
-    assert kept < 0.4 * single.rotations.nbytes
-    assert not np.shares_memory(raw.R_first_root, single.rotations)
-    assert raw.joints.shape == (FRAMES, BODY.K, 3)

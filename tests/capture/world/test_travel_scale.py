@@ -107,12 +107,3 @@ def test_strides_on_the_spot_contradict_a_path_that_stands_still():
     assert not seen_short.any()
     on_the_spot = contradicting_strides(placed(walk(0.65) - body[:, None], 0.0 * body), UP)
     assert on_the_spot.mean() > 0.9
-
-
-def test_legs_that_kick_or_stand_contradict_nothing():
-    stands = np.tile(walk()[0], (T, 1, 1))
-    root = np.zeros((T, 3))
-    assert not contradicting_strides(placed(stands, root), UP).any()
-    kicks = stands.copy()
-    kicks[:, :2, 2] = stands[:, 2:, 2] + 0.4 * np.maximum(np.sin(2 * np.pi * TIMES), 0)[:, None]
-    assert not contradicting_strides(placed(kicks, root), UP).any()

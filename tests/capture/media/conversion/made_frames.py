@@ -15,7 +15,6 @@ av = package("av")
 # transfer characteristics of ITU-T H.273
 PQ = 16
 HLG = 18
-BT709 = 1
 BT2020 = 9  # primaries, and matrix of YUV
 
 

@@ -5,19 +5,15 @@ are reached.
 
 from __future__ import annotations
 
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.deinterlace import deinterlaced
-from scope.scope_addon.capture.media.frame_readers import PyavReader
-from scope.scope_addon.capture.media.hdr import hdr_rgb
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 
-from ....required import need_encoder
-from .made_frames import BT2020, HLG, av, coded_frame, marked, with_fields
+from .made_frames import av, marked, with_fields
 
 HEIGHT = 48
 WIDTH = 96
@@ -69,13 +65,6 @@ def test_no_frame_is_added_or_lost(count: int) -> None:
     assert times(deinterlaced(woven)) == times(woven)
 
 
-def test_progressive_frames_are_the_very_same() -> None:
-    frames = marked(
-        [av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24") for k in range(5)], "prog"
-    )
-    assert all(a is b for a, b in zip(deinterlaced(frames), frames, strict=True))
-
-
 def test_progressive_frames_among_interlaced_ones_are_left_alone() -> None:
     woven = with_fields([moving_bar(k) for k in range(24)])
     mixed = [
@@ -88,14 +77,6 @@ def test_progressive_frames_among_interlaced_ones_are_left_alone() -> None:
     assert times(shown) == times(mixed)
     changed = [not np.array_equal(grey(a), grey(b)) for a, b in zip(shown, mixed, strict=True)]
     assert [k for k in range(12) if not changed[k]] == [0, 1, 4, 5, 6, 11]
-
-
-def test_the_frame_before_makes_a_late_begin_the_same() -> None:
-    woven = with_fields([moving_bar(k) for k in range(20)])
-    whole = [grey(frame) for frame in deinterlaced(woven)]
-    late = [grey(frame) for frame in deinterlaced(woven[4:], woven[3])]
-    assert np.array_equal(whole[4:], late)
-    assert not np.array_equal(whole[4], grey(next(iter(deinterlaced(woven[4:])))))
 
 
 def test_a_change_of_size_or_format_loses_no_frame() -> None:
@@ -141,15 +122,6 @@ def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int
     shown = list(deinterlaced(woven))
     assert times(shown) == times(woven)
     assert shown[-1] is woven[-1] or (broken == "configure" and after > 0)  # which is called once
-
-
-def test_hdr_is_still_known_afterwards() -> None:
-    frames = [coded_frame(moving_bar(k) / 255, HLG) for k in range(4)]
-    shown = list(deinterlaced(marked(frames, "tff")))
-    assert {
-        (f.color_trc, f.color_primaries, int(f.colorspace), int(f.color_range)) for f in shown
-    } == {(HLG, BT2020, BT2020, 1)}
-    assert hdr_rgb(shown[0]) is not None
 
 
 def write(
@@ -224,55 +196,3 @@ def test_ranges_show_the_frames_of_the_whole(tmp_path: Path) -> None:
         for index, (time, image) in part.items():
             assert time == whole[index][0]
             assert np.array_equal(image, whole[index][1]), index
-
-
-@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-def test_after_seeking_the_frames_are_those_of_the_whole(tmp_path: Path, suffix: str) -> None:
-    path = write(tmp_path / f"a.{suffix}", 4 * 40, 4, g="24", bf="2")
-    whole = images(path)
-    for start_s in (21.0, 32.75, 39.75):
-        with open_video(path) as video:
-            late = list(video.frames_from(start_s))
-        assert [frame.index for frame in late] == list(range(int(4 * start_s), 160))
-        for frame in late:
-            assert frame.timestamp_s == whole[frame.index][0]
-            assert np.array_equal(frame.image_rgb, whole[frame.index][1]), frame.index
-
-
-def test_a_truncated_file_gives_what_can_be_decoded(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mts", 60, 25, g="12", bf="0")
-    path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
-    with av.open(str(path)) as container:
-        decoded = sum(1 for _ in container.decode(video=0))
-    frames = images(path)
-    assert list(frames) == list(range(decoded))
-    assert 20 < decoded < 60
-    assert max(combs(image) for _, image in list(frames.values())[:-1]) < 40
-
-
-def test_fields_that_are_frames_of_their_own_stay_as_they_are(tmp_path: Path) -> None:
-    path = tmp_path / "fields.mp4"
-    need_encoder("libx265")
-    with av.open(str(path), "w") as container:
-        options = {"x265-params": "log-level=none:interlace=tff"}
-        stream = container.add_stream("libx265", rate=50, options=options)
-        stream.width = WIDTH
-        stream.height = HEIGHT
-        stream.pix_fmt = "yuv420p"
-        for k in range(6):
-            frame = av.VideoFrame.from_ndarray(moving_bar(k), format="rgb24").reformat(
-                format="yuv420p"
-            )
-            frame.pts = k
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-    with av.open(str(path)) as container:
-        decoded = list(container.decode(video=0))
-    assert all(frame.interlaced_frame for frame in decoded)
-    with closing(PyavReader(path)) as reader:
-        for frame in decoded:
-            raw = frame.to_ndarray(format="rgb24", src_colorspace="ITU601", dst_colorspace="ITU601")
-            shown = reader.read()
-            assert shown is not None
-            assert np.array_equal(shown[1], raw)
-        assert reader.read() is None

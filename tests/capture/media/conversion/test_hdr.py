@@ -171,14 +171,3 @@ def test_files_show_what_was_filmed(tmp_path: Path, name: str, transfer: int) ->
     error = np.abs(frames[1].image_rgb - 255 * picture())
     assert np.median(error) < 5, np.median(error)  # swscale rounds down, as it does for SDR
     assert np.percentile(error, 95) < 12, np.percentile(error, 95)
-
-
-def test_pictures_in_hdr_are_converted_too(tmp_path: Path) -> None:
-    frame = coded_frame(as_hdr(picture(), PQ), PQ)
-    need_encoder("libsvtav1")
-    path = write_frames(
-        tmp_path / "a.avif", [frame], "libsvtav1", "yuv420p10le", crf="10", preset="10"
-    )
-    with open_video(path) as video:
-        image = next(iter(video)).image_rgb
-    assert np.median(np.abs(image - 255 * picture())) < 5

@@ -6,7 +6,6 @@ malicious.
 from __future__ import annotations
 
 import struct
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -160,25 +159,6 @@ def test_decoding_stops_at_the_maximum_number_of_pixels(
     assert len(decode_items(path, {2, 3, 4})) == 3
     monkeypatch.setattr(frame_readers, "MAX_PIXELS", 3 * 64 * 64 - 1)
     assert decode_items(path, {2, 3, 4}) == {}
-
-
-def test_surplus_tiles_are_refused() -> None:
-    layout = read_layout(heic(slopes(), 64))
-    assert layout is not None
-    assert (
-        assemble(
-            replace(layout, size=(64, 64)),
-            {n: np.zeros((64, 64, 3), np.uint8) for n in range(2, 8)},
-        )
-        is None
-    )
-
-
-def test_a_grid_in_the_idat_box_is_found(tmp_path: Path) -> None:
-    """Phones store the grid there."""
-    (tmp_path / "a.heic").write_bytes(heic(slopes(), 64, is_inside=True))
-    with open_video(tmp_path / "a.heic") as video:
-        assert (video.width, video.height) == (W, H)
 
 
 def test_a_box_that_contains_itself_terminates() -> None:

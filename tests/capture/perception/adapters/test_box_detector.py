@@ -20,10 +20,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.adapters.box_detector import (
     BORDER,
-    MAX_BOXES,
     BoxDetector,
-    Boxes,
-    suppress,
 )
 from scope.scope_addon.capture.perception.region import fit_in
 from scope.solver.errors import ModelFileError
@@ -41,17 +38,6 @@ from .person_in_picture import (
     in_picture,
     yolox_rows,
 )
-
-
-def test_the_json_takes_precedence(tmp_path: Path) -> None:
-    columns = np.zeros((84, CELLS), np.float32)
-    columns[[0, 1, 2, 3, 7], 3] = [50, 50, 40, 40, 0.35]
-    path = fixed(tmp_path / "m.onnx", "width", "height", {"output0": columns[None]})
-    with pytest.raises(ModelFileError, match=r"any size.*m\.json.*input_size"):
-        BoxDetector(path, threads=1)
-    settings = {"input_size": [WIDTH, HEIGHT], "score_threshold": 0.3, "person_class": 3}
-    (tmp_path / "m.json").write_text(json.dumps(settings))
-    assert len(BoxDetector(path, threads=1).detect(IMAGE)) == 1
 
 
 def test_a_graph_of_unknown_type_is_refused(tmp_path: Path) -> None:
@@ -89,24 +75,6 @@ def test_the_letterbox_maps_back_to_the_image() -> None:
         inside = heat[2:-2, 2:-2]
         y, x = (np.indices(inside.shape) * inside).sum(axis=(1, 2)) / inside.sum() + 2.5
         np.testing.assert_allclose(look.to_image(np.array([x, y])), [205, 105], atol=0.5)
-
-
-def test_of_millions_of_boxes_only_the_best_are_compared() -> None:
-    """All of a million, which lie apart, would take hours."""
-    corners = np.stack(
-        [np.arange(1e6), np.zeros(10**6), np.arange(1e6) + 0.5, np.ones(10**6)], axis=1
-    )
-    kept = suppress(Boxes(corners, np.linspace(0.5, 1.0, 1_000_000)), 0.4)
-    assert len(kept.scores) == MAX_BOXES
-    np.testing.assert_array_equal(kept.corners[:, 0], np.arange(10**6 - MAX_BOXES, 10**6)[::-1])
-
-
-@pytest.mark.parametrize("classes", [1, 80])
-def test_yolox_decoded(tmp_path: Path, classes: int) -> None:
-    rows, _ = yolox_rows(classes)
-    assert_finds_the_person(
-        fixed(tmp_path / "m.onnx", WIDTH, HEIGHT, {"output": rows[None]}), "yolox"
-    )
 
 
 def test_yolox_raw(tmp_path: Path) -> None:
