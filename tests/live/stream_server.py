@@ -7,7 +7,6 @@ A transport stream consists of packets of 188 bytes. Seven of them make a datagr
 """
 
 import io
-import socket
 import struct
 from contextlib import contextmanager, suppress
 from fractions import Fraction
@@ -15,7 +14,7 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
 from socketserver import StreamRequestHandler, ThreadingTCPServer
-from threading import Event, Thread
+from threading import Thread
 
 import av
 
@@ -63,11 +62,6 @@ def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, r
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return target.getvalue()
-
-
-def without_first(data, number, kind="mp4"):
-    """Return a stream as somebody gets it who comes too late for its first packets."""
-    return without(data, range(number), kind)
 
 
 def without(data, numbers, kind="mpegts"):
@@ -130,32 +124,6 @@ def _running(server):
 def datagrams(data):
     """Return a transport stream in pieces for the network."""
     return [data[at : at + DATAGRAM] for at in range(0, len(data), DATAGRAM)]
-
-
-@contextmanager
-def sent_by_udp(data, interval_s=0.002):
-    """Send a transport stream to a port of this computer, again and again; gives the address."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    stopped = Event()
-
-    def send():
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            while True:
-                for piece in datagrams(data):
-                    with suppress(OSError):  # nobody listens yet
-                        sender.sendto(piece, ("127.0.0.1", port))
-                    if stopped.wait(interval_s):
-                        return
-
-    thread = Thread(target=send)
-    thread.start()
-    try:
-        yield f"udp://127.0.0.1:{port}"
-    finally:
-        stopped.set()
-        thread.join()
 
 
 @contextmanager

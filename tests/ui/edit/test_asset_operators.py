@@ -48,18 +48,6 @@ def test_the_action_becomes_an_asset_with_picture_tags_and_details(rig):
     assert min(red.sum(), blue.sum()) > 500  # limbs of both sides, in their colours
 
 
-def test_the_picture_is_of_the_first_frame_that_needs_no_review(rig):
-    action = rig.animation_data.action
-    pictures = {}
-    for frame in (1, 11, 20):  # the footage's frame 10 is at the scene's frame 11
-        bpy.context.scene.frame_set(frame)
-        bpy.ops.scope.mark_asset(current_pose=True)
-        pictures[frame] = picture(action)
-    bpy.ops.scope.mark_asset()
-    np.testing.assert_array_equal(picture(action), pictures[11])
-    assert np.abs(pictures[11] - pictures[1]).mean() > 0.01
-
-
 def test_a_lost_motion_still_gives_an_asset(rig):
     del rig["scope_motion"]
     bpy.ops.scope.mark_asset(description_text="A walk")
@@ -96,17 +84,3 @@ def test_a_catalog_of_the_file_is_assigned_and_an_unknown_one_changes_nothing(ri
             bpy.ops.scope.mark_asset(catalog=unknown)
     bpy.ops.scope.mark_asset(catalog="Motions/Walks")
     assert rig.animation_data.action.asset_data.catalog_id == uid
-
-
-def test_the_picture_and_details_are_saved_with_the_file(rig, tmp_path):
-    bpy.ops.scope.mark_asset(author="Ada")
-    before = picture(rig.animation_data.action)
-    name = rig.animation_data.action.name
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walk.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True)
-    with bpy.data.libraries.load(str(tmp_path / "walk.blend"), assets_only=True) as (found, wanted):
-        assert found.actions == [name]
-        wanted.actions = found.actions
-    (action,) = wanted.actions
-    np.testing.assert_array_equal(picture(action), before)
-    assert action.asset_data.author == "Ada"

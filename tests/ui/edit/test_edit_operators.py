@@ -4,7 +4,6 @@
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.keys import read_clip
@@ -95,14 +94,6 @@ def test_smoothing_a_resampled_motion_keeps_its_keys_on_whole_frames(tmp_path):
     np.testing.assert_array_equal(read_clip(rig, BODY, 24.0)[1], before)
 
 
-def test_smoothing_without_the_captured_motion_is_an_error(rig):
-    before = seen(rig)
-    rig["scope_motion"] = "/nowhere/person1.npz"
-    with pytest.raises(RuntimeError, match="neither in this .blend file nor in the cache"):
-        bpy.ops.scope.smooth(strength=2.0)
-    np.testing.assert_array_equal(seen(rig), before)
-
-
 def test_interpolating_and_swapping_a_span(rig):
     before = keys(rig)[0]
     bpy.ops.scope.exchange_sides(start=20, end=30, limbs="legs")
@@ -132,13 +123,6 @@ def test_feet_to_floor(rig):
     lowest = keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min(axis=1)
     assert np.abs(lowest).max() < 0.06  # the feet of this walk are not exactly on one plane
     assert lowest.min() > -1e-4
-
-
-def test_the_floor_is_where_the_armature_was_put(rig):
-    rig.location.z = 0.5
-    bpy.ops.scope.refloor()
-    assert keys(rig)[0].soles(BODY, np.zeros(BODY.P))[..., 2].min() == pytest.approx(0.0, abs=1e-4)
-    assert "the height of the armature's origin" in bpy.ops.scope.refloor.get_rna_type().description
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
@@ -182,26 +166,6 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
     assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
-@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
-def test_a_moved_armature_is_in_place_again_when_root_motion_returns_to_the_bones(rig, mode):
-    rig.rotation_mode = "XYZ"
-    rig.location = (1.0, 2.0, 0.5)
-    rig.rotation_euler = (0.3, 0, 0.8)
-    rig.scale = (1.2,) * 3
-    bpy.ops.scope.smooth()
-    before = seen(rig)
-    place = np.array(rig.matrix_world)
-    clip = keys(rig)[0]
-    operators = bpy.ops.scope.smooth, lambda: bpy.ops.scope.root_motion(mode="BONES")
-    for back in operators:
-        bpy.ops.scope.root_motion(mode=mode)
-        back()
-        bpy.context.view_layer.update()
-        np.testing.assert_allclose(np.array(rig.matrix_world), place, atol=1e-5)
-        np.testing.assert_allclose(keys(rig)[0].root, clip.root, atol=1e-4)
-        np.testing.assert_allclose(seen(rig), before, atol=3e-4)
-
-
 @pytest.fixture
 def stage():
     """An animated object that is also moved, rotated, tilted and scaled."""
@@ -213,26 +177,6 @@ def stage():
         obj.location = (x, -1.0, 0.3)
         obj.keyframe_insert("location", frame=frame)
     return obj
-
-
-def test_root_motion_keeps_the_armatures_parent(rig, stage):
-    rig.parent = stage
-    rig.location = (0.4, 0, 0)
-    rig.rotation_euler = (0, 0, 0.5)
-    rig.rotation_mode = "XYZ"
-    rig.matrix_parent_inverse = Matrix.Translation((0, 0.2, 0)) @ Matrix.Scale(0.8, 4)
-    before = seen(rig)
-    for mode in ("OBJECT", "OBJECT", "IN_PLACE", "BONES", "OBJECT", "BONES"):
-        bpy.ops.scope.root_motion(mode=mode)
-        if mode == "BONES":
-            assert rig.parent == stage
-        else:
-            assert (root_object(rig).parent, rig.parent) == (stage, root_object(rig))
-        if mode == "IN_PLACE":
-            np.testing.assert_allclose(seen(rig)[0], before[0], atol=3e-4)
-        else:
-            np.testing.assert_allclose(seen(rig), before, atol=3e-4)
-    assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
 def test_root_motion_of_an_armature_parented_to_a_bone(rig, stage):
@@ -276,19 +220,6 @@ def test_a_failed_edit_restores_keys_and_root(rig, monkeypatch):
     assert rig.animation_data.action.name == action
 
 
-def test_each_cycle_of_a_loop_continues_from_the_previous_one(rig):
-    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
-    scene = bpy.context.scene
-    length = scene.frame_end + 1 - scene.frame_start
-    assert length in (30, 60)  # a period is one second
-    first = scene.frame_start
-    once = seen(rig, [first, first + 10])
-    next_time = seen(rig, [first + length, first + length + 10])
-    gone = next_time[:, 0] - once[:, 0]
-    np.testing.assert_allclose(gone[:, 1], -1.2 * length / RATE, atol=0.02)
-    np.testing.assert_allclose(next_time - next_time[:, :1], once - once[:, :1], atol=2e-3)
-
-
 def test_all_people_are_smoothed_at_once_on_request(tmp_path):
     motions = [motion_of(walk(1.0), noise=0.05, seed=seed) for seed in (0, 1)]
     for number, motion in enumerate(motions):
@@ -326,45 +257,6 @@ def test_smoothing_a_loop_restores_the_motion_and_the_frame_range(rig):
     scene.frame_start = 1  # a manual setting is kept
     bpy.ops.scope.smooth()
     assert (scene.frame_start, scene.frame_end) == (1, cycle[1])
-
-
-def test_a_loops_action_and_its_strip_are_as_long_as_the_cycle(rig):
-    """Whatever the action animates: confidence, deviations, contact and shape too."""
-    before = {c.data_path: read_keys(c) for c in _all_curves(rig) if _is_beside(c)}
-    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
-    cycle = bpy.context.scene.frame_start, bpy.context.scene.frame_end + 1
-    assert cycle[1] - cycle[0] < 70
-    for action in {rig.animation_data.action, _shape_keys(rig).animation_data.action}:
-        assert tuple(action.frame_range) in (cycle, (cycle[0], cycle[0]))
-    beside = {c.data_path: c for c in _all_curves(rig) if _is_beside(c)}
-    assert len(beside) == len(before) > 30
-    for path, curve in beside.items():  # what is inside the cycle is as it was
-        kept = read_keys(curve)
-        was = before[path]
-        np.testing.assert_allclose(
-            kept[:, 1], np.interp(kept[:, 0], was[:, 0], was[:, 1]), atol=1e-5
-        )
-    strips = rig.animation_data.nla_tracks
-    bpy.ops.scope.smooth()
-    for curve in _all_curves(rig):
-        if _is_beside(curve):
-            np.testing.assert_allclose(read_keys(curve), before[curve.data_path], atol=1e-5)
-    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
-    bpy.ops.scope.push_to_nla()
-    strip = strips[0].strips[0]
-    assert (strip.frame_start, strip.frame_end) == cycle
-
-
-def _shape_keys(rig):
-    return next(child.data.shape_keys for child in rig.children if child.type == "MESH")
-
-
-def _all_curves(rig):
-    return [*fcurves(rig), *fcurves(_shape_keys(rig))]
-
-
-def _is_beside(curve):
-    return not curve.data_path.endswith(("rotation_quaternion", "location"))
 
 
 @pytest.mark.parametrize("suffix", ["glb", "bvh"])
@@ -487,57 +379,6 @@ def test_a_renamed_or_converted_bone_is_named_and_the_keys_stay(rig, change):
             edit()
         now = [(c.data_path, c.array_index, read_keys(c).tobytes()) for c in fcurves(rig)]
         assert now == before
-
-
-def test_a_motion_in_the_nla_is_an_error_of_its_own(rig):
-    animation = rig.animation_data
-    action = animation.action
-    slot = getattr(animation, "action_slot", None)
-    animation.action = None
-    track = animation.nla_tracks.new()
-    strip = track.strips.new("walk", 1, action)
-    if slot is not None:
-        strip.action_slot = slot
-    with pytest.raises(
-        RuntimeError, match="NLA strip 'walk', not by an action of its own alone: enter Tweak Mode"
-    ):
-        bpy.ops.scope.refloor()
-    animation.nla_tracks.active = track
-    strip.select = True
-    animation.use_tweak_mode = True
-    assert bpy.ops.scope.refloor() == {"FINISHED"}
-
-
-def test_keys_over_those_in_the_nla_do_not_count_as_lost(rig):
-    before = seen(rig)
-    bpy.ops.scope.push_to_nla()
-    rig.animation_data.action = bpy.data.actions.new("fix")
-    rig.animation_data.action_blend_type = "ADD"
-    elbow = rig.pose.bones["left_elbow"]
-    elbow.rotation_quaternion = (0.9, 0.4, 0.0, 0.0)
-    elbow.keyframe_insert("rotation_quaternion", frame=1)
-    with pytest.raises(
-        RuntimeError,
-        match="NLA strip 'walk', .*: enter Tweak Mode .* bake all strips into one action",
-    ):
-        bpy.ops.scope.refloor()
-    fixed = seen(rig)
-    assert np.abs(fixed - before).max() > 0.05
-    bpy.ops.object.mode_set(mode="POSE")
-    bpy.ops.pose.select_all(action="SELECT")
-    first, last = map(int, rig.animation_data.nla_tracks[0].strips[0].action.frame_range)
-    bpy.ops.nla.bake(
-        frame_start=first,
-        frame_end=last,
-        only_selected=False,
-        bake_types={"POSE"},
-        clear_constraints=False,
-    )
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for track in rig.animation_data.nla_tracks:
-        track.mute = True
-    np.testing.assert_allclose(seen(rig), fixed, atol=1e-4)
-    assert bpy.ops.scope.reduce_keys() == {"FINISHED"}
 
 
 def test_an_edit_keeps_manual_changes(rig):

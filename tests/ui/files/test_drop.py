@@ -5,14 +5,11 @@ Where an operator writes a file whose name the user has entered.
 """
 
 import os
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.errors import UsageError
 from scope.scope_addon.ui import file_field
-from scope.scope_addon.ui.file_field import output_file
 
 from ...edit.walking import motion_of, walk
 from ...scene.made_rigs import build_rig, captured
@@ -41,26 +38,6 @@ def test_dropped_motions_are_imported(tmp_path):
     )
     assert file_field.SCOPE_FH_motion.bl_file_extensions == ".npz"
     assert bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(path)) == {"FINISHED"}
-
-
-def test_the_suffix_is_added_and_a_name_is_required(tmp_path):
-    assert output_file(str(tmp_path / "walk"), ".fbx") == output_file(
-        str(tmp_path / "walk.fbx"), ".fbx"
-    )
-    for nameless in ("", "//", ".fbx", str(tmp_path / ".fbx")):
-        with pytest.raises(UsageError, match="the file has no name"):
-            output_file(nameless, ".fbx")
-
-
-def test_a_path_beside_the_blend_file_needs_one(tmp_path):
-    with pytest.raises(
-        UsageError,
-        match=r"'//walk\.fbx' is relative to this \.blend file, which "
-        r"was never saved",
-    ):
-        output_file("//walk.fbx", ".fbx")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    assert output_file("//walk.fbx", ".fbx") == Path(tmp_path / "walk.fbx")
 
 
 def test_nothing_is_written_into_the_current_folder(tmp_path, monkeypatch):

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from scope.scope_addon.ui.capture_operators import SAMPLE
-from scope.scope_addon.ui.file_field import FOOTAGE, SCOPE_OT_choose_file, draw_file, present
+from scope.scope_addon.ui.file_field import SCOPE_OT_choose_file, draw_file
 
 SETTINGS = [("scope", "body_file"), ("scope", "calibration_file"), ("scope_live", "file")]
 
@@ -55,16 +54,6 @@ def test_the_text_of_a_path_shows_and_sets_it(owner, setting):
     assert getattr(settings, setting) == "/a/b.mp4"
     setattr(settings, setting, "//c.npz")
     assert getattr(settings, f"{setting}_text") == "//c.npz"
-
-
-@pytest.mark.parametrize(
-    ("typed", "path"),
-    [('"C:\\clips\\a b.mp4"', "C:\\clips\\a b.mp4"), ('"', '"'), ('""', ""), ('/a/"b', '/a/"b')],
-)
-def test_the_quotes_of_a_copied_path_are_not_part_of_it(typed, path):
-    settings = bpy.context.scene.scope
-    settings.footage_text = typed
-    assert settings.footage == path
 
 
 def test_a_name_that_is_not_utf8_can_be_shown_and_confirmed():
@@ -156,38 +145,8 @@ def test_a_chosen_file_of_another_drive_is_stored_as_it_is(saved, monkeypatch):
     assert bpy.context.scene.scope.body_file == "D:\\a.npz"
 
 
-@pytest.mark.parametrize(
-    ("owner", "setting"), [("", ""), ("scope", "quality"), ("render", "filepath"), ("no", "file")]
-)
-def test_only_files_of_scope_are_set(owner, setting):
-    before = bpy.context.scene.render.filepath
-    assert bpy.ops.scope.choose_file(filepath="/a", owner=owner, setting=setting) == {"CANCELLED"}
-    assert bpy.context.scene.render.filepath == before
-
-
-def test_the_browser_begins_at_the_present_file_unless_it_is_gone_or_the_sample(tmp_path):
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
-    (tmp_path / "walk.mp4").touch()
-    assert present(str(tmp_path / "walk.mp4")) == str(tmp_path / "walk.mp4")
-    assert present("//walk.mp4") == str(tmp_path / "walk.mp4")
-    assert present(str(tmp_path / "gone.mp4")) == ""
-    assert present(str(tmp_path)) == ""
-    assert present("") == ""
-    assert SAMPLE.is_file()
-    assert present(str(SAMPLE)) == ""
-
-
-def test_the_browser_begins_elsewhere_if_the_name_is_too_long():
-    assert present("/" + "a" * 300) == ""
-
-
 @pytest.mark.parametrize("operator", ["choose_footage", "import_video"])
 def test_footage_whose_name_is_too_long_is_an_error(operator):
     with pytest.raises(RuntimeError, match="aaa is not a file") as caught:
         getattr(bpy.ops.scope, operator)(filepath="/" + "a" * 300)
     assert "Traceback" not in str(caught.value)
-
-
-def test_the_filter_fits_into_blenders_field():
-    assert len(FOOTAGE) < 256  # Blender cuts a longer one
-    assert {"*.mts", "*.ts", "*.webm", "*.heic"} <= set(FOOTAGE.split(";"))

@@ -17,7 +17,6 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, UsageError, VideoError
 from scope.scope_addon.job.live_process import LiveProcess
 from scope.scope_addon.job.process import WorkerFailedError
-from scope.scope_addon.scene.actions import fcurves
 from scope.scope_addon.ui import live_job
 from scope.scope_addon.ui.live_job import LiveJob, live_request
 from scope.scope_addon.ui.preferences import cache
@@ -130,45 +129,6 @@ def test_a_recording_becomes_a_capture_and_the_body_goes(live):
     assert "Live" not in bpy.data.collections
     assert scene.scope.result.frames_per_second == 28.0
     assert not job.worker.job_folder.exists()
-
-
-def test_a_recorded_take_is_kept_by_the_blend_file(live, tmp_path):
-    """It is smoothed, saved, opened again, and smoothed again from the motion that the file
-    contains.
-    """
-    job = live(
-        'pose(1); assert receive() == "record"; pose(2); assert receive() == "stop"; finish()'
-    )
-    until(job, lambda: job.has_body)
-    job.record()
-    job.stop()
-    to_end(job)
-
-    def take():
-        person = next(
-            obj for obj in bpy.context.scene.scope.capture.all_objects if obj.type == "ARMATURE"
-        )
-        bpy.context.view_layer.objects.active = person
-        curves = fcurves(person)
-        keys = {
-            (c.data_path, c.array_index): [tuple(point.co) for point in c.keyframe_points]
-            for c in curves
-        }
-        return keys, person["scope_motion"]["motion"]
-
-    take()
-    assert bpy.ops.scope.smooth(strength=2.5) == {"FINISHED"}
-    before = take()
-    assert sum(len(points) for points in before[0].values()) > 24 * 4
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "take.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "take.blend"))
-    assert take() == before
-    assert bpy.ops.scope.smooth(strength=1.0) == {"FINISHED"}
-    assert bpy.ops.scope.smooth(strength=2.5) == {"FINISHED"}
-    keys, packed = take()
-    assert packed == before[1]
-    assert keys.keys() == before[0].keys()
 
 
 def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):

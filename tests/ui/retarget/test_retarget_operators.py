@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The retarget operators as a user runs them."""
 
-import re
-
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import PARTS
-from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature
@@ -52,45 +49,6 @@ def test_guess_keep_and_retarget(rig, tmp_path):
     assert len(settings.pairs) == count
     bpy.ops.scope.retarget()
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
-
-
-def two_people_who_meet():
-    """Return the armatures of two people who come towards each other, and their rigs of different
-    sizes and kinds.
-    """
-    apart = ([1.4, 0.3, 0.0], [0.0, 0.0, 0.0])
-    clips = (walk(2.0), walk(2.0, speed=0.8))
-    for clip, place in zip(clips, apart, strict=True):
-        clip.root += place
-    clips[0].root[:, 0] -= np.linspace(0.0, 1.0, len(clips[0]))
-    motions = [motion_of(clip) for clip in clips]
-    bpy.context.scene.render.fps = int(RATE)
-    people = [
-        p.armature for p in build_scene(motions, BODY, None, BuildOptions(start_frame=1.0)).people
-    ]
-    rigs = [build_rig(scheme, size)[0] for scheme, size in (("unreal", 1.5), ("mixamo", 0.8))]
-    for person in people:
-        person["scope_body_file"] = "scope"
-    return people, rigs
-
-
-def test_each_rigs_own_scale_parts_two_people(capfd):
-    """Which the message of the second Retarget gives the number to avoid for."""
-    people, rigs = two_people_who_meet()
-    settings = bpy.context.scene.scope_retarget
-    for person, rig in zip(people, rigs, strict=True):
-        bpy.context.view_layer.objects.active = person
-        settings.rig = rig
-        settings.pairs.clear()
-        bpy.ops.scope.retarget()
-    said = capfd.readouterr().out
-    scales = [float(number) for number in re.findall(r"floor scaled by ([\d.]+)", said)]
-    assert scales == pytest.approx([1.5 * LEG_RATIO, 0.8 * LEG_RATIO], abs=0.01)
-    hips_of = (("thigh_l", "thigh_r"), ("mixamorig:LeftUpLeg", "mixamorig:RightUpLeg"))
-    for rig, hips, scale, person in zip(rigs, hips_of, scales, people, strict=True):
-        path = seen(rig, hips)[..., :2].mean(axis=1)
-        true = seen(person, ("left_hip", "right_hip"))[..., :2].mean(axis=1)
-        np.testing.assert_allclose(path, scale * true, atol=0.01)
 
 
 @pytest.mark.parametrize("root", ["bone", "object", "in-place"])
