@@ -116,20 +116,6 @@ def test_a_new_pin_replaces_that_of_the_same_joint_and_frame():
     assert added(ALL, Pin(4, "left_wrist", pixel=(1.0, 2.0)))[:-1] == ALL
 
 
-def test_the_same_exchange_again_undoes_the_first():
-    assert added(ALL, ALL[3]) == (*ALL[:3], *ALL[4:])
-
-
-def test_an_interpolation_replaces_those_within_its_span():
-    assert added(ALL, Interpolation(3, 8)) == (*ALL[:6], *ALL[7:], Interpolation(3, 8))
-    assert added(ALL, Interpolation(5, 8)) == (*ALL, Interpolation(5, 8))
-
-
-def test_feet_are_put_on_the_floor_that_was_corrected_last():
-    assert added((Floor(3, 0.5),), FeetOnFloor()) == (Floor(3, 0.5), FeetOnFloor(height=0.5))
-    assert added(ALL[-1:], FeetOnFloor()) == (FeetOnFloor(),)
-
-
 def test_without_the_corrected_floor_feet_are_put_on_the_captured_one():
     assert removed(ALL, (Floor,)) == (*ALL[:-2], FeetOnFloor(level=True, lift=False))
     assert removed(ALL, (Upright,)) == (*ALL[:8], *ALL[9:])

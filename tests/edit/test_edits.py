@@ -3,11 +3,10 @@
 
 import numpy as np
 import pytest
-from scope.scope_addon.edit.corrected_motion import shot_of, with_corrections
+from scope.scope_addon.edit.corrected_motion import with_corrections
 from scope.scope_addon.edit.corrections import FeetOnFloor, Interpolation, Upright
-from scope.scope_addon.edit.edits import interpolated, moved_motion
+from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.edit.smooth import smoothed
-from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
 from .walking import BETAS, BODY, angle, motion_of, walk
@@ -75,16 +74,6 @@ def test_feet_stay_on_the_floor_in_every_smoothing(strength, world):
     assert lowest(clip)[far].max() < 0.06  # the feet of this walk are not exactly on one plane
     if world is None:
         np.testing.assert_array_equal(clip.root[:, :2], before.root[:, :2])
-
-
-@pytest.mark.parametrize("span", [(0, 5), (85, 90), (-20, -10), (200, 300), (-(2**53), 2**53)])
-def test_a_span_without_frames_on_both_sides_changes_nothing(span):
-    motion = damaged()
-    np.testing.assert_array_equal(
-        with_corrections(motion, BODY, (Interpolation(*span),)).poses, motion.poses
-    )
-    with pytest.raises(UsageError):
-        interpolated(TRUTH, [Interpolation(*span)], shot_of(motion), strict=True)
 
 
 def test_a_levelled_world_is_level_in_every_smoothing():

@@ -234,27 +234,6 @@ def frame_shown(camera: bpy.types.Object, scene_frame: int) -> int:
     return count + user.frame_offset - 1
 
 
-@pytest.mark.parametrize("rate", [24, 12, 60])
-@pytest.mark.parametrize("start", [1.0, -20.0])
-def test_footage_is_synchronized_at_a_rate_other_than_the_scenes(
-    body, make_motion, clip, rate, start
-):
-    scene = bpy.context.scene
-    scene.render.fps = rate
-    motion = make_motion(body, 20, rate=30.0, image_size=(64, 48))
-    for options in (
-        BuildOptions(start_frame=start),
-        BuildOptions(frame_rate="resample", start_frame=start),
-    ):
-        result = build_scene([motion], body, footage=clip, options=options)
-        assert result.warnings == []
-        camera = result.people[0].camera
-        frames = result.people[0].frames
-        for f in range(int(np.ceil(frames[0])), int(np.floor(frames[-1])) + 1):
-            assert abs(frame_shown(camera, f) - (f - start) / rate * 30) <= 0.5 + 1e-3
-    assert not bpy.data.movieclips
-
-
 @pytest.mark.parametrize(("before", "after"), [(20, 30), (30, 24)])
 def test_footage_stays_synchronized_when_the_scenes_rate_changes(
     body, make_motion, clip, before, after
@@ -321,16 +300,6 @@ def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_mo
     assert result.people[0].camera.data.background_images[0].image.source == "FILE"
     assert len(result.warnings) == 1
     assert "the camera shows that image only" in str(result.warnings[0])
-
-
-def test_a_picture_of_another_size_is_warned_about(body, make_motion, tmp_path):
-    picture = tmp_path / "still.png"
-    image = bpy.data.images.new("still", 32, 48)
-    image.filepath_raw = str(picture)
-    image.file_format = "PNG"
-    image.save()
-    result = build_scene([make_motion(body, 1)], body, footage=picture)
-    assert any("32 x 48" in warning for warning in map(str, result.warnings))
 
 
 def shown_by_blender(

@@ -80,19 +80,6 @@ def test_from_the_image_alone_several_headings_find_the_lowest_cost():
     assert one.cost == cost[0]
 
 
-@pytest.mark.parametrize("init", [None, "multi"])
-def test_a_clip_and_a_motion_start_from_several_headings_as_well(init):
-    body, _, everyone = people()
-    turned = max(everyone, key=lambda person: person.state.R_camera_root[2, 2])  # seen from behind
-    frames = [replace(turned.seen, keypoints3d=None)] * 2
-    wanted = turned.state.R_camera_root
-    clip = solver.fit_clip(body, frames, init=init)
-    motion = solver.fit_motion(body, frames, [0.0, 0.1], init=init)
-    for state in (clip.frames[0].state, motion.states[0]):
-        turn = np.linalg.norm(rotations.log(state.R_camera_root.T @ wanted))
-        assert turn < np.pi / 2
-
-
 def test_with_standard_deviations_those_of_the_result_are_calibrated():
     """The squares of the errors over the covariance are one on average."""
     body = solver.load_body("scope")

@@ -5,8 +5,6 @@ by the jaw.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.face import body_with_mouth, expressions_of, mouth_faces_of
@@ -101,11 +99,6 @@ def test_the_body_keeps_its_vertices_faces_and_expressions(plain, body):
         np.testing.assert_array_equal(large.vertices[own], small.vertices)
         np.testing.assert_array_equal(large.offsets[own], small.offsets)
     np.testing.assert_array_equal(mouth_faces_of(body), mouth_faces_of(plain))
-
-
-def test_other_bodies_and_one_that_has_it_already_stay_as_they_are(plain, body):
-    for each in (body, replace(plain, file="mine.npz"), replace(plain, name="smpl")):
-        assert body_with_mouth(each) is each
 
 
 def test_the_jaw_takes_the_lower_teeth_and_the_tongue(plain, body):

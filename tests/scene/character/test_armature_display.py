@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 import numpy as np
-import pytest
 import scope
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.character import armature
@@ -61,28 +60,6 @@ def test_rings_lie_around_the_limbs(body, make_motion):
             posed.custom_shape_translation, [0, bone.length / 2, 0], atol=1e-6
         )
         assert not posed.use_custom_shape_bone_size
-
-
-def test_captures_share_one_ring_that_is_in_no_scene(body, make_motion):
-    first = build_scene([make_motion(body, 2)], body).people[0].armature
-    second = build_scene([make_motion(body, 2)], body).people[0].armature
-    rings = {bone.custom_shape for rig in (first, second) for bone in rig.pose.bones}
-    assert len(rings) == 1
-    ring = rings.pop()
-    assert ring.name not in bpy.context.scene.objects
-    armature.remove_unused_ring()
-    assert armature.RING in bpy.data.objects
-    bpy.data.batch_remove([first, second])
-    armature.remove_unused_ring()
-    assert armature.RING not in bpy.data.objects
-    assert armature.RING not in bpy.data.meshes
-
-
-@pytest.mark.parametrize(
-    ("name", "side"), [("left_hip", "Left"), ("right_index1", "Right"), ("spine3", "Middle")]
-)
-def test_side_of_a_joint(name, side):
-    assert armature.side_of(name) == side
 
 
 def test_an_armature_that_is_appended_leaves_no_ring_in_the_scene(body, make_motion, tmp_path):

@@ -5,7 +5,6 @@ import pytest
 from scope.scope_addon.errors import VideoError
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE, BuildOptions, build_scene
-from scope.solver.rotations import exp
 
 
 @pytest.fixture
@@ -54,17 +53,6 @@ def test_deviations_follow_the_timeline_where_they_are_known(body, doubtful, ble
     assert curve.hide
 
 
-def test_unknown_deviations_are_no_property(body, doubtful):
-    rig = build_scene([doubtful], body).people[0].armature
-    assert "sigma_cm" not in rig.pose.bones["head"]
-
-
-def test_their_curves_are_hidden_in_the_graph_editor(body, doubtful):
-    rig = build_scene([doubtful], body).people[0].armature
-    hidden = {curve.data_path.rsplit("[", 1)[1] for curve in actions.fcurves(rig) if curve.hide}
-    assert hidden == {'"confidence"]', '"contact"]'}
-
-
 def test_markers_at_review_spans(body, doubtful):
     scene = bpy.context.scene
     options = BuildOptions(frame_rate="set", start_frame=101)
@@ -79,28 +67,6 @@ def test_markers_at_review_spans(body, doubtful):
     assert "person 2 check 141-145" in scene.timeline_markers
 
 
-def test_a_marker_where_a_foot_is_under_the_floor(body, make_motion):
-    motion = make_motion(body, 30)
-    lowest = under_floor_depth(body, motion)
-    motion.trans[:, 2] -= lowest  # the lowest vertex of each pose on the floor
-    motion.trans[10:15, 2] -= 0.03
-    build_scene([motion], body, options=BuildOptions(frame_rate="set"))
-    assert [(m.name, m.frame) for m in bpy.context.scene.timeline_markers] == [
-        ("under floor 10-14", 10)
-    ]
-
-
-def under_floor_depth(body, motion):
-    """(T,) the height of each pose's lowest vertex."""
-    betas = motion.betas.astype(float)
-    turns = exp(motion.poses.reshape(len(motion), -1, 3).astype(float))
-    poses = [
-        body.forward_kinematics(R, t, betas)
-        for R, t in zip(turns, motion.trans.astype(float), strict=True)
-    ]
-    return np.array([body.skin(*pose, betas)[:, 2].min() for pose in poses])
-
-
 def test_no_markers_unless_requested_and_none_after_a_failure(body, doubtful, tmp_path):
     scene = bpy.context.scene
     scene.timeline_markers.new("mine", frame=7)
@@ -108,17 +74,6 @@ def test_no_markers_unless_requested_and_none_after_a_failure(body, doubtful, tm
     with pytest.raises(VideoError):  # the camera comes after the markers
         build_scene([doubtful], body, footage=tmp_path / "gone.mp4")
     assert [m.name for m in scene.timeline_markers] == ["mine"]
-
-
-def test_the_action_is_named_and_kept(body, doubtful):
-    result = build_scene([doubtful], body)
-    person = result.people[0]
-    action = person.armature.animation_data.action
-    assert action.name == "walk"
-    assert action.use_fake_user
-    if actions.has_slots():
-        assert person.mesh.data.shape_keys.animation_data.action == action
-        assert {slot.target_id_type for slot in action.slots} == {"OBJECT", "KEY"}
 
 
 def test_resampling_puts_a_key_on_every_frame_of_the_scene(body, make_motion, truth, blender):

@@ -20,7 +20,6 @@ from scope.scope_addon.scene.character.body_mesh import mixed_vertices
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
 
 from ...made_motion import made_face
-from ..exported import read_back
 
 JAW = np.array([0.0, 0.3, 0.9, 0.2])
 
@@ -55,22 +54,6 @@ def test_a_key_moves_the_mesh_as_the_expression_says(whole_body, motion, shape):
     assert np.count_nonzero(np.abs(moved).max(axis=1) > 1e-6) <= len(smile.vertices)
 
 
-def test_whole_frames_where_they_are_asked_for(whole_body, motion):
-    bpy.context.scene.render.fps = 45  # three scene frames for two pictures
-    options = BuildOptions(frame_rate="resample")
-    mesh = build_scene([motion], whole_body, options=options).people[0].mesh
-    (curve,) = [c for c in actions.fcurves(mesh.data.shape_keys) if "jawOpen" in c.data_path]
-    keys = actions.read_keys(curve)
-    np.testing.assert_array_equal(keys[:, 0], np.arange(len(keys)))
-    np.testing.assert_allclose(keys[3, 1], 0.9, atol=1e-5)  # the third picture
-    np.testing.assert_allclose(keys[1, 1], 0.2, atol=1e-5)  # between the first and the second
-
-
-def test_a_motion_without_a_face_gets_no_keys(whole_body, make_motion):
-    mesh = build_scene([make_motion(whole_body, 4)], whole_body).people[0].mesh
-    assert not set(mesh.data.shape_keys.key_blocks.keys()) & set(EXPRESSIONS)
-
-
 def test_a_body_without_expressions_says_so(body, make_motion):
     built = build_scene([replace(make_motion(body, 4), face=made_face(4, jawOpen=JAW))], body)
     assert "has no expressions" in str(built.warnings[0])
@@ -98,66 +81,6 @@ def test_teeth_and_tongue_come_with_the_face(whole_body, motion, make_motion):
     for name, before in plain.data.shape_keys.key_blocks.items():
         same = mesh.data.shape_keys.key_blocks[name].data
         assert all(same[v].co == before.data[v].co for v in range(0, len(plain.data.vertices), 97))
-
-
-def primitive_of(path: Path, material: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The positions (n, 3) of a .glb's triangles of a material, and how far each target moves them;
-    without Blender.
-    """
-    data = path.read_bytes()
-    length = struct.unpack("<I", data[12:16])[0]
-    gltf = json.loads(data[20 : 20 + length])
-    binary = data[28 + length :]
-
-    def floats(index: int) -> np.ndarray:
-        accessor = gltf["accessors"][index]
-        assert (accessor["componentType"], accessor["type"]) == (5126, "VEC3")
-        values = np.zeros((accessor["count"], 3), np.float32)
-        if "bufferView" in accessor:
-            view = gltf["bufferViews"][accessor["bufferView"]]
-            start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-            values[:] = np.frombuffer(binary, "<f4", values.size, start).reshape(-1, 3)
-        if "sparse" in accessor:
-            sparse = accessor["sparse"]
-            kind = {5121: "<u1", 5123: "<u2", 5125: "<u4"}[sparse["indices"]["componentType"]]
-            starts = [
-                gltf["bufferViews"][sparse[key]["bufferView"]].get("byteOffset", 0)
-                + sparse[key].get("byteOffset", 0)
-                for key in ("indices", "values")
-            ]
-            rows = np.frombuffer(binary, kind, sparse["count"], starts[0])
-            values[rows] = np.frombuffer(binary, "<f4", 3 * sparse["count"], starts[1]).reshape(
-                -1, 3
-            )
-        return values
-
-    (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
-    names = [m["name"] for m in gltf["materials"]]
-    (found,) = [p for p in mesh["primitives"] if names[p["material"]] == material]
-    targets = [floats(t["POSITION"]) for t in found["targets"]]
-    return floats(found["attributes"]["POSITION"]), dict(
-        zip(mesh["extras"]["targetNames"], targets, strict=True)
-    )
-
-
-def test_a_glb_has_teeth_and_a_tongue_that_the_jaw_moves(whole_body, motion, tmp_path):
-    """As the source's targets say: at most 31 mm for the lower teeth, 28 mm for the tongue, 27 mm
-    for its own key.
-    """
-    path = tmp_path / "talk.glb"
-    export_motions([motion], whole_body, path)
-    teeth, tongue = (primitive_of(path, material) for material in ("teeth", "tongue"))
-    at = teeth[0]
-    opened = np.linalg.norm(teeth[1]["jawOpen"], axis=1)
-    lower = opened > 0
-    assert 0.4 < lower.mean() < 0.6
-    assert at[lower, 1].mean() < at[~lower, 1].mean() - 0.005
-    assert 0.025 < opened.max() <= 0.0316
-    assert np.linalg.norm(tongue[1]["jawOpen"], axis=1).max() == pytest.approx(0.0281, abs=2e-4)
-    assert np.linalg.norm(tongue[1]["tongueOut"], axis=1).max() == pytest.approx(0.0275, abs=2e-4)
-    assert not teeth[1]["tongueOut"].any()
-    assert not teeth[1]["mouthSmileLeft"].any()
-    assert teeth[1]["Shape000"].any()
 
 
 def morph_animation(path: Path) -> dict[str, np.ndarray]:
@@ -196,15 +119,3 @@ def test_a_glb_has_the_expressions_as_animated_morph_targets(whole_body, motion,
     if shape == "baked":
         kinds = [len(getattr(bpy.data, kind)) for kind in ("meshes", "shape_keys", "actions")]
         assert kinds == [0, 0, 0]  # nothing of what was baked is left behind
-
-
-def test_an_fbx_has_the_expressions_as_blend_shapes(whole_body, motion, blender, tmp_path):
-    path = tmp_path / "talk.fbx"
-    export_motions([motion], whole_body, path)
-    first = read_back(path)
-    keys = blender.only("MESH").data.shape_keys.key_blocks
-    assert set(EXPRESSIONS) <= set(keys.keys())
-    for t, value in enumerate(JAW):
-        blender.go_to(first + t)
-        assert keys["jawOpen"].value == pytest.approx(value, abs=1e-3)
-        assert keys["eyeBlinkLeft"].value == pytest.approx(0.4, abs=1e-3)

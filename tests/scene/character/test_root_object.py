@@ -16,7 +16,6 @@ from scope.scope_addon.scene.character.root_object import (
     remove_root_object,
     removed_root_motion,
     root_object,
-    topmost,
 )
 
 FRAMES = np.array([1.0, 11.0, 21.0])
@@ -81,15 +80,6 @@ def test_the_trajectory_is_read_back_between_its_keys_too(in_place):
     np.testing.assert_allclose(angles, [0.0, 0.25, 1.5], atol=1e-6)
     assert (empty.animation_data is None) == in_place
     np.testing.assert_allclose(place(armature, 21), expected(0 if in_place else 2), atol=1e-5)
-
-
-def test_a_second_root_object_replaces_the_first():
-    armature = made("hero")
-    parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
-    empty = parent_to_root_object(armature, FRAMES, POSITIONS + 1.0, ANGLES)
-    assert [obj.name for obj in bpy.data.objects if obj.type == "EMPTY"] == ["hero_root"]
-    assert (topmost(armature), root_object(armature)) == (armature, empty)
-    assert place(armature, 1)[:3, 3] == pytest.approx(POSITIONS[0] + 1.0)
 
 
 def test_another_armature_is_not_moved_along():

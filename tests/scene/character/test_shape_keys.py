@@ -29,22 +29,6 @@ def test_one_constant_key_each_at_the_first_frame(body, make_motion):
         assert curve.keyframe_points[0].interpolation == "CONSTANT"
 
 
-def test_every_frame_on_request(body, make_motion):
-    mesh = (
-        build_scene([make_motion(body, 7)], body, options=BuildOptions(shape="per_frame"))
-        .people[0]
-        .mesh
-    )
-    assert {len(c.keyframe_points) for c in actions.fcurves(mesh.data.shape_keys)} == {7}
-
-
-def test_baked_has_no_keys(body, make_motion):
-    mesh = (
-        build_scene([make_motion(body)], body, options=BuildOptions(shape="baked")).people[0].mesh
-    )
-    assert mesh.data.shape_keys is None
-
-
 @pytest.mark.parametrize("value", [-2.5, 1.5])
 def test_a_slider_moves_the_mesh_along_its_direction(body, make_motion, value):
     mesh = build_scene([make_motion(body, betas=[0.0] * 10)], body).people[0].mesh

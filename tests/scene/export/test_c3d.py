@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scope.scope_addon.scene.export.c3d import c3d_bytes
 from scope.scope_addon.scene.export.without_scene import write_without_scene
 
 BLOCK = 512
@@ -120,22 +119,6 @@ def test_a_variable_rate_becomes_constant_and_gaps_stay_missing(whole_body, make
     np.testing.assert_allclose(points[kept[:-1], :, :3], expected[kept[:-1], :, :3], atol=2e-2)
     assert (points[6:, :, 3] == -1.0).all()
     assert (points[:6, :, 3] >= 0.0).all()
-
-
-def test_a_motion_without_deviations_has_residuals_of_zero(whole_body, make_motion, tmp_path):
-    motion = replace(make_motion(whole_body, 3), joint_sigma_m=None, joint_sigma_depth_m=None)
-    *_, points = read(written(motion, whole_body, tmp_path).read_bytes())
-    assert not points[..., 3].any()
-
-
-def test_more_frames_than_sixteen_bits_hold():
-    frames = 70_000
-    points = np.arange(frames, dtype=float)[:, None, None] * np.ones(3)
-    content = c3d_bytes(["A"], ["of A"], points, np.zeros((frames, 1)), 120.0)
-    header, found, rows = read(content)
-    assert header[3] == found["POINT", "FRAMES"] == 65535
-    assert list(found["TRIAL", "ACTUAL_END_FIELD"]) == [frames - 65536, 1]
-    np.testing.assert_array_equal(rows[:, 0, 0], np.arange(frames))
 
 
 @pytest.mark.filterwarnings("ignore:No analog data")

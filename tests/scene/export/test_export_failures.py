@@ -19,25 +19,6 @@ SCENE_SUFFIXES = [suffix for suffix in SUFFIXES if suffix not in WITHOUT_SCENE]
 NOBODY = 65534
 
 
-def test_a_folder_is_distinguished_from_a_name_without_suffix(body, make_motion, tmp_path):
-    with pytest.raises(UsageError, match="it is a folder; name a file in it"):
-        export_motions([make_motion(body, 1)], body, tmp_path)
-
-
-def test_an_unknown_suffix_lists_the_valid_ones(body, make_motion, tmp_path):
-    with pytest.raises(
-        UsageError,
-        match=r"\.glb, \.fbx, \.blend, \.bvh, \.usdc, \.trc, \.c3d, \.vrma, \.mot, \.csv, \.npz",
-    ):
-        export_motions([make_motion(body, 1)], body, tmp_path / "walk.obj")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_missing_folder_is_named(body, make_motion, tmp_path):
-    with pytest.raises(OutputError, match="nowhere"):
-        export_motions([make_motion(body, 1)], body, tmp_path / "nowhere" / "walk.glb")
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows counts letters, and those of the whole path")
 @pytest.mark.parametrize("suffix", [".bvh", ".npz"])
 def test_names_may_be_as_long_as_the_system_lets_them(body, make_motion, tmp_path, suffix):

@@ -6,7 +6,6 @@ import pytest
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.edit.corrected_motion import shot_of
 from scope.scope_addon.edit.corrections import FeetOnFloor, Interpolation
-from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.character.corrected_keys import KeyEdits, begin_with_edits, floored
 
 from ....edit.walking import BETAS, BODY, motion_of, walk
@@ -54,20 +53,3 @@ def test_an_edit_from_before_changes_only_keys_that_begin_without_it(rig):
     assert np.abs(keys.rotations - WALK.rotations)[20:26].max() > 0.01
     keys, _ = begin_with_edits(rig, BODY, (WALK, WALK), FRAMES, edits(span, new=span, rows=rows))
     assert np.abs(keys.rotations - WALK.rotations)[15:20].max() > 0.01
-
-
-def test_a_floor_is_not_found_from_a_few_keys(rig):
-    rows = np.arange(len(WALK)) < 5
-    keys, old = begin_with_edits(
-        rig, BODY, (raised(0.3), raised(0.1)), FRAMES, edits(FeetOnFloor(), rows=rows)
-    )
-    np.testing.assert_array_equal(keys.root, raised(0.3).root)
-    np.testing.assert_array_equal(old.root, raised(0.1).root)
-
-
-def test_a_new_interpolation_needs_keys_around_it(rig):
-    span = Interpolation(0, 10)
-    with pytest.raises(UsageError, match="reaches the motion's end"):
-        begin_with_edits(rig, BODY, (WALK, WALK), FRAMES, edits(span, new=span))
-    keys, _ = begin_with_edits(rig, BODY, (WALK, WALK), FRAMES, edits(span))
-    np.testing.assert_array_equal(keys.rotations, WALK.rotations)
