@@ -290,6 +290,11 @@ def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | No
         write_modifiers(curve, [cycles, *read_modifiers(curve)])
 
 
+def is_cyclic(datablock: bpy.types.ID) -> bool:
+    """Return whether a curve of a datablock repeats."""
+    return any(m.type == "CYCLES" for curve in fcurves(datablock) for m in curve.modifiers)
+
+
 def remove_cycles(datablock: bpy.types.ID) -> None:
     """Remove the cycles from every curve of a datablock."""
     for curve in fcurves(datablock):

@@ -24,12 +24,14 @@ from ..retarget.rest_pose import rest_faults
 from ..retarget.rig_source import ROOTS
 from ..retarget.skeleton import BoneMotion, Pose, Skeleton, basis
 from ..retarget.transfer import Transfer, leg_ratio
+from .actions import add_cycles, bone_path, is_cyclic
 from .character.keys import read_clip
 from .character.root_object import (
     clip_as_displayed,
     parent_to_root_object,
     parent_transform,
     remove_root_object,
+    repeat_root_object,
     root_object,
     topmost,
 )
@@ -37,6 +39,7 @@ from .face_retarget import captured_expressions, face_keys, key_face, rest_face
 from .rig_action import (
     clear_offsets,
     leave_tweak_mode,
+    mark_written,
     override_nla,
     retire,
     root_locations,
@@ -210,6 +213,8 @@ def retarget(
         if face is not None:
             key_face(rig, face, source.name)
         _set_parent(rig, frames, motion)
+        if is_cyclic(source):
+            _repeat(rig, action, keys)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)
         retire(former, source.name)
@@ -314,6 +319,22 @@ def _with_source_transform(
     place, turn, _ = (source.matrix_world if empty is None else parent_transform(empty)).decompose()
     R = np.array(turn.to_matrix())
     return R @ rotations, heads @ R.T + np.array(place), float(turn.to_euler("ZYX").z)
+
+
+def _repeat(rig: bpy.types.Object, action: bpy.types.Action, keys: Sequence[BoneMotion]) -> None:
+    """Repeat the keys as the captured person's loop does: each cycle goes on where the one before
+    it ended.
+    """
+    travelling = {
+        (bone_path(key.bone, "location"), channel)
+        for key in keys
+        if key.locations is not None
+        for channel in range(3)
+    }
+    add_cycles(rig, offset_curves=travelling)
+    mark_written(action)
+    if (empty := root_object(rig)) is not None:
+        repeat_root_object(empty)
 
 
 def _set_parent(rig: bpy.types.Object, frames: NDArray[np.float64], motion: _PlacedMotion) -> None:

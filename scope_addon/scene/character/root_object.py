@@ -18,7 +18,7 @@ from ...edit.clip import Clip
 from ...edit.edits import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
-from ..actions import Channels, check_not_in_nla, fcurves, read_keys
+from ..actions import Channels, add_cycles, check_not_in_nla, fcurves, is_cyclic, read_keys
 from ..datablocks import remove_blocks
 from ..stored_values import stored_numbers
 from ..timing import Retiming
@@ -166,6 +166,15 @@ def move_root_motion_to_object(
         armature, frames, positions, angles, in_place=in_place, below_parent=True
     )
     empty[_PLACE] = [number for row in place for number in row]
+    if is_cyclic(armature):
+        repeat_root_object(empty)
+
+
+def repeat_root_object(empty: bpy.types.Object) -> None:
+    """Repeat the trajectory of a root object whose armature repeats: each cycle goes on where the
+    one before it ended.
+    """
+    add_cycles(empty, offset_curves={("location", 0), ("location", 1)})
 
 
 def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: float) -> None:

@@ -220,6 +220,42 @@ def test_a_failed_edit_restores_keys_and_root(rig, monkeypatch):
     assert rig.animation_data.action.name == action
 
 
+def test_a_loop_in_place_stays_there(rig):
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    bpy.ops.scope.root_motion(mode="IN_PLACE")
+    scene = bpy.context.scene
+    length = scene.frame_end + 1 - scene.frame_start
+    once, later = (seen(rig, [scene.frame_start + start]) for start in (0, 3 * length))
+    np.testing.assert_allclose(later, once, atol=0.01)
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_each_cycle_of_a_loop_continues_on_a_rig_and_on_a_root_object(rig, root):
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    hero, bone_of = made_rigs.build_rig("mixamo")
+    settings = bpy.context.scene.scope_retarget
+    settings.rig = hero
+    settings.root = root
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.scope.retarget()
+    bpy.context.view_layer.objects.active = rig
+    if root == "object":
+        bpy.ops.scope.root_motion(mode="OBJECT")
+    scene = bpy.context.scene
+    first = scene.frame_start
+    length = scene.frame_end + 1 - first
+    for armature, names in ((rig, NAMES), (hero, list(bone_of.values()))):
+        once, later = (
+            made_rigs.seen(armature, names, [first + start, first + start + 10])
+            for start in (0, 3 * length)
+        )
+        gone = later - once
+        ends = made_rigs.seen(armature, names, [first, first + length])
+        expected = 3 * (ends[1, 0] - ends[0, 0])
+        assert abs(expected[1]) > 2.0
+        np.testing.assert_allclose(gone, np.broadcast_to(expected, gone.shape), atol=0.01)
+
+
 def test_all_people_are_smoothed_at_once_on_request(tmp_path):
     motions = [motion_of(walk(1.0), noise=0.05, seed=seed) for seed in (0, 1)]
     for number, motion in enumerate(motions):
