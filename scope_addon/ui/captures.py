@@ -61,6 +61,17 @@ def show_again(capture: bpy.types.Collection) -> None:
     if capture.library is None and _HIDDEN in capture:
         del capture[_HIDDEN]
         capture.hide_viewport = capture.hide_render = False
+        _evaluate_animation(capture)
+
+
+def _evaluate_animation(capture: bpy.types.Collection) -> None:
+    """Let Blender evaluate a capture's animation at the current frame: on its own, it would show
+    the pose from before the capture was hidden until the frame changes.
+    """
+    for obj in capture.all_objects:
+        for block in (obj, obj.data, getattr(obj.data, "shape_keys", None)):
+            if block is not None and block.library is None:
+                block.update_tag(refresh={"TIME"})
 
 
 def people_of(capture: bpy.types.Collection) -> list[bpy.types.Object]:

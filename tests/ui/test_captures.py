@@ -4,10 +4,20 @@ armatures.
 """
 
 import bpy
+import numpy as np
 import pytest
+from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
-from scope.scope_addon.ui.captures import elided, people_of, shown_capture, unit_text
+from scope.scope_addon.ui.captures import (
+    elided,
+    hide_others,
+    people_of,
+    shown_capture,
+    unit_text,
+)
+
+from ..edit.walking import BODY, motion_of, walk
 
 
 def capture(fake_worker, footage, people=1, warnings=("a warning",)):
@@ -51,6 +61,28 @@ def listed() -> list[str]:
     fake = type("List", (), {"filter_name": "", "bitflag_filter_item": 1})()
     flags, _ = bpy.types.SCOPE_UL_captures.filter_items(fake, bpy.context, bpy.data, "collections")
     return [each.name for each, flag in zip(bpy.data.collections, flags, strict=True) if flag]
+
+
+def test_a_capture_that_is_shown_again_has_the_pose_of_the_current_frame():
+    """Blender alone shows the pose from before it was hidden, over the footage of another frame."""
+    scene = bpy.context.scene
+    motion = motion_of(walk(2.0))
+    first, second = (build_scene([motion], BODY, None, BuildOptions(name=n)) for n in "ab")
+    armature = first.people[0].armature
+
+    def ankle():
+        seen = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return np.array(seen.matrix_world @ seen.pose.bones["left_ankle"].head)
+
+    scene.frame_set(1)
+    before = ankle()
+    hide_others(scene, [second.collection])
+    scene.frame_set(40)
+    select("a")
+    shown_again = ankle()
+    scene.frame_set(40)
+    assert np.linalg.norm(ankle() - before) > 0.1
+    np.testing.assert_allclose(shown_again, ankle(), atol=1e-6)
 
 
 def test_each_capture_keeps_its_result(two):
