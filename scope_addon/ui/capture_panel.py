@@ -52,6 +52,9 @@ if TYPE_CHECKING:
     from ..job.job_progress import JobProgress
 
 _PIXELS_PER_CHARACTER = 7.0
+# Formats with a button of their own: more leave no room for their names in a sidebar of the default
+# width. A menu beside them has all.
+_EXPORT_BUTTONS = 4
 _STATUS_ICONS = {WAITING: "TIME", CAPTURING: "PLAY", DONE: "CHECKMARK", FAILED: "ERROR"}
 # What belongs to one clip, or to one person, is no preset.
 _OF_THE_CLIP = ("take", "use_range", "start", "end", "heights_m")
@@ -249,10 +252,11 @@ class SCOPE_PT_result(Tab, bpy.types.Panel):
         _draw_frame_rate(context, layout)
         row = layout.row(align=True)
         row.label(text="", icon="EXPORT")
-        for key, label, _, _ in FORMATS:
+        for key, label, _, _ in FORMATS[:_EXPORT_BUTTONS]:
             cell = row.column()
             cell.enabled = is_available(key)
             cell.operator("scope.export", text=label).format = key
+        row.menu("SCOPE_MT_export", text="", icon="DOWNARROW_HLT")
         row = layout.row(align=True)
         row.operator("scope.mark_asset", icon="ASSET_MANAGER")
         row.operator("scope.delete_capture", text="", icon="TRASH")

@@ -2,6 +2,7 @@
 """Settings in .blend files, export buttons, the camera button, progress."""
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -93,6 +94,17 @@ def test_buttons_are_disabled_until_their_input_exists(fake_worker, footage):
     assert bpy.ops.scope.capture.poll()
     assert bpy.ops.scope.export.poll()
     assert bpy.ops.scope.look_through.poll()
+
+
+def test_the_export_buttons_have_room_for_their_names(fake_worker, footage):
+    """In a sidebar of the default width, where a row of nine shows their first letters alone."""
+    captured(fake_worker, footage)
+    layout = MagicMock()
+    bpy.types.SCOPE_PT_result.draw(SimpleNamespace(layout=layout), bpy.context)
+    row = layout.row.return_value
+    buttons = row.column.return_value.operator.call_args_list
+    assert [button.kwargs["text"] for button in buttons] == ["FBX", "glTF", "BVH", "USD"]
+    assert row.menu.call_args.args == ("SCOPE_MT_export",)
 
 
 def test_export_buttons_write_files_and_do_not_change_the_scene(
