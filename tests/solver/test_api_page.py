@@ -110,6 +110,42 @@ def of_the_solution(found, seen):
     )
 
 
+def in_torch(found, seen):
+    """The gradient is that of differences, along a random direction."""
+    torch = found["torch"]
+    points, along = noisy(seen["joints"])
+    given = torch.tensor(points, requires_grad=True)
+
+    def loss(points):
+        return (found["FittedJoints"].apply(points)[20] ** 2).sum()
+
+    loss(given).backward()
+    with torch.no_grad():
+        step = 1e-4 * torch.tensor(along)
+        ahead, behind = float(loss(given + step)), float(loss(given - step))
+    gradient = given.grad.numpy()
+    assert (gradient * along).sum() == pytest.approx((ahead - behind) / 2e-4, rel=1e-4)
+
+
+def in_jax(found, seen):
+    """As in PyTorch; JAX computes in single precision unless told otherwise."""
+    jax = found["jax"]
+    points, along = noisy(seen["joints"])
+
+    def loss(points):
+        return (found["fitted_joints"](points)[20] ** 2).sum()
+
+    gradient = np.asarray(jax.grad(loss)(jax.numpy.array(points)))
+    ahead, behind = (float(loss(points + step * along)) for step in (5e-3, -5e-3))
+    assert (gradient * along).sum() == pytest.approx((ahead - behind) / 1e-2, rel=0.02)
+
+
+def noisy(joints):
+    """Return joints that no body has exactly, and a direction."""
+    along = np.random.default_rng(1).standard_normal(joints.shape)
+    return joints + 0.01 * np.random.default_rng(0).standard_normal(joints.shape), along
+
+
 def with_own_kernel(found, seen):
     errors = found["solver"].check_residual(
         found["body"], "plane", [[found["wrist"]]], [[0.0, 0.6, 0.8, 2.5]]
@@ -136,6 +172,8 @@ CHECKS = [
     with_own_tree,
     of_the_step,
     of_the_solution,
+    in_torch,
+    in_jax,
 ]
 
 
@@ -149,6 +187,9 @@ def test_every_block_has_its_check():
     ids=lambda c: getattr(c, "__name__", ""),
 )
 def test_a_block_finds_the_person(code, check, seen, tmp_path, monkeypatch):
+    for optional in ("torch", "jax"):
+        if f"import {optional}\n" in code:
+            pytest.importorskip(optional)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(external, "_external", {})  # other tests have registered theirs
     np.savez("SMPL_NEUTRAL.npz", **make_tables("smpl"))
