@@ -34,6 +34,9 @@ _UNITS = "Scope's unit is the metre; divide millimetres by 1000"
 _FEWEST_POINTS = 4  # that are no coincidence
 _WIDEST = 4.0  # tangent of half a pinhole camera's field of view, 76 degrees
 _MOST_CONFIDENT = 10.0  # on average: confidences are shares of one, or a few times that
+# Coordinates of a normalized image are in 0..1 or -1..1, of points beside it a bit larger.
+_NORMALIZED = 2.0
+_FARTHEST_NEIGHBOUR_M = 1.0  # from a person's pelvis to the nearest other point
 _STEEPEST = 0.5  # y of a floor's normal, of at most 1: more only if the camera is upside down
 _BELOW_M = 0.3
 _SHORTEST_PX = 10.0  # of a focal length in pixels: shorter ones belong to normalized coordinates
@@ -264,8 +267,8 @@ _TOO_CONFIDENT = (
 _OF_PIXELS = {
     1: (
         UnitsWarning,
-        "Pixels of 2D keypoints all lie in -1..1, as those of a normalized image; convert them to "
-        "pixels by its size.",
+        "Pixels of 2D keypoints all lie within 2 of (0, 0), as those of a normalized image; convert "
+        "them to pixels by its size.",
     ),
     2: (
         ScopeWarning,
@@ -459,7 +462,7 @@ def _fault_of_intrinsics(K: Array) -> int:
 
 @kernel
 def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
-    """Return 0, or what is wrong: 1 pixels in -1..1, 2 missing, 3 focal length, 4
+    """Return 0, or what is wrong: 1 pixels of a normalized image, 2 missing, 3 focal length, 4
     confidence, 5 principal point.
     """
     count = 0
@@ -475,7 +478,7 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
             continue
         count += 1
         confidence += normalized[k, 2]
-        if abs(x) <= 1.0 and abs(y) <= 1.0:
+        if abs(x) <= _NORMALIZED and abs(y) <= _NORMALIZED:
             small += 1
         if x == y and (x == 0.0 or x == -1.0):
             missing += 1
@@ -485,7 +488,7 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
             wide += 1
     if count < _FEWEST_POINTS:
         return 0
-    if small == count and K[0, 2] > 2.0:
+    if small == count and K[0, 2] > _NORMALIZED:
         return 1
     if 0 < missing < count:
         return 2
@@ -500,10 +503,11 @@ def _fault_of_pixels(K: Array, pixels: Array, normalized: Array) -> int:
 @kernel
 def _fault_of_points(points: Array) -> int:
     """Return 0, or what is wrong with (n, 4): 1 all behind the camera, 2 confidence, 3 missing at
-    the origin, where one point may be the pelvis, 4 some behind.
+    the origin, where one point among others may be the pelvis, 4 some behind.
     """
     count = 0
     zero = 0
+    nearest = np.inf
     behind = 0
     confidence = 0.0
     for k in range(points.shape[0]):
@@ -514,13 +518,16 @@ def _fault_of_points(points: Array) -> int:
         confidence += points[k, 3]
         if points[k, 2] < 0.0:
             behind += 1
-        if points[k, 0] == 0.0 and points[k, 1] == 0.0 and points[k, 2] == 0.0:
+        distance = math.sqrt(points[k, 0] ** 2 + points[k, 1] ** 2 + points[k, 2] ** 2)
+        if distance == 0.0:
             zero += 1
+        else:
+            nearest = min(nearest, distance)
     if count < _FEWEST_POINTS:
         return 0
     if behind == count:
         return 1
-    if 1 < zero < count:
+    if 1 < zero < count or (zero == 1 and nearest > _FARTHEST_NEIGHBOUR_M):
         return 3
     if confidence > _MOST_CONFIDENT * count:
         return 2

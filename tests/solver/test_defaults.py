@@ -202,6 +202,11 @@ MISTAKES = {
         ScopeWarning,
         r"are \(0, 0, 0\), .* confidence of 0",
     ),
+    "one missing at the origin": (
+        space(np.where(np.arange(M)[:, None] == 3, 0.0, POINTS)),
+        ScopeWarning,
+        r"are \(0, 0, 0\), .* confidence of 0",
+    ),
     "relative to the pelvis": (
         space(POINTS - POINTS.mean(axis=0), intrinsics=INTRINSICS),
         ScopeWarning,
@@ -235,11 +240,16 @@ MISTAKES = {
         UnitsWarning,
         "probably frame numbers",
     ),
-    "pixels in 0..1": (pixels(IMAGE / 1000.0), UnitsWarning, r"lie in -1\.\.1, .* by its size"),
+    "pixels in 0..1": (pixels(IMAGE / 1000.0), UnitsWarning, "normalized image; .* by its size"),
     "pixels in -1..1": (
         pixels(IMAGE / INTRINSICS[:2, 2] - 1.0),
         UnitsWarning,
-        r"lie in -1\.\.1, .* by its size",
+        "normalized image; .* by its size",
+    ),
+    "pixels in 0..1 of a person who is partly beside the image": (
+        pixels(IMAGE / 600.0),
+        UnitsWarning,
+        "normalized image; .* by its size",
     ),
     "missing at (0, 0)": (
         pixels(np.where(np.arange(M)[:, None] < 2, 0.0, IMAGE)),
