@@ -267,8 +267,8 @@ _TOO_CONFIDENT = (
 _OF_PIXELS = {
     1: (
         UnitsWarning,
-        "Pixels of 2D keypoints all lie within 2 of (0, 0), as those of a normalized image; convert "
-        "them to pixels by its size.",
+        "Pixels of 2D keypoints all lie within 2 of (0, 0), as those of a normalized image; "
+        "convert them to pixels by its size.",
     ),
     2: (
         ScopeWarning,

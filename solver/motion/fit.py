@@ -150,7 +150,7 @@ def fit_motion(
     check_type(options, Options, "options")
     announce_compilation(linearize_half, optimize)
     tree = make_tree(body)
-    warn_of_cameras(frames, len(tree.point_part))
+    has_wrong_cameras = warn_of_cameras(frames, len(tree.point_part))
     if stands is not None and has_names(stands.indices):
         stands = replace(
             stands,
@@ -174,7 +174,7 @@ def fit_motion(
             pool,
         )
         found = clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
-    if by_default:
+    if by_default and not has_wrong_cameras:
         chosen = some_of(frames)
         seen = [first_view(views_of(frames[k], ""), len(tree.point_part)) for k in chosen]
         warn_of_mirroring(

@@ -113,19 +113,20 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
     np.add.at(b, indices, (weight * value)[:, None] * row)
 
 
-def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]], points: int) -> None:
+def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]], points: int) -> bool:
     """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
     R_camera_world is transposed, its place replaced by t_camera_world, its whole pose inverted, or
     its pixels are mirrored or swapped; with `ScopeWarning`.
 
     :param points: how many points the body has, joints included.
+    :return: whether there was something to tell.
     """
     views = next((v for v in frames if not isinstance(v, Measurements) and len(v) > 1), None)
     if views is None or any(view.measurements.keypoints2d is None for view in views):
-        return
+        return False
     given = _median_error(views, points)
     if not given > _LARGEST_ERROR:
-        return
+        return False
     transposed = []
     moved = []
     inverted = []
@@ -144,12 +145,14 @@ def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]], points: int
         others[remedy] = [replace(view, measurements=change(view.measurements)) for view in views]
     errors = {remedy: _median_error(changed, points) for remedy, changed in others.items()}
     best = min(errors, key=errors.__getitem__)
-    if errors[best] < 0.2 * given:
-        warnings.warn(
-            f"The cameras' rays to a point miss each other, but meet in other axes; {best}.",
-            ScopeWarning,
-            stacklevel=3,
-        )
+    if not errors[best] < 0.2 * given:
+        return False
+    warnings.warn(
+        f"The cameras' rays to a point miss each other, but meet in other axes; {best}.",
+        ScopeWarning,
+        stacklevel=3,
+    )
+    return True
 
 
 def _median_error(views: Sequence[View], points: int) -> float:

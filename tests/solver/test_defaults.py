@@ -303,16 +303,16 @@ def test_what_is_right_brings_no_warning(make):
         make()
 
 
-def views(change):
-    """Two frames of a person seen by three cameras around, whose poses are changed."""
+def views(change, points=POINTS, indices=range(M), angles=(-0.8, 0.1, 0.9)):
+    """Two frames of a person seen by cameras around, whose poses are changed."""
     found = []
-    for angle in (-0.8, 0.1, 0.9):
+    for angle in angles:
         R = rotations.exp([0.1, angle, 0.05])
-        center = POINTS.mean(axis=0)
+        center = points.mean(axis=0)
         t = np.array([0.1, 0.0, 4.0]) - R @ center
-        p = POINTS @ R.T + t
+        p = points @ R.T + t
         image = p[:, :2] / p[:, 2:] * INTRINSICS[0, 0] + INTRINSICS[:2, 2]
-        seen = Measurements(INTRINSICS, Keypoints2D(np.arange(M), image))
+        seen = Measurements(INTRINSICS, Keypoints2D(list(indices), image))
         found.append(View(seen, *change(R, t)))
     return [found, found]
 
@@ -338,6 +338,17 @@ def test_cameras_in_other_axes_are_told(change, message):
     else:
         assert len(messages) == 1
         assert re.search(message, messages[0])
+
+
+def test_of_wrong_cameras_nothing_else_is_told():
+    """A body fits what they measured badly, but not because of an axis of the measurements."""
+    body, coco, everyone = people()
+    transpose = CHANGES["transposed"][0]
+    frames = views(transpose, everyone[0].points, coco, angles=(0.0, 1.2))
+    with pytest.warns(ScopeWarning) as told:
+        solver.fit_motion(body, frames, [0.0, 0.1])
+    assert len(told) == 1
+    assert "transpose R_camera_world" in str(told[0].message)
 
 
 def test_confidence_may_be_left_out_or_one_for_all():
