@@ -24,10 +24,14 @@ from .media.video import Video
 from .observe import Footage
 from .options import CaptureOptions
 from .solve import Solved
+from .world.travel_scale import FEET, NOTHING
 from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
 CLOSED = 0.5  # weight of a blink above which an eye is closed
 GIVEN_FLOOR_M = 0.03  # of the floor above or below z = 0 in the world of a given path
+# Relative deviation of the focal length above which the path of a camera that travels is unsure:
+# of an estimate from few edges of the background, or none.
+UNSURE_LENS = 0.15
 MIN_LEG_CONFIDENCE = 0.05  # of the shanks; below it, legs count as not seen
 
 
@@ -135,8 +139,12 @@ def camera_warnings(name: str, footage: Footage, solved: Solved) -> list[Notice]
     warnings = []
     if footage.zoom is not None and not footage.zoom.is_certain:
         warnings.append(notice("zoom", footage=name))
-    if not solved.has_scale:
+    if solved.travel_source == NOTHING:
         warnings.append(notice("unknown_travel", footage=name))
+    elif solved.travel_source == FEET:
+        warnings.append(notice("travel_by_feet", footage=name))
+    elif solved.travel_source is not None and footage.camera.focal_deviation > UNSURE_LENS:
+        warnings.append(notice("travel_by_lens", footage=name))
     if footage.world_from_camera is not None:
         lowered_m = (
             footage.world_from_camera[0, 2, 3] - solved.motions[0].world_from_camera[0, 2, 3]

@@ -49,7 +49,9 @@ class Solved:
     iterations: float
     up_source: str
     contradictions: list[BoolArray | None]  # of each person, frames (T,); see `travel_scale`
-    has_scale: bool  # whether it is known how far the camera travels, where it does
+    # What it follows from how far the camera travels, see `ScaledTravel.source`; None where it does
+    # not travel, or its path is given.
+    travel_source: str | None
 
 
 class Person:
@@ -204,7 +206,9 @@ def solve_people(shot: Shot, people: Sequence[Person], known: int) -> Solved:
     world = world_of(shot, [person.placed for person in people], shot.floor_up)
     motions = [person.finish(shot, world, number) for number, person in enumerate(people)]
     contradictions = [None if shot.treadmill else person.contradicts for person in people]
-    return Solved(motions, shot.path, iterations, world.up_source, contradictions, shot.has_scale)
+    return Solved(
+        motions, shot.path, iterations, world.up_source, contradictions, shot.travel_source
+    )
 
 
 def prepare(
@@ -269,8 +273,8 @@ def with_camera_path(shot: Shot, first: Person) -> Shot:
     placed = first.fitted_places(shot)
     up = world_of(shot, [placed]).up
     if shot.travel is not None:
-        scaled = scaled_travel(placed.soles, placed.valid, up, placed.times, shot.travel)
-        shot = replace(shot, floor_up=scaled.floor_up, has_scale=scaled.is_known)
+        scaled = scaled_travel(placed, up, shot.travel)
+        shot = replace(shot, floor_up=scaled.floor_up, travel_source=scaled.source)
         center = scaled.center
         if shot.belt_m_s:
             center = center + belt_travel(placed, up, shot.belt_m_s)

@@ -203,7 +203,8 @@ class Shot:
     # (4, 4) of the first frame's camera in the world of the path that the user gives; None: no path
     # is given
     T_world_first: Float64Array | None = None
-    has_scale: bool = True  # False: how far the camera travels is unknown
+    # What it follows from how far the camera travels, see `ScaledTravel.source`
+    travel_source: str | None = None
 
     @property
     def is_still(self) -> bool:

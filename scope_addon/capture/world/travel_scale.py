@@ -5,7 +5,8 @@ and where their strides contradict it.
 Where the map of the background has a floor, its distance below the camera is known twice: in units
 of the path, and in metres from the feet of a person of known size on it. The ratio of the two
 does not depend on how long strides are, which are seen too short where people walk along the line
-of sight. Without a floor, the scale is that with which one foot is at rest most of the time.
+of sight. Without a floor, the scale is that with which one foot is at rest most of the time, and
+with which people walk about as fast as their cadence tells.
 
 Strides contradict a path where legs walk while the body stays. With a(t) from the right foot to the
 left one, along the direction in which the pelvis faces, a walker travels at
@@ -32,15 +33,20 @@ from ...kinematics.smoothing import gaussian_smooth
 from ..camera.odometry import Odometry
 from .placement import PlacedTrack
 
+# What the scale of a path follows from, the most certain one first.
+FLOOR = "floor"
+FEET = "feet"
+NOTHING = "nothing"
+SOURCES = (FLOOR, FEET, NOTHING)
 MIN_FRAMES = 12  # in which the person was seen
 # The floor, see `find_floor`.
 PLANES = 600  # that are tried, of three corners each
 MAX_TILT_COS = np.cos(np.radians(15.0))  # between floor and up direction
 FLAT = 0.02  # distance of a corner from the floor, in units of the camera's height above it
 NEAR = 8.0  # of corners that tell the floor, likewise
-MIN_FLOOR = 20  # corners on it
+MIN_FLOOR = 12  # corners on it
 MAX_UNDER = 0.08  # share of the near corners that may be under it
-MAX_RATIO = 2.5  # between the scales from the floor and from the feet
+MAX_RATIO = 3.0  # between the scales from the floor and from the feet
 # The feet, see `scale_by_feet`.
 CARRYING_M_S = 0.35  # σ: speed below which a foot may carry
 CARRYING_HEIGHT_M = 0.1  # of such a foot above the lowest sole of its frame
@@ -51,6 +57,16 @@ LIKELY_SPEED_M_S = 1.4
 # Weight of the squared logarithm of the speed relative to that: decides where feet do not tell.
 SPEED_WEIGHT = 0.004
 MIN_CARRIED = 0.3  # share of the frames in which a foot must carry
+CADENCE_WEIGHT = 0.3
+SHORTENED = np.array([1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.3])  # g that are tried
+SHORTENED_WEIGHT = 0.02
+SLOWEST_M_S = 0.02  # that is told from rest
+# The walk, see `walking_speed`.
+WALK_RATIO = 0.385  # metre seconds for each step squared
+FASTEST_STEP_S = 0.25
+SLOWEST_STEP_S = 0.9
+MIN_STEPS = 3
+MIN_REGULAR = 0.7  # share of the steps whose times are those of a walk
 
 
 class Plane(NamedTuple):
@@ -68,43 +84,44 @@ class ScaledTravel:
 
     center: Float64Array
     floor_up: Float64Array | None
-    is_known: bool  # False: the scale of a part of the path is unknown, and it stays in place there
+    # What the scale follows from: `FLOOR`, `FEET`, or `NOTHING`, with which the camera stays in
+    # place. Of a path of several parts, the one that tells least.
+    source: str
 
 
-def scaled_travel(
-    soles: FloatArray, valid: BoolArray, up: FloatArray, times: Float64Array, travel: Odometry
-) -> ScaledTravel:
+def scaled_travel(placed: PlacedTrack, up: FloatArray, travel: Odometry) -> ScaledTravel:
     """Return the camera's travel in metres. Where ``travel`` shows none, the camera stays where it
     is.
 
-    :param soles: (T, F, 3) metres, relative to the camera's centre, in the first frame's axes.
-    :param valid: (T,) frames in which the person was seen.
+    :param placed: the person, relative to the camera's centre, in the first frame's axes.
     :param up: (3,) unit vector, as far as it is known.
-    :param times: (T,) seconds.
     :param travel: of the camera, up to scale.
     """
+    soles, valid, times = placed.soles, placed.valid, placed.times
     center = np.zeros((len(times), 3))
     floor_up = None
     most_frames = 0
-    is_known = True
+    sources = set()
     for number, places in enumerate(travel.maps):
         rows = np.flatnonzero(travel.part == number)
         part = slice(int(rows[0]), int(rows[-1]) + 1)
         path = travel.center[part]
         seen = valid[part]
-        scale = scale_by_feet(soles[part], seen, up, times[part], path)
+        scale = scale_by_feet(placed, part, up, path)
+        source = FEET if scale > 0.0 else NOTHING
         floor = find_floor(places, path, up)
         if floor is not None and seen.any():
             floor = with_feet(floor, places, soles[part][seen], path[seen])
             by_floor = scale_by_floor(soles[part][seen], path[seen], floor)
             if scale == 0.0 or abs(np.log(by_floor / scale)) < np.log(MAX_RATIO):
                 scale = by_floor
+                source = FLOOR
                 if len(rows) > most_frames:
                     floor_up, most_frames = floor.normal, len(rows)
-        is_known &= scale > 0.0
+        sources.add(source)
         center[part] = center[part.start] + scale * (path - path[0])
         center[part.stop :] = center[part.stop - 1]
-    return ScaledTravel(center, floor_up, bool(is_known))
+    return ScaledTravel(center, floor_up, max(sources, key=SOURCES.index, default=FLOOR))
 
 
 def find_floor(places: Float64Array, path: Float64Array, up: FloatArray) -> Plane | None:
@@ -196,51 +213,86 @@ def scale_by_floor(soles: FloatArray, path: Float64Array, floor: Plane) -> float
     return float(np.median(height_m / np.maximum(height, 1e-9)))
 
 
-def scale_by_feet(
-    soles: FloatArray, valid: BoolArray, up: FloatArray, times: Float64Array, path: Float64Array
-) -> float:
-    """Return the scale s of a camera's path, metres per unit; 0 if it is unknown.
+def scale_by_feet(placed: PlacedTrack, part: slice, up: FloatArray, path: Float64Array) -> float:
+    """Return the scale s of a part of a camera's path, metres per unit; 0 if it is unknown.
 
     In the world, one foot is at rest most of the time, whichever it is and however the person
     moves. With the speed v of the slowest of a frame's low soles for a scale, s minimizes
 
-        mean_t v² / (v² + σ²) + w log²(s v_c / v_0)        v = min_f |dq_f/dt + s dc/dt|
+        mean_t v² / (v² + σ²) + w log²(s v_c / v_0) + a log²(v_b / v_w) + b log² g
+        v = min_f |dq_f/dt + s dc/dt|
 
-    The second term, with the camera's mean speed s v_c, only decides where feet do not tell.
+    The second term, with the camera's mean speed s v_c, only decides where feet do not tell. The
+    last two are those of somebody who walks. Along the line of sight, strides are seen too short,
+    by an unknown factor g: q_f is stretched there, away from the pelvis, by 1 / g. What then is
+    open is told by the cadence, with the body's mean speed v_b and that of a walker of the same
+    cadence v_w (`walking_speed`).
 
-    :param soles: (T, F, 3) q, metres, relative to the camera's centre, in axes that do not rotate.
-    :param valid: (T,) frames in which the person was seen.
+    :param placed: the person, relative to the camera's centre, in axes that do not rotate.
+    :param part: frames of the path.
     :param up: (3,) unit vector.
-    :param times: (T,) seconds.
-    :param path: (T, 3) c of the camera, in units.
+    :param path: (n, 3) c of the camera in these frames, in units.
     """
+    soles, valid, times = placed.soles[part], placed.valid[part], placed.times[part]
     if valid.sum() < MIN_FRAMES:
         return 0.0
     height = soles @ up
     is_low = height < height.min(axis=1, keepdims=True) + CARRYING_HEIGHT_M
-    v_sole = np.gradient(gaussian_smooth(soles, times, CUTOFF_HZ), times, axis=0)
-    v_camera = np.gradient(gaussian_smooth(path, times, CUTOFF_HZ), times, axis=0)
+    v_camera = _velocity(path, times)
     unit_speed = float(np.sqrt((v_camera[valid] ** 2).sum(axis=1).mean()))
     if unit_speed <= 0.0:
         return 0.0
+    root = placed.root[part]
+    from_root = soles - root[:, None]
+    sight = root / np.maximum(np.linalg.norm(root, axis=1, keepdims=True), 1e-9)
+    along_sight = (from_root * sight[:, None]).sum(axis=2, keepdims=True) * sight[:, None]
+    walking_m_s = walking_speed(_step_times(placed, up, part))
+    shortened = SHORTENED if walking_m_s > 0.0 else SHORTENED[:1]
+    v_soles = [_velocity(soles + (1.0 / g - 1.0) * along_sight, times) for g in shortened]
+    # Without what changes within a stride.
+    v_body = _mean_velocity(root, times)
+    v_path = _mean_velocity(path, times)
 
-    def slowest2(speed_m_s: float) -> Float64Array:
-        v = v_sole + (speed_m_s / unit_speed) * v_camera[:, None]
+    def slowest2(scale: float, v_sole: FloatArray) -> Float64Array:
+        v = v_sole + scale * v_camera[:, None]
         v2: Float64Array = np.where(is_low, (v**2).sum(axis=2), np.inf).min(axis=1)[valid]
         return v2
 
-    def cost(speed_m_s: float) -> float:
-        v2 = slowest2(speed_m_s)
-        unlikely = SPEED_WEIGHT * np.log(speed_m_s / LIKELY_SPEED_M_S) ** 2
+    def cost(scale: float, k: int) -> float:
+        v2 = slowest2(scale, v_soles[k])
+        unlikely = SPEED_WEIGHT * np.log(scale * unit_speed / LIKELY_SPEED_M_S) ** 2
+        if walking_m_s > 0.0:
+            v = (v_body + scale * v_path)[valid]
+            level = v - (v @ up)[:, None] * up
+            body_m_s = max(float(np.linalg.norm(level, axis=1).mean()), SLOWEST_M_S)
+            unlikely += CADENCE_WEIGHT * np.log(body_m_s / walking_m_s) ** 2
+            unlikely += SHORTENED_WEIGHT * np.log(shortened[k]) ** 2
         return float((v2 / (v2 + CARRYING_M_S**2)).mean() + unlikely)
 
-    speeds = np.geomspace(*CAMERA_SPEEDS_M_S, SPEEDS)
-    best = float(speeds[np.argmin([cost(speed) for speed in speeds])])
-    fine = best * np.linspace(0.97, 1.03, 31)
-    best = float(fine[np.argmin([cost(speed) for speed in fine])])
-    if (slowest2(best) < CARRYING_M_S**2).mean() < MIN_CARRIED:
+    scales = np.geomspace(*CAMERA_SPEEDS_M_S, SPEEDS) / unit_speed
+    costs = np.array([[cost(scale, k) for scale in scales] for k in range(len(shortened))])
+    best_k, column = np.unravel_index(int(costs.argmin()), costs.shape)
+    fine = scales[column] * np.linspace(0.97, 1.03, 31)
+    best = float(fine[np.argmin([cost(scale, int(best_k)) for scale in fine])])
+    is_carried = slowest2(best, v_soles[best_k]) < CARRYING_M_S**2
+    return best if is_carried.mean() >= MIN_CARRIED else 0.0
+
+
+def walking_speed(step_times: Float64Array) -> float:
+    """Return the speed of an adult who takes steps at these times (n,) in seconds, m/s; 0 if they
+    are no walk.
+
+    Steps are the longer the faster they follow each other: length over cadence, the walk ratio, is
+    about the same at any speed. With f steps per second, the speed is thus `WALK_RATIO` f². In five
+    sets of recorded people who walk and run, half of all strides are within 20 % of it.
+
+    Source: Sekiya and Nagasaki 1998.
+    """
+    apart = np.diff(step_times)
+    regular = apart[(apart > FASTEST_STEP_S) & (apart < SLOWEST_STEP_S)]
+    if len(regular) < MIN_STEPS or len(regular) < MIN_REGULAR * len(apart):
         return 0.0
-    return best / unit_speed
+    return float(WALK_RATIO / np.median(regular) ** 2)
 
 
 # By which the strides' speed exceeds the body's.
@@ -276,10 +328,9 @@ def contradicting_strides(placed: PlacedTrack, up: FloatArray) -> BoolArray:
     contradicts = np.zeros(len(times), bool)
     if len(times) < 3 or np.ptp(times) < SHORTEST_S:
         return contradicts
-    apart = placed.soles[:, :2].mean(axis=1) - placed.soles[:, 2:].mean(axis=1)
-    along = (apart * _facing(placed, up)).sum(axis=1)
+    along = _ahead(placed, up)
     by_legs = gaussian_smooth(0.5 * np.abs(_velocity(along, times)), times, MEAN_HZ)
-    v_pelvis = gaussian_smooth(_velocity(placed.root, times), times, MEAN_HZ)
+    v_pelvis = _mean_velocity(placed.root, times)
     by_path = np.linalg.norm(v_pelvis - (v_pelvis @ up)[:, None] * up, axis=1)
     walks = _reached(along, times) & _reached(-along, times)
     exceeds = (by_legs > by_path + EXCESS_M_S) & (by_legs > EXCESS * by_path)
@@ -287,6 +338,29 @@ def contradicting_strides(placed: PlacedTrack, up: FloatArray) -> BoolArray:
         if times[end - 1] - times[first] >= SHORTEST_S:
             contradicts |= (times >= times[first] - MARGIN_S) & (times <= times[end - 1] + MARGIN_S)
     return contradicts
+
+
+def _ahead(placed: PlacedTrack, up: FloatArray) -> FloatArray:
+    """Return (T,) how far the left foot is ahead of the right one, metres."""
+    apart = placed.soles[:, :2].mean(axis=1) - placed.soles[:, 2:].mean(axis=1)
+    along: FloatArray = (apart * _facing(placed, up)).sum(axis=1)
+    return along
+
+
+def _step_times(placed: PlacedTrack, up: FloatArray, part: slice) -> Float64Array:
+    """Return when (n,) a foot overtakes the other one, in frames in which the person was seen.
+
+    Where feet stand side by side, a foot has to be ahead by `MIN_STEP_M` before it counts.
+    """
+    times = placed.times[part]
+    along = gaussian_smooth(_ahead(placed, up), placed.times, CUTOFF_HZ)[part]
+    is_ahead = np.abs(along) > MIN_STEP_M / 2
+    rows = np.flatnonzero(is_ahead & placed.valid[part])
+    changes = np.flatnonzero(np.diff(np.sign(along[rows])) != 0)
+    before, after = rows[changes], rows[changes + 1]
+    share = along[before] / (along[before] - along[after])
+    overtaking: Float64Array = times[before] + share * (times[after] - times[before])
+    return overtaking
 
 
 def _facing(placed: PlacedTrack, up: FloatArray) -> FloatArray:
@@ -304,6 +378,12 @@ def _reached(along: FloatArray, times: Float64Array) -> BoolArray:
     before = np.searchsorted(reaching, times + ALTERNATION_S, side="right")
     reached: BoolArray = before > after
     return reached
+
+
+def _mean_velocity(places: FloatArray, times: Float64Array) -> Float64Array:
+    """Return the velocities (T, 3) of places, averaged over a stride."""
+    mean: Float64Array = gaussian_smooth(_velocity(places, times), times, MEAN_HZ)
+    return mean
 
 
 def _velocity(values: FloatArray, times: Float64Array) -> Float64Array:

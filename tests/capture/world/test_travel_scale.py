@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.odometry import Odometry
 from scope.scope_addon.capture.world.travel_scale import (
+    FEET,
+    FLOOR,
+    NOTHING,
     contradicting_strides,
     find_floor,
     scaled_travel,
+    walking_speed,
 )
 from scope.solver.rotations import exp
 
@@ -64,39 +68,72 @@ def travel(places):
     return odometry, center
 
 
+def placed(soles, root):
+    """What is read of a motion whose pelvis faces +z."""
+    facing = np.tile(np.eye(3), (T, 1, 1, 1))
+    return SimpleNamespace(
+        soles=soles, root=root, times=TIMES, valid=np.ones(T, bool), rotations=facing
+    )
+
+
+def follower(shortened=1.0):
+    """The walker, relative to a camera that follows at the same speed."""
+    center = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
+    return placed(walk(shortened) - center[:, None], np.tile([0.0, 0.6, 4.0], (T, 1)))
+
+
 @pytest.mark.parametrize("shortened", [1.0, 0.65])
 def test_the_floor_tells_the_scale_however_long_strides_seem(shortened):
     odometry, center = travel(room(np.random.default_rng(0)))
-    seen = walk(shortened) - center[:, None]
     tilted = exp([0.1, 0.0, 0.0]) @ UP  # as the up direction of a body may be
-    found = scaled_travel(seen, np.ones(T, bool), tilted, TIMES, odometry)
+    found = scaled_travel(follower(shortened), tilted, odometry)
     assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
     assert np.degrees(np.arccos(found.floor_up @ UP)) < 1.0
-    assert found.is_known
+    assert found.source == FLOOR
 
 
 def test_without_a_floor_the_feet_tell_it():
     odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
     assert find_floor(odometry.maps[0], odometry.center, UP) is None
-    found = scaled_travel(walk() - center[:, None], np.ones(T, bool), UP, TIMES, odometry)
+    found = scaled_travel(follower(), UP, odometry)
     assert np.abs(found.center - center).max() < 0.1 * center[-1, 2]
     assert found.floor_up is None
+    assert found.source == FEET
+
+
+def test_a_floor_of_few_corners_tells_it_where_strides_seem_much_too_short():
+    """As of somebody who comes towards the camera, whose feet hardly swing in the picture."""
+    places = room(np.random.default_rng(0))
+    odometry, center = travel(np.concatenate([places[:16], places[80:]]))
+    found = scaled_travel(follower(0.4), UP, odometry)
+    assert found.source == FLOOR
+    assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+
+
+def test_the_cadence_tells_it_where_strides_along_the_line_of_sight_seem_much_too_short():
+    """Steps alone would tell a third to a half of it."""
+    odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
+    for shortened in (0.5, 0.3):
+        found = scaled_travel(follower(shortened), UP, odometry)
+        assert found.source == FEET
+        assert found.center[-1, 2] == pytest.approx(center[-1, 2], rel=0.25)
+
+
+def test_people_walk_as_fast_as_their_cadence_tells():
+    """The step of an adult at 110 steps per minute is 0.71 m long."""
+    step_s = 60 / 110
+    assert walking_speed(np.arange(8) * step_s) == pytest.approx(0.71 / step_s, rel=0.02)
+    assert walking_speed(np.arange(8) * 2.0) == 0.0
+    assert walking_speed(np.arange(2) * step_s) == 0.0
 
 
 def test_a_scale_that_nobody_tells_is_said_to_be_unknown():
     odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
-    seen = walk() - center[:, None]
-    found = scaled_travel(seen, np.zeros(T, bool), UP, TIMES, odometry)
-    assert not found.is_known
+    unseen = follower()
+    unseen.valid[:] = False
+    found = scaled_travel(unseen, UP, odometry)
+    assert found.source == NOTHING
     np.testing.assert_array_equal(found.center, 0.0)
-
-
-def placed(soles, root):
-    """What `contradicting_strides` reads of a motion whose pelvis faces +z."""
-    facing = np.tile(np.eye(3), (T, 1, 1, 1))
-    return SimpleNamespace(
-        soles=soles, root=root, times=TIMES, valid=np.ones(T, bool), rotations=facing
-    )
 
 
 def test_strides_on_the_spot_contradict_a_path_that_stands_still():
