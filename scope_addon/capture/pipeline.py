@@ -98,5 +98,6 @@ def shot_of(video: Video, body: Body, options: CaptureOptions, footage: Footage)
         view=video.wanted.view,
         speed=speed,
         travel=footage.camera_motion.travel,
+        at_rest=footage.camera_motion.at_rest,
         T_world_first=None if poses is None else poses[0],
     )

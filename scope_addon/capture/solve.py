@@ -27,12 +27,17 @@ from .world.clip_fit import fit_clip
 from .world.placement import PlacedTrack, RawMotion, place_track
 from .world.relative_sizes import relative_sizes, stander
 from .world.stance import stance_on_ground
-from .world.travel_scale import belt_travel, contradicting_strides, scaled_travel
+from .world.travel_scale import FEET, belt_travel, contradicting_strides, scaled_travel
 from .world.world_frame import SharedWorld, find_world
 
 # Of the prior of a stature that follows from the floor, relative. A compromise: 0.05 suits adults
 # best, less suits children, whose proportions are taken for adults' (benchmarks/notebook/clip.md).
 FLOOR_STATURE_SIGMA = 0.02
+# Of corners near the camera: sine of their angle below the horizon, 14 degrees, so the floor there
+# is four times as far away as the camera is high. And how many tell that it does not travel.
+NEAR_DOWN = 0.24
+MIN_NEAR_AT_REST = 12
+TOLD_TRAVEL_M = 1.0  # of a camera whose travel the feet alone tell, from which on it is said
 MIN_RESIZE = 0.03  # relative change of a size from which on a person is fitted again
 
 
@@ -266,6 +271,10 @@ def with_camera_path(shot: Shot, first: Person) -> Shot:
     """Return the shot with the camera's path, unless that is given; one person tells the scale of a
     travel that the background shows, and otherwise the travel of a rotating camera. Feet on a
     treadmill do not tell it; where its speed is given, the camera travels along with the person.
+
+    What is seen below the horizon is not farther away than the floor there. Where such corners near
+    the camera are at rest, it does not travel, whatever the feet seem to say: those of somebody who
+    comes nearer seem to slide, because strides along the line of sight are seen too short.
     """
     is_known = shot.path.is_static or shot.T_world_first is not None
     if shot.is_still or (is_known and not shot.belt_m_s):
@@ -280,8 +289,12 @@ def with_camera_path(shot: Shot, first: Person) -> Shot:
             center = center + belt_travel(placed, up, shot.belt_m_s)
     elif shot.treadmill:
         center = belt_travel(placed, up, shot.belt_m_s)
+    elif (shot.at_rest @ up < -NEAR_DOWN).sum() >= MIN_NEAR_AT_REST:
+        return shot
     else:
         center = camera_travel(placed.soles, placed.valid, up, placed.times, shot.uneven_ground)
+        if np.linalg.norm(center, axis=1).max() > TOLD_TRAVEL_M:
+            shot = replace(shot, travel_source=FEET)
     return replace(shot, path=replace(shot.path, center=center))
 
 

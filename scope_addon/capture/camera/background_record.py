@@ -23,11 +23,11 @@ import numpy as np
 from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array
 from ...kinematics.smoothing import fill_rotation_gaps
-from .corner_tracks import SAMPLES_HZ, CornerTracks, joined_corners
+from .corner_tracks import SAMPLES_HZ, CornerTracks, corners_at_rest, joined_corners
 from .heading_drift import FrameEdges, remove_heading_drift
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
-from .odometry import Odometry, travel_of
+from .odometry import INLIER_PX, WORKING_SIDE_PX, Odometry, travel_of
 from .zoom import Zoom, find_zoom
 
 TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
@@ -42,6 +42,9 @@ class CameraMotion:
     R_first_camera: Float64Array  # (T, 3, 3) the camera's axes in those of the first frame
     known: BoolArray  # (T,) frames in which it was estimated; elsewhere it is interpolated
     travel: Odometry | None = None
+    # (n, 3) unit vectors in the first frame's axes: corners of the background that stay where the
+    # rotation alone would have them, as those near a camera that travels do not
+    at_rest: Float64Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     @classmethod
     def given(cls, world_from_camera: Float64Array) -> CameraMotion:
@@ -137,7 +140,8 @@ class BackgroundRecord:
         odometry = travel_of(self.corners, R, times, camera, max(image_size))
         if odometry.travels:
             return CameraMotion(odometry.R_first_camera, known, odometry)
-        return CameraMotion(R, known)
+        tolerance = INLIER_PX * max(image_size) / WORKING_SIDE_PX / camera.intrinsics[0, 0]
+        return CameraMotion(R, known, at_rest=corners_at_rest(self.corners, R, camera, tolerance))
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:
         """Return the lines of the background in the first frame's axes.

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...arrays import BoolArray, Float32Array, Float64Array, IndexArray, Uint8Array
 from ..perception.region import inside
+from .intrinsics import Camera
 
 SAMPLES_HZ = 12.0  # hands tremble at up to 10 Hz, but by less than is visible here
 MAX_CORNERS = 220
@@ -28,6 +29,9 @@ MOVED_PX = 1.5  # median displacement from which on the corners are kept again
 # The same after some time: a slow camera would otherwise seem to move in steps.
 SLOWLY_MOVED_PX = 0.4
 SLOW_S = 0.5
+# Sightings of a corner from which on it is known whether it is at rest: most of a second.
+MIN_SIGHTINGS = 10
+MIN_RESTING_SHARE = 0.8  # of such corners, where the camera does not travel
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,32 @@ class CornerTracks:
     def count(self) -> int:
         """One more than the largest number of a corner."""
         return int(self.numbers.max(initial=-1)) + 1
+
+
+def corners_at_rest(
+    corners: CornerTracks, R_first_camera: Float64Array, camera: Camera, tolerance: float
+) -> Float64Array:
+    """Return the (n, 3) directions, in the first frame's axes, of corners that a camera which only
+    rotates sees at rest; none where many others move.
+
+    :param R_first_camera: (T, 3, 3).
+    :param tolerance: radians between a corner and its mean direction.
+    """
+    rays = camera.rays(corners.points_px.astype(float))
+    rays /= np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-9)
+    seen = np.einsum("nij,nj->ni", R_first_camera[corners.rows], rays)
+    count = np.bincount(corners.numbers, minlength=corners.count)
+    total = np.zeros((corners.count, 3))
+    np.add.at(total, corners.numbers, seen)
+    mean = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
+    off = np.zeros(corners.count)
+    np.maximum.at(off, corners.numbers, np.linalg.norm(seen - mean[corners.numbers], axis=1))
+    is_known = count >= MIN_SIGHTINGS
+    rests = is_known & (off < tolerance)
+    if rests.sum() < MIN_RESTING_SHARE * is_known.sum():
+        return np.zeros((0, 3))
+    resting: Float64Array = mean[rests]
+    return resting
 
 
 def joined_corners(parts: Sequence[CornerTracks]) -> CornerTracks:

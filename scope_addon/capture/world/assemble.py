@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -198,6 +198,8 @@ class Shot:
     view: FootageView = AS_IN_FILE  # how the footage was turned
     speed: float = 1.0  # how many times as fast as the footage plays everything happened
     travel: Odometry | None = None  # of the camera, up to scale, if the background shows it
+    # (n, 3) directions of corners at rest, see `CameraMotion`
+    at_rest: Float64Array = field(default_factory=lambda: np.zeros((0, 3)))
     # (3,) of the floor that a travelling camera passes, in the first frame's axes
     floor_up: Float64Array | None = None
     # (4, 4) of the first frame's camera in the world of the path that the user gives; None: no path

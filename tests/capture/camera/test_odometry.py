@@ -6,7 +6,11 @@ cameras see them.
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.bundle_adjustment import Bundle, adjust, refine_pose
-from scope.scope_addon.capture.camera.corner_tracks import CornerTracks, joined_corners
+from scope.scope_addon.capture.camera.corner_tracks import (
+    CornerTracks,
+    corners_at_rest,
+    joined_corners,
+)
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.odometry import travel_of
 from scope.scope_addon.capture.camera.zoom import find_zoom
@@ -203,3 +207,25 @@ def test_an_adjusted_bundle_is_the_true_one():
     found_R, found_t = refine_pose(places, rays[frame == 5], moved_R[5], moved_t[5], 0.01)
     np.testing.assert_allclose(found_R, R[5], atol=1e-6)
     np.testing.assert_allclose(found_t, t[5], atol=1e-6)
+
+
+def test_corners_are_at_rest_for_a_camera_that_only_shakes():
+    """Also where one in ten is a passer-by."""
+    places = street(np.random.default_rng(0))
+    R = exp(2 * SHAKE)
+    R = R[0].T @ R
+    center = np.zeros((T, 3))
+    found = corners_at_rest(seen(places, R, center, outliers=0.1), R, camera(), 0.004)
+    assert len(found) > 50
+    directions = places @ R[0]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    nearest = (found @ directions.T).max(axis=1)
+    assert np.degrees(np.arccos(np.clip(nearest, -1, 1))).max() < 0.1
+
+
+def test_corners_are_not_at_rest_for_a_camera_that_travels():
+    center = TIMES[:, None] * [0.0, 0.0, -0.5] + SHAKE
+    R = np.tile(np.eye(3), (T, 1, 1))
+    corners = seen(street(np.random.default_rng(0)), R, center)
+    assert not len(corners_at_rest(corners, R, camera(), 0.004))
+    assert not len(corners_at_rest(CornerTracks.none(), R, camera(), 0.004))
