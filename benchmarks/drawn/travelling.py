@@ -19,17 +19,20 @@ from ...solver.rotations import exp, log
 from ..evaluation.metrics import aligned, pa_mpjpe, root_translation_error, similarity, wa_mpjpe
 from ..frames import CACHE
 from ..report import table
-from .footage import Camera, draw_clip, truth_of
+from .footage import FOCAL_PX, Camera, draw_clip, truth_of
 from .surroundings import Surroundings
 from .walk import RUNS, Walk, Walker
 
 FOLDER = CACHE / "travelling"
 SECONDS = 6.0
+STEP_FRAMES = 15
 SHAKE_DEG = 0.4
 SHAKE_M = 0.012
+BY_CHANCE = 12  # scenes whose walker, lens and camera are drawn by number
 QUICK = ("backs away, street", "beside a walker")
 SHOWN = {
     "root_percent": "root, % of the path",
+    "path": "path, captured over true",
     "wa_mpjpe": "WA-MPJPE mm",
     "pa_mpjpe": "PA-MPJPE mm",
     "camera_percent": "camera position, % of its path",
@@ -49,6 +52,8 @@ class TravellingScene:
     surroundings: Callable[[], Surroundings]
     follow: Follow
     seed: int
+    focal_px: float = FOCAL_PX
+    seconds: float = SECONDS
 
     def camera(self) -> Camera:
         """Return the camera that follows the walker."""
@@ -62,6 +67,7 @@ class TravellingScene:
             seed=self.seed,
             shake_deg=SHAKE_DEG,
             shake_m=SHAKE_M,
+            focal_px=lambda _: self.focal_px,
         )
 
 
@@ -115,6 +121,50 @@ SCENES = {
 }
 
 
+def _by_chance() -> dict[str, TravellingScene]:
+    """Return scenes in which the camera follows faster or slower than people walk, with any
+    lens.
+    """
+    rng = np.random.default_rng(77)
+    scenes = {}
+    for number in range(BY_CHANCE):
+        surroundings = _room if number % 3 == 2 else _street
+        speed_m_s = rng.uniform(0.8, 1.5)
+        period_s = rng.uniform(0.95, 1.2)
+        heading_deg = float(rng.choice([0, 180, 90])) if number % 3 != 2 else 0.0
+        starts = {
+            0.0: (rng.uniform(-0.5, 0.5), rng.uniform(1, 4)),
+            180.0: (rng.uniform(-0.5, 0.5), rng.uniform(-6, -3)),
+            90.0: (-3.0, 0.0),
+        }
+        turn = float(rng.choice([0, 0, 0.12]))
+        walk = Walk(speed_m_s, period_s, heading_deg, starts[heading_deg], turn)
+        height_m = rng.uniform(0.8, 2.1)
+        focal_px = rng.uniform(520, 950)
+        behind_m = rng.uniform(3.0, 4.5) * focal_px / FOCAL_PX
+        side_m = rng.uniform(-1.5, 1.5)
+        rate = rng.uniform(0.5, 1.2)
+        follow = _lagging(walk, rate, (side_m, -behind_m, height_m))
+        scenes[f"by chance {number}"] = TravellingScene(
+            walk, surroundings(100 + number), follow, number, focal_px, 5.0
+        )
+    return scenes
+
+
+def _lagging(walk: Walk, rate: float, offset: tuple[float, float, float]) -> Follow:
+    """Return a camera that travels at so many times the walker's speed."""
+    start = walk.place(0.0)[0]
+
+    def follow(_: float, p: Float64Array) -> tuple[list[float], list[float]]:
+        x, y = start + (p - start) * rate
+        return [x + offset[0], y + offset[1], offset[2]], [p[0], p[1], 0.95]
+
+    return follow
+
+
+SCENES |= _by_chance()
+
+
 def travelling(quick: bool) -> dict[str, Any]:
     """Draw what is missing, measure, print the table, return the figures by scene.
 
@@ -140,7 +190,7 @@ def draw_scene(body: Body, name: str, folder: Path) -> Path:
     if not clip.is_file():
         scene = SCENES[name]
         walkers = [Walker(body, scene.walk)]
-        draw_clip(clip, scene.surroundings(), walkers, scene.camera(), SECONDS)
+        draw_clip(clip, scene.surroundings(), walkers, scene.camera(), scene.seconds)
     return clip
 
 
@@ -164,9 +214,17 @@ def score(body: Body, clip: Path, captured: Capture) -> dict[str, Any]:
     error = np.linalg.norm(log(np.swapaxes(turned_true, 1, 2) @ turned), axis=1)
     return {
         "root_percent": float(root_translation_error(joints[:, 0], true[:, 0]).mean()),
+        "path": _path_m(joints[:, 0]) / _path_m(true[:, 0]),
         "wa_mpjpe": float(wa_mpjpe(joints, true).mean()),
         "pa_mpjpe": float(pa_mpjpe(joints, true).mean()),
         "camera_percent": 100.0 * float(np.sqrt(np.square(apart_m).mean())) / path_m,
         "camera_deg": float(np.degrees(error.max())),
         "warnings": ", ".join(sorted({each.code for each in captured.report.warnings})),
     }
+
+
+def _path_m(root: Float64Array) -> float:
+    """Return how far a person travels whose pelvis is at these places (T, 3): without what changes
+    within a step.
+    """
+    return float(np.linalg.norm(np.diff(root[::STEP_FRAMES, :2], axis=0), axis=1).sum())

@@ -77,7 +77,7 @@ def test_with_smpl_and_a_regressor_joints_are_those_of_the_mesh(tmp_path, table)
         ),
         ("jointPositions", [np.full((COUNT, 72), np.nan)], "jointPositions contains NaN"),
         ("jointPositions", [np.full((COUNT, 72), 1e6)], r"1e\+06 m from the origin"),
-        ("jointPositions", [np.array([{}] * COUNT)], "an array of type .O8."),
+        ("jointPositions", [np.array([{}] * COUNT)], "an array of Python objects"),
         ("jointPositions", {}, "holds nobody"),
         ("campose_valid", [np.zeros(COUNT, bool)], "holds nobody|lacks campose_valid"),
         (
