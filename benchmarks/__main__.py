@@ -18,7 +18,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 from ..scope_addon.atomic_write import atomic_path  # noqa: E402
 from . import frames, report  # noqa: E402
-from .solver import clip_comparison, clip_steps, peers, plots, startup, steps  # noqa: E402
+from .solver import clip_comparison, clip_steps, peers, plain, plots, startup, steps  # noqa: E402
 
 OUT = frames.CACHE
 ELSEWHERE = {  # imported where they are wanted: some need packages that others do not
@@ -58,6 +58,9 @@ def solver(quick: bool) -> dict[str, Any]:
     figures["experiments"] = experiments
     figures["many_joints"] = steps.many_joints(3 if quick else 20)
     print(report.joint_lines(figures["many_joints"]), end="\n\n", flush=True)
+    figures["plain"] = plain.against_plain(rounds)
+    ratios = [[name, f"{ratio:.2f}"] for name, ratio in figures["plain"].items()]
+    print(report.table(("without solver/fast", "times as long"), ratios), end="\n\n", flush=True)
     figures["clip"] = clip_steps.clip_table(3 if quick else 10)
     figures["clip_gradients"] = clip_steps.against_gradients(1 if quick else 5)
     figures["clip_dense"] = clip_comparison.against_dense(3 if quick else 20)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loops over columns and joints that all fits run: those of `fast`, or the same in plain numba.
 
-With ten shape coefficients, a Gauss-Newton step in plain numba takes 1.7 to 2 times as long as with
+With ten shape coefficients, a Gauss-Newton step in plain numba takes about twice as long as with
 `fast`. To do without it, delete its folder, its tests, and all of this file but the second import.
 """
 
