@@ -199,9 +199,10 @@ def overlap(
     K[:2, 2] += [(width - scale * size[0]) / 2, (height - scale * size[1]) / 2]
     blank = np.zeros((height, width, 3), np.uint8)
     bodies = [camera_vertices(motion, body, ROWS[0]) for motion in people]
-    wanted = draw_overlay(blank, bodies, body.faces, K, None, [np.ones(3)] * len(bodies), 1.0).any(
-        axis=2
-    )
+    colors = [np.ones(3)] * len(bodies)
+    opacities = [1.0] * len(bodies)
+    overlay = draw_overlay(blank, bodies, body.faces, K, None, colors, opacities)
+    wanted = overlay.any(axis=2)
     # not the paths
     opened = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
     return float((opened & wanted).sum() / (opened | wanted).sum())
