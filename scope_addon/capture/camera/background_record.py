@@ -27,7 +27,7 @@ from .corner_tracks import SAMPLES_HZ, CornerTracks, corners_at_rest, joined_cor
 from .heading_drift import FrameEdges, remove_heading_drift
 from .intrinsics import Camera
 from .line_segments import Lines, Segments
-from .odometry import INLIER_PX, WORKING_SIDE_PX, Odometry, travel_of
+from .odometry import Odometry, sighting_tolerance, travel_of
 from .zoom import Zoom, find_zoom
 
 TRAVELLING_SHARE = 0.8  # mean share of inliers below which the camera travels: near corners pass by
@@ -140,7 +140,7 @@ class BackgroundRecord:
         odometry = travel_of(self.corners, R, times, camera, max(image_size))
         if odometry.travels:
             return CameraMotion(odometry.R_first_camera, known, odometry)
-        tolerance = INLIER_PX * max(image_size) / WORKING_SIDE_PX / camera.intrinsics[0, 0]
+        tolerance = sighting_tolerance(camera, max(image_size))
         return CameraMotion(R, known, at_rest=corners_at_rest(self.corners, R, camera, tolerance))
 
     def lines(self, motion: CameraMotion, camera: Camera) -> Lines:

@@ -96,12 +96,11 @@ class Sightings:
         """Return the corners of a clip whose images have this longer side."""
         rows, first = np.unique(corners.rows, return_index=True)
         rays = camera.rays(corners.points_px.astype(float))[:, :2]
-        tolerance = INLIER_PX * longer_side_px / WORKING_SIDE_PX / camera.intrinsics[0, 0]
         return cls(
             rows,
             np.split(corners.numbers, first[1:]),
             np.split(rays, first[1:]),
-            float(tolerance),
+            sighting_tolerance(camera, longer_side_px),
         )
 
     def common(self, a: int, b: int) -> tuple[IndexArray, IndexArray, IndexArray]:
@@ -110,6 +109,13 @@ class Sightings:
             self.numbers[a], self.numbers[b], assume_unique=True, return_indices=True
         )
         return numbers, in_a, in_b
+
+
+def sighting_tolerance(camera: Camera, longer_side_px: float) -> float:
+    """Return the largest error of a corner's line of sight, radians, in images with this longer
+    side.
+    """
+    return float(INLIER_PX * longer_side_px / WORKING_SIDE_PX / camera.intrinsics[0, 0])
 
 
 def travel_of(

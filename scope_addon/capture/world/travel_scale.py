@@ -97,7 +97,9 @@ def scaled_travel(placed: PlacedTrack, up: FloatArray, travel: Odometry) -> Scal
     :param up: (3,) unit vector, as far as it is known.
     :param travel: of the camera, up to scale.
     """
-    soles, valid, times = placed.soles, placed.valid, placed.times
+    soles = placed.soles
+    valid = placed.valid
+    times = placed.times
     center = np.zeros((len(times), 3))
     floor_up = None
     most_frames = 0
@@ -223,17 +225,19 @@ def scale_by_feet(placed: PlacedTrack, part: slice, up: FloatArray, path: Float6
         v = min_f |dq_f/dt + s dc/dt|
 
     The second term, with the camera's mean speed s v_c, only decides where feet do not tell. The
-    last two are those of somebody who walks. Along the line of sight, strides are seen too short,
-    by an unknown factor g: q_f is stretched there, away from the pelvis, by 1 / g. What then is
-    open is told by the cadence, with the body's mean speed v_b and that of a walker of the same
-    cadence v_w (`walking_speed`).
+    last two apply to somebody who walks. Strides along the line of sight appear too short by an
+    unknown factor g, so q_f is stretched by 1 / g in that direction, relative to the pelvis. This
+    leaves the scale open, and the cadence decides: v_b is the body's mean speed, and v_w that of a
+    walker of the same cadence (`walking_speed`).
 
     :param placed: the person, relative to the camera's centre, in axes that do not rotate.
     :param part: frames of the path.
     :param up: (3,) unit vector.
     :param path: (n, 3) c of the camera in these frames, in units.
     """
-    soles, valid, times = placed.soles[part], placed.valid[part], placed.times[part]
+    soles = placed.soles[part]
+    valid = placed.valid[part]
+    times = placed.times[part]
     if valid.sum() < MIN_FRAMES:
         return 0.0
     height = soles @ up
@@ -357,7 +361,8 @@ def _step_times(placed: PlacedTrack, up: FloatArray, part: slice) -> Float64Arra
     is_ahead = np.abs(along) > MIN_STEP_M / 2
     rows = np.flatnonzero(is_ahead & placed.valid[part])
     changes = np.flatnonzero(np.diff(np.sign(along[rows])) != 0)
-    before, after = rows[changes], rows[changes + 1]
+    before = rows[changes]
+    after = rows[changes + 1]
     share = along[before] / (along[before] - along[after])
     overtaking: Float64Array = times[before] + share * (times[after] - times[before])
     return overtaking
