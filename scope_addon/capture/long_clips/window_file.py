@@ -2,8 +2,9 @@
 """What was observed in a window as a file, for the process that joins the windows: arrays, and JSON
 that says where in the record they are; no Python objects.
 
-A file that is missing, damaged, of another window or of another version of the program counts for
-nothing: the window is observed again.
+A file may come from another machine, so its numbers are checked (`sound_record`). One that is
+missing, damaged, of another window or of another version of the program counts for nothing: the
+window is observed again.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from ..perception.observation import PendingReference, PersonMask
 from ..perception.region import Region
 from ..tracking.track import Tracklet
 from .kept_estimates import KeptFolder
+from .sound_record import is_sound
 
 # The records of which an observation consists; no other class is made of a file.
 _RECORDS = {
@@ -82,7 +84,7 @@ def load_window(folder: Path, window: Window) -> Observed | None:
     with suppress(ScopeError, *UNREADABLE):
         arrays = read_npz(path, ModelFileError, "window")
         observed = _of_json(json.loads(arrays[_JSON].tobytes()), arrays)
-        if isinstance(observed, Observed) and observed.window == window:
+        if isinstance(observed, Observed) and observed.window == window and is_sound(observed):
             return observed
     return None
 

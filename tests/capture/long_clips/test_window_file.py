@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+from scope.scope_addon.capture.camera.corner_tracks import CornerTracks
 from scope.scope_addon.capture.camera.heading_drift import FrameEdges
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.frame_observer import Observed, Window
@@ -134,6 +136,54 @@ def test_a_file_without_an_array_or_with_another_version_s_text_counts_for_nothi
     for damaged in (missing, objects, other_version, no_text):
         np.savez(path, **damaged)
         assert load_window(tmp_path, WINDOW) is None
+
+
+def _changed(path: Path, change: Callable[[Observed], object]) -> Observed | None:
+    """What is read of a record that was changed before it was written."""
+    made = record()
+    change(made)
+    save_window(path, made)
+    return load_window(path, WINDOW)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda r: r.tracklets[0].values[0].__setitem__((0, 0), np.nan),
+        lambda r: r.tracklets[0].rows.__setitem__(-1, FRAMES),
+        lambda r: r.tracklets[0].rows.__setitem__(0, -1),
+        lambda r: r.tracklets[0].rows.__setitem__(1, 0),
+        lambda r: r.tracklets[0].rows.__setitem__(0, 0.5),
+        lambda r: r.tracklets[0].rows.pop(),
+        lambda r: r.tracklets[0].hands.pop(),
+        lambda r: r.tracklets[4].sides_px.__setitem__(0, 0.0),
+        lambda r: r.tracklets[4].references.__setitem__(0, (99, known_reference(None))),
+        lambda r: r.tracklets[4].masks.__setitem__(0, (99, r.tracklets[4].masks[0][1])),
+        lambda r: r.anchor_regions.__setitem__(0, Region((0.0, 0.0), -1.0, 0.0)),
+        lambda r: r.timestamps.__setitem__(4, 0.0),
+        lambda r: r.checksums.pop(),
+        lambda r: setattr(r, "first", FRAMES + 1),
+        lambda r: r.cut_rows.__setitem__(0, 0),
+        lambda r: r.background.bars.__setitem__(0, np.zeros(3)),
+        lambda r: r.background.edge_frames.__setitem__(0, FrameEdges(FRAMES, Segments.none())),
+        lambda r: setattr(r, "background", replace(r.background, known=np.zeros(FRAMES - 1, bool))),
+        lambda r: setattr(
+            r,
+            "background",
+            replace(
+                r.background,
+                corners=CornerTracks(
+                    np.zeros(1, np.int64), np.full(1, 2**40), np.zeros((1, 2), np.float32)
+                ),
+            ),
+        ),
+    ],
+)
+def test_numbers_that_do_not_fit_make_a_file_worthless(
+    tmp_path: Path, change: Callable[[Observed], object]
+) -> None:
+    assert _changed(tmp_path, lambda _: None) is not None
+    assert _changed(tmp_path, change) is None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
