@@ -181,8 +181,7 @@ class FrameObserver:
         if is_anchor:
             self._anchor = row
         is_shared = not is_own or self._anchor is not None
-        image = np.ascontiguousarray(frame.image_rgb)
-        self._checksums.append(zlib.crc32(image.data) if is_shared else 0)
+        self._checksums.append(_checksum(frame.image_rgb) if is_shared else 0)
         self._first += not is_own
         with self._clock.stage("decode"):
             lit = self._upcoming_lit
@@ -264,3 +263,7 @@ class FrameObserver:
     def _wait_for_background(self) -> None:
         if self._background_call is not None:
             self._background_call.result()
+
+
+def _checksum(image_rgb: Uint8Array) -> int:
+    return zlib.crc32(np.ascontiguousarray(image_rgb).data)

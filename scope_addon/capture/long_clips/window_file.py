@@ -81,7 +81,7 @@ def save_window(folder: Path, observed: Observed) -> Path:
 def load_window(folder: Path, window: Window) -> Observed | None:
     """Read a window's file; None if it is missing, damaged, or of another window."""
     path = folder / window_name(window.number)
-    with suppress(ScopeError, *UNREADABLE):
+    with suppress(ScopeError, AttributeError, *UNREADABLE):
         arrays = read_npz(path, ModelFileError, "window")
         observed = _of_json(json.loads(arrays[_JSON].tobytes()), arrays)
         if isinstance(observed, Observed) and observed.window == window and is_sound(observed):

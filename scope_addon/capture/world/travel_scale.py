@@ -262,22 +262,27 @@ def scale_by_feet(placed: PlacedTrack, part: slice, up: FloatArray, path: Float6
         v2: Float64Array = np.where(is_low, (v**2).sum(axis=2), np.inf).min(axis=1)[valid]
         return v2
 
-    def cost(scale: float, k: int) -> float:
-        v2 = slowest2(scale, v_soles[k])
-        unlikely = SPEED_WEIGHT * np.log(scale * unit_speed / LIKELY_SPEED_M_S) ** 2
+    def speed_cost(scale: float) -> float:
+        cost = SPEED_WEIGHT * np.log(scale * unit_speed / LIKELY_SPEED_M_S) ** 2
         if walking_m_s > 0.0:
             v = (v_body + scale * v_path)[valid]
             level = v - (v @ up)[:, None] * up
             body_m_s = max(float(np.linalg.norm(level, axis=1).mean()), SLOWEST_M_S)
-            unlikely += CADENCE_WEIGHT * np.log(body_m_s / walking_m_s) ** 2
-            unlikely += SHORTENED_WEIGHT * np.log(shortened[k]) ** 2
-        return float((v2 / (v2 + CARRYING_M_S**2)).mean() + unlikely)
+            cost += CADENCE_WEIGHT * np.log(body_m_s / walking_m_s) ** 2
+        return float(cost)
+
+    def feet_cost(scale: float, k: int) -> float:
+        v2 = slowest2(scale, v_soles[k])
+        cost = (v2 / (v2 + CARRYING_M_S**2)).mean()
+        return float(cost + SHORTENED_WEIGHT * np.log(shortened[k]) ** 2)
 
     scales = np.geomspace(*CAMERA_SPEEDS_M_S, SPEEDS) / unit_speed
-    costs = np.array([[cost(scale, k) for scale in scales] for k in range(len(shortened))])
+    costs = np.array([[feet_cost(scale, k) for scale in scales] for k in range(len(shortened))])
+    costs += [speed_cost(scale) for scale in scales]
     best_k, column = np.unravel_index(int(costs.argmin()), costs.shape)
     fine = scales[column] * np.linspace(0.97, 1.03, 31)
-    best = float(fine[np.argmin([cost(scale, int(best_k)) for scale in fine])])
+    fine_costs = [feet_cost(scale, int(best_k)) + speed_cost(scale) for scale in fine]
+    best = float(fine[np.argmin(fine_costs)])
     is_carried = slowest2(best, v_soles[best_k]) < CARRYING_M_S**2
     return best if is_carried.mean() >= MIN_CARRIED else 0.0
 

@@ -162,6 +162,7 @@ def _changed(path: Path, change: Callable[[Observed], object]) -> Observed | Non
         lambda r: r.anchor_regions.__setitem__(0, Region((0.0, 0.0), -1.0, 0.0)),
         lambda r: r.timestamps.__setitem__(4, 0.0),
         lambda r: r.checksums.pop(),
+        lambda r: setattr(r, "background", None),
         lambda r: setattr(r, "first", FRAMES + 1),
         lambda r: r.cut_rows.__setitem__(0, 0),
         lambda r: r.background.bars.__setitem__(0, np.zeros(3)),
