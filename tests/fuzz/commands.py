@@ -112,7 +112,7 @@ def _import(suffix: str) -> Command:
     if suffix == ".fbx":
         # a quarter of the bytes, which are written 4 kB at a time
         arguments += ("--shape-keys", "baked")
-    is_whole = _is_as_large if suffix in (".fbx", ".blend", ".usdc") else _is_same
+    is_whole = _is_as_large if suffix == ".blend" else _is_same
     return Command(suffix[1:], SCOPE, arguments, (f"out/walk{suffix}",), ("walk",), is_whole)
 
 

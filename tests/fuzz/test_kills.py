@@ -25,7 +25,7 @@ BY_NAME = {command.name: command for command in COMMANDS}
         ("npz", KILL, (-2,)),  # before it renames
         ("npz", NO_MEMORY, (-1,)),
         ("blend", FULL, (7,)),  # Blender does not say so
-        ("usdc", FULL, (10,)),  # nor does it here
+        ("usdc", FULL, (10, -18)),  # nor does it here, or when a piece in the middle is refused
         ("cache", KILL, (31,)),  # before a capture is moved into it
         ("cache", FULL, (5,)),
         ("compile", KILL, (8,)),  # before it renames

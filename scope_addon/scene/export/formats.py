@@ -40,9 +40,8 @@ from ...errors import OutputError
 from .. import timing
 from . import bvh
 from .fbx_file import correct_fbx
+from .usd_file import has_content, is_whole_crate, saved_layers
 
-_CRATE = b"PXR-USDC"
-_SECTION = struct.Struct("<16sqq")  # name, start, size
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"
 # magic numbers around the table of a seekable Zstandard file
 _TABLE = 0x184D2A5E
@@ -140,26 +139,29 @@ def write_usd(path: Path, camera: bool = False) -> None:
     :raises OSError: when the file is incomplete.
     :raises OutputError: Blender cannot write it.
     """
-    call_operator(
-        bpy.ops.wm.usd_export,
-        filepath=str(path),
-        selected_objects_only=False,
-        visible_objects_only=False,
-        export_animation=True,
-        export_armatures=True,
-        only_deform_bones=False,
-        export_shapekeys=True,
-        export_uvmaps=True,
-        export_normals=True,
-        export_materials=True,
-        generate_preview_surface=True,
-        export_textures=False,
-        export_cameras=camera,
-        export_lights=False,
-        convert_world_material=False,
-        root_prim_path="/root",
-    )
-    if path.suffix == ".usdc" and path.is_file() and not is_whole_crate(path):
+    with saved_layers() as layers:
+        call_operator(
+            bpy.ops.wm.usd_export,
+            filepath=str(path),
+            selected_objects_only=False,
+            visible_objects_only=False,
+            export_animation=True,
+            export_armatures=True,
+            only_deform_bones=False,
+            export_shapekeys=True,
+            export_uvmaps=True,
+            export_normals=True,
+            export_materials=True,
+            generate_preview_surface=True,
+            export_textures=False,
+            export_cameras=camera,
+            export_lights=False,
+            convert_world_material=False,
+            root_prim_path="/root",
+        )
+    if path.suffix != ".usdc" or not path.is_file():
+        return
+    if not is_whole_crate(path) or not all(has_content(path, layer) for layer in layers):
         raise _incomplete(path)
 
 
@@ -327,38 +329,6 @@ def call_operator(operator: Any, **settings: Any) -> None:
         if re.search(r"^KeyboardInterrupt\b", str(error), re.MULTILINE):
             raise KeyboardInterrupt from None
         raise
-
-
-def is_whole_crate(path: Path) -> bool:
-    """Return whether a USD crate file has its table of contents, and more than the root of the
-    scene.
-
-    The table is written last and located by the header. The exporter writes the file first without
-    and then with the scene.
-
-    Source: OpenUSD, pxr/usd/usd/crateFile.h: identifier (8 bytes), version (8), offset of the table
-    (8); the table is a count (8) of sections of 32 bytes each; the section of paths begins with
-    their count (8).
-    """
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        head = file.read(24)
-        if len(head) < 24 or head[:8] != _CRATE:
-            return False
-        (table,) = struct.unpack("<q", head[16:])
-        if not 24 <= table <= size - 8:
-            return False
-        file.seek(table)
-        (count,) = struct.unpack("<q", file.read(8))
-        if not 0 < count <= (size - table - 8) // _SECTION.size:
-            return False
-        sections = [_SECTION.unpack(file.read(_SECTION.size)) for _ in range(count)]
-        starts = [start for name, start, _ in sections if name.rstrip(b"\0") == b"PATHS"]
-        if not starts or not 0 <= starts[0] <= size - 8:
-            return False
-        file.seek(starts[0])
-        (paths,) = struct.unpack("<q", file.read(8))
-    return bool(paths > 1)
 
 
 def is_whole_blend(path: Path) -> bool:
