@@ -68,7 +68,7 @@ def import_motions(
         raise UsageError(f"the up axis must be one of auto, {', '.join(R_WORLD_FILE)}, not '{up}'")
     if not (np.isfinite(rate) and rate >= 0):
         raise UsageError(f"the frame rate must be above zero, not {rate}")
-    if npz_keys(path) >= REQUIRED_KEYS:
+    if npz_keys(path, MotionFileError, "motion file") >= REQUIRED_KEYS:
         own = Motion.load(path)
         chosen = own.body_model if body == "scope" else body
         if body != "scope" or chosen in BUILT_IN:

@@ -8,7 +8,6 @@ Everything that a file holds is checked here, once, before ``solver.smpl_family`
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -95,15 +94,21 @@ def load_body(which: str | Path = "scope") -> Body:
 def is_user_model(path: Path) -> bool:
     """Whether a file is one for ``load_model``: a pickle, or a .npz with a joint regressor. Cheap;
     reads no array.
+
+    :raises ModelFileError: the file cannot be read.
     """
-    return path.suffix.lower() in (".pkl", ".pickle") or "J_regressor" in npz_keys(path)
+    if path.suffix.lower() in (".pkl", ".pickle"):
+        return True
+    return "J_regressor" in npz_keys(path, ModelFileError, "body file")
 
 
 def is_motion(path: Path) -> bool:
     """Whether a .npz holds poses and no body, as AMASS's files and our own motions do. Cheap; reads
     no array.
+
+    :raises ModelFileError: the file cannot be read.
     """
-    keys = npz_keys(path)
+    keys = npz_keys(path, ModelFileError, "body file")
     return {"poses", "trans"} <= keys and "v_template" not in keys
 
 
@@ -131,7 +136,7 @@ def load_model(path: str | Path) -> Body:
 
 
 def _read_tables(path: Path) -> dict[str, NDArray[Any]]:
-    if zipfile.is_zipfile(path):
+    if npz_keys(path, ModelFileError, "body file"):
         wanted = (*_NUMERIC, *_TEXT, "posedirs")
         arrays = read_npz(path, ModelFileError, "body file", wanted=wanted)
         posedirs = arrays.pop("posedirs", np.zeros(())).shape

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError, ModelFileError
 
 _LONGEST = 200  # characters
+_ARCHIVE = b"PK"  # with which zip archives begin
 
 
 def in_one_line(cause: object) -> str:
@@ -71,15 +72,35 @@ _HEADER_READERS: dict[tuple[int, int], Any] = {
 }
 
 
-def npz_keys(path: Path) -> set[str]:
-    """Return the names of the arrays in a .npz file; empty when it is not a zip file at all."""
+def is_archive(path: Path) -> bool:
+    """Return whether a file begins as a zip archive; False for what is no file.
+
+    ``zipfile.is_zipfile`` takes an archive that cannot be read for none.
+
+    :raises OSError: the file cannot be read.
+    """
     if not path.is_file():  # opening a pipe would wait for a writer
-        return set()
+        return False
+    with path.open("rb") as file:
+        return file.read(len(_ARCHIVE)) == _ARCHIVE
+
+
+def npz_keys(path: Path, error: type[InputError], what: str) -> set[str]:
+    """Return the names of the arrays in a .npz file; empty when it is not a zip file at all.
+
+    :param error: class of what is raised.
+    :param what: what the file should be, for the message, e.g. ``motion file``.
+    :raises InputError: as `error`, when the file cannot be read.
+    """
     try:
+        if not is_archive(path):
+            return set()
         with zipfile.ZipFile(path) as archive:
             return {name.removesuffix(".npy") for name in archive.namelist()}
-    except UNREADABLE:
-        return set()
+    except UNREADABLE as cause:
+        raise error(
+            f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file"
+        ) from cause
 
 
 def read_header(file: IO[bytes], key: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:

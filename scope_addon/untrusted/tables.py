@@ -22,7 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError, ModelFileError
-from .files import LARGEST_BYTES, UNREADABLE, check_regular, in_one_line, read_header, read_npz
+from .files import (
+    LARGEST_BYTES,
+    UNREADABLE,
+    check_regular,
+    in_one_line,
+    is_archive,
+    read_header,
+    read_npz,
+)
 from .pickles import (
     HANDLERS,
     UNREADABLE_PICKLE,
@@ -40,7 +48,6 @@ DEEPEST = 12  # tables within each other; trackers' files have four
 MAX_OPCODES = 5_000_000  # of a file with a table for each frame
 _LARGEST_PICKLE = 1 << 30  # bytes, unpacked
 _ZLIB = b"\x78"  # the first byte of what joblib has compressed
-_ZIP = b"PK"
 # How pickles begin: from protocol 2 on, and the tables, lists, tuples and objects of older ones.
 _PICKLES = (b"\x80", b"}", b"]", b"(", b"c")
 _PYTORCH = "data.pkl"
@@ -68,7 +75,7 @@ def read_tables(path: Path, error: type[InputError], what: str, wanted: Collecti
     """
     check_regular(path, error, what, LARGEST_BYTES)
     try:
-        if zipfile.is_zipfile(path):
+        if is_archive(path):
             with zipfile.ZipFile(path) as archive:
                 tables = _of_archive(archive, path, error, what, wanted)
         elif _begins_like_tables(path):
@@ -134,7 +141,7 @@ def _put(tables: Table, key: str, value: Any) -> None:
 
 def _begins_like_tables(path: Path) -> bool:
     with path.open("rb") as file:
-        return file.read(8).startswith((np.lib.format.MAGIC_PREFIX, _ZIP, _ZLIB, *_PICKLES))
+        return file.read(8).startswith((np.lib.format.MAGIC_PREFIX, _ZLIB, *_PICKLES))
 
 
 def _of_stream(path: Path) -> Any:
@@ -149,8 +156,6 @@ def _of_stream(path: Path) -> Any:
         if not dtype.hasobject:
             raise ModelFileError("it holds a single array without a name")
         return _Plain().convert(_unpickled(stream.read()))
-    if data.startswith(_ZIP):
-        zipfile.ZipFile(path).close()  # which says what is wrong with it
     if data.startswith(_ZLIB):
         unpacker = zlib.decompressobj()
         data = unpacker.decompress(data, _LARGEST_PICKLE)
