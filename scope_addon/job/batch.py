@@ -21,7 +21,7 @@ from typing import Any
 from ...solver.errors import InputError
 from ..atomic_write import complete_file, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, json_text
+from ..footage import FOOTAGE_SUFFIXES, json_text, unicode_text
 from ..temporary import remove
 from .clip_runner import LocalRunner, Runner
 from .clip_task import (
@@ -34,6 +34,7 @@ from .clip_task import (
     Entry,
     Extras,
     find_clips,
+    names_of_results,
 )
 from .finished_clip import finished_file, has_content
 from .request import program_version
@@ -140,7 +141,7 @@ class Batch:
             raise OutputError(
                 f"cannot create the folder {out}: {error.strerror}; choose another with --out"
             ) from error
-        previous = {} if again else self._previous_entries()
+        previous = {} if again else self._previous_entries(clips)
         entries: dict[str, Entry] = {}
         runner = runner or LocalRunner(self._program, jobs)
         try:
@@ -168,36 +169,46 @@ class Batch:
         for name, path in clips.items():
             file = path.relative_to(self.folder).as_posix()
             entry = previous.get(name)
-            known = entry if entry and self._is_finished(entry) else None
+            known = entry if entry and self._is_finished(name, entry) else None
             yield ClipTask(
                 name, file, str(path), str(self.out), self._basis, self.settings, known, again=again
             )
 
-    def _is_finished(self, entry: Entry) -> bool:
+    def _is_finished(self, name: str, entry: Entry) -> bool:
         """Return whether an entry of the previous report is of a finished clip whose files are
         still as they were written.
+
+        :param name: of the clip.
         """
         if entry.get("status") not in FINISHED:
             return False
         outputs = entry.get("outputs")
+        content = entry.get("content", {})
+        if not isinstance(outputs, list) or not all(isinstance(n, str) for n in outputs):
+            return False
+        if isinstance(content, dict):
+            content = dict(zip(names_of_results(content, name), content.values(), strict=True))
+        files = names_of_results(outputs, name)
         with suppress(OSError):  # of a name that no file can have
-            if not isinstance(outputs, list) or not all(isinstance(n, str) for n in outputs):
-                return False
-            return has_content(
-                self.out, outputs, entry.get("content", {}), sizes_alone=self._is_mirror
-            )
+            return has_content(self.out, files, content, sizes_alone=self._is_mirror)
         return False
 
-    def _previous_entries(self) -> dict[str, Entry]:
+    def _previous_entries(self, clips: Iterable[str]) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or
         damaged.
 
+        :param clips: their names.
         :raises OutputError: what has its name is no file, so that no report could be written.
         """
         resolve_link(self.report_file)
         try:
             entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
-            return {e["name"]: e for e in entries if isinstance(e["status"], str)}
+            of_clips = {unicode_text(name): name for name in clips}
+            return {
+                of_clips.get(e["name"], e["name"]): e
+                for e in entries
+                if isinstance(e["status"], str)
+            }
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return {}
 

@@ -27,6 +27,7 @@ from ..footage import (
     is_sequence,
     numbered_from,
     pictures_in,
+    unicode_text,
 )
 from .finished_clip import (
     FINISHED_FILE,
@@ -185,7 +186,7 @@ def capture_clip(
     report = _last_object(stdout)
     if status == 0 and report is not None:
         try:
-            return entry | _outcome(report, out)
+            return entry | _outcome(report, out, task.name)
         except OSError as error:
             return entry | failure(task, f"a result cannot be read again ({error})")
     if status == NO_PERSON:
@@ -210,9 +211,18 @@ def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry
     if report is None:
         return None
     try:
-        return entry | _outcome(report, Path(task.out)) | {"status": "skipped"}
+        return entry | _outcome(report, Path(task.out), task.name) | {"status": "skipped"}
     except OSError:
         return None
+
+
+def names_of_results(reported: Iterable[str], name: str) -> list[str]:
+    """Return the names of a clip's results on the disk, of which a report may have `unicode_text`.
+
+    :param name: of the clip, with which they begin.
+    """
+    start = unicode_text(name)
+    return [name + unicode_text(each).removeprefix(start) for each in reported]
 
 
 def failure(task: ClipTask, message: str) -> Entry:
@@ -220,14 +230,16 @@ def failure(task: ClipTask, message: str) -> Entry:
     return {"file": task.file, "name": task.name, "status": "failed", "message": message}
 
 
-def _outcome(report: dict[str, Any], out: Path) -> Entry:
+def _outcome(report: dict[str, Any], out: Path, name: str) -> Entry:
     """Return what the report of a process that has ended well adds to the clip's entry.
 
+    :param name: of the clip.
     :raises OSError: a result cannot be read.
     """
     if report.get("windows"):
         return {"status": DIVIDED, "windows": report["windows"]}
-    outputs = [Path(p).relative_to(out).as_posix() for p in report.pop("outputs")]
+    paths = names_of_results(report.pop("outputs"), str(out / name))
+    outputs = [Path(path).relative_to(out).as_posix() for path in paths]
     content = content_of(out, outputs)
     return {"status": "done", "outputs": outputs, "content": content, "report": report}
 
@@ -335,13 +347,13 @@ def find_clips(
     taken: set[str] = set()
     for path, name in names.items():
         # The output folder may not tell names apart of which the case of a letter is all that
-        # differs.
+        # differs, nor the report those that differ in bytes which are not UTF-8.
         unique = name
         number = 1
-        while unique.casefold() in taken:
+        while unicode_text(unique).casefold() in taken:
             number += 1
             unique = f"{name} {number}"
-        taken.add(unique.casefold())
+        taken.add(unicode_text(unique).casefold())
         clips[unique] = path
     return clips
 

@@ -19,7 +19,6 @@ from typing import Any
 
 from ..atomic_write import complete_file
 from ..errors import OutputError
-from ..footage import json_text
 from ..temporary import remove
 
 FINISHED_FILE = "--finished-file"  # option that only a batch passes to its processes
@@ -47,7 +46,8 @@ def write_finished(file: Path, report: dict[str, Any]) -> None:
         content = content_of(Path(), report["outputs"])
         with complete_file(file) as temporary:
             record = {"report": report, "content": content}
-            temporary.write_text(json_text(record), encoding="utf-8")
+            # With escapes for bytes of names that are not UTF-8, which only this program reads.
+            temporary.write_text(json.dumps(record), encoding="utf-8")
 
 
 def read_finished(file: Path, out: Path) -> dict[str, Any] | None:

@@ -173,8 +173,8 @@ def read_batch_report(path: Path) -> None:
     folder.mkdir(exist_ok=True)
     shutil.copy(path, folder / REPORT_NAME)
     batch = Batch(folder, folder, ["scope"], {}, [".npz"])
-    for entry in batch._previous_entries().values():
-        batch._is_finished(entry)
+    for entry in batch._previous_entries(["a"]).values():
+        batch._is_finished("a", entry)
 
 
 def requests(_: Path) -> list[bytes]:

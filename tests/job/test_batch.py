@@ -155,6 +155,37 @@ def test_finished_clips_are_skipped_and_changed_ones_captured(folder, tmp_path):
     assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
 
 
+NAMES = b"caf\xe8.mp4", b"caf\xe9.mp4", "caf\ufffd.mp4".encode(), b"a.mp4"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_clips_whose_names_are_no_text_are_skipped_like_others(tmp_path):
+    """Names that are shown alike are told apart, also in a folder of such a name."""
+    clips = tmp_path / "clips"
+    out = tmp_path / os.fsdecode(b"\xe9t\xe9")
+    clips.mkdir()
+    for number, name in enumerate(NAMES):
+        (clips / os.fsdecode(name)).write_text(f"clip {number}")
+    shown = "from scope.scope_addon.footage import json_text\nprint(json_text({"
+    program = [sys.executable, "-c", PROGRAM.replace("print(json.dumps({", shown)]
+
+    def statuses():
+        report = Batch(clips, out, program, {}, [".npz"]).run(1)
+        written = json.loads((out / REPORT_NAME).read_text("utf-8"))
+        json.dumps(written, ensure_ascii=False).encode()  # no half characters
+        assert len(written["files"]) == len(report["files"])
+        return [entry["status"] for entry in report["files"]]
+
+    assert statuses() == ["done"] * 4
+    contents = {file.read_text("utf-8") for file in out.glob("*.npz")}
+    assert contents == {f"result of clip {number}" for number in range(4)}
+    assert statuses() == ["skipped"] * 4
+    (clips / os.fsdecode(b"caf\xe9.mp4")).write_text("another one")
+    (out / os.fsdecode(b"caf\xe8.npz")).write_text("damage")
+    assert sorted(statuses()) == ["done", "done", "skipped", "skipped"]
+    assert statuses() == ["skipped"] * 4
+
+
 @pytest.mark.parametrize("damage", ["", "longer than it was"])
 def test_clips_whose_results_were_damaged_are_captured_again(folder, tmp_path, damage):
     """An emptied or replaced file is no result, whatever its name says."""

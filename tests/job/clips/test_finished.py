@@ -37,6 +37,16 @@ def test_a_record_has_the_report(written, tmp_path):
     assert read_finished(record, tmp_path) == report
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_a_record_has_names_that_are_no_text(tmp_path):
+    result = tmp_path / os.fsdecode(b"caf\xe9.npz")
+    result.write_text("result")
+    report = {"warnings": [], "outputs": [str(result)]}
+    record = finished_file(tmp_path, result.stem, KEY)
+    write_finished(record, report)
+    assert read_finished(record, tmp_path) == report
+
+
 def test_another_key_has_another_record(written, tmp_path):
     assert read_finished(finished_file(tmp_path, "below/a[1]", KEY[::-1]), tmp_path) is None
 
