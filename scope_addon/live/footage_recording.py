@@ -24,7 +24,7 @@ from ..errors import OutputError
 from ..notices import counted
 from ..temporary import remove
 from .source import Picture
-from .unfinished import unfinished_video
+from .unfinished import Target, unfinished_video
 
 _WAITING = 16  # pictures; at 720p, 44 MB
 
@@ -34,6 +34,7 @@ class Footage:
 
     def __init__(self, path: Path, fps: Fraction) -> None:
         self._path = path
+        self._target = Target(path)
         self._fps = fps
         self.origin: tuple[int, float] | None = None  # number and time of the first picture
         self.lost = 0  # pictures that were left out
@@ -85,9 +86,12 @@ class Footage:
             self._thread.join()
         if not self._problem and self.unfinished is not None:
             try:
+                self._target.check()
                 finish(self.unfinished, self._path)
             except OSError as error:
                 self._problem = f"cannot write {self._path}: {reason(error)}"
+            except OutputError as error:
+                self._problem = str(error)
         if self._problem:
             raise OutputError(self._problem + self._kept())
         self.unfinished = None

@@ -40,7 +40,7 @@ from .journal import About, Journal, fingerprint, read_about, read_records, save
 from .people import LivePeople
 from .pose import LivePose, Presence
 from .smoothing import DELAY_S
-from .unfinished import lock_of
+from .unfinished import Target, lock_of
 
 _SAME_TIME_S = 1e-3
 _SAME_SHAPE = 0.01
@@ -294,6 +294,7 @@ class PeopleRecording:
         keep: Keep | None = None,
     ) -> None:
         self._recordings = [Recording(path, body, source) for path in paths]
+        self._targets = {path: Target(path) for path in paths}
         self._body = body
         self._source = source
         self._from_zero = from_zero
@@ -358,7 +359,7 @@ class PeopleRecording:
         elsewhere = self._saved(motions)
         if self._journal is not None:
             self._journal.remove()  # which may have been what has filled the disk
-        moved = [_moved(motions[path], path, other) for path, other in elsewhere.items()]
+        moved = [self._moved(motions[path], path, other) for path, other in elsewhere.items()]
         if problems := [problem for problem in moved if problem]:
             raise OutputError("; ".join(problems))
         return list(motions)
@@ -371,13 +372,31 @@ class PeopleRecording:
         elsewhere = {}
         for path, motion in motions.items():
             try:
-                motion.save(path)
+                self._replace(path, motion)
             except OutputError as error:
                 try:
                     elsewhere[path] = saved_elsewhere(path, motion.save)
                 except OutputError:
                     raise OutputError(f"{error}; {self.whereabouts}") from error
         return elsewhere
+
+    def _moved(self, motion: Motion, path: Path, other: Path) -> str:
+        """Save a motion where it should be after all, and remove the other file; say why not."""
+        try:
+            self._replace(path, motion)
+        except OutputError as error:
+            return f"{error}; the recording is in {other}"
+        remove(other)
+        return ""
+
+    def _replace(self, path: Path, motion: Motion) -> None:
+        """Save a motion where it should be.
+
+        :raises OutputError: it cannot be written, or was since the capture began.
+        """
+        self._targets[path].check()
+        motion.save(path)
+        self._targets[path] = Target(path)
 
     @property
     def whereabouts(self) -> str:
@@ -396,16 +415,6 @@ class PeopleRecording:
     def camera(self) -> Camera | None:
         """The camera as it is known now; None before somebody was seen."""
         return self._recordings[0].camera
-
-
-def _moved(motion: Motion, path: Path, other: Path) -> str:
-    """Save a motion where it should be after all, and remove the other file; say why not."""
-    try:
-        motion.save(path)
-    except OutputError as error:
-        return f"{error}; the recording is in {other}"
-    remove(other)
-    return ""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from ..content import state_of
+from ..errors import OutputError
 from ..temporary import is_abandoned, remove
 
 SUFFIX = ".recording"
@@ -52,3 +54,30 @@ def remove_recording(recording: Path) -> None:
 def unfinished_video(path: Path) -> Path:
     """Return the name of a recording's video while it grows."""
     return path.with_stem(f"{path.stem}.unfinished")
+
+
+class Target:
+    """A file that a live capture replaces at its end, but not if another one, which ran at the same
+    time, has written it meanwhile.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._before = self._written()
+
+    def check(self) -> None:
+        """Compare the file with what it was.
+
+        :raises OutputError: somebody has written it.
+        """
+        if self._written() != self._before:
+            raise OutputError(
+                f"{self._path} is not replaced, since another program has written it meanwhile"
+            )
+
+    def _written(self) -> tuple[int, ...]:
+        """Return size and time; some file systems change a file's number by themselves."""
+        try:
+            return state_of(self._path)[2:]
+        except OSError:  # which writing says
+            return ()

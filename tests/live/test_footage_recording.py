@@ -107,6 +107,23 @@ def test_a_full_disk_keeps_the_pictures_until_then_and_the_earlier_take(tmp_path
         assert sum(1 for _ in video) >= 40  # some were in the encoder
 
 
+def test_of_two_captures_at_once_neither_replaces_the_others_footage(tmp_path):
+    path = tmp_path / "take.mp4"
+    path.write_bytes(b"an earlier take")
+    first = Footage(path, Fraction(30))
+    second = Footage(path, Fraction(30))
+    for k in range(len(TIMES)):
+        first.add(picture(k))
+        second.add(picture(k, (98, 128, 3)))
+    assert first.save() == path
+    kept = tmp_path / "take.unfinished 2.mp4"
+    with pytest.raises(OutputError, match=f"has written it meanwhile; the images .* in {kept}"):
+        second.save()
+    for file, width in ((path, 64), (kept, 128)):
+        with open_video(file) as video:
+            assert [frame.image_rgb.shape[1] for frame in video] == [width] * len(TIMES)
+
+
 def test_pictures_of_another_size_are_left_out_and_counted(tmp_path):
     footage = Footage(tmp_path / "take.mp4", Fraction(30))
     footage.add(picture(0))

@@ -158,6 +158,19 @@ def test_a_second_capture_of_the_same_name_is_refused(tmp_path, body, monkeypatc
     assert recording.save() == [path]
 
 
+def test_of_two_recordings_that_begin_at_once_neither_replaces_the_other(tmp_path, body):
+    """Neither sees the other before its first pose."""
+    first, (path,) = recorded(tmp_path / "a", body)
+    second, _ = recorded(tmp_path / "a", body)
+    assert first.save() == [path]
+    content = path.read_bytes()
+    other = tmp_path / "user" / "recordings" / path.name
+    with pytest.raises(OutputError, match=f"written it meanwhile; the recording is in {other}"):
+        second.save()
+    assert path.read_bytes() == content
+    np.testing.assert_array_equal(Motion.load(other).trans, Motion.load(path).trans)
+
+
 def test_where_a_recording_is_is_said_if_the_folder_is_gone(tmp_path, body, monkeypatch, capfd):
     path = tmp_path / "out" / "take.npz"
     path.parent.mkdir()
@@ -308,9 +321,11 @@ def refusing(monkeypatch, *folders):
 def test_a_full_disk_at_the_end_leaves_the_recording_in_a_second_place(tmp_path, body, monkeypatch):
     recording, _ = recorded(tmp_path / "truth", body)
     (truth,) = recording.save()
-    recording, (path,) = recorded(tmp_path / "full", body)
+    path = tmp_path / "full" / "take0.npz"
+    path.parent.mkdir()
     path.write_bytes(EARLIER)
-    refusing(monkeypatch, tmp_path / "full")
+    recording, _ = recorded(path.parent, body)
+    refusing(monkeypatch, path.parent)
     other = tmp_path / "user" / "recordings" / path.name
     with pytest.raises(journal.OutputError, match=f"No space.*; the recording is in {other}"):
         recording.save()
