@@ -3,15 +3,16 @@
 
 The motion keeps what was corrected, and of the frames that this changed how they were before.
 
-What a fit could not meet is measured afterwards: how far pins put feet under the floor, and how far
-from it parts stay that shall rest there. The fit keeps feet above it unless a pin asks for more.
+What a fit could not meet is measured afterwards: how far pins and contacts put feet under the
+floor, and how far from it parts stay that shall rest there. The fit keeps feet above it unless one
+of these asks for more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -245,24 +246,63 @@ def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating
     return poses
 
 
-def feet_under_floor(motion: Motion, body: Body) -> tuple[float, int]:
-    """Return how far a foot is under the floor because of what was measured, metres, and in how
-    many frames.
+class FeetUnderFloor(NamedTuple):
+    """Feet that corrections have put under the floor.
+
+    :param depth: of the lowest foot, metres.
+    :param frames: number of frames with a foot under the floor.
+    :param cause: the correction without which the lowest foot is higher; None if no single one is.
+    """
+
+    depth: float
+    frames: int
+    cause: Contact | Pin | None
+
+
+def feet_under_floor(motion: Motion, body: Body) -> FeetUnderFloor | None:
+    """Return which feet are under the floor because of what pins and contacts require.
 
     :param body: the motion's body.
-    :return: the largest depth and the number of frames, of feet that are more than
-        `UNDER_FLOOR_M` under the floor and lower than without pins; 0 and 0 if there are none,
-        and on uneven ground.
+    :return: feet that are more than `UNDER_FLOOR_M` under the floor and lower than without pins and
+        contacts; None if there are none, and on uneven ground.
     :raises MotionFileError: the motion's corrections are damaged.
     """
     if motion.uneven_ground:
-        return 0.0, 0
-    free = with_corrections(
-        motion, body, tuple(c for c in corrections_of(motion) if not isinstance(c, Contact | Pin))
-    )
-    lowest, before = (foot_heights(m, body).min(axis=1) for m in (motion, free))
-    under = (lowest < -UNDER_FLOOR_M) & (lowest < before - _NOTICED_M)
-    return (-float(lowest[under].min()), int(np.count_nonzero(under))) if under.any() else (0.0, 0)
+        return None
+    corrections = corrections_of(motion)
+    required = [c for c in corrections if isinstance(c, Contact | Pin)]
+    lowest = foot_heights(motion, body).min(axis=1)
+    free = _lowest_without(motion, body, required)
+    under = (lowest < -UNDER_FLOOR_M) & (lowest < free - _NOTICED_M)
+    if not under.any():
+        return None
+    deepest = int(np.where(under, lowest, np.inf).argmin())
+    frame = int(motion.frames[deepest])
+
+    def is_cause(correction: Contact | Pin) -> bool:
+        height = _lowest_without(motion, body, [correction])[deepest]
+        return bool(lowest[deepest] < height - _NOTICED_M)
+
+    nearest_first = sorted(required, key=lambda each: _frames_between(each, frame))
+    cause = next(filter(is_cause, nearest_first), None)
+    return FeetUnderFloor(-float(lowest[deepest]), int(np.count_nonzero(under)), cause)
+
+
+def _lowest_without(
+    motion: Motion, body: Body, removed: Sequence[Correction]
+) -> NDArray[np.float64]:
+    """Return the height of the lower foot in each frame, (T,), without some of the corrections."""
+    kept = tuple(c for c in corrections_of(motion) if c not in removed)
+    reduced = with_corrections(motion, body, kept)
+    lowest: NDArray[np.float64] = foot_heights(reduced, body).min(axis=1)
+    return lowest
+
+
+def _frames_between(correction: Contact | Pin, frame: int) -> int:
+    """Return how many frames a correction is away from a frame; 0 within its span."""
+    if isinstance(correction, Pin):
+        return abs(correction.frame - frame)
+    return max(correction.first - frame, frame - correction.last, 0)
 
 
 def distance_from_floor(motion: Motion, body: Body, contact: Contact) -> float:

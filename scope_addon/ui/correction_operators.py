@@ -204,21 +204,30 @@ def floor_warning(armature: bpy.types.Object, body: Body) -> str:
     """Return the message about feet that corrections have put under the floor; empty if there are
     none.
     """
-    from ..edit.corrected_motion import feet_under_floor
+    from ..edit.corrected_motion import corrections_of, feet_under_floor
+    from ..edit.corrections import Contact
 
     motion = motion_of(armature)
-    depth, count = feet_under_floor(motion, body)
-    if not count:
+    found = feet_under_floor(motion, body)
+    if found is None:
         return ""
+    remedy = rpt_("move the pin up")
+    if isinstance(found.cause, Contact):
+        entry = listed_corrections(armature)[corrections_of(motion).index(found.cause)]
+        remedy = rpt_(
+            "remove '{correction}', or add it for fewer frames", correction=iface_(entry["text"])
+        )
+    elif found.cause is None:
+        remedy = rpt_("remove one of them")
     return rpt_(
-        "The corrections put a foot up to {depth:.0f} cm under the floor: move the pin up"
+        "The corrections put a foot up to {depth:.0f} cm under the floor: {remedy}"
         if len(motion) == 1
         else "The corrections put a foot up to {depth:.0f} cm under the floor in {count} of "
-        "{total} frames: "
-        "move the pin up",
-        depth=100 * depth,
-        count=count,
+        "{total} frames: {remedy}",
+        depth=100 * found.depth,
+        count=found.frames,
         total=len(motion),
+        remedy=remedy,
     )
 
 

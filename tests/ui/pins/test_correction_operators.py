@@ -146,9 +146,25 @@ def test_a_pin_under_the_floor_is_said_with_its_depth(rig, tmp_path, capfd):
     bpy.ops.scope.add_pin(joint="right_ankle", frame=49, location=[*ankle[:2], -0.03])
     heights = foot_heights(stored_motion_of(rig), BODY)[48, 2:]
     assert (
-        f"up to {-100 * heights.min():.0f} cm under the floor in 1 of 91 frames"
+        f"up to {-100 * heights.min():.0f} cm under the floor in 1 of 91 frames: move the pin up"
         in capfd.readouterr().out
     )
+
+
+def test_a_foot_that_stands_and_goes_under_the_floor_is_said_by_name(rig, capfd):
+    """A pin elsewhere on the body is not what puts it there, nor one of the same foot later."""
+    hand = seen(rig)[0, WRIST] + [0.0, 0.0, 0.1]
+    later = seen(rig, [85])[0, ANKLE] + [0.0, 0.0, 0.03]
+    bpy.ops.scope.add_pin(joint="left_wrist", frame=FRAME, location=hand)
+    bpy.ops.scope.add_pin(joint="right_ankle", frame=85, location=later)
+    assert "under the floor" not in capfd.readouterr().out
+    bpy.ops.scope.foot_stands(start=20, end=60, foot="right")  # while the person walks on
+    said = capfd.readouterr().out
+    assert "frames: remove 'Right Foot Stands', or add it for fewer frames" in said
+    assert "move the pin" not in said
+    bpy.ops.scope.remove_correction(index=2)
+    bpy.ops.scope.foot_stands(start=FRAME, end=FRAME + 6, foot="right")
+    assert "under the floor" not in capfd.readouterr().out
 
 
 CORRECTIONS = {
