@@ -21,9 +21,16 @@ from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
 from ..scene.datablocks import is_person
 from ..scene.stored_values import LAST_FRAME
-from .captured_person import EditOperator, SpanOperator, body_of, motion_of, set_motion_of
+from .captured_person import (
+    EditOperator,
+    SpanOperator,
+    body_of,
+    captured_armature,
+    motion_of,
+    set_motion_of,
+)
 from .preferences import keep_machine_code
-from .reporting import iface_, rpt_
+from .reporting import iface_, refuse, rpt_, tip_
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -505,6 +512,16 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
     index: IntProperty(
         name="Number", default=-1, min=-1, description="Counted from 0; -1 removes all"
     )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Require a captured armature with corrections."""
+        if not super().poll(context):
+            return False
+        armature = captured_armature(context)
+        if armature is None or not listed_corrections(armature):
+            return refuse(cls, tip_("The selected person has no corrections"))
+        return True
 
     def edit(
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float

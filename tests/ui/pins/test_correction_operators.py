@@ -114,6 +114,19 @@ def test_removing_pins_restores_the_motion_in_any_order(rig):
     np.testing.assert_allclose(seen(rig, frames), before, atol=1e-5)
 
 
+def test_without_corrections_there_is_none_to_remove(rig):
+    """Blender greys out the operator: it would have nothing to do."""
+    assert not bpy.ops.scope.remove_correction.poll()
+    with pytest.raises(RuntimeError, match="has no corrections"):
+        bpy.ops.scope.remove_correction(index=-1)
+    bpy.ops.scope.foot_stands(start=FRAME, end=FRAME + 6, foot="right")
+    assert bpy.ops.scope.remove_correction.poll()
+    with pytest.raises(RuntimeError, match="no correction 3"):
+        bpy.ops.scope.remove_correction(index=3)
+    assert bpy.ops.scope.remove_correction(index=-1) == {"FINISHED"}
+    assert not bpy.ops.scope.remove_correction.poll()
+
+
 def test_a_pin_out_of_reach_is_said_with_its_distance_and_listed(rig, capfd):
     before = seen(rig)[0]
     bpy.ops.scope.add_pin(
@@ -415,8 +428,6 @@ def test_a_failure_changes_nothing(rig, monkeypatch):
     monkeypatch.setattr("scope.scope_addon.motion.Motion.to_bytes", fail)
     with pytest.raises(RuntimeError, match="No room"):
         bpy.ops.scope.add_pin(joint="head", location=(0, 0, 2))
-    with pytest.raises(RuntimeError, match="no correction 3"):
-        bpy.ops.scope.remove_correction(index=3)
     assert rig["scope_motion"] == path
     assert listed_corrections(rig) == []
     assert bpy.context.scene.frame_current == FRAME
