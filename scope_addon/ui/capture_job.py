@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,12 +32,13 @@ from ..options.capture import AUTO
 from ..review_spans import Span, find_review_spans
 from ..scene.build import BuildOptions, BuildResult, build_scene
 from ..scene.camera import pixel_aspect
-from ..scene.datablocks import check_local, found
+from ..scene.datablocks import captures_of, check_local, found, holds
 from ..scene.packed_motion import pack_motion
 from ..scene.stored_values import FrameSpan, in_scene
+from ..scene.timing import current_frame_kept
 from ..untrusted.body_file import load_body
 from . import preview_picture
-from .captures import hide_others
+from .captures import hide_others, show_again
 from .declared_properties import option_values
 from .frame_rate_operators import rate_warnings
 from .preferences import cache, preferences, python_command
@@ -61,6 +62,7 @@ class CaptureJob:
         self.cancelled = False
         self.messages = 0  # of the worker so far
         self._scene_uid = scene.session_uid
+        self._selection = _Selection(scene)
         self._options = build_options(scene)
         self._request = capture_request(scene)
         self._kind = kind_of(self._request.values)
@@ -151,14 +153,71 @@ class CaptureJob:
         report = Report.from_json(captured.report)
         views = report.placed_videos(self._request.views)
         view_footage = [path if path.is_file() else None for path in views]
-        build_capture(
-            scene,
-            [(path, path.read_bytes()) for path in captured.motions],
-            self._request.values["body"],
-            self._request.footage,
-            report,
-            replace(self._options, view_footage=view_footage),
-        )
+        is_busy = _Selection(scene).shows_work(since=self._selection)
+        with _selection_kept(scene) if is_busy else nullcontext():
+            build_capture(
+                scene,
+                [(path, path.read_bytes()) for path in captured.motions],
+                self._request.values["body"],
+                self._request.footage,
+                report,
+                replace(self._options, view_footage=view_footage),
+            )
+
+
+class _Selection:
+    """The selected objects of the view layer that a scene is shown in, the active one, and its
+    mode.
+    """
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._is_shown = bpy.context.scene == scene
+        layer = bpy.context.view_layer if self._is_shown else scene.view_layers[0]
+        active = layer.objects.active
+        self._selected = {obj.session_uid for obj in _selected_objects(layer)}
+        self._active = active.session_uid if active else 0
+        self._mode = active.mode if active else "OBJECT"
+
+    def shows_work(self, since: _Selection) -> bool:
+        """Return whether the user has begun to work on something else: what is selected is not what
+        was selected before, or is being edited.
+        """
+        if not self._is_shown:
+            return False
+        if self._mode not in ("OBJECT", "POSE"):
+            return True
+        now = self._selected, self._active, self._mode
+        before = since._selected, since._active, since._mode
+        return bool(self._selected) and now != before
+
+
+def _selected_objects(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    return [obj for obj in layer.objects if obj.select_get(view_layer=layer)]
+
+
+@contextmanager
+def _selection_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    """Keep the selection, the active object, its mode and the current frame while a capture is
+    built, and show other captures that something is selected of.
+    """
+    layer = bpy.context.view_layer
+    selected = _selected_objects(layer)
+    active = layer.objects.active
+    mode = active.mode if active else "OBJECT"
+    with current_frame_kept(scene):
+        yield
+    for capture in captures_of(scene):
+        if any(holds(capture, obj) for obj in selected):
+            show_again(capture)
+    for obj in layer.objects:
+        obj.select_set(obj in selected, view_layer=layer)
+    layer.objects.active = active
+    if mode == "OBJECT":
+        return
+    # The modes that edit data have undo steps of their own, which do not contain the capture.
+    if mode != "POSE" and not bpy.app.background:
+        bpy.ops.ed.undo_push(message="Capture")
+    bpy.ops.object.mode_set(mode=mode)
 
 
 def build_capture(

@@ -62,6 +62,8 @@ def show_new_capture(context: bpy.types.Context) -> None:
         comparison.end_others(context.scene, shown)
         for other in [obj for obj in captured_people(context) if not holds(shown, obj)]:
             hide_again(other, context.view_layer)  # it was shown for the comparison alone
+        if not any(holds(shown, obj) for obj in context.selected_objects):
+            return  # the user is working on something else
     frame_selected(context)
 
 

@@ -65,6 +65,78 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     assert len(captures()) == 2
 
 
+def selection():
+    layer = bpy.context.view_layer
+    active = layer.objects.active
+    selected = sorted(obj.name for obj in bpy.context.selected_objects)
+    return selected, active.name if active else "", active.mode if active else ""
+
+
+@pytest.fixture
+def cubes():
+    """Two cubes, the first of which is selected."""
+    for name in ("first", "second"):
+        bpy.ops.mesh.primitive_cube_add()
+        bpy.context.object.name = name
+    select("first")
+    return "first", "second"
+
+
+def select(*names):
+    bpy.ops.object.select_all(action="DESELECT")
+    for name in names:
+        bpy.data.objects[name].select_set(True)
+        bpy.context.view_layer.objects.active = bpy.data.objects[name]
+
+
+def started(fake_worker, footage):
+    fake_worker(FINISH)
+    bpy.context.scene.scope.footage = str(footage)
+    return CaptureJob(bpy.context.scene)
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_what_was_selected_during_a_capture_stays_selected(fake_worker, footage, cubes, mode):
+    job = started(fake_worker, footage)
+    select(*cubes)
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.scene.frame_set(60)
+    run_to_end(job)
+    assert len(captures()) == 1
+    assert selection() == (["first", "second"], "second", mode)
+    assert bpy.context.scene.frame_current == 60
+
+
+def test_a_mesh_that_is_edited_since_before_the_capture_stays_in_edit_mode(
+    fake_worker, footage, cubes
+):
+    bpy.ops.object.mode_set(mode="EDIT")
+    job = started(fake_worker, footage)
+    run_to_end(job)
+    assert selection() == (["first"], "first", "EDIT")
+
+
+def test_an_earlier_capture_that_is_posed_meanwhile_stays_visible(fake_worker, footage):
+    run_to_end(started(fake_worker, footage))
+    (earlier,) = captures()
+    armature = bpy.context.view_layer.objects.active
+    job = started(fake_worker, footage)
+    bpy.ops.object.mode_set(mode="POSE")
+    run_to_end(job)
+    assert len(captures()) == 2
+    assert selection() == ([armature.name], armature.name, "POSE")
+    assert not earlier.hide_viewport
+    assert not earlier.hide_render
+
+
+@pytest.mark.parametrize("change", [lambda: None, lambda: select()], ids=["unchanged", "empty"])
+def test_otherwise_the_captured_person_is_selected(fake_worker, footage, cubes, change):
+    job = started(fake_worker, footage)
+    change()
+    run_to_end(job)
+    assert selection() == (["person"], "person", "OBJECT")
+
+
 def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(
     fake_worker, footage, tmp_path, monkeypatch
 ):
