@@ -66,6 +66,19 @@ def end_capture() -> None:
     state.message = ""
 
 
+def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path: str) -> None:
+    """Set the footage to a file. Videos of other cameras belong to the footage before, so they are
+    removed, which the operator reports.
+    """
+    settings = context.scene.scope
+    before = bpy.path.abspath(settings.footage)
+    settings.footage = stored_path(context, path)
+    if settings.views and bpy.path.abspath(settings.footage) != before:
+        settings.views.clear()
+        text = rpt_("Removed the other cameras' videos, which belong to the previous footage")
+        operator.report({"INFO"}, text)
+
+
 class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
     """Choose a video or image of a person, or several that are captured one after the other"""
 
@@ -79,7 +92,7 @@ class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
         if not paths:
             return {"CANCELLED"}
         settings = context.scene.scope
-        settings.footage = stored_path(context, paths[0])
+        _set_footage(self, context, paths[0])
         settings.queue.clear()
         if len(paths) > 1:
             for path in paths:
@@ -154,7 +167,7 @@ class SCOPE_OT_use_sample(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the sample clip."""
-        context.scene.scope.footage = str(SAMPLE)
+        _set_footage(self, context, str(SAMPLE))
         return {"FINISHED"}
 
 
@@ -505,8 +518,7 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
         if not os.path.isfile(path):  # Path.is_file raises where a name is too long
             self.report({"ERROR"}, rpt_("{path} is not a file; choose a video or image", path=path))
             return {"CANCELLED"}
-        context.scene.scope.footage = stored_path(context, str(path))
-        context.scene.scope.views.clear()  # which are of other footage
+        _set_footage(self, context, str(path))
         show_tab(context)
         try:
             bpy.ops.scope.capture("INVOKE_DEFAULT")

@@ -290,6 +290,7 @@ class LiveJob:
         if self._kept and Path(self._kept).is_file():
             # Capture then captures the take once more
             self._footage = scene.scope.footage = str(self._kept)
+            scene.scope.views.clear()  # which are of other footage
         built = build_capture(
             scene, contents, body, self._footage, Report.from_json(result["report"]), options
         )

@@ -272,6 +272,23 @@ def test_one_chosen_clip_is_no_queue(footage):
     assert not bpy.ops.scope.capture_queue.poll()
 
 
+def test_other_footage_leaves_no_views_of_the_last_one_behind(footage, capfd):
+    views = bpy.context.scene.scope.views
+    other = footage.with_name("other.png")
+    shutil.copy(footage, other)
+    choose_several([footage])
+    bpy.ops.scope.add_view(filepath=str(other))
+    choose_several([footage])  # once more the same
+    assert len(views) == 1
+    assert "Removed" not in capfd.readouterr().out
+    choose_several([other])
+    assert len(views) == 0
+    assert "Removed the other cameras' videos" in capfd.readouterr().out
+    bpy.ops.scope.add_view(filepath=str(footage))
+    bpy.ops.scope.use_sample()
+    assert len(views) == 0
+
+
 def test_a_queue_with_a_missing_file_is_refused(footage):
     choose_several([footage])
     with pytest.raises(RuntimeError, match="is not a file"):
