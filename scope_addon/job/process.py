@@ -20,7 +20,7 @@ from typing import Any
 from ...solver.errors import ScopeError
 from ..errors import SetupError
 from ..temporary import discard, remove
-from .request import WARM_UP, FormatsRequest, JobRequest, LiveRequest
+from .request import WARM_UP, FormatsRequest, JobRequest, LiveRequest, PictureRequest
 from .start_worker import worker_command
 
 LONGEST_LINE = 16 << 20  # bytes; a report of 10 people has some 100 kB
@@ -38,7 +38,8 @@ def is_number(value: object) -> bool:
     return type(value) is int and 0 <= value < _LARGEST_NUMBER
 
 
-def _is_side(value: object) -> bool:
+def is_side(value: object) -> bool:
+    """Return whether it can be the width or height of a preview."""
     return type(value) is int and 0 < value <= _LARGEST_SIDE
 
 
@@ -85,7 +86,7 @@ WARM_UP_FIELDS: Fields = {
     "result": {},
 }
 CAPTURE_FIELDS: Fields = WARM_UP_FIELDS | {
-    "preview": {"file": _is_name, "width": _is_side, "height": _is_side, "frame": is_number},
+    "preview": {"file": _is_name, "width": is_side, "height": is_side, "frame": is_number},
     "result": {"motions": _are_names, "report": _is_report},
 }
 
@@ -152,7 +153,7 @@ class WorkerProcess:
 
     def __init__(
         self,
-        request: JobRequest | LiveRequest | FormatsRequest | None,
+        request: JobRequest | LiveRequest | FormatsRequest | PictureRequest | None,
         job_folder: Path,
         kernels: Path | None,
         python: Sequence[str] = (sys.executable,),
@@ -160,8 +161,8 @@ class WorkerProcess:
     ) -> None:
         """Start the worker.
 
-        :param request: the capture, or the question to a camera; None to compile what captures
-            need.
+        :param request: the capture, the question to a camera, or the frame to be shown; None to
+            compile what captures need.
         :param job_folder: folder for the worker's files.
         :param kernels: folder for the code that numba compiles; if None, next to the sources.
         :param python: interpreter and its arguments; inside Blender ``[sys.executable,

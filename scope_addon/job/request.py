@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The requests to a worker: for a capture, with the key of its result in the cache, for a live
-capture and for a camera's formats; and the commands to a running live capture.
+capture, for a camera's formats and for a frame; and the commands to a running live capture.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Self
 
 from ..content import add_content
 from ..errors import SetupError, UsageError
-from ..options import Place, options_at
+from ..options import Place, option, options_at
 
 # the request to compile what a capture needs, without capturing anything
 WARM_UP = json.dumps({"warm_up": True})
@@ -256,3 +256,33 @@ class FormatsRequest(LineRequest):
     def to_json(self) -> str:
         """Return the request as one line of JSON."""
         return json.dumps({"formats_of": self.source})
+
+
+class PictureRequest(LineRequest):
+    """The frame of some footage at a time, as a capture with these options sees it."""
+
+    called = "the request for a frame"
+    first_key = "picture_of"
+
+    def __init__(self, picture_of: str, *, time_s: float, rotate: str, mirror: bool) -> None:
+        """Check the values.
+
+        :param picture_of: path of the footage.
+        :param rotate, mirror: the options of a capture.
+        :raises UsageError: one is of the wrong type, or none of the choices.
+        """
+        is_time = type(time_s) in (int, float) and 0.0 <= time_s < float("inf")
+        if not isinstance(picture_of, str) or not is_time:
+            raise UsageError("a request for a frame needs the footage and a time")
+        for name, value in (("rotate", rotate), ("mirror", mirror)):
+            if problem := option(name).type_error(value):
+                raise UsageError(f"{name} {problem}")
+        self.footage = picture_of
+        self.time_s = time_s
+        self.rotate = rotate
+        self.mirror = mirror
+
+    def to_json(self) -> str:
+        """Return the request as one line of JSON."""
+        values = {"time_s": self.time_s, "rotate": self.rotate, "mirror": self.mirror}
+        return json.dumps({"picture_of": self.footage, **values})

@@ -21,7 +21,7 @@ from ..footage import json_text
 from ..parent import end_with_parent
 from ..temporary import discard, remove
 from .cache import cache_of
-from .request import WARM_UP, Commands, FormatsRequest, JobRequest, LiveRequest
+from .request import WARM_UP, Commands, FormatsRequest, JobRequest, LiveRequest, PictureRequest
 from .unfinished import unfinished_capture
 from .watched_footage import WatchedFootage
 
@@ -59,7 +59,7 @@ class Reporter:
         self.send("progress", stage=stage, done=done, total=total)
 
 
-Request = JobRequest | LiveRequest | FormatsRequest | None
+Request = JobRequest | LiveRequest | FormatsRequest | PictureRequest | None
 
 
 def run(
@@ -68,7 +68,8 @@ def run(
     """Do what is requested and return the exit status. Every failure is reported as an ``error``
     message.
 
-    :param request: the capture, or the question to a camera; None to compile what captures need.
+    :param request: the capture, the question to a camera, or the frame to be shown; None to compile
+        what captures need.
     :param commands: of the parent, to a live capture.
     """
     try:
@@ -86,6 +87,10 @@ def run(
 
             camera = camera_with_formats(request.source)
             reporter.send("result", name=camera.name, formats=camera.formats)
+        elif isinstance(request, PictureRequest):
+            from .footage_picture import write_picture
+
+            write_picture(request, job_folder, reporter.send)
         else:
             _capture(request, job_folder, reporter)
         return 0
@@ -189,6 +194,8 @@ def _parsed(line: str) -> Request:
         return None
     if FormatsRequest.is_in(line):
         return FormatsRequest.from_json(line)
+    if PictureRequest.is_in(line):
+        return PictureRequest.from_json(line)
     return LiveRequest.from_json(line) if LiveRequest.is_in(line) else JobRequest.from_json(line)
 
 
@@ -199,7 +206,7 @@ def _confine(request: Request, job_folder: Path) -> None:
     if request is None:
         return
     folders = [cache_of(job_folder) or job_folder.parent]
-    values = {} if isinstance(request, FormatsRequest) else request.values
+    values = {} if isinstance(request, FormatsRequest | PictureRequest) else request.values
     if isinstance(request, LiveRequest) and values["keep_footage"]:
         folders += folders_of(Path(values["keep_footage"]))
     confine_capture(

@@ -151,12 +151,17 @@ class CaptureDeclaration:
         "person",
         str,
         "",
-        Place.COMMAND_LINE | Place.WORKER,
+        _EVERYWHERE,
         "capture this person first, or alone unless --people says how many: who is at x, y, in "
         "pixels, at a time",
         argument=Argument(
             metavar="X,Y[@TIME]",
             default_text="the most prominent",
+        ),
+        blender=Property(
+            description="Who is at this place of the footage, in pixels, at a time in seconds, "
+            "such as 640,360@2.5, is captured alone, or first of several. Empty: the most "
+            "prominent person",
         ),
     )
     start: ClassVar[Option] = Option(

@@ -67,13 +67,16 @@ def end_capture() -> None:
 
 
 def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path: str) -> None:
-    """Set the footage to a file. Videos of other cameras belong to the footage before, so they are
-    removed, which the operator reports.
+    """Set the footage to a file. The place of the person to capture and videos of other cameras
+    belong to the footage before: they are removed, of which the operator reports the latter.
     """
     settings = context.scene.scope
     before = bpy.path.abspath(settings.footage)
     settings.footage = stored_path(context, path)
-    if settings.views and bpy.path.abspath(settings.footage) != before:
+    if bpy.path.abspath(settings.footage) == before:
+        return
+    settings.person = ""
+    if settings.views:
         settings.views.clear()
         text = rpt_("Removed the other cameras' videos, which belong to the previous footage")
         operator.report({"INFO"}, text)

@@ -57,7 +57,7 @@ _PIXELS_PER_CHARACTER = 7.0
 _EXPORT_BUTTONS = 4
 _STATUS_ICONS = {WAITING: "TIME", CAPTURING: "PLAY", DONE: "CHECKMARK", FAILED: "ERROR"}
 # What belongs to one clip, or to one person, is no preset.
-_OF_THE_CLIP = ("take", "use_range", "start", "end", "heights_m")
+_OF_THE_CLIP = ("take", "person", "use_range", "start", "end", "heights_m")
 _VIEW = {"name": "View", "description": "Video of the same moment, by another camera"}
 _FOOTAGE = {"name": "Footage", "description": "Video or image of a person to capture"}
 
@@ -180,6 +180,9 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
         layout.prop(settings, "people")
         if settings.people == "COUNT":
             layout.prop(settings, "people_count", text="Number")
+        row = layout.row(align=True)
+        row.prop(settings, "person")
+        row.operator("scope.pick_person", text="", icon="EYEDROPPER")
         layout.prop(settings, "body")
         if settings.body == "FILE":
             draw_file(layout, settings, "body_file", text="File")

@@ -321,7 +321,7 @@ def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
         or min(region.width, region.height) < 2
     ):
         return
-    left, right, bottom, top = _visible(area, region)
+    left, right, bottom, top = visible_part(area, region)
     render = scene.render
     size = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
     width, height = _frame_at_one(camera.data.sensor_fit, size, (region.width, region.height))
@@ -355,7 +355,9 @@ def _frame_at_one(
     return size[0] * scale, size[1] * scale
 
 
-def _visible(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
+def visible_part(
+    area: bpy.types.Area, region: bpy.types.Region
+) -> tuple[float, float, float, float]:
     """Return the left, right, bottom and top of what no other region covers, in pixels of the
     viewport's region.
     """

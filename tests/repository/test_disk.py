@@ -49,6 +49,7 @@ WRITES = {
     "scope_addon/capture/overlay_video.py",
     "scope_addon/capture/media/video_writer.py",
     "scope_addon/job/finished_clip.py",
+    "scope_addon/job/footage_picture.py",
     "scope_addon/job/preview.py",
     "scope_addon/motion.py",
     "scope_addon/scene/character/uncorrected_keys.py",

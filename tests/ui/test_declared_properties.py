@@ -56,6 +56,7 @@ LABELS = {
     "quality": "Quality",
     "people": "People",
     "people_count": "At Most",
+    "person": "Person",
     "body": "Body",
     "body_file": "Body File",
     "hands": "Hands",
