@@ -16,7 +16,8 @@ from bpy.props import IntProperty
 from ...solver.errors import ScopeError
 from ..scene.datablocks import found
 from . import preview_picture, warm_up
-from .captures import unit_text
+from .captures import shown_capture, unit_text
+from .export_operators import unused_path, write_captures
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
 from .job_operator import JobOperator, clear_status_bar
 from .live_properties import state as live_state
@@ -36,6 +37,7 @@ WAITING = "WAITING"
 CAPTURING = "CAPTURING"
 DONE = "DONE"
 FAILED = "FAILED"
+NO_FILES = "NONE"  # of the formats in which the clips of the queue are written
 
 
 class _State:
@@ -317,15 +319,25 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         settings = context.scene.scope
         if settings.views:
             return refuse(cls, tip_("Remove the other cameras' videos first"))
-        if not any(_waits(clip) for clip in settings.queue):
+        if all(clip.status == DONE for clip in settings.queue):
             return refuse(cls, tip_("All clips of the list have been captured; choose others"))
+        if settings.queue_format != NO_FILES and not os.path.isdir(_folder_of_files(settings)):
+            return refuse(cls, tip_("Choose a folder for the files"))
         return True
+
+    def start(self, context: bpy.types.Context) -> bool:
+        """Start the first clip; those that failed before are tried again."""
+        for clip in context.scene.scope.queue:
+            if clip.status == FAILED:
+                clip.status = WAITING
+        return super().start(context)
 
     def begin(self, scene: bpy.types.Scene) -> bool:
         """Start the first clip that waits and can be started; return whether there is one."""
         for clip in scene.scope.queue:
             if _waits(clip):
                 clip.status = CAPTURING
+                clip.message = ""
                 scene.scope.footage = clip.footage
                 if super().begin(scene):
                     return True
@@ -352,12 +364,33 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             clip = _clip_of_job()
             if clip is not None:
                 clip.status = DONE
+                clip.message = self._write_files(scene) if scene is not None else ""
             stop_job()
             if not bpy.app.background:  # so that each capture can be undone alone
                 bpy.ops.ed.undo_push(message="Capture")
         if scene is not None and self.begin(scene):
             return None
         return {"FINISHED"} if self._finished else {"CANCELLED"}
+
+    def _write_files(self, scene: bpy.types.Scene) -> str:
+        """Write the files of the clip that was captured last, if there shall be any; return why
+        that failed, or an empty text.
+        """
+        from .capture_job import window_shows
+
+        settings = scene.scope
+        kind = settings.queue_format
+        capture = shown_capture(scene)
+        if kind == NO_FILES or capture is None:
+            return ""
+        try:
+            with window_shows(scene):
+                path = unused_path(Path(_folder_of_files(settings)), capture, kind)
+                write_captures(path, kind, [capture])
+        except (ScopeError, OSError) as error:
+            self.report({"WARNING"}, sentence(error))
+            return sentence(error)
+        return ""
 
     def step(self, context: bpy.types.Context) -> set[str] | None:
         """Advance, and show the progress of the clip that is captured."""
@@ -386,6 +419,14 @@ class SCOPE_OT_remove_clip(_RemoveFromList, bpy.types.Operator):
     bl_idname = "scope.remove_clip"
     bl_label = "Remove Clip"
     listed = "queue"
+
+
+def _folder_of_files(settings: Any) -> str:
+    """Return the folder for the files of the list's clips; empty if none is chosen."""
+    if settings.queue_folder.startswith("//") and not bpy.data.filepath:
+        return ""  # relative to a .blend file that was never saved
+    folder: str = bpy.path.abspath(settings.queue_folder)
+    return folder
 
 
 def _waits(clip: Any) -> bool:

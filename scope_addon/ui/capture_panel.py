@@ -17,6 +17,7 @@ from bl_ui.utils import PresetPanel
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
+    EnumProperty,
     FloatProperty,
     FloatVectorProperty,
     IntProperty,
@@ -29,7 +30,7 @@ from ..footage import display_text
 from ..options import Place, Section, options_at
 from ..scene.stored_values import parse_spans
 from . import preview_picture, warm_up
-from .capture_operators import CAPTURING, DONE, FAILED, WAITING, state
+from .capture_operators import CAPTURING, DONE, FAILED, NO_FILES, WAITING, state
 from .captured_person import has_captured_person
 from .captures import (
     draw_captures,
@@ -112,7 +113,7 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
         for index, view in enumerate(settings.views):
             _draw_view(column, view, index)
         if settings.queue:
-            _draw_queue(context, column.box(), settings.queue)
+            _draw_queue(context, column.box(), settings)
         column.row(align=True).prop(settings, "quality", expand=True)
         if state.job is not None:
             _draw_progress(context, layout, state.job.progress)
@@ -137,17 +138,23 @@ def _draw_view(layout: bpy.types.UILayout, view: bpy.types.PropertyGroup, index:
 
 
 def _draw_queue(
-    context: bpy.types.Context, layout: bpy.types.UILayout, queue: bpy.types.CollectionProperty
+    context: bpy.types.Context, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
 ) -> None:
-    """Draw the clips that are captured one after the other, and why some were not."""
+    """Draw the clips that are captured one after the other, why some were not, and which files are
+    written.
+    """
     column = layout.column(align=True)
-    for index, clip in enumerate(queue):
+    for index, clip in enumerate(settings.queue):
         row = column.row(align=True)
         name = display_text(Path(clip.footage).name)
         row.label(text=name, icon=_STATUS_ICONS.get(clip.status, "DOT"), translate=False)
         row.operator("scope.remove_clip", text="", icon="X", emboss=False).index = index
         if clip.message:
             draw_text(context, column, clip.message, "BLANK1")
+    row = layout.row(align=True)
+    row.prop(settings, "queue_format", text="", icon="EXPORT")
+    if settings.queue_format != NO_FILES:
+        row.prop(settings, "queue_folder", text="")
 
 
 def _draw_progress(
@@ -535,6 +542,21 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     )
     queue: CollectionProperty(
         type=SCOPE_PG_clip, description="Clips that are captured one after the other"
+    )
+    queue_format: EnumProperty(
+        name="Files",
+        items=(
+            (NO_FILES, "No Files", "The captures stay in the scene alone", 0),
+            *((key, label, text, number + 1) for key, label, text, number in FORMATS),
+        ),
+        default=NO_FILES,
+        description="Format in which each clip of the list is written as well, once it is captured",
+    )
+    queue_folder: StringProperty(
+        name="Folder",
+        subtype="DIR_PATH",
+        options=PATH_OPTIONS,
+        description="Folder for the files of the clips; existing files stay",
     )
     capture: PointerProperty(
         name="Capture",

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +16,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..errors import UsageError
 from ..options import Place
 from ..scene.datablocks import captures_of, holds
+from ..scene.export.output_paths import person_paths
 from .captured_person import PERSON, body_of, motion_of
 from .captures import people_of, shown_capture
 from .comparison import cameras_of
@@ -182,17 +185,13 @@ class SCOPE_OT_export(SavingOperator):
         :raises UsageError: the file has no name or folder, or there is nothing of what is to be
             written.
         """
-        from ..scene.export.export import export
-
         path = output_file(self.filepath, self.suffix())
-        if not is_available(self.format):
-            raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
+        _check_available(self.format)
         if self.which == "RIG":
             written = self._write_rig(context.scene, path)
-        elif self.format in _OF_MOTION:
-            written = _write_motions(path, self._captures(context))
         else:
-            written = export(path, self._captures(context), options=self._options())
+            captures = self._captures(context)
+            written = write_captures(path, self.format, captures, self._options())
         return rpt_(
             "Wrote {files} in {folder}",
             files=", ".join(p.name for p in written),
@@ -245,6 +244,41 @@ class SCOPE_OT_export(SavingOperator):
             )
         take = _take_of(rig, captures_of(scene))
         return export_rig(path, rig, replace(self._options(), take=take))
+
+
+def write_captures(
+    path: Path,
+    kind: str,
+    captures: list[bpy.types.Collection],
+    options: ExportOptions | None = None,
+) -> list[Path]:
+    """Write captures in a format, a key of ``FORMATS``; return the files.
+
+    :raises UsageError: this build of Blender cannot write the format, or nobody is left of the
+        captures.
+    :raises OutputError: a file cannot be written.
+    """
+    from ..scene.export.export import export
+
+    _check_available(kind)
+    if kind in _OF_MOTION:
+        return _write_motions(path, captures)
+    return export(path, captures, options=options)
+
+
+def unused_path(folder: Path, capture: bpy.types.Collection, kind: str) -> Path:
+    """Return a path for a capture's file, with the capture's name, and a number where files of that
+    name exist.
+
+    :param kind: a key of ``FORMATS``.
+    """
+    name = _file_name(capture)
+    for number in itertools.count(1):
+        stem = name if number == 1 else f"{name}_{number}"
+        path = folder / f"{stem}{_SUFFIX[kind]}"
+        if not any(map(os.path.lexists, [path, *person_paths(path, 2, separate=True)])):
+            break
+    return path
 
 
 def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[Path]:
@@ -309,14 +343,28 @@ class SCOPE_OT_save_calibration(SavingOperator):
 def _proposed(context: bpy.types.Context, suffix: str) -> Path:
     """Return the file that is proposed for the shown capture."""
     shown = shown_capture(context.scene)
-    name = re.sub(r'[\\/:*?"<>|]', "_", shown.name) if shown else "capture"
+    name = _file_name(shown) if shown else "capture"
     folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
     return folder / f"{name}{suffix}"
+
+
+def _file_name(capture: bpy.types.Collection) -> str:
+    """Return a capture's name without what a file's name cannot hold."""
+    return re.sub(r'[\\/:*?"<>|]', "_", capture.name)
 
 
 def is_available(kind: str) -> bool:
     """Return whether this build of Blender can write a format, a key of ``FORMATS``."""
     return kind != "USDC" or "usd_export" in dir(bpy.ops.wm)
+
+
+def _check_available(kind: str) -> None:
+    """Check that this build of Blender can write a format.
+
+    :raises UsageError: it cannot.
+    """
+    if not is_available(kind):
+        raise UsageError(_NO_USD[0].lower() + _NO_USD[1:])
 
 
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
+from scope.scope_addon.errors import OutputError
 from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.ui import capture_operators
 from scope.scope_addon.ui.capture_job import CaptureJob
@@ -226,11 +227,63 @@ def test_clips_of_a_queue_are_captured_one_after_the_other_and_a_bad_one_stops_n
     assert bpy.ops.scope.capture_queue() == {"FINISHED"}
     assert queued() == [("a.png", "DONE"), ("b.png", "FAILED"), ("c.png", "DONE")]
     assert "b.png is damaged" in bpy.context.scene.scope.queue[1].message
+    fake_worker("finish()")
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}  # of those that failed
+    assert queued() == [("a.png", "DONE"), ("b.png", "DONE"), ("c.png", "DONE")]
+    assert bpy.context.scene.scope.queue[1].message == ""
     names = sorted(each.name for each in captures_of(bpy.context.scene))
-    assert names == ["a", "c"]
+    assert names == ["a", "b", "c"]
     assert not bpy.ops.scope.capture_queue.poll()
     assert bpy.ops.scope.remove_clip(index=1) == {"FINISHED"}
     assert queued() == [("a.png", "DONE"), ("c.png", "DONE")]
+
+
+@pytest.mark.parametrize(("kind", "suffix"), [("BVH", ".bvh"), ("NPZ", ".npz"), ("GLB", ".glb")])
+def test_clips_of_a_queue_are_written_as_files_beside_those_that_exist(
+    fake_worker, footage, tmp_path, kind, suffix
+):
+    paths = [footage.with_name(f"{name}.png") for name in ("a", "b")]
+    for path in paths:
+        shutil.copy(footage, path)
+    fake_worker("finish(people=2 if request['footage'].endswith('b.png') else 1)")
+    choose_several(paths)
+    settings = bpy.context.scene.scope
+    folder = tmp_path / "files"
+    settings.queue_format = kind
+    settings.queue_folder = str(folder)
+    assert not bpy.ops.scope.capture_queue.poll()
+    folder.mkdir()
+    present = folder / f"a{suffix}"
+    present.write_text("mine")
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    of_b = [f"b{suffix}"] if kind == "GLB" else [f"b.person1{suffix}", f"b.person2{suffix}"]
+    assert sorted(path.name for path in folder.iterdir()) == [present.name, f"a_2{suffix}", *of_b]
+    assert present.read_text() == "mine"
+    assert [clip.message for clip in settings.queue] == ["", ""]
+    assert len(captures_of(bpy.context.scene)) == 2
+
+
+def test_a_clip_whose_file_cannot_be_written_says_so_and_stays_in_the_scene(
+    fake_worker, footage, tmp_path, monkeypatch
+):
+    paths = [footage.with_name(f"{name}.png") for name in ("a", "b")]
+    for path in paths:
+        shutil.copy(footage, path)
+    fake_worker("finish()")
+    choose_several(paths)
+    settings = bpy.context.scene.scope
+    settings.queue_format = "BVH"
+    settings.queue_folder = str(tmp_path)
+
+    def full(path, *_):
+        raise OutputError(f"cannot write {path.name}: no space is left")
+
+    monkeypatch.setattr(capture_operators, "write_captures", full)
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert queued() == [("a.png", "DONE"), ("b.png", "DONE")]
+    messages = [clip.message for clip in settings.queue]
+    assert messages == [f"Cannot write {name}.bvh: no space is left" for name in ("a", "b")]
+    assert len(captures_of(bpy.context.scene)) == 2
 
 
 def test_a_clip_that_is_removed_while_it_is_captured_marks_no_other_as_done(fake_worker, footage):

@@ -67,6 +67,8 @@ LABELS = {
     "fov": "Field of View",
     "calibration_file": "Calibration",
     "scene_camera": "Scene Camera",
+    "queue_format": "Files",
+    "queue_folder": "Folder",
     "rotate": "Turn",
     "mirror": "Mirror",
     "crop": "Only in Part",
