@@ -22,7 +22,7 @@ from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, sto
 from .job_operator import JobOperator, clear_status_bar
 from .live_properties import state as live_state
 from .reporting import iface_, refuse, restore_libraries, rpt_, sentence, tip_
-from .sidebar import redraw_sidebars, show_tab
+from .sidebar import redraw_sidebars, redraw_sidebars_twice, show_tab
 from .view_operators import show_new_capture
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path:
     settings = context.scene.scope
     before = bpy.path.abspath(settings.footage)
     settings.footage = stored_path(context, path)
+    redraw_sidebars_twice()
     if bpy.path.abspath(settings.footage) == before:
         return
     settings.person = ""

@@ -154,7 +154,7 @@ def _draw_queue(
     row = layout.row(align=True)
     row.prop(settings, "queue_format", text="", icon="EXPORT")
     if settings.queue_format != NO_FILES:
-        row.prop(settings, "queue_folder", text="")
+        row.prop(settings, "queue_folder", text="", placeholder=iface_("Folder"))
 
 
 def _draw_progress(
