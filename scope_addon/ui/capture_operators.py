@@ -359,6 +359,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         outcome = super()._advance()
         if outcome is None:
             return None
+        redraw_sidebars_twice()  # the list shows what has become of the clip
         scene = _scene_of_job()
         if "FINISHED" in outcome:
             self._finished += 1
@@ -392,12 +393,6 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             self.report({"WARNING"}, sentence(error))
             return sentence(error)
         return ""
-
-    def step(self, context: bpy.types.Context) -> set[str] | None:
-        """Advance, and show the progress of the clip that is captured."""
-        outcome = super().step(context)
-        redraw_sidebars()
-        return outcome
 
     def say_cancelled(self) -> None:
         """Say what the scene keeps."""

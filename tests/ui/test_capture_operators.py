@@ -18,6 +18,7 @@ from scope.scope_addon.ui.capture_operators import (
     SAMPLE,
     SCOPE_OT_cancel,
     SCOPE_OT_capture,
+    SCOPE_OT_capture_queue,
     SCOPE_PT_stop_capture,
     end_capture,
     state,
@@ -68,7 +69,8 @@ def test_an_unexpected_error_ends_the_capture():
     assert state.job is None  # otherwise no other capture could be started
 
 
-def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
+@pytest.mark.parametrize("capturing", [SCOPE_OT_capture, SCOPE_OT_capture_queue])
+def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch, capturing):
     drawn = []
     now = [100.0]
     monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
@@ -79,9 +81,8 @@ def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
     operator = SimpleNamespace(
         _shown=("", "", 0), _drawn_s=0.0, _pause_s=0.3, timer_s=0.1, job_state=state
     )
-    operator.step, operator._advance = (
-        partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
-    )
+    operator.step = partial(capturing.step, operator)
+    operator._advance = partial(SCOPE_OT_capture._advance, operator)
     timer = SimpleNamespace(type="TIMER", value="NOTHING")
 
     def drawings(seconds=0.4):
