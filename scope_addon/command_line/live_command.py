@@ -24,7 +24,7 @@ from ..live.unfinished import (
 from ..notices import counted
 from ..options import Place
 from ..options.body_choice import chosen_body
-from ..scene.export.output_paths import check_output, person_paths
+from ..scene.export.output_paths import check_output, left_over, person_paths
 from ..temporary import is_held
 from .arguments import add_options, values_in_range
 from .outputs import check_outputs, confine
@@ -134,7 +134,9 @@ def _capture(
             if isinstance(error, KeyboardInterrupt) and is_saved:
                 raise KeyboardInterrupt("what was recorded is written") from None
             raise
-    report["outputs"] = [str(path) for path in _save(recording, footage)]
+    saved = _save(recording, footage)
+    _tell_left_over(values["record"], saved)
+    report["outputs"] = [str(path) for path in saved]
     return report
 
 
@@ -167,6 +169,12 @@ def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Pa
     if footage is not None and footage.missing:
         print_message(f"{footage.missing} in {video[0]}, since the computer was too busy")
     return [*motions, *(path for path in video if path)]
+
+
+def _tell_left_over(record: Path | None, saved: Sequence[Path]) -> None:
+    """Tell which motion files beside those of a recording are of another one."""
+    if record is not None and (others := left_over([record], saved)):
+        print_message(f"warning: {others}")
 
 
 def _save_after_failure(recording: PeopleRecording | None, footage: Footage | None) -> bool:
@@ -204,6 +212,7 @@ def _finish_recording(journal: Path, record: Path | None) -> dict[str, Any]:
     recording, about = unfinished_recording(journal, paths)
     saved = recording.save()
     remove_recording(journal)
+    _tell_left_over(record or journal.with_suffix(".npz"), saved)
     if about.footage and Path(about.footage).is_file():
         print_message(f"its images are in {about.footage}")
     return {

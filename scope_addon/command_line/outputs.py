@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import glob
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -18,9 +17,9 @@ from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
-from ..notices import Notice, counted
+from ..notices import OTHER, Notice, counted, notice
 from ..options import option
-from ..scene.export.output_paths import WITHOUT_SCENE, check_output
+from ..scene.export.output_paths import WITHOUT_SCENE, check_output, files_of_people, left_over
 from ..scene.export.without_scene import write_without_scene
 from .blender_module import bounded_import, load_blender
 
@@ -159,8 +158,7 @@ def check_outputs(
         check_output(calibration, CALIBRATION_SUFFIXES)
     written = [*outputs, *filter(None, (overlay, report, calibration))]
     for path in outputs:
-        # Several people have a file each in formats that have room for one.
-        written += path.parent.glob(f"{glob.escape(path.stem)}.person*{path.suffix}")
+        written += files_of_people(path)
     refuse_inputs(written, files_to_read(inputs))
 
 
@@ -332,6 +330,8 @@ def write_outputs(
         else:
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
             written += files
+    if others := left_over(outputs, written):
+        warnings = [*warnings, notice(OTHER, text=others)]
     return written, warnings
 
 

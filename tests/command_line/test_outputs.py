@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where results lie that were given no place."""
+"""Where results lie that were given no place, and what lies beside them."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line.outputs import default_outputs
 from scope.scope_addon.errors import UsageError
 
@@ -55,3 +56,41 @@ def test_folders_of_images_whose_names_have_dots_have_different_results(tmp_path
         folder.mkdir()
     assert default_outputs(first) == [tmp_path / "take.1.npz", tmp_path / "take.1.glb"]
     assert set(default_outputs(first)).isdisjoint(default_outputs(second))
+
+
+def save_people(path, count):
+    """Save SMPL-style motions of some people, as trackers do."""
+    poses = np.zeros((2, 72))
+    people = {f"{number}/poses": poses for number in range(count)}
+    np.savez(path, **people)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "left"),
+    [
+        (3, 2, ["walk.person3.npz", "walk.person3.trc"]),
+        (3, 1, [f"walk.person{n}.{suffix}" for suffix in ("npz", "trc") for n in (1, 2, 3)]),
+        (1, 2, ["walk.npz", "walk.trc"]),
+        (2, 3, []),
+    ],
+)
+def test_files_of_an_earlier_number_of_people_stay_and_are_named(
+    tmp_path, capfd, before, after, left
+):
+    (tmp_path / "walk.personal.npz").write_text("not a result")
+    for count in (before, after):
+        save_people(tmp_path / "tracked.npz", count)
+        for file in tmp_path.glob("walk*"):
+            file.write_text("earlier")
+        capfd.readouterr()
+        outputs = [
+            part for suffix in ("npz", "trc") for part in ("-o", f"{tmp_path}/walk.{suffix}")
+        ]
+        assert main(["import", str(tmp_path / "tracked.npz"), *outputs]) == 0
+    said = capfd.readouterr().err
+    listed = "".join(line for line in said.splitlines() if "not part of this result" in line)
+    assert [name for name in left if name not in listed] == []
+    assert bool(left) == bool(listed)
+    assert "personal" not in said
+    for name in left:
+        assert (tmp_path / name).read_text("utf-8") == "earlier"

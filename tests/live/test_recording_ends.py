@@ -422,6 +422,17 @@ def test_the_command_finishes_the_recording_however_its_capture_ends(
     assert [file.name for file in path.parent.iterdir()] == ["take.npz"]
 
 
+def test_a_motion_of_an_earlier_recording_of_more_people_is_named(
+    tmp_path, monkeypatch, capfd, body
+):
+    fake_run(monkeypatch, lambda: None)
+    earlier = tmp_path / "take.person2.npz"
+    earlier.write_bytes(EARLIER)
+    assert main(["live", str(SAMPLE), "--record", str(tmp_path / "take.npz")]) == 0
+    assert f"warning: {earlier.name} is not part of this result" in capfd.readouterr().err
+    assert earlier.read_bytes() == EARLIER
+
+
 def test_where_motion_and_images_are_is_said_if_neither_can_be_saved(
     tmp_path, monkeypatch, capfd, body
 ):

@@ -6,7 +6,10 @@ arguments first.
 from __future__ import annotations
 
 import errno
+import glob
 import os
+import re
+from collections.abc import Collection
 from pathlib import Path
 
 from ...atomic_write import reason, resolve_link
@@ -71,3 +74,28 @@ def person_paths(path: str | Path, people: int, separate: bool = False) -> list[
     if people == 1 or not (separate or path.suffix.lower() in PER_PERSON):
         return [path]
     return [path.with_name(f"{path.stem}.person{i + 1}{path.suffix}") for i in range(people)]
+
+
+def files_of_people(path: Path) -> list[Path]:
+    """Return the existing files of a result, of whatever number of people; see `person_paths`."""
+    of_person = re.compile(re.escape(path.stem) + r"\.person[0-9]+" + re.escape(path.suffix))
+    beside = path.parent.glob(f"{glob.escape(path.stem)}.person*{glob.escape(path.suffix)}")
+    people = sorted(each for each in beside if of_person.fullmatch(each.name))
+    return [path, *people] if path.exists() else people
+
+
+def left_over(paths: Collection[Path], written: Collection[Path]) -> str:
+    """Say which files lie beside results as if they were a part of them, though they are of a
+    capture with more people, or fewer; empty if there are none.
+
+    :param paths: as the user has given them.
+    :param written: the results.
+    """
+    others = [each for path in paths for each in files_of_people(path) if each not in written]
+    if not others:
+        return ""
+    names = ", ".join(each.name for each in others)
+    return (
+        f"{names} {'is' if len(others) == 1 else 'are'} not part of this result, but of another "
+        "capture; remove what you do not need"
+    )
