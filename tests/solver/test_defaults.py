@@ -80,6 +80,23 @@ def test_from_the_image_alone_several_headings_find_the_lowest_cost():
     assert one.cost == cost[0]
 
 
+def test_cold_starts_from_exact_points_find_every_limb():
+    """Points of millimetres are taken for less exact at first, where the cost asks for it."""
+    body, _, everyone = people()
+    seen = [
+        Measurements(keypoints3d=Keypoints3D(body.joint_names, person.joints, sigma_m=0.002))
+        for person in everyone
+    ]
+    from_truth = solver.fit_batch(body, seen, init=[person.state for person in everyone])
+    least = np.array([fit.cost for fit in from_truth])
+    as_stated = solver.fit_batch(body, seen, options=Options(stages=COLD_STAGES))
+    cost_as_stated = np.array([fit.cost for fit in as_stated])
+    assert (cost_as_stated > 1.5 * least).any()
+    cost = np.array([fit.cost for fit in solver.fit_batch(body, seen)])
+    assert (cost <= 1.5 * least).all()
+    assert (cost <= cost_as_stated).all()
+
+
 def test_with_standard_deviations_those_of_the_result_are_calibrated():
     """The squares of the errors over the covariance are one on average."""
     body = solver.load_body("scope")
