@@ -43,8 +43,9 @@ class Weights:
     at a focal length of 1000. keypoints3d, foot_contact, floor: per metre^2; 1e4 is a centimetre.
     orientation_field: per squared difference of unit vectors, joint_prior and joint_limits: per
     radian^2. joint_flow multiplies a density's exponent, and shape the population's, so that 1 is
-    what was learned: larger weights of these two are regularization. pose_prior and the tables
-    weigh what their rows say. `tables`: of further registered residuals by name, 1 if left out.
+    what was learned of people; to draw a fit to the population more than is likely, `regularized`.
+    pose_prior and the tables weigh what their rows say. `tables`: of further registered residuals
+    by name, 1 if left out.
     """
 
     keypoints2d: float = SIGMA_2D**-2
@@ -72,6 +73,16 @@ class Weights:
         for name, weight in self.tables.items():
             registered(name)
             check_weight(weight, f"Weights.tables[{name!r}]")
+
+    def regularized(self, strength: float) -> Weights:
+        """Return weights with `strength` times those of the population, joint_flow and shape.
+
+        With 1, a fit is the most likely person and pose; a larger strength is regularization.
+
+        :raises InvalidValueError: the strength is negative, infinite or no number.
+        """
+        check_weight(strength, "strength")
+        return replace(self, joint_flow=strength * self.joint_flow, shape=strength * self.shape)
 
     def row(self) -> list[float]:
         """Return the weights in the registry's order."""

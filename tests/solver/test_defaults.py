@@ -138,6 +138,19 @@ def test_one_weight_changes_all_default_stages():
         Options(weights=weights, stages=[Stage()])
 
 
+def test_regularization_draws_a_person_to_the_population():
+    body, _, everyone = people()
+    seen = everyone[0].seen
+    assert Weights().regularized(1.0) == Weights()
+    betas = []
+    for strength in (1.0, 100.0):
+        options = Options(weights=Weights().regularized(strength))
+        betas.append(solver.fit(body, seen, init=everyone[0].state, options=options).state.beta)
+    assert np.linalg.norm(betas[1]) < 0.7 * np.linalg.norm(betas[0])
+    with pytest.raises(InvalidValueError, match="strength"):
+        Weights().regularized(-1.0)
+
+
 def height(part, ints, floats):
     return part.t[1:2] - floats
 
