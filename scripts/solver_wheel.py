@@ -36,6 +36,8 @@ ASSETS = (
     "assets/prior/README.md",
     "assets/prior/joint_prior.npz",
 )
+# Optional extras, and the package that each needs for the examples of docs/solver_api.md.
+EXTRAS = {"jax": "jax", "torch": "torch"}
 DOCUMENTATION = "../docs/"  # what the README links to, which a wheel does not have
 MADE_FROM = "made_from"  # in a folder of machine code: a digest of the sources
 # What a researcher's first programs call: all that these compile is shipped.
@@ -99,9 +101,10 @@ def main() -> int:
     parser.add_argument("--code", type=Path, default=CODE, help="folder of machine code")
     parser.add_argument("--code-only", action="store_true", help="make no wheel")
     arguments = parser.parse_args()
-    compile_code(arguments.code)
+    digest = sources_digest()
+    compile_code(arguments.code, digest)
     if not arguments.code_only:
-        print(build_wheel(arguments.folder, arguments.code))
+        print(build_wheel(arguments.folder, arguments.code, digest))
     return 0
 
 
@@ -123,17 +126,28 @@ def sources_digest() -> str:
     return digest.hexdigest()
 
 
-def compile_code(folder: Path) -> None:
+def refuse_changes(digest: str) -> None:
+    """Stop where the solver's files are no longer those of a digest.
+
+    :raises SystemExit: they are not.
+    """
+    if sources_digest() != digest:
+        raise SystemExit(
+            "solver_wheel: files of the solver changed while the wheel was made; run it again"
+        )
+
+
+def compile_code(folder: Path, digest: str) -> None:
     """Compile the solver with this Python into a folder in `folder`, unless that has been done.
 
     Code of other sources is removed. It is compiled from a copy of the solver without the rest of
     Scope, whose cache of machine code is another.
 
-    :raises SystemExit: it could not be compiled.
+    :param digest: of the sources.
+    :raises SystemExit: it could not be compiled, or the sources have changed.
     """
-    wanted = sources_digest()
     for made in folder.glob(f"*/{MADE_FROM}"):
-        if made.read_text("utf-8") != wanted:
+        if made.read_text("utf-8") != digest:
             shutil.rmtree(made.parent)
     with tempfile.TemporaryDirectory(prefix="scope-solver-") as name:
         copy = Path(name)
@@ -147,6 +161,7 @@ def compile_code(folder: Path) -> None:
         for asset in ASSETS:
             (copy / "scope" / asset).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / asset, copy / "scope" / asset)
+        refuse_changes(digest)
         ask = "from scope.solver import shipped_code as s; print(s.shipped_folder().name); "
         target, processor = _run(copy, {}, ask + "print(s.shipped_processor())").split()
         if (folder / target / MADE_FROM).is_file():
@@ -155,7 +170,7 @@ def compile_code(folder: Path) -> None:
         chosen["NUMBA_CACHE_DIR"] = str(copy / "cache")
         print(f"solver_wheel: compiling for {target}: one or two minutes", file=sys.stderr)
         _run(copy, chosen, WARM_UP, str(folder))
-    (folder / target / MADE_FROM).write_text(wanted, "utf-8")
+    (folder / target / MADE_FROM).write_text(digest, "utf-8")
 
 
 def _run(packages: Path, variables: dict[str, str], program: str, *arguments: str) -> str:
@@ -170,8 +185,12 @@ def _run(packages: Path, variables: dict[str, str], program: str, *arguments: st
     return done.stdout
 
 
-def build_wheel(folder: Path, code: Path) -> Path:
-    """Write the wheel with all machine code in a folder, and return its path."""
+def build_wheel(folder: Path, code: Path, digest: str) -> Path:
+    """Write the wheel with all machine code in a folder, and return its path.
+
+    :param digest: of the sources that the machine code was made from.
+    :raises SystemExit: the sources have changed since; nothing is written.
+    """
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
     version = manifest["version"]
@@ -187,6 +206,8 @@ def build_wheel(folder: Path, code: Path) -> Path:
         "License-File: LICENSE",
         f"Requires-Python: {project['requires-python']}",
         *(f"Requires-Dist: {needed}" for needed in project["dependencies"]),
+        *(f"Provides-Extra: {extra}" for extra in EXTRAS),
+        *(f'Requires-Dist: {needed}; extra == "{extra}"' for extra, needed in EXTRAS.items()),
         "Description-Content-Type: text/markdown",
     ]
     information = f"{NAME}-{version}.dist-info"
@@ -197,6 +218,7 @@ def build_wheel(folder: Path, code: Path) -> Path:
     for path in sorted(code.glob("*/*.nb[ic]")):
         files[f"scope/solver/machine_code/{path.parent.name}/{path.name}"] = path
     contents = {name: path.read_bytes() for name, path in files.items()}
+    refuse_changes(digest)
     contents[f"{information}/METADATA"] = ("\n".join(metadata) + f"\n\n{readme}").encode()
     wheel = "Wheel-Version: 1.0\nGenerator: scope\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
     contents[f"{information}/WHEEL"] = wheel.encode()

@@ -30,13 +30,8 @@ for name in solver.__all__:
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    """The wheel, with a file in place of machine code."""
-    place = tmp_path_factory.mktemp("solver_wheel")
-    made = place / "code" / CODE.removeprefix("machine_code/")
-    made.parent.mkdir(parents=True)
-    made.write_bytes(b"code")
-    (made.parent / "made_from").write_text("sources")
+def script():
+    """The module of the script."""
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(ROOT / "scripts"))
         spec = importlib.util.spec_from_file_location(
@@ -44,7 +39,18 @@ def wheel(tmp_path_factory):
         )
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
-        return module.build_wheel(place, place / "code")
+        yield module
+
+
+@pytest.fixture(scope="module")
+def wheel(script, tmp_path_factory):
+    """The wheel, with a file in place of machine code."""
+    place = tmp_path_factory.mktemp("solver_wheel")
+    made = place / "code" / CODE.removeprefix("machine_code/")
+    made.parent.mkdir(parents=True)
+    made.write_bytes(b"code")
+    (made.parent / "made_from").write_text("sources")
+    return script.build_wheel(place, place / "code", script.sources_digest())
 
 
 def test_it_has_the_solver_its_data_and_machine_code_and_nothing_else(wheel):
@@ -86,10 +92,36 @@ def test_it_states_its_licences_and_needs_numpy_and_numba_alone(wheel):
         text = archive.read(metadata).decode()
     lines = text.splitlines()
     assert "License-Expression: Apache-2.0 AND GPL-3.0-or-later AND CC0-1.0" in lines
-    needed = [line.split()[1].split(">")[0] for line in lines if line.startswith("Requires-Dist")]
-    assert needed == ["numpy", "numba", "llvmlite"]
+    needed = [
+        line.removeprefix("Requires-Dist: ") for line in lines if line.startswith("Requires-Dist")
+    ]
+    assert [each.split(">")[0] for each in needed[:-2]] == ["numpy", "numba", "llvmlite"]
+    assert needed[-2:] == ['jax; extra == "jax"', 'torch; extra == "torch"']
+    assert [line for line in lines if line.startswith("Provides-Extra")] == [
+        "Provides-Extra: jax",
+        "Provides-Extra: torch",
+    ]
     assert "joint prior (`assets/prior/joint_prior.npz`) is under GPL-3.0-or-later" in text
     assert "](../" not in text
+
+
+def test_files_that_change_meanwhile_are_refused(script, tmp_path, monkeypatch):
+    """Machine code would be that of others."""
+    source = tmp_path / "solver" / "kernel.py"
+    source.parent.mkdir()
+    source.write_text("before")
+    with monkeypatch.context() as patch:
+        patch.setattr(script, "ROOT", tmp_path)
+        digest = script.sources_digest()
+        script.refuse_changes(digest)
+        source.write_text("after")
+        with pytest.raises(SystemExit, match="changed while the wheel was made; run it again"):
+            script.refuse_changes(digest)
+    with pytest.raises(SystemExit, match="changed while"):
+        script.build_wheel(tmp_path / "dist", tmp_path / "code", digest)
+    with pytest.raises(SystemExit, match="changed while"):
+        script.compile_code(tmp_path / "code", digest)
+    assert not (tmp_path / "dist").exists()
 
 
 def test_it_works_without_the_rest_of_scope(wheel, tmp_path):
