@@ -289,10 +289,13 @@ class _Painter:
                 )
 
     def _draw_face(self, image: Uint8Array, face: dict[str, NDArray[Any]], row: int) -> None:
-        """Draw the points of one person's face into the image, in place, if it was seen."""
+        """Draw the points of one person's face into the image, in place, if it was seen here."""
         if not face or face["expression_confidence"][row] <= 0:
             return
-        for u, v in face["face_points"][row] * self._scale:
+        points = face["face_points"][row]
+        if not points.any():  # the face was seen by another camera
+            return
+        for u, v in points * self._scale:
             if max(abs(u), abs(v)) < 1e5:
                 cv2.circle(
                     image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA

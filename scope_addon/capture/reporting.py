@@ -79,14 +79,18 @@ def make_report(
         warnings=footage.warnings
         + speed_warnings(video, options)
         + up_warnings(Path(video.path).name, solved.up_source, is_still)
-        + capture_warnings(Path(video.path).name, options, footage.cuts_s, motions)
+        + capture_warnings(Path(video.path).name, body, options, footage.cuts_s, motions)
         + camera_warnings(Path(video.path).name, footage, solved)
         + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
     )
 
 
 def capture_warnings(
-    name: str, options: CaptureOptions, cuts_s: list[float], motions: list[Motion]
+    name: str,
+    body: Body,
+    options: CaptureOptions,
+    cuts_s: list[float],
+    motions: list[Motion],
 ) -> list[Notice]:
     """List what a user should know about the result; ``name`` is the footage's."""
     warnings = []
@@ -109,7 +113,7 @@ def capture_warnings(
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
             warnings.append(notice("unseen_legs", footage=name, person=person))
         warnings += _plausibility_warnings(name, person, motion)
-        if options.hands == ON and not any(hand_frames(motion).values()):
+        if options.hands == ON and not any(hand_frames(body, motion).values()):
             warnings.append(notice("no_hands", footage=name, person=person))
         if options.face and not face_frames(motion).get("face_frames"):
             warnings.append(notice("no_face", footage=name, person=person))
@@ -209,22 +213,26 @@ def face_frames(motion: Motion) -> dict[str, Any]:
     return counts
 
 
-def hand_frames(motion: Motion) -> dict[str, int]:
-    """Count the frames in which each hand was seen; empty where hands were not looked for."""
+def hand_frames(body: Body, motion: Motion) -> dict[str, int]:
+    """Count the frames in which each hand was seen, by another camera too; empty where hands were
+    not looked for.
+    """
     names = motion.keypoints2d_names.tolist()
-    wrists = {f"{side}_hand_frames": f"hand/{side}_wrist" for side in ("left", "right")}
-    confidence = {
-        key: motion.keypoints2d[:, names.index(name), 2]
-        for key, name in wrists.items()
-        if name in names
-    }
-    return {key: int((values > 0).sum()) for key, values in confidence.items()}
+    counts = {}
+    for side in ("left", "right"):
+        if f"hand/{side}_wrist" not in names:
+            continue
+        seen = motion.keypoints2d[:, names.index(f"hand/{side}_wrist"), 2] > 0
+        finger = body.joint_names.index(f"{side}_index1")
+        seen = seen | (motion.joint_confidence[:, finger] > 0)
+        counts[f"{side}_hand_frames"] = int(seen.sum())
+    return counts
 
 
 def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
     seen = motion.frames[motion.valid]
     return (
-        hand_frames(motion)
+        hand_frames(body, motion)
         | face_frames(motion)
         | {
             "valid_frames": len(seen),

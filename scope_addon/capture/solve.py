@@ -19,6 +19,7 @@ from .clock import Progress
 from .fitting.frame_sequence import FittedTrack
 from .fitting.prepared_track import PreparedTrack, prepare_track
 from .fitting.track_fit import fit_each_frame, fit_track, ground
+from .tracking.expression_fit import with_expressions
 from .tracking.track import Track
 from .world.above_floor import raise_body
 from .world.assemble import Shot, assemble_motion
@@ -77,13 +78,19 @@ class Person:
     contradicts: BoolArray | None = None
 
     def __init__(
-        self, shot: Shot, track: Track, height_m: float | None, progress: Progress
+        self,
+        shot: Shot,
+        track: Track,
+        height_m: float | None,
+        progress: Progress,
+        has_hands: bool,
     ) -> None:
-        """Lift the track to 3D, and set up the person's priors. Fingers are left out where no hand
-        is seen.
+        """Lift the track to 3D, and set up the person's priors.
+
+        :param track: with the expressions of its face.
+        :param has_hands: whether a hand is seen; if none is, fingers are left out.
         """
-        fingers = track.hands is not None and bool((track.hands[:, :, 0, 2] > 0).any())
-        prepared = prepare_track(shot.body, track, shot.camera, height_m, fingers)
+        prepared = prepare_track(shot.body, track, shot.camera, height_m, has_hands)
         self._progress = progress
         self.track = track.without_depth()
         # With its keypoints where the network places them, for the reprojection error.
@@ -223,12 +230,20 @@ def prepare(
     return_freed_memory()  # Of the networks.
     count = len(tracks)
     heights = [*heights_m, *[None] * count]
-    people = [
-        Person(shot, track, heights[k], progress_of_person(progress, k, count))
-        for k, track in enumerate(tracks)
-    ]
+    people = []
+    for k, track in enumerate(tracks):
+        own_progress = progress_of_person(progress, k, count)
+        expressive = with_face_expressions(track)
+        people.append(Person(shot, expressive, heights[k], own_progress, track.has_hands))
     return_freed_memory()
     return people
+
+
+def with_face_expressions(track: Track) -> Track:
+    """Return a track with the expressions of its face; see `with_expressions`."""
+    if track.face is None:
+        return track
+    return replace(track, face=with_expressions(track.face, track.times))
 
 
 def progress_of_person(progress: Progress, number: int, count: int) -> Progress:

@@ -309,14 +309,17 @@ def test_missing_footage_and_a_wrong_body_are_errors(tmp_path, footage, body):
 
 def test_the_points_of_a_face_are_drawn_where_it_was_seen(tmp_path, footage, body, monkeypatch):
     monkeypatch.setattr(overlay_video, "OPACITY", 0.0)
-    motion = standing(body, [0, 1])
-    motion.face = made_face(2) | {
-        "face_points": np.full((2, 3, 2), 20.0),
-        "expression_confidence": np.array([0, 1.0]),
+    motion = standing(body, [0, 1, 2])
+    points = np.full((3, 3, 2), 20.0)
+    points[2] = 0.0  # another camera saw it
+    motion.face = made_face(3) | {
+        "face_points": points,
+        "expression_confidence": np.array([0, 1.0, 1.0]),
     }
     with open_video(footage) as video:
         size = (video.height, video.width)
-    shown = dict(painted_frames(footage, [motion], body, [0, 1]))
+    shown = dict(painted_frames(footage, [motion], body, [0, 1, 2]))
     assert shown[0].shape[:2] == size
     assert abs(int(shown[0][20, 20].max()) - GREY) < 10
     assert shown[1][20, 20].min() > 200
+    assert abs(int(shown[2][0, 0].max()) - GREY) < 10

@@ -137,9 +137,7 @@ class HandMeasurer:
         if not seen:
             return measured
         confidence = hands[seen, :, 2]
-        size_px = np.linalg.norm(hands[seen, _MIDDLE_KNUCKLE, :2] - hands[seen, 0, :2], axis=-1)
-        by_size = np.minimum(size_px / FULL_SIZE_PX, 1.0) ** 2
-        reliable = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2 * by_size[:, None]
+        reliable = reliability(hands[seen])
         directions = self._directions(hands[seen])
         return replace(
             measured,
@@ -174,6 +172,20 @@ class HandMeasurer:
             for joint in (self.wrists[side], *joints):
                 out[:, joint] = hands[:, side, 0, 2]
         return out
+
+
+def reliability(hands: FloatArray) -> FloatArray:
+    """Return how reliable the pose of each hand is at each keypoint (..., 21), 0..1: less where it
+    is blurred or small.
+
+    :param hands: (..., 21, 6) as `HandMeasurer.add` takes them.
+    """
+    confidence = hands[..., 2]
+    size_px = np.linalg.norm(hands[..., _MIDDLE_KNUCKLE, :2] - hands[..., 0, :2], axis=-1)
+    by_size = np.minimum(size_px / FULL_SIZE_PX, 1.0) ** 2
+    reliable: FloatArray = confidence * np.minimum(confidence / RELIABLE, 1.0) ** 2
+    reliable = reliable * by_size[..., None]
+    return reliable
 
 
 def with_finger_limits(priors: Priors, body: Body) -> Priors:

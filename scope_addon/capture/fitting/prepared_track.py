@@ -72,6 +72,10 @@ class OtherView:
     lifted: Lifted
     R_camera_first: Float64Array  # (3, 3)
     t_camera_first: Float64Array  # (3,) metres
+    # As in `PreparedTrack`
+    hand_measurer: HandMeasurer | None = None
+    hands: FloatArray | None = None
+    head: FloatArray | None = None
 
     def sees(self, k: int) -> bool:
         """Whether the camera sees the person in frame ``k``."""
@@ -82,6 +86,16 @@ class OtherView:
         points = self.lifted.points[k]
         sigma = self.lifted.sigma_along[k]
         return self.measurer.measure(self.pixels[k], self.confidence[k], points, sigma)
+
+    def measure_all(self, k: int) -> Measurements:
+        """Return the measurements of frame ``k`` with head and hands, where these are known."""
+        return _with_head_and_hands(self, self.measure(k), k)
+
+    def with_body(self, body: Body) -> OtherView:
+        """Return the view with the measurers of another body."""
+        K = self.measurer.intrinsics
+        hands = None if self.hand_measurer is None else HandMeasurer(body, K)
+        return replace(self, measurer=Measurer(body, K), hand_measurer=hands)
 
 
 @dataclass(frozen=True)
@@ -110,27 +124,38 @@ class PreparedTrack:
     stance: Stance | None = None
     others: tuple[OtherView, ...] = ()  # the same person in other cameras
 
-    def views(self, k: int, measured: Measurements) -> list[View]:
+    def views(self, k: int, measured: Measurements, whole: bool) -> list[View]:
         """Return what all cameras measured of frame ``k``, each in its own axes.
 
         Where another camera sees the person, depth follows from both: the lifted points, and the
         pelvis as it follows from the floor, are left out, and directions weigh less.
 
         :param measured: what the track's own camera measured.
+        :param whole: with the other cameras' heads and hands.
         """
         seen = [other for other in self.others if other.sees(k)]
         if not seen:
             return [View(measured)]
         share = DIRECTIONS_OF_VIEWS / (len(seen) + 1)
-        own = replace(_without_depth(measured, share), pose_priors=None)
+        own = replace(self._without_depth(measured, share), pose_priors=None)
         if not self.track.seen[k]:
             own = replace(own, keypoints2d=None, orientation_field=None)
-        return [View(own)] + [
-            View(
-                _without_depth(other.measure(k), share), other.R_camera_first, other.t_camera_first
-            )
-            for other in seen
-        ]
+        views = [View(own)]
+        for other in seen:
+            theirs = self._without_depth(other.measure_all(k) if whole else other.measure(k), share)
+            views.append(View(theirs, other.R_camera_first, other.t_camera_first))
+        return views
+
+    def _without_depth(self, measured: Measurements, share: float) -> Measurements:
+        """Return measurements without lifted points, and with a share of the weight of the body's
+        directions; a head or a hand has directions in one camera alone.
+        """
+        field = measured.orientation_field
+        if field is not None:
+            confidence = np.array(field.confidence, float)
+            confidence[: len(self.measurer.bone_starts)] *= share
+            field = replace(field, confidence=confidence)
+        return replace(measured, keypoints3d=None, orientation_field=field)
 
     def measure(self, k: int, root_cam: FloatArray | None = None) -> Measurements:
         """Return the measurements of the body in frame ``k``.
@@ -152,11 +177,7 @@ class PreparedTrack:
         measured = self.measure(k, None if self.stance is None else self.stance.root_cam[k])
         if self.stance is not None:
             measured = replace(measured, floor=self.stance.floor(k, self.contact_point_indices))
-        if self.head is not None:
-            measured = self.measurer.with_head(measured, self.head[k, :3], float(self.head[k, 3]))
-        if self.hand_measurer is None or self.hands is None:
-            return measured
-        return self.hand_measurer.add(measured, self.hands[k])
+        return _with_head_and_hands(self, measured, k)
 
     @property
     def contact_point_indices(self) -> IndexArray:
@@ -186,10 +207,7 @@ class PreparedTrack:
         K = self.measurer.intrinsics
         body = whole if self.body is self.whole_body else without_fingers(whole)
         hands = None if self.hand_measurer is None else HandMeasurer(body, K)
-        others = tuple(
-            replace(other, measurer=Measurer(body, other.measurer.intrinsics))
-            for other in self.others
-        )
+        others = tuple(other.with_body(body) for other in self.others)
         return replace(
             self,
             body=body,
@@ -214,12 +232,15 @@ class PreparedTrack:
         )
 
 
-def _without_depth(measured: Measurements, share: float) -> Measurements:
-    """Return measurements without lifted points, and with directions of less weight."""
-    field = measured.orientation_field
-    if field is not None:
-        field = replace(field, confidence=share * np.asarray(field.confidence))
-    return replace(measured, keypoints3d=None, orientation_field=field)
+def _with_head_and_hands(
+    seen: PreparedTrack | OtherView, measured: Measurements, k: int
+) -> Measurements:
+    """Add to the measurements of frame ``k`` what the same camera saw of head and hands."""
+    if seen.head is not None:
+        measured = seen.measurer.with_head(measured, seen.head[k, :3], float(seen.head[k, 3]))
+    if seen.hand_measurer is None or seen.hands is None:
+        return measured
+    return seen.hand_measurer.add(measured, seen.hands[k])
 
 
 def prepare_track(
@@ -261,19 +282,31 @@ def prepare_track(
         is_stature_given=height_m is not None,
         is_stature_known=height_m is not None,
     )
-    if track.face is not None:
-        across = across_head(track.face, camera, track.zoom)
-        ears = lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
-        prepared = replace(
-            prepared, head=np.column_stack([across, certainty(track.face, across, ears)])
-        )
+    prepared = replace(prepared, head=head_of(track, camera, lifted))
     if track.hands is None or not fingers:
         return prepared
-    hands = np.concatenate([camera.undistort(track.hands[..., :2]), track.hands[..., 2:]], axis=-1)
-    hand_measurer = HandMeasurer(body, camera.intrinsics)
     return replace(
-        prepared, hand_measurer=hand_measurer, hands=hands, priors=with_finger_limits(priors, body)
+        prepared,
+        hand_measurer=HandMeasurer(body, camera.intrinsics),
+        hands=undistorted_hands(track.hands, camera),
+        priors=with_finger_limits(priors, body),
     )
+
+
+def head_of(track: Track, camera: Camera, lifted: Lifted) -> Float64Array | None:
+    """Return (T, 4) the direction across the head in camera axes, and its certainty; None where no
+    face was looked for.
+    """
+    if track.face is None:
+        return None
+    across = across_head(track.face, camera, track.zoom)
+    ears = lifted.points[:, EARS[1]] - lifted.points[:, EARS[0]]
+    return np.column_stack([across, certainty(track.face, across, ears)])
+
+
+def undistorted_hands(hands: FloatArray, camera: Camera) -> FloatArray:
+    """Return hands (T, 2, 21, 6) with their pixels without lens distortion."""
+    return np.concatenate([camera.undistort(hands[..., :2]), hands[..., 2:]], axis=-1)
 
 
 def lift(measurer: Measurer, track: Track, pixels: FloatArray) -> Lifted:

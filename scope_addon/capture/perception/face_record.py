@@ -126,6 +126,13 @@ def with_expression(
     return out
 
 
+def with_landmarks_of(rows: FloatArray, others: FloatArray) -> FloatArray:
+    """Return rows (T, RECORD) with the landmarks of other rows (T, RECORD)."""
+    out = rows.copy()
+    out[:, _POINTS] = others[:, _POINTS]
+    return out
+
+
 def _ramp(value: Any, low: float, high: float) -> Any:
     return np.clip((value - low) / (high - low), 0.0, 1.0)
 

@@ -417,7 +417,12 @@ def _without(track: Track, spans: Sequence[tuple[float, float]], place: CameraPl
     for start, end in spans:
         wrong |= (times >= start) & (times <= end)
     confidence = np.where(wrong[:, None], 0.0, track.confidence)
-    return replace(track, confidence=confidence, seen=track.seen & ~wrong)
+    hands = face = None
+    if track.hands is not None:
+        hands = np.where(wrong[:, None, None, None], 0.0, track.hands)
+    if track.face is not None:
+        face = np.where(wrong[:, None], 0.0, track.face)
+    return replace(track, confidence=confidence, seen=track.seen & ~wrong, hands=hands, face=face)
 
 
 def _about_cameras(views: Sequence[_View], matches: Sequence[Match | None]) -> list[Notice]:

@@ -19,16 +19,25 @@ from ..camera.intrinsics import Camera
 from ..clock import Progress
 from ..fitting.frame_measurements import Measurer
 from ..fitting.frame_sequence import FittedTrack
+from ..fitting.hand_measurements import HandMeasurer, smooth_fingers
 from ..fitting.outline import fit_shape_to_outline, usable_masks
-from ..fitting.prepared_track import OtherView, PreparedTrack, lift
+from ..fitting.prepared_track import (
+    OtherView,
+    PreparedTrack,
+    head_of,
+    lift,
+    undistorted_hands,
+)
 from ..fitting.stature import mean_shape, stature_sigma
 from ..fitting.weights import ROBUST, clip_stages, motion_priors
+from ..perception.hand_landmarks import SIDES
 from ..perception.landmark_network import HIPS
-from ..solve import Person
+from ..solve import Person, with_face_expressions
 from ..tracking.track import Track
 from ..world.assemble import Shot
 from ..world.placement import PlacedTrack
 from ..world.stance import stance_on_ground
+from .best_view import with_best_faces, with_best_hands
 from .bundle import CameraPlace
 from .seen_person import Between
 
@@ -47,11 +56,18 @@ def with_focal_scale(camera: Camera, place: CameraPlace) -> Camera:
 
 
 def track_at(track: Track, times: Float64Array) -> Track:
-    """Return a track at other times (n,) of its own clock: keypoints by linear interpolation, the
-    rest of the nearest frame, and nothing of hands, face and masks.
+    """Return a track at other times (n,) of its own clock: keypoints by linear interpolation, also
+    of hands; the rest of the nearest frame, and no masks.
     """
     between = Between.of(np.asarray(track.times, float), track.seen, times)
     nearest = np.where(between.share < 0.5, between.before, between.after)
+    hands = face = None
+    if track.hands is not None:
+        hands = track.hands[nearest].astype(float)
+        hands[..., :2] = between.mixed(track.hands[..., :2])
+        hands[..., 2] = between.least(track.hands[..., 2])
+    if track.face is not None:
+        face = track.face[nearest] * between.seen[:, None]
     return Track(
         frames=np.arange(len(times)),
         times=times,
@@ -60,6 +76,8 @@ def track_at(track: Track, times: Float64Array) -> Track:
         confidence=between.least(track.confidence),
         world_landmarks=track.world_landmarks[nearest] * between.seen[:, None, None],
         acquired=track.acquired[nearest] & between.seen,
+        hands=hands,
+        face=face,
     )
 
 
@@ -68,16 +86,27 @@ def other_view(
 ) -> OtherView:
     """Return what another camera sees of a prepared track's person.
 
-    :param track: that camera's, by its own clock.
+    :param track: that camera's, at the times of the prepared track.
     :param camera: with its true focal length.
     """
-    times = np.asarray(prepared.track.times, float)
-    at = track_at(track, place.own_times(times))
     measurer = Measurer(prepared.body, camera.intrinsics)
-    pixels = camera.undistort(at.keypoints_px)
-    lifted = lift(measurer, at, pixels)
-    return OtherView(
-        measurer, pixels, at.confidence, lifted, place.R_camera_first, place.t_camera_first
+    pixels = camera.undistort(track.keypoints_px)
+    lifted = lift(measurer, track, pixels)
+    view = OtherView(
+        measurer,
+        pixels,
+        track.confidence,
+        lifted,
+        place.R_camera_first,
+        place.t_camera_first,
+        head=head_of(track, camera, lifted),
+    )
+    if track.hands is None or prepared.hand_measurer is None:
+        return view
+    return replace(
+        view,
+        hand_measurer=HandMeasurer(prepared.body, camera.intrinsics),
+        hands=undistorted_hands(track.hands, camera),
     )
 
 
@@ -98,8 +127,23 @@ class PersonInViews(Person):
         :param others: of each other camera that shows the person, the track, the camera with its
             true focal length, and its place.
         """
-        super().__init__(shot, track, height_m, progress)
-        views = tuple(other_view(self.prepared, *other) for other in others)
+        times = np.asarray(track.times, float)
+        first = with_face_expressions(track)
+        later = [
+            track_at(with_face_expressions(theirs), place.own_times(times))
+            for theirs, _, place in others
+        ]
+        own, *theirs = with_best_hands([first, *later])
+        (own, *theirs), with_all = with_best_faces([own, *theirs])
+        has_hands = any(each.has_hands for each in (own, *theirs))
+        super().__init__(shot, own, height_m, progress, has_hands)
+        # What the file says of the first camera's picture is what that camera sees.
+        hands = own.hands if first.hands is None else first.hands
+        self.track = replace(self.track, hands=hands, face=with_all.face)
+        views = tuple(
+            other_view(self.prepared, seen, camera, place)
+            for seen, (_, camera, place) in zip(theirs, others, strict=True)
+        )
         self.prepared = replace(self.prepared, others=views)
 
     def fit_alone(self) -> None:
@@ -141,7 +185,7 @@ def fit_views(prepared: PreparedTrack) -> FittedTrack:
     weights = replace(prepared.weights, shape=prepared.weights.shape * len(frames))
     found = fit_motion(
         prepared.body,
-        [prepared.views(k, prepared.measure(k)) for k in frames],
+        [prepared.views(k, prepared.measure(k), False) for k in frames],
         times,
         priors=prepared.priors,
         options=replace(ROBUST, stages=clip_stages(weights)),
@@ -216,7 +260,7 @@ def fit_views_alone(prepared: PreparedTrack, start: FittedTrack) -> FittedTrack:
     ]
     found = fit_motion(
         prepared.body,
-        [prepared.views(k, prepared.measure_all(k)) for k in frames],
+        [prepared.views(k, prepared.measure_all(k), True) for k in frames],
         prepared.track.times[frames],
         init=states,
         priors=prepared.priors,
@@ -246,11 +290,23 @@ def _fitted(prepared: PreparedTrack, frames: IndexArray, found: MotionFit) -> Fi
     row = np.maximum(np.searchsorted(frames, np.arange(T), side="right") - 1, 0)
     rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
     root = np.array([state.t_camera_root for state in found.states])
+    rotations = rotations[row]
     confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
     for other in prepared.others:
         confidence = np.maximum(confidence, other.measurer.joint_confidence(other.confidence))
+    if prepared.hand_measurer is not None:
+        seen = np.zeros((T, len(SIDES)), bool)
+        cameras: list[PreparedTrack | OtherView] = [prepared, *prepared.others]
+        for view in cameras:
+            if view.hands is not None and view.hand_measurer is not None:
+                of_hands = view.hand_measurer.joint_confidence(view.hands)
+                confidence = np.maximum(confidence, of_hands)
+                seen |= view.hands[:, :, 0, 2] > 0.0
+        fingers = prepared.hand_measurer.fingers
+        seen &= valid[:, None]
+        rotations = smooth_fingers(rotations, fingers, seen, prepared.track.times)
     return FittedTrack(
-        rotations=rotations[row],
+        rotations=rotations,
         t_camera_root=root[row],
         betas=found.beta,
         valid=valid,

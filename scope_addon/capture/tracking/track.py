@@ -64,6 +64,11 @@ class Track:
         """Whether the landmark network estimated depth; a user's keypoint network does not."""
         return bool(self.world_landmarks.any())
 
+    @property
+    def has_hands(self) -> bool:
+        """Whether some hand was seen."""
+        return self.hands is not None and bool((self.hands[:, :, 0, 2] > 0).any())
+
     def steadied(self, camera: Camera, zoom: Float64Array) -> Track:
         """Return the track as it was seen by a lens that zooms, by a constant focal length.
 

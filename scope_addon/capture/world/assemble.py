@@ -22,7 +22,6 @@ from ..camera.line_segments import Lines
 from ..camera.odometry import Odometry
 from ..fitting.hand_measurements import HAND_KEYPOINT_NAMES
 from ..perception.landmark_network import KEYPOINT_NAMES
-from ..tracking.expression_fit import with_expressions
 from ..tracking.expression_motion import expression_motion
 from ..tracking.track import Track
 from .camera_path import CameraPath
@@ -46,6 +45,7 @@ def assemble_motion(
     Rotations relative to the parent do not depend on the world; R_world_root = R_world_camera
     R_camera_root and trans = T_world_camera t_camera_root − J_0(β).
 
+    :param track: with the expressions of its face.
     :param body: with its keypoints where the network places them, for the reprojection error.
     :param raw: the motion of which every frame was fitted alone.
     :param placed: the final motion: its rotations and root, in the first frame's camera axes.
@@ -77,9 +77,7 @@ def assemble_motion(
     sigma = raw.joint_sigma_m
     face = {}
     if track.face is not None:
-        face = expression_motion(
-            with_expressions(track.face, placed.times), placed.times, shot.smoothing
-        )
+        face = expression_motion(track.face, placed.times, shot.smoothing)
     return Motion(
         poses=poses,
         trans=trans,

@@ -171,7 +171,7 @@ class ClipWindow:
         path = self.path
         if self.prepared.others:
             prepared = self.prepared
-            return [prepared.views(k, each) for k, each in zip(frames, measured, strict=True)]
+            return [prepared.views(k, each, True) for k, each in zip(frames, measured, strict=True)]
         if path.is_static:
             return measured
         R = np.swapaxes(path.R_first_camera[frames], 1, 2)
