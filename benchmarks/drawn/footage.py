@@ -16,7 +16,7 @@ from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.fitting.rasterizer import Canvas, rasterize
 from ...scope_addon.capture.media.video_writer import VideoWriter
 from ...scope_addon.capture.overlay_video import blended, body_colors
-from ...solver.rotations import exp
+from ...solver.rotations import exp, log
 from .surroundings import Surroundings
 from .walk import Walker
 
@@ -25,6 +25,8 @@ HEIGHT = 432
 FPS = Fraction(30)
 FOCAL_PX = 665.0
 TINT = 2  # of the first person's body
+# Of a picture whose rows are read out one after another; each band has a moment of its own.
+READOUT_BANDS = 12
 
 Place = Callable[[float], Float64Array]  # of a time in seconds: (3,) in the world, metres
 
@@ -42,6 +44,8 @@ class Camera:
     shake_deg: float = 0.0
     shake_m: float = 0.0
     seed: int = 0
+    # From the first row to the last one, whose middle is the frame's time; 0: a global shutter
+    readout_s: float = 0.0
 
     def times(self, seconds: float) -> Float64Array:
         """Return the times of its frames."""
@@ -59,6 +63,18 @@ class Camera:
             for t, center, turn in zip(times, centers, turns, strict=True)
         ]
         return np.array(rotations), centers
+
+    def speeds(
+        self, R_world_camera: Float64Array, centers: Float64Array
+    ) -> tuple[Float64Array, Float64Array]:
+        """Return the camera's angular velocity (T, 3) in its own axes, radians per second, and its
+        velocity (T, 3) in the world, metres per second, along its `path`.
+        """
+        before = np.maximum(np.arange(len(centers)) - 1, 0)
+        after = np.minimum(np.arange(len(centers)) + 1, len(centers) - 1)
+        seconds = np.maximum(after - before, 1)[:, None] / float(self.fps)
+        R_before_after = np.swapaxes(R_world_camera[before], 1, 2) @ R_world_camera[after]
+        return log(R_before_after) / seconds, (centers[after] - centers[before]) / seconds
 
 
 def intrinsics_of(focal_px: float) -> Float64Array:
@@ -81,9 +97,12 @@ def draw_clip(
     times = camera.times(seconds)
     R_world_camera, centers = camera.path(times)
     focal_px = np.array([camera.focal_px(t) for t in times])
+    turns, velocities = camera.speeds(R_world_camera, centers)
     moving = (centers, R_world_camera, focal_px)
     is_background_static = all(np.ptp(values, axis=0).max() == 0 for values in moving)
     background = None
+    bands = READOUT_BANDS if camera.readout_s else 1
+    rows = HEIGHT // bands
     skins = [_skin(walker, TINT + number) for number, walker in enumerate(walkers)]
     joints = []
     stands = []
@@ -92,18 +111,25 @@ def draw_clip(
         atomic_path(path) as temporary,
         VideoWriter(temporary, camera.fps, WIDTH, HEIGHT, path) as writer,
     ):
-        for time_s, R, center, focal in zip(times, R_world_camera, centers, focal_px, strict=True):
-            K = intrinsics_of(focal)
-            if background is None or not is_background_static:
-                background = surroundings.draw(R, center, K, WIDTH, HEIGHT)
+        for k, time_s in enumerate(times):
             poses = [walker.pose(time_s) for walker in walkers]
             joints.append([w.joints(pose) for w, pose in zip(walkers, poses, strict=True)])
             stands.append([pose.stands for pose in poses])
-            canvas = Canvas.blank(WIDTH, HEIGHT)
-            for skin, walker, pose in zip(skins, walkers, poses, strict=True):
-                vertices = (walker.vertices(pose) - center) @ R
-                rasterize(canvas, vertices, *skin, K)
-            writer.write(change(time_s, blended(background, canvas)))
+            picture = []
+            for band in range(bands):
+                later_s = camera.readout_s * ((band + 0.5) / bands - 0.5)
+                R = R_world_camera[k] @ exp(later_s * turns[k])
+                center = centers[k] + later_s * velocities[k]
+                K = intrinsics_of(focal_px[k])
+                K[1, 2] -= band * rows
+                if background is None or not is_background_static:
+                    background = surroundings.draw(R, center, K, WIDTH, rows)
+                canvas = Canvas.blank(WIDTH, rows)
+                for skin, walker in zip(skins, walkers, strict=True):
+                    vertices = (walker.vertices(walker.pose(time_s + later_s)) - center) @ R
+                    rasterize(canvas, vertices, *skin, K)
+                picture.append(blended(background, canvas))
+            writer.write(change(time_s, np.concatenate(picture)))
     truth: dict[str, Any] = {
         "joints": np.swapaxes(np.array(joints), 0, 1),  # (people, T, K+1, 3) in the world, metres
         "stands": np.swapaxes(np.array(stands), 0, 1),  # (people, T, 2)

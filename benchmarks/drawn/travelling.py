@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,7 @@ class TravellingScene:
     seed: int
     focal_px: float = FOCAL_PX
     seconds: float = SECONDS
+    readout_s: float = 0.0
 
     def camera(self) -> Camera:
         """Return the camera that follows the walker."""
@@ -68,6 +69,7 @@ class TravellingScene:
             shake_deg=SHAKE_DEG,
             shake_m=SHAKE_M,
             focal_px=lambda _: self.focal_px,
+            readout_s=self.readout_s,
         )
 
 
@@ -162,6 +164,12 @@ def _lagging(walk: Walk, rate: float, offset: tuple[float, float, float]) -> Fol
     return follow
 
 
+ROLLING = [name for name in SCENES if "turns" not in name and "plain" not in name]
+ROLLING.remove("rises")
+READOUT_S = 0.025  # of a phone
+SCENES |= {
+    f"{name}, rolling shutter": replace(SCENES[name], readout_s=READOUT_S) for name in ROLLING
+}
 SCENES |= _by_chance()
 
 

@@ -6,11 +6,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scope.benchmarks.drawn.footage import HEIGHT, WIDTH, Camera, intrinsics_of
+from scope.benchmarks.drawn.footage import (
+    FOCAL_PX,
+    HEIGHT,
+    READOUT_BANDS,
+    WIDTH,
+    Camera,
+    draw_clip,
+    intrinsics_of,
+)
 from scope.benchmarks.drawn.surroundings import Surroundings
 from scope.benchmarks.drawn.view_scenes import FIRST, SECOND
 from scope.benchmarks.drawn.views import _score_camera
 from scope.benchmarks.drawn.walk import RUNS, Walk, Walker
+from scope.scope_addon.capture.media.video import open_video
 
 
 @pytest.mark.parametrize("walk", [Walk(1.3), Walk(3.0, 0.72, style=RUNS), Walk(1.0, turn=0.3)])
@@ -47,6 +56,30 @@ def test_a_box_is_drawn_where_it_is():
     assert columns.min() == pytest.approx(WIDTH / 2 - half, abs=1.5)
     assert columns.max() == pytest.approx(WIDTH / 2 + half, abs=1.5)
     assert rows.min() == pytest.approx(HEIGHT / 2 - focal_px * 1.0 / 5.0, abs=1.5)
+
+
+def test_rows_that_are_read_out_later_show_a_later_moment(tmp_path):
+    walls = np.zeros((4, 8, 8, 3), np.float32)
+    walls[1] = 200.0
+    shell = np.array([[-5.0, -5.0, -200.0], [5.0, 5.0, 300.0]])
+    column = np.array([[[-0.5, 1.0, -100.0], [0.5, 2.0, 100.0]]])
+    scene = Surroundings(shell, column, np.array([1]), (walls,) * 7, is_plain=False)
+    eye = np.array([0.0, -4.0, 1.0])
+    turn_rad_s = 0.5
+    camera = Camera(
+        lambda _: eye,
+        lambda t: eye + [np.sin(turn_rad_s * t), np.cos(turn_rad_s * t), 0.0],
+        readout_s=0.03,
+    )
+    clip = tmp_path / "column.mp4"
+    draw_clip(clip, scene, [], camera, 0.1)
+    with open_video(clip) as video:
+        image = next(iter(video)).image_rgb
+    left = [np.flatnonzero(image[row, :, 0] > 100).min() for row in (1, HEIGHT - 2)]
+    # To the left, as the camera turns to the right, from the middle of the first band of rows to
+    # that of the last one.
+    share = (READOUT_BANDS - 1) / READOUT_BANDS
+    assert left[0] - left[1] == pytest.approx(FOCAL_PX * turn_rad_s * 0.03 * share, abs=1.5)
 
 
 def test_a_camera_has_the_frames_of_its_own_clock():
