@@ -126,9 +126,7 @@ def draw(layout: bpy.types.UILayout) -> None:
     """Show the progress while the solver is being compiled."""
     if WarmUp.process is not None and (compiled := _files() - WarmUp.files_before) > 0:
         share = min(1.0, compiled / kernel_count())
-        text = iface_(
-            "Compiling the solver in the background, {percent:.0f} %", percent=100 * share
-        )
+        text = iface_("Compiling the solver: {percent:.0f} %", percent=100 * share)
         layout.progress(text=text, factor=share)
 
 

@@ -70,7 +70,7 @@ def test_progress_is_shown_only_while_something_is_compiled(process):
     warm_up.draw(layout)
     ((text, share),) = layout.shown
     assert share == pytest.approx(0.5, abs=0.01)
-    assert text == f"Compiling the solver in the background, {100 * share:.0f} %"
+    assert text == f"Compiling the solver: {100 * share:.0f} %"
     warm_up.stop()
     warm_up.draw(layout)
     assert len(layout.shown) == 1
