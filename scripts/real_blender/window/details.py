@@ -55,6 +55,7 @@ BROWSERS = (
     ("choose_file", {"owner": "scope_live", "setting": "file"}, FOOTAGE_FILES[:5]),
     ("choose_file", {"owner": "preferences", "setting": "detector_file"}, ("net.onnx",)),
 )
+WIDTH, HEIGHT = 640, 480  # of the footage
 STILL = OUT / "still.npz"
 LOW = OUT / "low.npz"
 FRAMES = 120
@@ -101,6 +102,29 @@ def two_captures() -> Iterator[float]:
         assert any("keeps its 20 frames/s, the footage has" in text for text in warnings()), (
             warnings()
         )
+
+
+def picked() -> Iterator[float]:
+    """Click the person to capture in the first frame of the footage; Escape keeps the choice."""
+    settings = bpy.context.scene.scope
+    here = viewport()
+    region = here["region"]
+    middle = region.x + region.width // 2, here["window"].height - region.y - region.height // 2
+    invoke(bpy.ops.scope.pick_person, "INVOKE_DEFAULT")
+    yield from press(middle, lambda: bool(settings.person))
+    report["picked"] = settings.person
+    place, _, time_s = settings.person.partition("@")
+    x, y = map(int, place.split(","))
+    assert 0 < x < WIDTH, settings.person
+    assert 0 < y < HEIGHT, settings.person
+    assert float(time_s) == 0.0, settings.person
+    invoke(bpy.ops.scope.pick_person, "INVOKE_DEFAULT")
+    yield 5.0
+    picture("33_pick_person")
+    key("Escape")
+    yield 1.0
+    assert settings.person == report["picked"]
+    settings.person = ""
 
 
 def compared() -> Iterator[float]:
@@ -386,6 +410,7 @@ def steps() -> Iterator[float]:
     yield 1.0
     show_tab()
     yield from two_captures()
+    yield from picked()
     yield from compared()
     yield from shortcut()
     yield from above_the_fold()
