@@ -83,7 +83,7 @@ SENTENCES = {
     "start and end time",
     "left_out": "{footage} shows more people than were captured: at least {others} more, one of "
     "them at {place} (x, y in pixels, @ seconds). Capture everyone, or choose the one to be "
-    "captured with --person {place}",
+    "captured with Person, --person {place} on the command line",
     "turned_footage": "{footage}: the person lies or stands on the head in the picture from "
     "beginning to end. If the camera was turned, capture with Turn, --rotate {degrees} on the "
     "command line",

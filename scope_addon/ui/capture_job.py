@@ -279,7 +279,8 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
     """Make the request to the worker from the scene's settings and the preferences.
 
     :raises UsageError: the scene is linked, no footage, calibration, camera or body file is chosen,
-        the captured part is empty, or the camera cannot have filmed the footage.
+        the captured part is empty, a person is chosen of several cameras, or the camera cannot have
+        filmed the footage.
     :raises VideoError: the footage does not exist.
     """
     settings = scene.scope
@@ -293,6 +294,11 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
             raise VideoError(f"{path} {what}; choose the video or image again")
     if settings.use_range and settings.range_end <= settings.range_start:
         raise UsageError("the part of the video ends before it starts; change From or To")
+    if settings.person and views:
+        raise UsageError(
+            "Person is a place in one video, and there are several; clear it, or remove the other "
+            "cameras' videos"
+        )
     if settings.lens == "FILE" and not settings.calibration_file:
         raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
     values = chosen_values(scene)

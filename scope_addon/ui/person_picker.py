@@ -69,12 +69,14 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Require a viewport, footage of one take, and that nothing is running."""
+        """Require a viewport, footage of one camera, and that nothing is running."""
         if context.area is None or context.area.type != "VIEW_3D" or not nothing_runs(cls):
             return False
         settings = context.scene.scope
         if not settings.footage:
             return refuse(cls, tip_("Choose a video or image first"))
+        if settings.views:
+            return refuse(cls, tip_("Remove the other cameras' videos first"))
         if settings.queue:
             return refuse(cls, tip_("In each clip of the list, somebody else is at that place"))
         return True

@@ -14,6 +14,7 @@ from scope.scope_addon.job.footage_picture import FootagePicture
 from scope.scope_addon.ui import person_picker
 from scope.scope_addon.ui.capture_job import capture_request
 from scope.scope_addon.ui.person_picker import SCOPE_OT_pick_person, box_of_picture, person_at
+from scope.solver.errors import ScopeError
 
 SIZE = (1920, 1080)
 VISIBLE = (60.0, 1020.0, 0.0, 700.0)
@@ -118,10 +119,17 @@ def test_the_request_has_the_chosen_person_until_other_footage_is_chosen(footage
     assert scene.scope.person == ""
 
 
-def test_it_needs_footage_of_one_take(footage):
+def test_it_needs_one_video(footage):
     context = SimpleNamespace(area=SimpleNamespace(type="VIEW_3D"), scene=bpy.context.scene)
     assert not SCOPE_OT_pick_person.poll(context)
     bpy.ops.scope.choose_footage(filepath=str(footage))
+    assert SCOPE_OT_pick_person.poll(context)
+    context.scene.scope.person = "640,360@2.50"
+    bpy.ops.scope.add_view(filepath=str(footage))
+    assert not SCOPE_OT_pick_person.poll(context)
+    with pytest.raises(ScopeError, match="Person is a place in one video"):
+        capture_request(context.scene)
+    bpy.ops.scope.remove_view(index=0)
     assert SCOPE_OT_pick_person.poll(context)
     context.scene.scope.queue.add().footage = str(footage)
     assert not SCOPE_OT_pick_person.poll(context)
