@@ -20,6 +20,7 @@ from ...solver.body import Body
 from ...solver.body_file import BUILT_IN, CHOICE, as_path, scope_body
 from ...solver.body_file import load_body as load_trusted_body
 from ...solver.errors import ModelFileError
+from ...solver.names import BODY_JOINTS
 from ...solver.smpl_family import REQUIRED, smpl_body
 from .files import npz_keys, read_npz
 from .pickles import read_pickle, to_array
@@ -68,7 +69,7 @@ def load_body(which: str | Path = "scope") -> Body:
     """Load a body by name, from a .npz in the format of ours, or a user's model, as
     ``solver.load_body`` does; of a pickle nothing is run.
 
-    :raises ModelFileError: the file is missing, not a body, or contradicts itself.
+    :raises ModelFileError: the file is missing, not a person's body, or contradicts itself.
     :raises InvalidValueError: `which` is neither a name nor a path.
     """
     if str(which) in BUILT_IN:
@@ -77,8 +78,17 @@ def load_body(which: str | Path = "scope") -> Body:
     # unlike Path.is_file also of names that are too long for the system
     if not os.path.isfile(path):
         raise ModelFileError(f"body '{which}' was not found: {CHOICE}")
-    if is_user_model(path):
-        return load_model(path)
+    body = load_model(path) if is_user_model(path) else _load_own(path)
+    if missing := [name for name in BODY_JOINTS if name not in body.joint_names]:
+        raise ModelFileError(f"{path} has no joints {', '.join(missing)}: {CHOICE}")
+    return body
+
+
+def _load_own(path: Path) -> Body:
+    """Load a body from a file in the format of ours.
+
+    :raises ModelFileError: the file is not a body, or contradicts itself.
+    """
     if is_motion(path):
         raise ModelFileError(
             f"{path} is a motion file, which holds how a body moves, not the body itself: {CHOICE}"

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scope.scope_addon.untrusted.body_file import load_body
 from scope.solver.errors import ModelFileError
+from scope.solver.names import BODY_JOINTS, BODY_PARENTS
 
-N = 3
+N = len(BODY_JOINTS)
 V = 8
 F = 5
 M = 4
@@ -16,13 +17,13 @@ P = 2
 
 
 def small_body():
-    """The arrays of a body of two joints below its root, with all that is optional."""
+    """The arrays of a body of few vertices, with all that is optional."""
     rng = np.random.default_rng(0)
     return {
         "name": np.array("small"),
         "license": np.array("CC0"),
-        "joint_names": np.array(["pelvis", "knee", "ankle"]),
-        "kintree_table": np.array([[-1, 0, 1], [0, 1, 2]]),
+        "joint_names": np.array(BODY_JOINTS),
+        "kintree_table": np.array([BODY_PARENTS, range(N)]),
         "v_template": rng.standard_normal((V, 3)),
         "shapedirs": rng.standard_normal((V, 3, P)),
         "J_template": rng.standard_normal((N, 3)).astype(np.float32),
@@ -87,7 +88,7 @@ def test_a_body_is_shown_by_its_name_and_sizes(tmp_path):
 
 
 BROKEN = {
-    "a flat tree": ("kintree_table", np.arange(N), r"must have shape \(2, any\), but has \(3,\)"),
+    "a flat tree": ("kintree_table", np.arange(N), r"must have shape \(2, any\), but has \(22,\)"),
     "no tree": ("kintree_table", np.int64(3), r"must have shape \(2, any\), but has \(\)"),
     "a fractional tree": (
         "kintree_table",
@@ -98,7 +99,7 @@ BROKEN = {
         "J_shapedirs",
         np.zeros((N, 3)),
         r"must have shape \(any, 3, any\), but "
-        r"has \(3, 3\)",
+        r"has \(22, 3\)",
     ),
     "flat faces": ("faces", np.arange(4), r"must have shape \(any, any\), but has \(4,\)"),
     "faces of five": (
@@ -169,6 +170,14 @@ def test_a_body_that_is_flat_tiny_or_in_millimetres_is_refused(tmp_path, factors
         r"does; .* metre",
     ):
         load_body(saved(tmp_path / "body.npz", arrays))
+
+
+def test_the_body_of_an_animal_is_refused(tmp_path):
+    """Captures, imports and most formats use joints by their names."""
+    arrays = small_body()
+    arrays["joint_names"] = np.array([name.replace("knee", "hock") for name in BODY_JOINTS])
+    with pytest.raises(ModelFileError, match=r"dog\.npz has no joints left_knee, right_knee: give"):
+        load_body(saved(tmp_path / "dog.npz", arrays))
 
 
 def test_a_motion_is_told_from_a_body(tmp_path):
