@@ -38,6 +38,7 @@ from ....solver.rotations import exp, log
 from ...arrays import Float64Array
 from ...atomic_write import write_result
 from ...errors import UsageError
+from ...footage import display_text
 from ...json_file import read_json_object
 from ...motion import Motion
 from ...untrusted.files import in_one_line
@@ -256,12 +257,12 @@ def calibration_text(motion: Motion) -> str:
     seen = [motion, *(motion.from_view(number) for number in range(motion.view_count))]
     view = motion.view
     lines: list[str] = []
-    names: list[str] = []
+    names = ["metadata"]
     for number, each in enumerate(seen, 1):
         size = each.image_size.tolist()
         turned = np.linalg.inv(each.world_from_camera[0])
         turned[:3] = view.axes.T @ turned[:3]
-        name = Path(each.source).stem
+        name = display_text(Path(each.source).stem)
         if name in names:
             name = f"{name}_{number}"
         names.append(name)
@@ -275,11 +276,19 @@ def calibration_text(motion: Motion) -> str:
             "translation": turned[:3, 3].tolist(),
             "fisheye": False,
         }
-        lines.append(f"[{json.dumps(name)}]")
-        # Lists of numbers, strings and booleans are the same in JSON and TOML.
-        lines += [f"{key} = {json.dumps(value)}" for key, value in values.items()]
+        # Lists of numbers, strings and booleans are the same in JSON and TOML, but not escapes of
+        # what 16 bits do not hold.
+        lines.append(f"[{json.dumps(name, ensure_ascii=False)}]")
+        lines += [
+            f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items()
+        ]
         lines.append("")
-    lines += ["[metadata]", "adjusted = false", f"error = {float(np.mean(motion.residual_px))}", ""]
+    lines += [
+        f"[{names[0]}]",
+        "adjusted = false",
+        f"error = {float(np.mean(motion.residual_px))}",
+        "",
+    ]
     return "\n".join(lines)
 
 

@@ -51,8 +51,13 @@ def has_tables(path: Path) -> bool:
 
 def split_camera(path: Path) -> tuple[Path, str]:
     """Return the file of a calibration, and the name of the camera in it, which may be empty."""
-    file, _, camera = str(path).rpartition("#")
-    return (Path(file), camera) if camera and file.endswith(SUFFIXES) else (path, "")
+    text = str(path)
+    sign = text.rfind("#")
+    while sign > 0:
+        if text[:sign].endswith(SUFFIXES) and text[sign + 1 :]:
+            return Path(text[:sign]), text[sign + 1 :]
+        sign = text.rfind("#", 0, sign)  # the camera's name may have one, too
+    return path, ""
 
 
 def files_of_calibration(path: Path) -> list[Path]:

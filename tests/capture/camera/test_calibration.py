@@ -11,6 +11,7 @@ from scope.scope_addon.capture.camera.calibration import (
     calibration_text,
     placed_cameras,
     read_calibration,
+    write_calibration,
 )
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.footage_view import FootageView
@@ -296,5 +297,21 @@ def test_cameras_whose_videos_have_the_same_name_are_saved_too(tmp_path):
     path = tmp_path / "found.toml"
     path.write_text(calibration_text(motion), "utf-8")
     found = placed_cameras(path, ["walk", "walk"])
+    lenses = [read_calibration(file).intrinsics[0, 0] for file, _ in found]
+    assert lenses == [600.0, 500.0]
+
+
+@pytest.mark.parametrize(
+    "name", ["\U0001f3ac", "metadata", "caf\udce9", "a#b", 'a"b\\', "a\nb\x1b"]
+)
+def test_cameras_are_saved_whatever_the_names_of_their_videos(tmp_path, name):
+    body = load_body("scope")
+    views = made_views(0.5) | {"view_sources": np.array(["caf\ufffd.mp4"])}
+    poses = np.zeros((1, 3 * (body.K + 1)))
+    motion = made_motion(body, poses, np.zeros((1, 3)), views=views)
+    motion.source = f"{name}.mp4"
+    path = tmp_path / "found.toml"
+    write_calibration(path, motion)
+    found = placed_cameras(path, [name, "caf\ufffd"])
     lenses = [read_calibration(file).intrinsics[0, 0] for file, _ in found]
     assert lenses == [600.0, 500.0]
