@@ -30,13 +30,15 @@ from ..untrusted.body_file import load_body
 from ..untrusted.bvh_file import read_bvh
 from ..untrusted.files import npz_keys
 from .performer import find_performers
-from .smpl_motion import HAND_JOINTS, SmplMotion, read_smpl_motions
+from .smpl_motion import FASTEST, HAND_JOINTS, SLOWEST, SmplMotion, read_smpl_motions
 
 DEFAULT_RATE = 30.0  # frames per second
 # by the axis that points up
 R_WORLD_FILE = {"z": np.eye(3), "y": R_WORLD_MODEL, "camera": R_WORLD_LEVELCAMERA}
 _AXIS_TEXT = {"z": "z", "y": "y", "camera": "minus y, as in a camera's axes,"}
 _UPRIGHT = 0.5  # mean cosine of the trunk with an axis, above which people stand or sit along it
+_LATEST_S = 1e10  # of a frame; 300 years
+_LARGEST_BODY_M = 50.0
 _CAMERA_DISTANCE_M = 10.0  # in front of the nearest position; motion files need a camera
 
 
@@ -100,11 +102,29 @@ def _own(motion: Motion, body: Body, path: Path) -> Imported:
             raise MotionFileError(
                 f"{path}: {each.name} contains NaN or infinity; choose another file"
             )
-    if not 0 < motion.mocap_framerate <= 10_000 or (np.diff(motion.timestamps) <= 0).any():
+    is_possible = (
+        SLOWEST <= motion.mocap_framerate <= FASTEST
+        and np.abs(motion.timestamps).max() <= _LATEST_S
+        and (np.diff(motion.timestamps) > 0).all()
+    )
+    if not is_possible:
         raise MotionFileError(
             f"{path}: its frame rate or timestamps cannot be used; choose another file"
         )
+    _check_size(body, motion.betas, path)
     return Imported(motion, body)
+
+
+def _check_size(body: Body, betas: NDArray[np.floating[Any]], path: Path) -> None:
+    """Refuse a shape that is nobody's: formats have no room for its numbers.
+
+    :raises MotionFileError: it is such a shape.
+    """
+    size_m = np.ptp(body.rest_joints(np.asarray(betas, float)), axis=0).max()
+    if size_m > _LARGEST_BODY_M:
+        raise MotionFileError(
+            f"{path}: with its betas, the body is {size_m:.3g} m large; choose another file"
+        )
 
 
 def _from_bvh(path: Path, body: str, up: str) -> list[Imported]:
@@ -140,6 +160,7 @@ def convert(
     if exact:
         count = min(body.P, source.betas.size)
         betas[:count] = source.betas[:count]
+        _check_size(body, betas, path)
         if source.gender != body.gender:
             notes.append(
                 notice(

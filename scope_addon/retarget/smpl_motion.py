@@ -30,7 +30,10 @@ MAX_PEOPLE = 100  # of one file
 _LISTED = 8  # names of a table's content in a message
 MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
 _MAX_BETAS = 400
-_LARGEST_RATE = 10_000.0
+# Frames per second.
+SLOWEST = 1e-4
+FASTEST = 10_000.0
+_POSITIVE = (float(np.finfo(float).tiny), float(np.finfo(float).max))
 _ORTHONORMAL = 0.01  # largest deviation of RᵀR from the identity
 FARTHEST_M = 1e5  # from the origin; a number beyond that is not in metres
 
@@ -189,7 +192,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
                 f"{path}: {trans} must have shape ({count}, 3), as the poses, not {position.shape}"
             )
         position = position / (
-            _positive(arrays, _SCALE, "a positive number", float(np.finfo(float).max), path) or 1.0
+            _number_of(arrays, _SCALE, "a positive number", _POSITIVE, path) or 1.0
         )
         if np.abs(position).max() > FARTHEST_M:
             raise MotionFileError(
@@ -201,7 +204,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         poses=poses,
         trans=position,
         betas=_betas(arrays, count, path),
-        rate=_positive(arrays, _RATES, "a number of frames per second", _LARGEST_RATE, path),
+        rate=_number_of(arrays, _RATES, "a number of frames per second", (SLOWEST, FASTEST), path),
         gender=gender_of(arrays.get(_GENDER), Path("neutral")),
         body_model=_text(arrays.get(_MODEL)),
         usual_up=usual_up,
@@ -377,15 +380,15 @@ def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> NDArra
     return values if values.ndim == 1 else values.mean(axis=0)
 
 
-def _positive(
+def _number_of(
     arrays: Mapping[str, NDArray[Any]],
     names: tuple[str, ...],
     wanted: str,
-    largest: float,
+    limits: tuple[float, float],
     path: Path,
 ) -> float | None:
-    """Return the first of these numbers that the file has, which must be positive; None if it has
-    none.
+    """Return the first of these numbers that the file has, which must lie within the limits; None
+    if it has none.
     """
     key = _first(arrays, names)
     if key is None:
@@ -396,7 +399,7 @@ def _positive(
             f"{path}: {key} must be {wanted}, but has shape {array.shape} and holds {array.dtype}"
         )
     number = float(array.reshape(-1)[0])
-    if not 0 < number <= largest:
+    if not limits[0] <= number <= limits[1]:
         raise MotionFileError(f"{path}: {key} must be {wanted}, but is {number:g}")
     return number
 

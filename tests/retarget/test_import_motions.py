@@ -105,6 +105,27 @@ def test_a_damaged_file_of_our_own_is_an_error(tmp_path, key):
         import_motion(tmp_path / "own.npz")
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("mocap_framerate", 1e-300),
+        ("timestamps", np.arange(len(MOTION)) * 1e37),
+        ("betas", np.full(BODY.P, 1e6)),
+    ],
+)
+def test_numbers_for_which_formats_have_no_room_are_an_error(tmp_path, key, value):
+    own = motion_of(CLIP)
+    setattr(own, key, value)
+    own.save(tmp_path / "own.npz")
+    with pytest.raises(MotionFileError, match="frame rate|betas"):
+        import_motion(tmp_path / "own.npz")
+    arrays = {"body_model": np.array("scope"), "betas": np.zeros(BODY.P), **in_file("z")}
+    np.savez(tmp_path / "other.npz", **arrays | {key: value})
+    if key != "timestamps":  # which those of other tools have not
+        with pytest.raises(MotionFileError, match="frames per second|betas"):
+            import_motion(tmp_path / "other.npz")
+
+
 def test_fingers_choose_the_body_with_fingers(tmp_path):
     arrays = in_file("z")
     body_joints = arrays["poses"][:, : 3 * 22]
