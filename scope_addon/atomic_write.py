@@ -43,22 +43,25 @@ def atomic_path(path: Path, durable: bool = True) -> Iterator[Path]:
     :raises OSError: the file cannot be created or renamed.
     :raises OutputError: ``path`` exists and is not a regular file.
     """
-    with complete_file(resolve_link(path), durable) as temporary:
+    with complete_file(resolve_link(path), durable, suffix=path.suffix) as temporary:
         yield temporary
 
 
 @contextmanager
-def complete_file(target: Path, durable: bool = True, mode: int | None = None) -> Iterator[Path]:
+def complete_file(
+    target: Path, durable: bool = True, mode: int | None = None, suffix: str = ""
+) -> Iterator[Path]:
     """Write a file as `atomic_path` does, but replace a link by it: for a name that nobody but this
     program gives, under which a link leads where nobody has asked to write.
 
     :param mode: permissions; None: those of any new file.
+    :param suffix: of the temporary file, by which exporters know the format; empty: the target's.
     :raises OSError: the file cannot be created or renamed.
     """
     # Short enough for the limit on names, even where a letter takes several bytes, and without
     # bytes that are not UTF-8, at which exporters fail.
     stem = target.stem[:40].encode("utf-8", "ignore").decode()
-    temporary = claim(target.parent, f".{stem}.", target.suffix.lower())
+    temporary = claim(target.parent, f".{stem}.", (suffix or target.suffix).lower())
     try:
         # The system decides on the permissions of a new file, by the process's umask or the
         # folder's list. To read the umask, one has to change it for a moment, in which other

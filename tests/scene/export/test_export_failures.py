@@ -131,6 +131,20 @@ def test_a_failing_writer_leaves_the_old_file_and_no_other(
     assert [s.name for s in bpy.data.scenes] == ["Scene"]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="links need a permission there")
+@pytest.mark.parametrize("suffix", SCENE_SUFFIXES)
+def test_a_link_may_lead_to_a_file_without_a_suffix(body, make_motion, tmp_path, suffix):
+    """As version control of large files makes them."""
+    stored = tmp_path / "objects" / "5f2a"
+    stored.parent.mkdir()
+    path = tmp_path / f"walk{suffix}"
+    path.symlink_to(stored)
+    export_motions([make_motion(body, 1)], body, path)
+    assert path.is_symlink()
+    assert stored.stat().st_size > 1000
+    assert list(stored.parent.iterdir()) == [stored]
+
+
 class StoppedExporter(bpy.types.Operator):
     """An exporter in Python that is interrupted with Ctrl-C."""
 
