@@ -16,7 +16,7 @@ from .untrusted.files import check_regular
 
 LARGEST_JSON_BYTES = 1_000_000
 # that every reader of JSON holds exactly; 10**400 fits no float (RFC 7493, 2.2)
-_LARGEST_WHOLE_NUMBER = 1 << 53
+LARGEST_WHOLE_NUMBER = 1 << 53
 
 
 def read_json_object(
@@ -102,6 +102,6 @@ def _article(noun: str) -> str:
 
 def _parse_whole_number(digits: str) -> int:
     number = int(digits)
-    if abs(number) > _LARGEST_WHOLE_NUMBER:
+    if abs(number) > LARGEST_WHOLE_NUMBER:
         raise ValueError(f"it has a number of {len(digits)} digits")
     return number

@@ -19,6 +19,7 @@ import numpy as np
 from ....solver.errors import InputError
 from ....solver.rotations import exp, log
 from ...arrays import Float64Array
+from ...json_file import LARGEST_WHOLE_NUMBER
 from ...untrusted.files import check_regular, in_one_line
 from ...untrusted.tables import read_tables
 
@@ -29,6 +30,7 @@ _YAML = (".yml", ".yaml")
 _PICKLE = (".pickle", ".pkl")
 SUFFIXES = (*_TOML, *_YAML, *_PICKLE)
 _LARGEST = 1 << 20  # bytes
+_DEEPEST = 100  # dots in a key; the time of Python's reader grows with their square
 _EASYMOCAP = ("intri", "extri")  # names of its files, of lenses and of places
 _MATRIX = "matrix"  # the key that a camera's table has, by any of its names
 # Cameras that are so many of the file's units apart are given in millimetres.
@@ -103,10 +105,30 @@ def camera_tables(path: Path, lens_names: tuple[str, ...]) -> Tables:
 
 def _of_toml(path: Path) -> Tables:
     """Return all tables of a TOML file; not all of them are cameras."""
+    text = _text(path)
+    if any(line.partition("=")[0].count(".") > _DEEPEST for line in text.splitlines()):
+        raise InputError(f"{path} is not a calibration: its tables are too deep")
     try:
-        return tomllib.loads(_text(path))
+        tables: Tables = _as_json_has_it(tomllib.loads(text))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not a TOML file ({in_one_line(error)})") from error
+    return tables
+
+
+def _as_json_has_it(value: Any) -> Any:
+    """Return a value of a TOML file without dates, which become texts.
+
+    :raises ValueError: a number is too large for floating point.
+    """
+    if isinstance(value, dict):
+        return {key: _as_json_has_it(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_as_json_has_it(each) for each in value]
+    if isinstance(value, int):
+        if abs(value) > LARGEST_WHOLE_NUMBER:
+            raise ValueError(f"it has a number of {len(str(abs(value)))} digits")
+        return value
+    return value if isinstance(value, str | float) else str(value)
 
 
 def _of_easymocap(path: Path) -> Tables:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.camera.calibration import read_calibration
+from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
 from scope.solver.errors import InputError
 
 POSE2SIM = """
@@ -61,3 +61,25 @@ def test_what_does_not_say_which_camera_it_is_is_refused(path: Path) -> None:
         read_calibration(path)
     with pytest.raises(InputError, match="does not exist"):
         read_calibration(path.with_name("none.toml"))
+
+
+@pytest.mark.parametrize("value", [f"1{'0' * 400}", f"[{'9' * 400}, 1, 1]", "[1979-05-27, 1, 1]"])
+@pytest.mark.parametrize("key", ["size", "matrix", "rotation", "translation"])
+def test_numbers_and_dates_that_json_has_not_are_refused(path: Path, key: str, value: str) -> None:
+    lines = path.read_text().splitlines()
+    changed = [f"{key} = {value}" if line.startswith(key) else line for line in lines]
+    path.write_text("\n".join(changed))
+
+    def read() -> None:
+        placed_cameras(path, ["cam_01", "cam_02"])
+        read_calibration(Path(f"{path}#cam_01"))
+
+    with pytest.raises(InputError):
+        read()
+
+
+def test_a_key_of_thousands_of_parts_is_refused_before_it_is_read(path: Path) -> None:
+    """Python's reader would take minutes."""
+    path.write_text("a." * 400_000 + "b = 1")
+    with pytest.raises(InputError, match="too deep"):
+        read_calibration(path)
