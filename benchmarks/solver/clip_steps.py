@@ -28,7 +28,7 @@ from ...solver.gauss_newton.terms import pack_priors
 from ...solver.motion.band import make_factor, solve_clip
 from ...solver.motion.problem import ClipProblem, MotionTerms
 from ...solver.motion.system import make_poses
-from ...solver.motion.views import pack_frames
+from ...solver.motion.views import View, pack_frames
 from ...solver.part import Pose
 from ...solver.tree import make_tree, with_fixed_shape
 from .clip_gradients import ConjugateGradients
@@ -67,7 +67,7 @@ def make_clip(
         Measurements() if first <= f < first + gap else added(p.measurements, f)
         for f in range(frames)
     ]
-    views, _ = pack_frames(tree, seen, packed)
+    views, _ = pack_frames(tree, [[View(m)] for m in seen], packed)
     poses = make_poses(tree, frames)
     for f in range(frames):
         swing = 0.1 * np.sin(3.0 * f / RATE)

@@ -43,7 +43,7 @@ from .levenberg_marquardt import Optimizer
 from .prior import MotionPrior, StandingPoints
 from .problem import ClipProblem, MotionTerms, linearize_half
 from .system import make_poses
-from .views import View, pack_frames, view_frames_of, views_of
+from .views import View, pack_frames, view_frames_of
 
 _FRAMES_FOR_TWO_THREADS = 16
 
@@ -123,9 +123,9 @@ def fit_motion(
     :raises ShapeError: there is no frame, or an array does not fit the body or the clip.
     :raises InvalidValueError: a value that no fit can use.
     """
-    frames = view_frames_of(body, frames)
-    clock = _checked_times(times, len(frames))
-    states = given_states(init, len(frames))
+    views = view_frames_of(body, frames)
+    clock = _checked_times(times, len(views))
+    states = given_states(init, len(views))
     if not as_number(window, "window") > 0.0:
         raise InvalidValueError(
             f"window must be a positive number of seconds, or infinite for one, but is {window}."
@@ -134,8 +134,6 @@ def fit_motion(
         raise InvalidValueError(
             f"The overlap of windows must lie in 0..{window} s, but is {overlap} s."
         )
-    for f, frame in enumerate(frames):
-        views_of(frame, f"frames[{f}]")
     check_type(motion, MotionPrior, "motion")
     # weights of their own are given by those who know how far apart their frames are
     if _weighs_by_default(motion):
@@ -150,7 +148,7 @@ def fit_motion(
     check_type(options, Options, "options")
     announce_compilation(linearize_half, optimize)
     tree = make_tree(body)
-    has_wrong_cameras = warn_of_cameras(frames, len(tree.point_part))
+    has_wrong_cameras = warn_of_cameras(views, len(tree.point_part))
     if stands is not None and has_names(stands.indices):
         stands = replace(
             stands,
@@ -159,15 +157,15 @@ def fit_motion(
     shape = _checked_shape(shape, tree, focal)
     if states is None:
         cold = MULTI if init is not None else None
-        states = _first_states(tree, frames, shape, priors, options, cold)
-    many = len(frames) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
+        states = _first_states(tree, views, shape, priors, options, cold)
+    many = len(views) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
     with ThreadPoolExecutor(2) if many else nullcontext() as pool:
         terms = MotionTerms.make(
             tree, clock, motion, StandingPoints() if stands is None else stands
         )
         clip = _Clip(
             tree,
-            frames,
+            views,
             terms,
             states,
             _Settings(priors, options, focal, focal_weight, covariance),
@@ -175,8 +173,8 @@ def fit_motion(
         )
         found = clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
     if by_default and not has_wrong_cameras:
-        chosen = some_of(frames)
-        seen = [first_view(views_of(frames[k], ""), len(tree.point_part)) for k in chosen]
+        chosen = some_of(views)
+        seen = [first_view(views[k], len(tree.point_part)) for k in chosen]
         warn_of_mirroring(
             [view.measurements for view in seen],
             [
@@ -223,7 +221,7 @@ def _checked_shape(shape: ArrayLike | None, tree: Tree, focal: bool) -> Array | 
 
 def _first_states(
     tree: Tree,
-    frames: Sequence[Measurements | Sequence[View]],
+    frames: Sequence[Sequence[View]],
     shape: Array | None,
     priors: Priors,
     options: Options,
@@ -259,7 +257,7 @@ class _Clip:
     def __init__(
         self,
         tree: Tree,
-        frames: Sequence[Measurements | Sequence[View]],
+        frames: Sequence[Sequence[View]],
         motion: MotionTerms,
         init: Sequence[State],
         settings: _Settings,
@@ -313,11 +311,8 @@ class _Clip:
         settings = self.settings
         P = tree.shape
         priors = settings.priors if P else _without_shape(settings.priors)
-        first = window.frames.start
         frames = self.frames[window.frames]
-        views, self.counts[window.frames] = pack_frames(
-            tree, frames, pack_priors(tree, priors), first
-        )
+        views, self.counts[window.frames] = pack_frames(tree, frames, pack_priors(tree, priors))
         poses = make_poses(tree, len(frames))
         poses.R[:, 0] = self.R[window.frames, 0]
         poses.t[:, 0] = self.t[window.frames, 0]

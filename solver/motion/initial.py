@@ -28,14 +28,13 @@ _LEAST_SHARE = 1 / 3  # of one camera's points that must be triangulated, or tha
 
 def initial_states(
     tree: Tree,
-    frames: Sequence[Measurements | Sequence[View]],
+    frames: Sequence[Sequence[View]],
     priors: Priors,
     options: Options,
     cold: Literal["multi"] | None = None,
 ) -> list[State]:
     """Return each frame's state in the world's axes, of one shape; `cold` as of `fit_in_order`."""
-    views = [[View(frame)] if isinstance(frame, Measurements) else list(frame) for frame in frames]
-    chosen = [first_view(v, len(tree.point_part)) for v in views]
+    chosen = [first_view(views, len(tree.point_part)) for views in frames]
     cameras = [_camera_of(view) for view in chosen]
     states = fit_in_order(
         tree, [view.measurements for view in chosen], priors, options, None, cameras, cold
@@ -113,7 +112,7 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
     np.add.at(b, indices, (weight * value)[:, None] * row)
 
 
-def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]], points: int) -> bool:
+def warn_of_cameras(frames: Sequence[Sequence[View]], points: int) -> bool:
     """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
     R_camera_world is transposed, its place replaced by t_camera_world, its whole pose inverted, or
     its pixels are mirrored or swapped; with `ScopeWarning`.
@@ -121,7 +120,7 @@ def warn_of_cameras(frames: Sequence[Measurements | Sequence[View]], points: int
     :param points: how many points the body has, joints included.
     :return: whether there was something to tell.
     """
-    views = next((v for v in frames if not isinstance(v, Measurements) and len(v) > 1), None)
+    views = next((v for v in frames if len(v) > 1), None)
     if views is None or any(view.measurements.keypoints2d is None for view in views):
         return False
     given = _median_error(views, points)

@@ -126,18 +126,13 @@ def terms_of(views: PackedViews, v: int) -> Terms:
 
 
 def pack_frames(
-    tree: Tree,
-    frames: Sequence[Measurements | Sequence[View]],
-    priors: PackedPriors,
-    first: int = 0,
+    tree: Tree, frames: Sequence[Sequence[View]], priors: PackedPriors
 ) -> tuple[PackedViews, Array]:
     """Return the terms of frames, and how many measurements of each are usable. Each frame's first
     view has the priors.
 
-    :param first: number of the first frame, for messages.
     :raises ShapeError: an array does not fit the body.
-    :raises InvalidValueError: a value that no fit can use, or a frame that is neither measurements
-        nor views.
+    :raises InvalidValueError: a value that no fit can use.
     """
     without = PackedPriors(empty_tables(), priors.shape_mean, priors.shape_information)
     layout: Layout | None = None
@@ -146,8 +141,7 @@ def pack_frames(
     seen: list[Terms] = []
     cameras = []
     for f, frame in enumerate(frames):
-        views = views_of(frame, f"frames[{first + f}]") or [View(Measurements())]
-        for k, view in enumerate(views):
+        for k, view in enumerate(frame or [View(Measurements())]):
             terms, slots, layout = fill_terms(
                 tree, view.measurements, without if k else priors, layout
             )
@@ -205,7 +199,7 @@ def _packed(
     )
 
 
-def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
+def _views_of(frame: Any, name: str) -> Sequence[View]:
     """Return what cameras measured of a frame, checked: measurements alone are the view of a camera
     at the origin.
 
@@ -233,16 +227,19 @@ def views_of(frame: Measurements | Sequence[View], name: str) -> Sequence[View]:
 
 def view_frames_of(
     body: object, frames: Sequence[Measurements | Sequence[View]] | Measurements | Sequence[View]
-) -> Sequence[Measurements | Sequence[View]]:
-    """Return what was measured of each frame, with points as numbers, however it was given: see
-    `fit_motion`.
+) -> list[list[View]]:
+    """Return the views of each frame, checked and with points as numbers, however they were given:
+    see `fit_motion`.
 
-    :raises ShapeError: the arrays of a clip, or of its cameras, have different numbers of frames.
-    :raises InvalidValueError: the body has no point of a name, or `frames` is no list.
+    :raises ShapeError: the arrays of a clip, or of its cameras, have different numbers of frames,
+        or a camera's rotation or position has another shape.
+    :raises InvalidValueError: the body has no point of a name, `frames` is no list, a frame is
+        neither measurements nor views, or a camera's rotation is none.
     """
     if isinstance(frames, Measurements):
-        return frames_of(body, frames, "frames")
+        return [[View(m)] for m in frames_of(body, frames, "frames")]
     check_list(frames, "frames", "frame")
+    by_frame: Sequence[Any] = frames
     if len(frames) and all(isinstance(view, View) for view in frames):
         cameras = [
             [replace(view, measurements=m) for m in frames_of(body, view.measurements, "frames")]
@@ -252,21 +249,13 @@ def view_frames_of(
         lengths = [len(camera) for camera in cameras]
         if len(set(lengths)) > 1:
             raise ShapeError(f"Cameras must have the same number of frames, but have {lengths}.")
-        return [list(views) for views in zip(*cameras, strict=True)]
-    return [_numbered_frame(body, frame) for frame in frames]
-
-
-def _numbered_frame(body: object, frame: Any) -> Any:
-    """Return what was measured of one frame with points as numbers; anything else as it is."""
-    if isinstance(frame, Measurements):
-        return numbered(body, frame)
-    if not isinstance(frame, (list, tuple)):
-        return frame
+        by_frame = list(zip(*cameras, strict=True))
     return [
-        replace(view, measurements=numbered(body, view.measurements))
-        if isinstance(view, View) and isinstance(view.measurements, Measurements)
-        else view
-        for view in frame
+        [
+            replace(view, measurements=numbered(body, view.measurements))
+            for view in _views_of(frame, f"frames[{f}]")
+        ]
+        for f, frame in enumerate(by_frame)
     ]
 
 

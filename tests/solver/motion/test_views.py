@@ -16,7 +16,7 @@ from scope.solver import (
     rotations,
 )
 from scope.solver.gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, make_terms, pack_priors
-from scope.solver.motion.views import pack_frames, terms_of
+from scope.solver.motion.views import pack_frames, terms_of, view_frames_of
 
 from ..synthetic import INTRINSICS, random_body
 
@@ -54,7 +54,7 @@ def test_the_terms_of_every_view_are_those_it_has_alone():
     pair = [
         View(seen(rng, sets[k]), rotations.exp(np.array([0.1, k, 0.0])), np.ones(3)) for k in (0, 2)
     ]
-    frames = [*single, pair, []]
+    frames = [*([View(m)] for m in single), pair, []]
     views, counts = pack_frames(tree, frames, pack_priors(tree, priors))
     flat = (
         [(m, priors) for m in single]
@@ -82,7 +82,7 @@ def test_the_terms_of_every_view_are_those_it_has_alone():
 
 
 def test_frames_that_are_neither_measurements_nor_views_are_refused():
-    tree = make_tree(random_body(np.random.default_rng(0), K, P, M))
-    for frame, name in (([Measurements()], r"frames\[7\]\[0\]"), (3, r"frames\[7\]")):
+    body = random_body(np.random.default_rng(0), K, P, M)
+    for frame, name in (([Measurements()], r"frames\[1\]\[0\]"), (3, r"frames\[1\]")):
         with pytest.raises(InvalidValueError, match=name):
-            pack_frames(tree, [frame], pack_priors(tree, Priors()), 7)
+            view_frames_of(body, [Measurements(), frame])
