@@ -15,10 +15,9 @@ from ..gauss_newton.optimizer import MIN_DAMPING, SeveralFrames
 from ..gauss_newton.recursion import move
 from ..kernel import kernel
 from ..part import Array, Blocks, Pose
-from ..tree import Tree
 from .band import eliminate_clip, make_factor, solve_clip
 from .problem import ClipProblem
-from .system import ClipSystem, make_poses, pose_of
+from .system import make_poses, pose_of
 
 
 @register_jitable
@@ -81,40 +80,6 @@ def _apply(tree, poses, curvature, share, added, system) -> None:  # type: ignor
                     k += 1
 
 
-class ClipCurvature:
-    """The estimate at the current poses of T frames."""
-
-    def __init__(self, tree: Tree, frames: int, on: bool) -> None:
-        """Begin with nothing; if it is not `on`, it stays at that."""
-        self._tree = tree
-        self._on = on
-        parts = len(tree.parents)
-        S, H = np.zeros((2, frames, parts, 3, 3))
-        self._curvature = Curvature(S, H, np.zeros((frames, parts, 3)))
-        self._added = np.zeros((frames, parts, 6))
-
-    def set_current(self, poses: Pose, joints: Blocks) -> None:
-        """Take over the joints' own Hessians and gradients at `poses`: blocks with a leading
-        dimension of frames.
-        """
-        if self._on:
-            _set_current(self._tree, poses, joints, self._curvature, self._added)
-
-    def update(self, poses: Pose, d: Array, trial: Pose, joints: Blocks, accepted: bool) -> None:
-        """Update by the step d (T, n) from the current poses to `trial`, which `joints` belong
-        to.
-        """
-        if self._on:
-            _update(self._tree, poses, d, trial, joints, accepted, self._curvature)
-
-    def apply(self, poses: Pose, system: ClipSystem, wanted: bool = True) -> None:
-        """Add what may be added of S to the system of the current poses, or take away what was
-        added.
-        """
-        if self._on:
-            _apply(self._tree, poses, self._curvature, float(wanted), self._added, system)
-
-
 @kernel
 def retract_clip(tree, poses, d, dg, trial) -> None:  # type: ignore[no-untyped-def]
     """Write the poses moved by d (T, n) and dg to `trial`: see `move`."""
@@ -141,18 +106,32 @@ class Optimizer(SeveralFrames):
         self._other = problem.make_system()
         self.factor = make_factor(self.system)
         self.costs = dict[str, float]()
+        shape = problem.frames, len(problem.tree.parents)
+        S, H = np.zeros((2, *shape, 3, 3))
+        self._curvature = Curvature(S, H, np.zeros((*shape, 3)))
+        self._added = np.zeros((*shape, 6))
 
     def _begin(self, s: int) -> float:
         cost = self.problem.linearize(s, self.poses, self.system)
         self.costs = self.problem.costs
-        self._learned = ClipCurvature(
-            self.problem.tree, self.problem.frames, self.settings.curvature
-        )
-        self._learned.set_current(self.poses, self.problem.joints)
+        self._curvature.S[:] = 0.0
+        self._set_current()
         return cost
 
+    def _set_current(self) -> None:
+        """Take over the joints' own Hessians and gradients at the current poses."""
+        if self.settings.curvature:
+            joints = self.problem.joints
+            _set_current(self.problem.tree, self.poses, joints, self._curvature, self._added)
+
+    def _apply(self, share: float) -> None:
+        """Add that share of what may be added of S to the current system, instead of what was."""
+        if self.settings.curvature:
+            tree = self.problem.tree
+            _apply(tree, self.poses, self._curvature, share, self._added, self.system)
+
     def _step(self, s: int, damping: float) -> float:
-        self._learned.apply(self.poses, self.system)
+        self._apply(1.0)
         root_scale = self.settings.root_scale
         return solve_clip(
             self.problem.tree, self.system, damping, root_scale, self.factor, self.pool
@@ -163,17 +142,21 @@ class Optimizer(SeveralFrames):
         return self.problem.linearize(s, self._trial, self._other)
 
     def _conclude(self, s: int, cost: float, accepted: bool) -> None:
-        joints = self.problem.joints
-        if np.isfinite(cost):
-            self._learned.update(self.poses, self.factor.d, self._trial, joints, accepted)
+        if self.settings.curvature and np.isfinite(cost):
+            problem = self.problem
+            step = self.factor.d
+            _update(
+                problem.tree, self.poses, step, self._trial, problem.joints, accepted,
+                self._curvature,
+            )  # fmt: skip
         if accepted:
             self.costs = self.problem.costs
             self.poses, self._trial = self._trial, self.poses
             self.system, self._other = self._other, self.system
-            self._learned.set_current(self.poses, joints)
+            self._set_current()
 
     def _end(self) -> None:
-        self._learned.apply(self.poses, self.system, wanted=False)
+        self._apply(0.0)
 
     def information(self) -> Array:
         """Return the information (G, G) of the global columns with all poses eliminated, priors
