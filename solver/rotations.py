@@ -222,14 +222,7 @@ def left_jacobian_inverse(phi: ArrayLike) -> Array:
 
     :raises ShapeError: the vectors have another shape.
     """
-    phi = as_arrays(phi, (3,), "A rotation vector")
-    s = np.sum(phi * phi, axis=-1)[..., None, None]
-    small = s < 1e-2
-    h = 0.5 * np.sqrt(np.where(small, 1.0, s))
-    series = (1.0 + s * (1.0 / 60.0 + s * (1.0 / 2520.0 + s / 100800.0))) / 12.0
-    k = np.where(small, series, (1.0 - h / np.tan(h)) / np.where(small, 1.0, s))
-    cross = hat(phi)
-    return np.eye(3) - 0.5 * cross + k * (cross @ cross)
+    return np.linalg.inv(left_jacobian(phi))
 
 
 def quaternion_from_matrix(rotation: ArrayLike) -> Array:
