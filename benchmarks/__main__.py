@@ -95,15 +95,10 @@ def _real_frames(quick: bool) -> dict[str, Any]:
     clips = frames.load_clips(names)
     rows = []
     figures = {}
-    settings = [(tolerance, 0.0) for tolerance in frames.TOLERANCES] + [(frames.REPORTED, 0.9)]
-    for tolerance, triggs in settings:
-        for kind, outcome in frames.measure(
-            clips, tolerance, triggs, every=5 if quick else 1
-        ).items():
-            rows.append(
-                {"kind": kind, "tolerance": tolerance, "triggs": triggs, **outcome.summary()}
-            )
-            if (tolerance, triggs) == (frames.REPORTED, 0.0):
+    for tolerance in frames.TOLERANCES:
+        for kind, outcome in frames.measure(clips, tolerance, every=5 if quick else 1).items():
+            rows.append({"kind": kind, "tolerance": tolerance, **outcome.summary()})
+            if tolerance == frames.REPORTED:
                 figures[f"{kind}_frame_ms"] = rows[-1]["milliseconds"]
     print(report.frame_lines(rows), end="\n\n", flush=True)
     batch = frames.throughput(clips)

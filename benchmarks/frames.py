@@ -152,11 +152,11 @@ def _read(path: Path) -> Clip:
     return Clip(frames, arrays["joint_weights"])
 
 
-def capture_options(cold: bool, tolerance: float, triggs: float = 0.0, limit: int = 50) -> Options:
+def capture_options(cold: bool, tolerance: float, limit: int = 50) -> Options:
     """Return the capture's options with another end of the last stage."""
     stages = (fit_weights.cold_stages if cold else fit_weights.warm_stages)(fit_weights.WEIGHTS)
     last: Stage = replace(stages[-1], tolerance=tolerance, max_iterations=limit)
-    return replace(fit_weights.ROBUST, stages=(*stages[:-1], last), triggs=triggs)
+    return replace(fit_weights.ROBUST, stages=(*stages[:-1], last))
 
 
 def capture_priors(body: Body, clip: Clip) -> Priors:
@@ -186,16 +186,14 @@ class Outcome:
         }
 
 
-def measure(
-    clips: Sequence[Clip], tolerance: float, triggs: float = 0.0, every: int = 1
-) -> dict[str, Outcome]:
+def measure(clips: Sequence[Clip], tolerance: float, every: int = 1) -> dict[str, Outcome]:
     """Fit every frame cold and warm; return the outcomes by kind. `every` k-th frame is judged, all
     are followed.
     """
     body = load_body("scope")
     rows: dict[str, list[tuple[Any, ...]]] = {"cold": [], "warm": []}
-    options = {kind: capture_options(kind == "cold", tolerance, triggs) for kind in rows}
-    tight = {kind: capture_options(kind == "cold", 1e-12, triggs, 1000) for kind in rows}
+    options = {kind: capture_options(kind == "cold", tolerance) for kind in rows}
+    tight = {kind: capture_options(kind == "cold", 1e-12, 1000) for kind in rows}
     for clip in clips:
         solver = FrameSolver(body, capture_priors(body, clip))
         last: State | None = None

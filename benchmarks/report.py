@@ -139,7 +139,6 @@ def frame_lines(convergence: list[dict[str, Any]]) -> str:
     keys = (
         "kind",
         "tolerance",
-        "triggs",
         "frames",
         "milliseconds",
         "iterations",

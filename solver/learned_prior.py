@@ -62,23 +62,18 @@ class JointPrior:
         return row
 
     def tables(
-        self,
-        joint_names: Sequence[str],
-        weights: Mapping[str, float] | None = None,
-        log_det: float = 0.0,
+        self, joint_names: Sequence[str], weights: Mapping[str, float] | None = None
     ) -> tuple[Array, Array]:
         """Return the tables of residuals/joint_flow.py for the joints of a body (K+1,) that have a
         prior.
 
         :param weights: w by joint name, 1 for joints that are missing.
-        :param log_det: h, one for the density's maximum, zero for the paper's 1/2 |z|^2.
         :return: (n, INTS) int64 and (n, FLOATS) float64.
-        :raises InvalidValueError: a weight or `log_det` is negative or not a number, or
-            `joint_names` is not a list of strings.
+        :raises InvalidValueError: a weight is negative or not a number, or `joint_names` is not a
+            list of strings.
         """
         check_list(joint_names, "joint_names", "part")
         check_type(weights, (Mapping, type(None)), "weights")
-        check_weight(log_det, "log_det")
         for name, weight in (weights or {}).items():
             check_weight(weight, f"The weight of {name!r}")
         for k, joint in enumerate(joint_names):
@@ -90,7 +85,7 @@ class JointPrior:
         parameters = np.array([self.of(name) for _, name in rows]).reshape(
             len(rows), joint_flow.SIZE
         )
-        return joint_flow.pack(np.array([i for i, _ in rows], np.int64), parameters, w, log_det)
+        return joint_flow.pack(np.array([i for i, _ in rows], np.int64), parameters, w)
 
     def sample(self, joint: str, count: int, rng: np.random.Generator) -> Array:
         """Return states (count, 3, 3) of a joint drawn from its prior.

@@ -161,8 +161,7 @@ class Options:
 
     weights: of the default schedule, whose earlier stages scale them; `Weights()` if None.
     robust_*: Geman-McClure sigma in the square of each residual's unit; infinity turns the kernel
-    off. triggs: 0 is first-order reweighting; up to 1, the second-order correction clamped at that
-    share. damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians;
+    off. damping: Levenberg-Marquardt lambda at the start, on joint rotations in radians;
     root_length: metres of pelvis motion that are damped like one radian. stages: replaces the
     default schedule, COLD_STAGES or, where an initial state is given, WARM_STAGES. curvature:
     estimate from the steps taken what Gauss-Newton leaves out of the joints' Hessians
@@ -175,7 +174,6 @@ class Options:
     robust_keypoints2d: float = 0.01
     robust_keypoints3d: float = 0.1
     robust_orientation_field: float = 1.0
-    triggs: float = 0.0
     damping: float = 1.0
     root_length: float = 0.3
     curvature: bool = True
@@ -195,8 +193,6 @@ class Options:
                 )
         for name in ("robust_keypoints2d", "robust_keypoints3d", "robust_orientation_field"):
             check_robust(getattr(self, name), f"Options.{name}")
-        if not 0.0 <= as_number(self.triggs, "Options.triggs") <= 1.0:
-            raise InvalidValueError(f"Options.triggs must lie in 0..1, but is {self.triggs}.")
         for name in ("curvature", "report"):
             check_switch(getattr(self, name), f"Options.{name}")
         check_type(self.stages, (Sequence, type(None)), "Options.stages")
@@ -316,20 +312,16 @@ class Priors:
         return mean, 0.5 * (information + information.T)
 
 
-def default_priors(body: object, log_det: float = 0.0) -> Priors:
+def default_priors(body: object) -> Priors:
     """Return what is known of any person: the learned prior of the joints that `body` names as SMPL
     does, the limits of its knees and elbows, and the population's shape. Joints without a learned
     prior are drawn to the rest pose.
 
     :param body: `joint_names` (K+1,) are all that is read of it; without any, only the shape is
         known.
-    :param log_det: 0 for the learned prior's 1/2 |z|^2, as in the paper; 1 for its whole -log p
-        (residuals/joint_flow.py).
     :raises ModelFileError: the prior cannot be read.
-    :raises InvalidValueError: `log_det` is negative or not a number, or `joint_names` is not a
-        list.
+    :raises InvalidValueError: `joint_names` is not a list.
     """
-    check_weight(log_det, "log_det")
     names = getattr(body, "joint_names", ())
     check_list(names, "joint_names of the body", "part")
     names = list(names)
@@ -338,4 +330,4 @@ def default_priors(body: object, log_det: float = 0.0) -> Priors:
         return Priors(limits=limits)
     prior = load_joint_prior()
     unknown = np.array([name not in prior.names for name in names[1:]], dtype=np.float64)
-    return Priors(joint_weights=unknown, limits=limits, flow=prior.tables(names, log_det=log_det))
+    return Priors(joint_weights=unknown, limits=limits, flow=prior.tables(names))

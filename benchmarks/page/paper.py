@@ -33,7 +33,11 @@ def stated_table(figures: Mapping[str, Any]) -> Markup:
     :param figures: of ``bench solver``.
     """
     rows: list[Sequence[str]] = []
-    converged = {row["kind"]: row for row in _frames(figures) if row["tolerance"] == REPORTED}
+    converged = {
+        row["kind"]: row
+        for row in (figures.get("convergence") or [])
+        if row["tolerance"] == REPORTED
+    }
     if converged:
         found = ", ".join(f"{row['milliseconds']:.2f} {kind}" for kind, row in converged.items())
         rows.append(
@@ -60,7 +64,7 @@ def convergence_plot(figures: Mapping[str, Any]) -> Markup:
     """Return milliseconds of a frame by the relative decrease at which it stops, below the paper's
     time; or nothing.
     """
-    rows = _frames(figures)
+    rows = figures.get("convergence") or []
     curves = []
     for n, (kind, name) in enumerate(_KINDS.items()):
         chosen = sorted(
@@ -93,8 +97,3 @@ def convergence_plot(figures: Mapping[str, Any]) -> Markup:
         timed=False,
     )
     return page.plot_figure(title, svg, {curve.name: curve.color for curve in curves})
-
-
-def _frames(figures: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the rows of real frames with the robust kernel as the capture has it."""
-    return [row for row in figures.get("convergence") or [] if not row["triggs"]]

@@ -189,7 +189,6 @@ class ConjugateGradients:
                 tree,
                 terms_of(problem.views, f),
                 stage,
-                0.0,
                 self.poses[f],
                 self.blocks[f],
                 self.work[f].scratch,

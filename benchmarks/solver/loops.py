@@ -32,7 +32,7 @@ def steps(  # type: ignore[no-untyped-def]
     total = 0.0
     for k in range(count):
         put(bank, k, pose)
-        total += linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
+        total += linearize(tree, terms, stage, pose, blocks, work.scratch)
         total += step(tree, pose, blocks, damping, root_scale, work)
     return total
 
@@ -57,13 +57,13 @@ def iterations(  # type: ignore[no-untyped-def]
     rejected.
     """
     put(bank, 0, pose)
-    total = linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
+    total = linearize(tree, terms, stage, pose, blocks, work.scratch)
     for k in range(count):
         put(bank, k, pose)
         apply_correction(tree, pose, blocks, curvature, 1.0)
         total += step(tree, pose, blocks, damping, root_scale, work)
         retract(tree, pose, work, trial)
-        total += linearize(tree, terms, stage, 0.0, trial, other, work.scratch)
+        total += linearize(tree, terms, stage, trial, other, work.scratch)
         update(tree, pose, work.u, trial, other, True, curvature)
         set_current(tree, trial, other, curvature)
     return total

@@ -321,7 +321,6 @@ class _Joint(SeveralFrames):
                 self.tree,
                 f.terms,
                 self.stages[s],
-                self.settings.triggs,
                 pose,
                 f.blocks,
                 f.work.scratch,
@@ -366,9 +365,8 @@ class _Joint(SeveralFrames):
         """Return the frames' results."""
         out = []
         last = self.stages[-1]
-        triggs = self.settings.triggs
         for f in self.frames:
-            f.cost = linearize(self.tree, f.terms, last, triggs, f.pose, f.blocks, f.work.scratch)
+            f.cost = linearize(self.tree, f.terms, last, f.pose, f.blocks, f.work.scratch)
             eliminate(self.tree, f.pose, f.blocks, MIN_DAMPING, self.settings.root_scale, f.work)
             shares = self._shares(f) if self.report else {}
             seen, measurements = usable(f.terms)
@@ -394,7 +392,6 @@ class _Joint(SeveralFrames):
             self.tree,
             f.terms,
             self.stages[-1],
-            self.settings.triggs,
             f.pose,
             f.blocks,
             f.work.scratch,

@@ -159,7 +159,6 @@ class _Problem:
         self.state = state
         self.priors = default_priors(body) if priors is None else priors
         self.tree, self.terms, self.stage = problem_of(body, measurements, self.priors, options)
-        self.triggs = options.triggs
 
     def hessian(self) -> Array:
         """Return H (n, n)."""
@@ -173,7 +172,7 @@ class _Problem:
         :raises InvalidValueError: there is none, because an unknown is not fixed, or the cost does
             not rise in every direction.
         """
-        step = preconditioner(self.tree, self.terms, self.stage, self.state, self.triggs)
+        step = preconditioner(self.tree, self.terms, self.stage, self.state)
         found: Array = np.zeros(len(loss))
         rest = loss
         direction = step(rest)
@@ -246,10 +245,10 @@ class _Problem:
         alone = np.zeros_like(self.stage)
         alone[1] = self.stage[1]
         alone[0, column] = 1.0
-        return gradient(self.tree, self.terms, alone, self.state, self.triggs)
+        return gradient(self.tree, self.terms, alone, self.state)
 
     def _gradient_at(self, state: State) -> Array:
-        return gradient(self.tree, self.terms, self.stage, state, self.triggs)
+        return gradient(self.tree, self.terms, self.stage, state)
 
     def _gradient_of(
         self, kind: str, given: Any, of: str, values: Array, k: int, step: float
@@ -262,7 +261,7 @@ class _Problem:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what is unlikely was told of the measurements
             terms = make_terms(self.tree, measurements, self.priors)
-        return gradient(self.tree, terms, self.stage, self.state, self.triggs)
+        return gradient(self.tree, terms, self.stage, self.state)
 
 
 def _motion_of_joints(tree: Tree, state: State) -> Array:

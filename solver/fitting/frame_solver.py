@@ -199,9 +199,7 @@ class FrameSolver:
         information = work.C[:P, :P] - last[0, SHAPE_PRIOR] * terms.shape_information[:P, :P]
         shares = {}
         if report:
-            shares = cost_by_term(
-                tree, terms, last, settings.triggs, found, memory.blocks[0], work.scratch
-            )
+            shares = cost_by_term(tree, terms, last, found, memory.blocks[0], work.scratch)
         return Fit(
             state=State.from_pose(tree, found),
             R_camera_part=found.R.copy(),
@@ -268,7 +266,6 @@ def cost_by_term(
     tree: Tree,
     terms: Terms,
     stage: NDArray[np.float64],
-    triggs: float,
     pose: Pose,
     blocks: Blocks,
     scratch: NDArray[np.float64],
@@ -291,5 +288,5 @@ def cost_by_term(
         if stage[0, column] > 0.0:
             alone = stage.copy()
             alone[0] = np.where(np.arange(len(stage[0])) == column, stage[0], 0.0)
-            found[name] = float(linearize(tree, terms, alone, triggs, pose, blocks, scratch))
+            found[name] = float(linearize(tree, terms, alone, pose, blocks, scratch))
     return found

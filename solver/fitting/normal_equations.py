@@ -70,7 +70,7 @@ def linearize(
     :raises InvalidValueError: a value that no fit can use.
     """
     tree, terms, stage = problem_of(body, measurements, priors, options)
-    return equations(tree, terms, stage, state, options.triggs)
+    return equations(tree, terms, stage, state)
 
 
 def gauss_newton_step(
@@ -93,7 +93,7 @@ def gauss_newton_step(
     """
     check_weight(damping, "damping")
     tree, terms, stage = problem_of(body, measurements, priors, options)
-    _, pose, blocks, work = _linearized(tree, terms, stage, state, options.triggs)
+    _, pose, blocks, work = _linearized(tree, terms, stage, state)
     decrease = step(tree, pose, blocks, float(damping), 1.0 / options.root_length, work)
     direction = _direction(tree, work)
     return GaussNewtonStep(direction, float(decrease), moved(tree, state, direction))
@@ -117,23 +117,21 @@ def problem_of(
     return tree, terms, options.stage_table([last])[0][0]
 
 
-def equations(
-    tree: Tree, terms: Terms, stage: Array, state: State, triggs: float = 0.0
-) -> NormalEquations:
+def equations(tree: Tree, terms: Terms, stage: Array, state: State) -> NormalEquations:
     """Return the normal equations at a state.
 
     :param stage: (2, C) a row of weights and a row of 1/sigma, as of `Options.stage_table`.
     """
-    cost, pose, blocks, _ = _linearized(tree, terms, stage, state, triggs)
+    cost, pose, blocks, _ = _linearized(tree, terms, stage, state)
     return NormalEquations(cost, *_dense(tree, pose, blocks))
 
 
-def gradient(tree: Tree, terms: Terms, stage: Array, state: State, triggs: float = 0.0) -> Array:
+def gradient(tree: Tree, terms: Terms, stage: Array, state: State) -> Array:
     """Return g (n,) of `equations` alone, in O(K) + O(N).
 
     The force and moment about the pelvis on a joint are those on all parts below it.
     """
-    _, pose, blocks, _ = _linearized(tree, terms, stage, state, triggs)
+    _, pose, blocks, _ = _linearized(tree, terms, stage, state)
     forces = blocks.A[:, :, GRADIENT].copy()
     for i in range(len(tree.parents) - 1, 0, -1):
         forces[tree.parents[i]] += forces[i]
@@ -143,10 +141,10 @@ def gradient(tree: Tree, terms: Terms, stage: Array, state: State, triggs: float
 
 
 def preconditioner(
-    tree: Tree, terms: Terms, stage: Array, state: State, triggs: float = 0.0
+    tree: Tree, terms: Terms, stage: Array, state: State
 ) -> Callable[[Array], Array]:
     """Return the function that solves (H + Lambda) d = b (n,) by the recursion, hardly damped."""
-    _, pose, blocks, work = _linearized(tree, terms, stage, state, triggs)
+    _, pose, blocks, work = _linearized(tree, terms, stage, state)
     end = 3 + 3 * len(tree.parents)
 
     def solve(b: Array) -> Array:
@@ -166,13 +164,13 @@ def _direction(tree: Tree, work: Workspace) -> Array:
 
 
 def _linearized(
-    tree: Tree, terms: Terms, stage: Array, state: State, triggs: float
+    tree: Tree, terms: Terms, stage: Array, state: State
 ) -> tuple[float, Pose, Blocks, Workspace]:
     """Return the cost, the placed parts and the blocks at a state, and memory for a step."""
     pose = state.pose(tree)
     blocks = make_blocks(tree)
     work = make_workspace(tree)
-    cost = write_blocks(tree, terms, stage, float(triggs), pose, blocks, work.scratch)
+    cost = write_blocks(tree, terms, stage, pose, blocks, work.scratch)
     raise_failure()
     return float(cost), pose, blocks, work
 

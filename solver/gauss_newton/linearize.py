@@ -242,12 +242,12 @@ def point_at_rest(terms, beta, j, P):  # type: ignore[no-untyped-def]
 def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def]
     """Evaluate what was measured of slot j, at e (3) from the origin t (3) of its part.
 
-    settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
+    settings: weight and 1/sigma of each kind of term, focal scale.
     Return the cost so far; W = GᵀG (6), [e]x W (9) and Gᵀr (3) of the position terms; with the
     direction, W, [e]x W and Gᵀr of all; and Gᵀg (3), gᵀg and gᵀr of the focal length, g = dr/dlog
     f.
     """
-    w2, k2, w3, k3, wd, kd, focal, triggs = settings
+    w2, k2, w3, k3, wd, kd, focal = settings
     flags = terms.flags[j]
     p = _add3(e, t)
     w = _ZERO6
@@ -257,11 +257,11 @@ def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def
     fr = 0.0
     if flags & HAS_2D:
         q = terms.image[j]
-        more, w, f, h, ff, fr = keypoint2d.term(p, (q[0], q[1]), focal, w2 * q[2], k2, triggs)
+        more, w, f, h, ff, fr = keypoint2d.term(p, (q[0], q[1]), focal, w2 * q[2], k2)
         cost += more
     if flags & HAS_3D:
         q = terms.point[j]
-        more, w_more, f_more = keypoint3d.term(p, (q[0], q[1], q[2]), w3 * q[3], k3, triggs)
+        more, w_more, f_more = keypoint3d.term(p, (q[0], q[1], q[2]), w3 * q[3], k3)
         cost += more
         w = _add6(w, w_more)
         f = _add3(f, f_more)
@@ -271,7 +271,7 @@ def _point_terms(terms, j, e, t, settings, cost):  # type: ignore[no-untyped-def
     f_all = f
     if flags & HAS_DIRECTION:
         q = terms.direction[j]
-        more, w_more, f_more = orientation_field.term(e, (q[0], q[1], q[2]), wd * q[3], kd, triggs)
+        more, w_more, f_more = orientation_field.term(e, (q[0], q[1], q[2]), wd * q[3], kd)
         cost += more
         w_all = _add6(w, w_more)
         f_all = _add3(f, f_more)
@@ -285,7 +285,7 @@ def _add_points(  # type: ignore[no-untyped-def]
 ):
     """Add the terms of part i's points to the cost, N, C and c.
 
-    settings: weight and 1/sigma of each kind of term, focal scale, share of the second-order terms.
+    settings: weight and 1/sigma of each kind of term, focal scale.
     Return the cost and sums over the points about the part's origin: W (6), [e]x W (9), [e]x W_all
     [e]xᵀ (6), the force (3) and its moment (3), and those of the focal length's column.
     """
@@ -346,7 +346,6 @@ def linearize(
     tree: Tree,
     terms: Terms,
     stage: Array,
-    triggs: float,
     pose: Pose,
     blocks: Blocks,
     scratch: Array,
@@ -361,7 +360,7 @@ def linearize(
     inv_sigma = stage[1]
     settings = (
         weights[KEYPOINT2D], inv_sigma[KEYPOINT2D], weights[KEYPOINT3D], inv_sigma[KEYPOINT3D],
-        weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD], np.exp(pose.log_focal[0]), triggs,
+        weights[ORIENTATION_FIELD], inv_sigma[ORIENTATION_FIELD], np.exp(pose.log_focal[0]),
     )  # fmt: skip
     clear_blocks(blocks)
     ox = pose.t[0, 0]

@@ -41,7 +41,6 @@ class Settings(NamedTuple):
     stages: NDArray[np.float64]  # (S, 2, weights): weights and 1/sigma in the registry's order
     tolerances: NDArray[np.float64]  # (S,) relative decrease at which a stage ends
     limits: NDArray[np.int64]  # (S,) iterations
-    triggs: float
     damping: float  # at the start of each stage
     root_scale: float  # radians per metre of the pelvis's motion
     curvature: bool  # whether curvature.py takes part
@@ -53,10 +52,9 @@ def make_settings(options: Options, stages: Sequence[Stage]) -> Settings:
     :raises ShapeError: when a weight, a robust scale or a tolerance cannot be used.
     """
     table = options.stage_table(stages)
-    triggs = float(options.triggs)
     damping = float(options.damping)
     root_scale = 1.0 / options.root_length
-    return Settings(*table, triggs, damping, root_scale, bool(options.curvature))
+    return Settings(*table, damping, root_scale, bool(options.curvature))
 
 
 class Memory(NamedTuple):
@@ -117,7 +115,7 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
     blocks = memory.blocks[start]
     trial = memory.poses[1 - start]
     trial_blocks = memory.blocks[1 - start]
-    cost = linearize(tree, terms, stage, settings.triggs, pose, blocks, work.scratch)
+    cost = linearize(tree, terms, stage, pose, blocks, work.scratch)
     if not np.isfinite(cost):
         return cost, NON_FINITE, iterations, rejected, at
     if settings.curvature:
@@ -135,9 +133,7 @@ def _run_stage(tree, terms, s, settings, memory, start):  # type: ignore[no-unty
         trial_cost = np.inf
         if np.isfinite(predicted):
             retract(tree, pose, work, trial)
-            trial_cost = linearize(
-                tree, terms, stage, settings.triggs, trial, trial_blocks, work.scratch
-            )
+            trial_cost = linearize(tree, terms, stage, trial, trial_blocks, work.scratch)
         accepted, damping, growth, verdict = _judge_trial(
             cost, trial_cost, predicted, damping, growth, tolerance
         )
@@ -188,7 +184,6 @@ def optimize(tree, terms, measured, settings, memory):  # type: ignore[no-untype
             tree,
             terms,
             settings.stages[-1],
-            settings.triggs,
             memory.poses[0],
             memory.blocks[0],
             work.scratch,

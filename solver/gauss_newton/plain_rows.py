@@ -14,7 +14,7 @@ from ..kernel import inlined_kernel, kernel
 from ..part import GRADIENT, SHAPE
 
 LANES = 8  # joints side by side in a row of joint_flow's tables
-STATE = 16  # numbers of a joint's state there
+STATE = 13  # numbers of a joint's state there
 
 
 @kernel
@@ -158,5 +158,4 @@ def _state_of(state, lane):  # type: ignore[no-untyped-def]
         state[4 * LANES + lane], state[5 * LANES + lane], state[6 * LANES + lane],
         state[7 * LANES + lane], state[8 * LANES + lane], state[9 * LANES + lane],
         state[10 * LANES + lane], state[11 * LANES + lane], state[12 * LANES + lane],
-        state[13 * LANES + lane], state[14 * LANES + lane], state[15 * LANES + lane],
     )  # fmt: skip

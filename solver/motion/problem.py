@@ -104,7 +104,7 @@ def _make_memory(tree: Tree) -> _Memory:
 
 @inlined_kernel
 def linearize_frames(  # type: ignore[no-untyped-def]
-    tree, views, first, last, stage, triggs, poses, memory, joints, system
+    tree, views, first, last, stage, poses, memory, joints, system
 ) -> float:
     """Write the blocks of frames first..last-1 and what `joints` has, add to C and c of `memory`;
     return the cost.
@@ -126,7 +126,7 @@ def linearize_frames(  # type: ignore[no-untyped-def]
         while v < end:
             if not alone:
                 place_in_camera(views.R[v], views.t[v], pose, memory.seen)
-            cost += linearize(tree, terms_of(views, v), stage, triggs, at, blocks, memory.scratch)
+            cost += linearize(tree, terms_of(views, v), stage, at, blocks, memory.scratch)
             if not alone:
                 add_turned(views.R[v], blocks, total)
             v += 1
@@ -158,7 +158,7 @@ def couple_frames(  # type: ignore[no-untyped-def]
 
 @kernel
 def linearize_half(  # type: ignore[no-untyped-def]
-    tree, views, motion, first, last, coupled, stage, triggs, poses, memory, joints, system, costs
+    tree, views, motion, first, last, coupled, stage, poses, memory, joints, system, costs
 ) -> None:
     """Write the equations of frames first..last-1, those from `coupled` on with what couples them;
     costs (3,).
@@ -167,9 +167,7 @@ def linearize_half(  # type: ignore[no-untyped-def]
     memory.c[:] = 0.0
     for a in range(first, last, _CHUNK):
         b = min(a + _CHUNK, last)
-        costs[0] += linearize_frames(
-            tree, views, a, b, stage, triggs, poses, memory, joints, system
-        )
+        costs[0] += linearize_frames(tree, views, a, b, stage, poses, memory, joints, system)
         standing.place_points(tree, poses, motion, a, b, system)
         couple_frames(tree, poses, motion, max(a, coupled), b, memory, system, costs)
 
@@ -261,7 +259,6 @@ class ClipProblem:
             self.motion,
             *frames,
             self.settings.stages[s],
-            self.settings.triggs,
             poses,
             memory,
             self.joints,

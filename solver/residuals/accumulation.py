@@ -4,10 +4,8 @@ Gauss-Newton blocks.
 
 The Geman-McClure kernel is
     rho(s) = sigma s / (sigma + s),  s = |r|^2        cost 1/2 w rho(s)
-With k = sigma / (sigma + s): rho = s k, rho' = k^2, rho''/rho' = -2 k / sigma. The kernels take
-1/sigma, so that 0 turns it off. First-order reweighting replaces JᵀJ by k^2 JᵀJ; Triggs' correction
-subtracts from it, along r, 4 (s/sigma) k of the part, which for s > sigma/3 would make the term
-concave, so it is clamped by `triggs` in [0, 1).
+With k = sigma / (sigma + s): rho = s k, rho' = k^2. The kernels take
+1/sigma, so that 0 turns it off. First-order reweighting replaces JᵀJ by k^2 JᵀJ.
 
 A residual of a point p fixed to part i, with W = GᵀG and f = Gᵀr for G = dr/dp, adds, with e = p -
 origin and B = R_i V + D_i,
@@ -39,15 +37,6 @@ def geman_mcclure(s: float, inv_sigma: float) -> tuple[float, float]:
     """Return (rho(s), rho'(s)); s in the square of the residual's unit, sigma likewise."""
     k = 1.0 / (1.0 + s * inv_sigma)
     return s * k, k * k
-
-
-@kernel
-def triggs_share(s: float, inv_sigma: float, triggs: float) -> float:
-    """Return kappa >= 0: the second-order term takes rho' (JᵀJ - kappa (Jᵀr)(Jᵀr)ᵀ / s) instead of
-    rho' JᵀJ.
-    """
-    x = s * inv_sigma
-    return min(4.0 * x / (1.0 + x), triggs)
 
 
 @kernel

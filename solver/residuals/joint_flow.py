@@ -2,11 +2,9 @@
 """A joint's state by a normalizing flow z(Omega) on SO(3), learned from motion: the paper's joint
 state prior.
 
-    r = sqrt(w) (z, sqrt(h) l),   1/2 |z|^2 + l^2/2 = -log p(Omega) + const,
-    l = 0 for h = 0 (the paper's residual)
-    dr/du = sqrt(w) (dz/dw; ...) R_parᵀ,   for Omega <- exp(R_parᵀ u) Omega
-p is the density against the Haar measure; l^2/2 = floor(B - log |det dz/dmu|) with floor(a) = (a +
-sqrt(a^2 + 1))/2 and a bound B of the log-determinant near the data.
+    r = sqrt(w) z,   1/2 |z|^2 = -log p(Omega) + log |det dz/dmu| + const
+    dr/du = sqrt(w) dz/dw R_parᵀ,   for Omega <- exp(R_parᵀ u) Omega
+p is the density against the Haar measure mu.
 
 Chart: with M a mean rotation and (w, v) the unit quaternion of MᵀOmega, w >= 0,
     y = v / sqrt(w),   dmu/dy = 2/pi^2 w^(5/2) / (1 + w^2),
@@ -49,13 +47,12 @@ LAYER_SIZE = sum(math.prod(shape) for shape in LAYER_SHAPES.values())
 MEAN = 0
 FIRST_LAYER = 9
 LAST = FIRST_LAYER + LAYERS * LAYER_SIZE  # A (3, 3) and b (3,) of the last linear map
-# sum of log |det A| with -log(2/pi^2); B
-CONSTANT = LAST + 12
-BOUND = LAST + 13
+CONSTANT = LAST + 12  # sum of log |det A| with -log(2/pi^2)
+BOUND = LAST + 13  # of log |det dz/dmu| at the data of training; files have it, no fit reads it
 SIZE = LAST + 14  # of a joint's parameters
 
 INTS = LANES  # joints, 0 for none: one row holds several
-FLOATS = LANES * (SIZE + 2)  # their parameters, then w and h, each as LANES values
+FLOATS = LANES * (SIZE + 1)  # their parameters, then w, each as LANES values
 INDEXES = "parts"
 _W = SIZE
 NEAREST = 1e-4  # radians to pi
@@ -64,9 +61,9 @@ _FARTHEST = math.sin(0.5 * NEAREST) ** -2.5  # of (1 + w^2) / w^(5/2)
 
 formula: Any = register_jitable  # Python runs such a function as it is; kernels may call it
 
-# A state of the formulas has STATE entries: x (3), dx/de (9) by rows, |det dx/dmu| without
-# constants, and the gradient of its logarithm by e (3). Formulas take it as a tuple, and find their
-# parameter k at q[at + k n]. Their numbers may be numpy arrays, or whatever `in_lanes` passes.
+# A state of the formulas has STATE entries: x (3), dx/de (9) by rows, and |det dx/dmu| without
+# constants. Formulas take it as a tuple, and find their parameter k at q[at + k n]. Their numbers
+# may be numpy arrays, or whatever `in_lanes` passes.
 
 
 @formula
@@ -98,14 +95,12 @@ def chart(q, at, n, s):  # type: ignore[no-untyped-def]
     hx = 0.5 * x
     hy = 0.5 * y
     hz = 0.5 * z
-    ww1 = 1.0 + w * w
-    g = f * (2.5 / w - 2.0 * w / ww1)  # dw/de = -v/2
     return (
         x, y, z,
         f + a * x, a * y + hz, a * z - hy,
         a * y - hz, f + b * y, b * z + hx,
         a * z + hy, b * z - hx, f + c * z,
-        ww1 / (w * w * root), g * x, g * y, g * z,
+        (1.0 + w * w) / (w * w * root),
     )  # fmt: skip
 
 
@@ -122,7 +117,7 @@ def _matrix(q, at, n):  # type: ignore[no-untyped-def]
 def _linear(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return A x + b and A J, with A and b from parameter `at` on, and the rest of the state."""
     a00, a01, a02, a10, a11, a12, a20, a21, a22 = _matrix(q, at, n)
-    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = s
+    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = s
     return (
         q[at + 9 * n] + a00 * x + a01 * y + a02 * z,
         q[at + 10 * n] + a10 * x + a11 * y + a12 * z,
@@ -136,7 +131,7 @@ def _linear(q, at, n, s):  # type: ignore[no-untyped-def]
         a20 * j00 + a21 * j10 + a22 * j20,
         a20 * j01 + a21 * j11 + a22 * j21,
         a20 * j02 + a21 * j12 + a22 * j22,
-        det, g0, g1, g2,
+        det,
     )  # fmt: skip
 
 
@@ -193,25 +188,19 @@ def _hidden2(q, at, n, x, y):  # type: ignore[no-untyped-def]
 
 @formula
 def _bend(beta, x):  # type: ignore[no-untyped-def]
-    """Return x + beta sqrt(1 + x^2), its derivative, and that of the derivative's logarithm."""
+    """Return x + beta sqrt(1 + x^2) and its derivative."""
     root = np.sqrt(1.0 + x * x)
-    inverse = 1.0 / root
-    slope = 1.0 + beta * x * inverse
-    return x + beta * root, slope, beta * inverse * inverse * inverse / slope
+    return x + beta * root, 1.0 + beta * x / root
 
 
 @formula
 def layer(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state after one layer, whose parameters start at `at`."""
-    x1, x2, x3, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = _linear(q, at, n, s)
+    x1, x2, x3, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = _linear(q, at, n, s)
     a, a1, t, t1 = _hidden1(q, at + 12 * n, n, x1)
     root = np.sqrt(1.0 + a * a)
     scale2 = a + root
-    rate = a1 / root  # d log S / dx_1
-    k1 = scale2 * rate * x2 + t1
-    g0 = g0 + rate * j00
-    g1 = g1 + rate * j01
-    g2 = g2 + rate * j02
+    k1 = scale2 * (a1 / root) * x2 + t1  # a1 / root = d log S / dx_1
     i10 = scale2 * j10 + k1 * j00
     i11 = scale2 * j11 + k1 * j01
     i12 = scale2 * j12 + k1 * j02
@@ -219,38 +208,28 @@ def layer(q, at, n, s):  # type: ignore[no-untyped-def]
     a, a1, a2, t, t1, t2 = _hidden2(q, at + (14 + 4 * HIDDEN) * n, n, x1, x2)
     root = np.sqrt(1.0 + a * a)
     scale3 = a + root
-    rate1 = a1 / root
-    rate2 = a2 / root
-    k1 = scale3 * rate1 * x3 + t1
-    k2 = scale3 * rate2 * x3 + t2
-    g0 = g0 + rate1 * j00 + rate2 * j10
-    g1 = g1 + rate1 * j01 + rate2 * j11
-    g2 = g2 + rate1 * j02 + rate2 * j12
+    k1 = scale3 * (a1 / root) * x3 + t1
+    k2 = scale3 * (a2 / root) * x3 + t2
     i20 = scale3 * j20 + k1 * j00 + k2 * j10
     i21 = scale3 * j21 + k1 * j01 + k2 * j11
     i22 = scale3 * j22 + k1 * j02 + k2 * j12
     moved3 = scale3 * x3 + t
-    y1, slope1, bend1 = _bend(q[at + (LAYER_SIZE - 3) * n], x1)
-    y2, slope2, bend2 = _bend(q[at + (LAYER_SIZE - 2) * n], moved2)
-    y3, slope3, bend3 = _bend(q[at + (LAYER_SIZE - 1) * n], moved3)
+    y1, slope1 = _bend(q[at + (LAYER_SIZE - 3) * n], x1)
+    y2, slope2 = _bend(q[at + (LAYER_SIZE - 2) * n], moved2)
+    y3, slope3 = _bend(q[at + (LAYER_SIZE - 1) * n], moved3)
     return (
         y1, y2, y3,
         slope1 * j00, slope1 * j01, slope1 * j02,
         slope2 * i10, slope2 * i11, slope2 * i12,
         slope3 * i20, slope3 * i21, slope3 * i22,
         det * scale2 * scale3 * slope1 * slope2 * slope3,
-        g0 + bend1 * j00 + bend2 * i10 + bend3 * i20,
-        g1 + bend1 * j01 + bend2 * i11 + bend3 * i21,
-        g2 + bend1 * j02 + bend2 * i12 + bend3 * i22,
     )  # fmt: skip
 
 
 @formula
 def finish(q, at, n, s):  # type: ignore[no-untyped-def]
     """Return the state z with derivatives in the parent's axes in place of M's."""
-    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = _linear(
-        q, at + LAST * n, n, s
-    )
+    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = _linear(q, at + LAST * n, n, s)
     m00, m01, m02, m10, m11, m12, m20, m21, m22 = _matrix(q, at, n)
     # (M row) of each row of derivatives
     return (
@@ -265,16 +244,13 @@ def finish(q, at, n, s):  # type: ignore[no-untyped-def]
         m10 * j20 + m11 * j21 + m12 * j22,
         m20 * j20 + m21 * j21 + m22 * j22,
         det,
-        m00 * g0 + m01 * g1 + m02 * g2,
-        m10 * g0 + m11 * g1 + m12 * g2,
-        m20 * g0 + m21 * g1 + m22 * g2,
     )  # fmt: skip
 
 
 @formula
 def normal(q, at, n, s):  # type: ignore[no-untyped-def]
-    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, and from entry 12 on what `finish` left."""
-    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det, g0, g1, g2 = s
+    """Return JᵀJ (6, upper), Jᵀz (3), |z|^2, and from entry 10 on what a state has."""
+    x, y, z, j00, j01, j02, j10, j11, j12, j20, j21, j22, det = s
     return (
         j00 * j00 + j10 * j10 + j20 * j20,
         j00 * j01 + j10 * j11 + j20 * j21,
@@ -286,7 +262,7 @@ def normal(q, at, n, s):  # type: ignore[no-untyped-def]
         j01 * x + j11 * y + j21 * z,
         j02 * x + j12 * y + j22 * z,
         x * x + y * y + z * z,
-        x, y, det, g0, g1, g2,
+        x, y, det,
     )  # fmt: skip
 
 
@@ -358,57 +334,33 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         for lane in range(LANES):
             i = ints[k, lane]
             w = weight * floats[k, _W * LANES + lane]
-            h = floats[k, (_W + 1) * LANES + lane]
             if i == 0 or w <= 0.0:
                 continue
             e = state[lane::LANES]
             cost += 0.5 * w * e[9]
             H = (w * e[0], w * e[1], w * e[2], w * e[3], w * e[4], w * e[5])
             g = (w * e[6], w * e[7], w * e[8])
-            if h > 0.0:
-                a = (
-                    floats[k, BOUND * LANES + lane]
-                    - floats[k, CONSTANT * LANES + lane]
-                    - math.log(e[12])
-                )
-                root = math.sqrt(a * a + 1.0)
-                half = 0.5 * (a + root)  # l^2 / 2
-                slope = half / root
-                cost += w * h * half
-                x = -slope * e[13]
-                y = -slope * e[14]
-                z = -slope * e[15]
-                v = 0.5 * w * h / half
-                H = (
-                    H[0] + v * x * x, H[1] + v * x * y, H[2] + v * x * z,
-                    H[3] + v * y * y, H[4] + v * y * z, H[5] + v * z * z,
-                )  # fmt: skip
-                g = (g[0] + w * h * x, g[1] + w * h * y, g[2] + w * h * z)
             add_to_joint(tree, pose, blocks, i, *H, *g)
     return cost
 
 
-def pack(
-    joints: Array, parameters: Array, weights: Array, log_det: float = 0.0
-) -> tuple[Array, Array]:
-    """Return the tables of `accumulate` from joints (n,) in 1..K, parameters (n, SIZE), weights w
-    (n,), and h.
+def pack(joints: Array, parameters: Array, weights: Array) -> tuple[Array, Array]:
+    """Return the tables of `accumulate` from joints (n,) in 1..K, parameters (n, SIZE) and weights
+    w (n,).
     """
     n = len(joints)
     rows = -(-n // LANES)
     ints = np.zeros((rows * LANES, 1), np.int64)
-    floats = np.zeros((rows * LANES, SIZE + 2))
+    floats = np.zeros((rows * LANES, SIZE + 1))
     floats[:, MEAN : MEAN + 9] = np.eye(3).ravel()
     ints[:n, 0] = joints
-    floats[:n] = np.hstack(
-        [np.reshape(parameters, (n, SIZE)), np.c_[weights], np.full((n, 1), log_det)]
-    )
-    width_last = floats.reshape(rows, LANES, SIZE + 2).transpose(0, 2, 1)
+    floats[:n] = np.hstack([np.reshape(parameters, (n, SIZE)), np.c_[weights]])
+    width_last = floats.reshape(rows, LANES, SIZE + 1).transpose(0, 2, 1)
     return ints.reshape(rows, LANES), np.ascontiguousarray(width_last).reshape(rows, FLOATS)
 
 
-def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Array]:
-    """Return z (..., 3), dz/dw (..., 3, 3), log |det dz/dmu| (...) and its gradient by w (..., 3).
+def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array]:
+    """Return z (..., 3), dz/dw (..., 3, 3) and log |det dz/dmu| (...).
 
     For parameters (SIZE,) and states Omega (..., 3, 3), with Omega <- exp(w) Omega and mu the
     normalized Haar measure.
@@ -429,7 +381,7 @@ def transform(parameters: Array, Omega: Array) -> tuple[Array, Array, Array, Arr
         s = layer(p, FIRST_LAYER + k * LAYER_SIZE, 1, s)
     s = [np.asarray(v) for v in finish(p, 0, 1, s)]
     J = np.stack(s[3:12], -1).reshape(*s[0].shape, 3, 3)
-    return np.stack(s[:3], -1), J, np.log(s[12]) + p[CONSTANT], np.stack(s[13:], -1)
+    return np.stack(s[:3], -1), J, np.log(s[12]) + p[CONSTANT]
 
 
 def log_density(parameters: Array, Omega: Array) -> Array:
@@ -439,7 +391,7 @@ def log_density(parameters: Array, Omega: Array) -> Array:
     :param parameters: (SIZE,) of one joint.
     :param Omega: (..., 3, 3) states of the joint.
     """
-    z, _, log_det, _ = transform(parameters, Omega)
+    z, _, log_det = transform(parameters, Omega)
     density: Array = -0.5 * np.sum(z * z, axis=-1) - 1.5 * np.log(2.0 * np.pi) + log_det
     return density
 

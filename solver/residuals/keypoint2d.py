@@ -16,13 +16,13 @@ is finite and continuous. Source: section 3 of the paper, pinhole projection.
 """
 
 from ..kernel import kernel
-from .accumulation import geman_mcclure, triggs_share
+from .accumulation import geman_mcclure
 
 Z_MIN = 0.1  # metres
 
 
 @kernel
-def term(p, uv, focal, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+def term(p, uv, focal, weight, inv_sigma):  # type: ignore[no-untyped-def]
     """Return (cost, w GᵀG by rows of its upper triangle (6), w Gᵀr (3), w Gᵀg (3), w gᵀg, w gᵀr) of
     p (3) seen at uv (2), with g = dr/dlog f.
     """
@@ -44,25 +44,12 @@ def term(p, uv, focal, weight, inv_sigma, triggs):  # type: ignore[no-untyped-de
     fx = aw * rx
     fy = aw * ry
     fz = w * (bx * rx + by * ry)
-    w00 = a * aw
-    w01 = 0.0
-    w02 = bx * aw
-    w11 = a * aw
-    w12 = by * aw
     w22 = w * (bx * bx + by * by)
-    if triggs > 0.0 and s > 0.0:
-        k = triggs_share(s, inv_sigma, triggs) / (s * w) if w > 0.0 else 0.0
-        w00 = w00 - k * fx * fx
-        w01 = w01 - k * fx * fy
-        w02 = w02 - k * fx * fz
-        w11 = w11 - k * fy * fy
-        w12 = w12 - k * fy * fz
-        w22 = w22 - k * fz * fz
     h = (aw * gx, aw * gy, w * (bx * gx + by * gy))
     if not front:
         depth = (Z_MIN - z) / Z_MIN
         cost += 0.5 * weight * depth * depth
         w22 += weight / (Z_MIN * Z_MIN)
         fz -= weight * depth / Z_MIN
-    W = (w00, w01, w02, w11, w12, w22)
+    W = (a * aw, 0.0, bx * aw, a * aw, by * aw, w22)
     return cost, W, (fx, fy, fz), h, w * (gx * gx + gy * gy), w * (gx * rx + gy * ry)

@@ -8,11 +8,11 @@ Source: section 3 of the paper.
 """
 
 from ..kernel import kernel
-from .accumulation import geman_mcclure, triggs_share
+from .accumulation import geman_mcclure
 
 
 @kernel
-def term(p, measured, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+def term(p, measured, weight, inv_sigma):  # type: ignore[no-untyped-def]
     """Return (cost, w GᵀG by rows of its upper triangle (6), w Gᵀr (3)) of two points (3)."""
     rx = p[0] - measured[0]
     ry = p[1] - measured[1]
@@ -23,8 +23,4 @@ def term(p, measured, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def
     x = w * rx
     y = w * ry
     z = w * rz
-    k = 0.0
-    if triggs > 0.0 and s > 0.0 and w > 0.0:
-        k = triggs_share(s, inv_sigma, triggs) / (s * w)
-    W = (w - k * x * x, -k * x * y, -k * x * z, w - k * y * y, -k * y * z, w - k * z * z)
-    return 0.5 * weight * rho, W, (x, y, z)
+    return 0.5 * weight * rho, (w, 0.0, 0.0, w, 0.0, w), (x, y, z)

@@ -13,13 +13,13 @@ Source: section 3 of the paper (part orientation field).
 import math
 
 from ..kernel import kernel
-from .accumulation import geman_mcclure, triggs_share
+from .accumulation import geman_mcclure
 
 SHORTEST = 1e-4  # metres
 
 
 @kernel
-def term(d, n, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
+def term(d, n, weight, inv_sigma):  # type: ignore[no-untyped-def]
     """Return (cost, w GᵀG by rows of its upper triangle (6), w Gᵀr (3)) of a lever d (3) measured
     along n (3).
     """
@@ -44,18 +44,8 @@ def term(d, n, weight, inv_sigma, triggs):  # type: ignore[no-untyped-def]
     fy = g * (ry - hy * along)
     fz = g * (rz - hz * along)
     g *= il
-    w00 = g * (1.0 - hx * hx)
-    w01 = -g * hx * hy
-    w02 = -g * hx * hz
-    w11 = g * (1.0 - hy * hy)
-    w12 = -g * hy * hz
-    w22 = g * (1.0 - hz * hz)
-    if triggs > 0.0 and s > 0.0 and w > 0.0:
-        k = triggs_share(s, inv_sigma, triggs) / (s * w)
-        w00 = w00 - k * fx * fx
-        w01 = w01 - k * fx * fy
-        w02 = w02 - k * fx * fz
-        w11 = w11 - k * fy * fy
-        w12 = w12 - k * fy * fz
-        w22 = w22 - k * fz * fz
-    return 0.5 * weight * rho, (w00, w01, w02, w11, w12, w22), (fx, fy, fz)
+    W = (
+        g * (1.0 - hx * hx), -g * hx * hy, -g * hx * hz,
+        g * (1.0 - hy * hy), -g * hy * hz, g * (1.0 - hz * hz),
+    )  # fmt: skip
+    return 0.5 * weight * rho, W, (fx, fy, fz)

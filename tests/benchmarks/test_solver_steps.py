@@ -66,7 +66,7 @@ def test_dense_and_sparse_steps_agree(K, P, N, prior):
     dense = Dense(p)
     for k in (0, 5):
         put(p.bank, k, pose)
-        linearize(p.tree, p.terms, p.stage, 0.0, pose, blocks, work.scratch)
+        linearize(p.tree, p.terms, p.stage, pose, blocks, work.scratch)
         step(p.tree, pose, blocks, p.damping, p.root_scale, work)
         found = np.concatenate([work.x[0], work.u[1:].ravel(), work.dbeta[:P]])
         expected = dense.step(k)

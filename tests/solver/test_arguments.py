@@ -320,7 +320,7 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
             {"priors": PRIORS, "fitted": _fitted(), "shape_weight": 100.0},
         ),
         "make_tree": lambda: (solver.make_tree, {"body": BODY, "focal": True}),
-        "default_priors": lambda: (solver.default_priors, {"body": BODY, "log_det": 0.0}),
+        "default_priors": lambda: (solver.default_priors, {"body": BODY}),
         "register_residual": lambda: (solver.register_residual, own),
         "check_residual": lambda: (
             _checked,
@@ -339,7 +339,7 @@ def _calls() -> dict[str, Callable[[], tuple[Callable[..., Any], dict[str, Any]]
         "JointPrior.of": lambda: (_joint_prior().of, {"joint": "neck"}),
         "JointPrior.tables": lambda: (
             _joint_prior().tables,
-            {"joint_names": ["pelvis", "neck"], "weights": {}, "log_det": 0.0},
+            {"joint_names": ["pelvis", "neck"], "weights": {}},
         ),
         "JointPrior.sample": lambda: (
             _joint_prior().sample,

@@ -138,7 +138,7 @@ def run_iterates(body, state, m, count=5):
     work = make_workspace(tree)
     out = []
     for _ in range(count):
-        cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
+        cost = linearize(tree, terms, table[0], pose, blocks, work.scratch)
         out.append((cost, pose.Omega[1:].copy(), pose.beta.copy(), pose.t - pose.t[0]))
         step(tree, pose, blocks, 30.0, 1 / 0.3, work)
         retract(tree, pose, work, trial)
@@ -188,22 +188,11 @@ def test_predicted_decrease_is_the_actual_one_near_the_solution(damping):
     trial = make_pose(tree)
     blocks = make_blocks(tree)
     work = make_workspace(tree)
-    cost = linearize(tree, terms, table[0], 0.0, pose, blocks, work.scratch)
+    cost = linearize(tree, terms, table[0], pose, blocks, work.scratch)
     predicted = step(tree, pose, blocks, damping, 1 / 0.3, work)
     retract(tree, pose, work, trial)
-    actual = cost - linearize(tree, terms, table[0], 0.0, trial, blocks, work.scratch)
+    actual = cost - linearize(tree, terms, table[0], trial, blocks, work.scratch)
     assert actual == pytest.approx(predicted, rel=2e-3)
-
-
-def test_second_order_correction_reaches_the_same_minimum():
-    body, state = scene(6)
-    m = measured(body, state, noise=1.0)
-    init = fit(body, m).state
-    tight = [Stage(Weights(), 1e-13, 300)]
-    first, second = (
-        fit(body, m, init=init, options=Options(stages=tight, triggs=t)) for t in (0.0, 0.9)
-    )
-    assert second.cost == pytest.approx(first.cost, rel=1e-7)
 
 
 def test_joint_limit_keeps_a_knee_from_bending_forwards():
@@ -326,8 +315,6 @@ def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
             lambda: Options(root_length=np.inf),
             "root_length must be positive and finite, but is inf",
         ),
-        (lambda: Options(triggs=5), "triggs must lie in 0..1, but is 5"),
-        (lambda: Options(triggs=np.nan), "triggs must lie in 0..1, but is nan"),
     ],
 )
 def test_options_that_no_fit_could_use_are_refused(make, message):

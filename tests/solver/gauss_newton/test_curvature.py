@@ -237,7 +237,7 @@ def test_the_information_on_the_shape_is_gauss_newtons(body):
     pose = found.state.pose(tree)
     blocks = make_blocks(tree)
     work = make_workspace(tree)
-    linearize(tree, make_terms(tree, m, priors), table[0], 0.0, pose, blocks, work.scratch)
+    linearize(tree, make_terms(tree, m, priors), table[0], pose, blocks, work.scratch)
     eliminate(tree, pose, blocks, MIN_DAMPING, 1.0 / 0.3, work)
     expected = work.C[:10, :10] - table[0, 0, SHAPE_PRIOR] * np.eye(10)
     np.testing.assert_allclose(

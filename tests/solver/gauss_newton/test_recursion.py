@@ -122,7 +122,7 @@ def test_step_equals_dense_step(K, P, M):
         pose = State(*state).pose(tree)
         blocks = make_blocks(tree)
         work = make_workspace(tree)
-        assert linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch) == pytest.approx(
+        assert linearize(tree, terms, stage, pose, blocks, work.scratch) == pytest.approx(
             cost, rel=1e-11
         )
         if coupled:
@@ -149,7 +149,7 @@ def test_focal_length_is_one_more_column(damping):
     pose = State(*state).pose(tree)
     blocks = make_blocks(tree)
     work = make_workspace(tree)
-    linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
+    linearize(tree, terms, stage, pose, blocks, work.scratch)
     Lambda = damping * np.concatenate(
         [np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(69), np.zeros(11)]
     )
@@ -165,7 +165,7 @@ def test_twists_of_parts_follow_from_the_step():
     trial = make_pose(tree)
     blocks = make_blocks(tree)
     work = make_workspace(tree)
-    linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
+    linearize(tree, terms, stage, pose, blocks, work.scratch)
     step(tree, pose, blocks, 1.0, ROOT_SCALE, work)
     for array in (work.x, work.u, work.dbeta):
         array *= 1e-7
@@ -184,7 +184,7 @@ def test_a_rejected_step_is_solved_again_from_the_kept_blocks():
     pose = State(*state).pose(tree)
     blocks = make_blocks(tree)
     work = make_workspace(tree)
-    linearize(tree, terms, stage, 0.0, pose, blocks, work.scratch)
+    linearize(tree, terms, stage, pose, blocks, work.scratch)
     first = step(tree, pose, blocks, 5.0, ROOT_SCALE, work)
     x = work.x.copy()
     assert step(tree, pose, blocks, 500.0, ROOT_SCALE, work) < first

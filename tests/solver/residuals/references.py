@@ -164,22 +164,15 @@ def joint_prior(part, Omega_mean, weight=1.0):
     return Linearization(g * phi, np.zeros((3, 6)), J_u, np.zeros((3, len(part.beta))))
 
 
-def joint_flow(part, parameters, weight=1.0, log_det=0.0):
-    """Return the residual (4 rows) times sqrt(weight) and its derivatives; the last row is sqrt(h)
-    l, h = log_det.
+def joint_flow(part, parameters, weight=1.0):
+    """Return the residual (3 rows) times sqrt(weight) and its derivatives.
 
     :param parameters: (SIZE,) of the joint.
     """
-    z, J, value, gradient = flow.transform(parameters, part.Omega)
-    a = parameters[flow.BOUND] - value
-    half = 0.5 * (a + np.sqrt(a * a + 1.0))
-    last = np.sqrt(2.0 * log_det * half)
-    slope = -np.sqrt(0.5 * log_det * half / (a * a + 1.0))
+    z, J, _ = flow.transform(parameters, part.Omega)
     scale = np.sqrt(weight)
-    J_u = scale * np.vstack([J, slope * gradient]) @ part.R_parent.T
-    return Linearization(
-        scale * np.append(z, last), np.zeros((4, 6)), J_u, np.zeros((4, len(part.beta)))
-    )
+    J_u = scale * J @ part.R_parent.T
+    return Linearization(scale * z, np.zeros((3, 6)), J_u, np.zeros((3, len(part.beta))))
 
 
 def joint_limits(

@@ -31,7 +31,7 @@ def test_every_value_has_its_state_and_every_state_its_value():
 def test_log_determinant_is_that_of_the_numeric_derivative():
     Omega = uniform_rotations(np.random.default_rng(1), 50)
     h = 1e-6
-    z, J, log_det, gradient = jf.transform(FLOW, Omega)
+    _, J, log_det = jf.transform(FLOW, Omega)
     up = [jf.transform(FLOW, rotations.exp(h * e) @ Omega) for e in np.eye(3)]
     down = [jf.transform(FLOW, rotations.exp(-h * e) @ Omega) for e in np.eye(3)]
     numeric = np.stack([(a[0] - b[0]) / (2 * h) for a, b in zip(up, down, strict=True)], -1)
@@ -40,8 +40,6 @@ def test_log_determinant_is_that_of_the_numeric_derivative():
         log_det, np.linalg.slogdet(numeric)[1] - np.log(HAAR_PER_RADIAN3), atol=1e-6
     )
     assert (np.linalg.det(J) > 0).all() or (np.linalg.det(J) < 0).all()
-    numeric = np.stack([(a[2] - b[2]) / (2 * h) for a, b in zip(up, down, strict=True)], -1)
-    np.testing.assert_allclose(gradient, numeric, atol=1e-7 * np.abs(numeric).max())
 
 
 def test_density_integrates_to_one_over_all_rotations():
@@ -91,37 +89,19 @@ def test_vector_kernel_agrees_with_numpy_joint_by_joint_also_at_half_turns():
     pose = State(R0, t0, Omega, np.zeros(0)).pose(tree)
     weights = rng.uniform(0.5, 2.0, K)
     weights[5] = 0.0
-    for h in (0.0, 0.8):
-        blocks = make_blocks(tree)
-        cost = jf.accumulate(
-            tree, *jf.pack(np.arange(1, K + 1), flows, weights, h), 1.3, pose, blocks
+    blocks = make_blocks(tree)
+    cost = jf.accumulate(tree, *jf.pack(np.arange(1, K + 1), flows, weights), 1.3, pose, blocks)
+    expected = 0.0
+    for i in range(1, K + 1):
+        z, J, _ = jf.transform(flows[i - 1], pose.Omega[i])
+        w = 1.3 * weights[i - 1]
+        R = pose.R[tree.parents[i]]
+        expected += 0.5 * w * z @ z
+        np.testing.assert_allclose(
+            blocks.H_u[i, :, 6], w * R @ J.T @ z, rtol=1e-6, atol=1e-9, err_msg=str(i)
         )
-        expected = 0.0
-        for i in range(1, K + 1):
-            z, J, log_det, gradient = jf.transform(flows[i - 1], pose.Omega[i])
-            a = flows[i - 1, jf.BOUND] - log_det
-            half = 0.5 * (a + np.sqrt(a * a + 1.0))
-            g = J.T @ z - h * half / np.sqrt(a * a + 1.0) * gradient
-            w = 1.3 * weights[i - 1]
-            R = pose.R[tree.parents[i]]
-            expected += w * (0.5 * z @ z + h * half)
-            np.testing.assert_allclose(
-                blocks.H_u[i, :, 6], w * R @ g, rtol=1e-6, atol=1e-9, err_msg=str(i)
-            )
-            if h == 0.0:
-                H = w * R @ J.T @ J @ R.T
-                np.testing.assert_allclose(
-                    blocks.H_uu[i], H, rtol=1e-6, atol=1e-9 * np.abs(H).max() + 1e-12
-                )
-        assert cost == pytest.approx(expected, rel=1e-6)
-
-
-def test_density_and_its_gradient_are_what_is_minimized_with_the_log_determinant():
-    """1/2 |r|^2 + log p is nearly constant where the log-determinant stays well below its bound."""
-    p = FLOW.copy()
-    Omega = MEAN @ rotations.exp(0.2 * np.random.default_rng(6).standard_normal((50, 3)))
-    z, _, log_det, _ = jf.transform(p, Omega)
-    p[jf.BOUND] = log_det.max() + 1000.0
-    a = p[jf.BOUND] - log_det
-    cost = 0.5 * (z * z).sum(-1) + 0.5 * (a + np.sqrt(a * a + 1.0))
-    assert np.ptp(cost + jf.log_density(p, Omega)) < 1e-4
+        H = w * R @ J.T @ J @ R.T
+        np.testing.assert_allclose(
+            blocks.H_uu[i], H, rtol=1e-6, atol=1e-9 * np.abs(H).max() + 1e-12
+        )
+    assert cost == pytest.approx(expected, rel=1e-6)
