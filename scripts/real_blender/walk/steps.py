@@ -14,7 +14,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from shared.session import addon, interface, invoke, use, viewport
 from walk.file_steps import FileSteps, Step
 
-TOOLS = ("pin_limb", "upright_line")
+TOOLS = ("pick_person", "pin_limb", "upright_line")
 # Cancelled or not, these change what is not undone: the view, the frame.
 UNCHECKED = (
     "cancel",
@@ -118,7 +118,7 @@ class Steps(FileSteps):
             return outcome
 
         step = Step(f"scope.{name}(tool)", take)
-        if name == "pin_limb":
+        if name != "upright_line":
             return step
         self.next.append(step)  # the line is drawn in the view of the comparison
         return Step("scope.look_through({})", lambda: use(bpy.ops.scope.look_through))
