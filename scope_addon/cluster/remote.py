@@ -27,7 +27,7 @@ import fsspec
 from ...solver.errors import InputError, ScopeError
 from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError, UsageError
-from ..footage import is_url
+from ..footage import display_address, is_url
 from ..job.batch import REPORT_NAME
 from ..job.finished_clip import file_hash
 from ..private_folder import lasting_folder
@@ -48,7 +48,10 @@ def store_errors(error: type[InputError] | type[OutputError], url: str) -> Itera
     except ScopeError:
         raise
     except Exception as failure:
-        cause = " ".join(f"{failure}".split())[:200] or type(failure).__name__
+        cause = " ".join(f"{failure}".split())[:200]
+        # A store may quote a part of the address in which nobody would recognize a password.
+        if not cause or display_address(url) != url:
+            cause = type(failure).__name__
         raise error(
             f"{url} cannot be used ({cause}); check the address and the credentials"
         ) from failure

@@ -10,6 +10,7 @@ from scope.scope_addon import temporary
 from scope.scope_addon.cluster import remote
 from scope.scope_addon.cluster.remote import RemoteStaging, mirror_footage, mirror_results, upload
 from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.footage import display_text
 from scope.scope_addon.job.batch import REPORT_NAME
 from scope.solver.errors import InputError
 
@@ -32,6 +33,15 @@ def store():
 
 def files(folder):
     return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+
+
+@pytest.mark.parametrize(
+    ("url", "said"), [("s3://key:SECRET@b/clips", "ValueError"), ("s3://b/clips", "no bucket b")]
+)
+def test_what_a_store_says_of_an_address_with_a_password_is_not_told(url, said):
+    with pytest.raises(InputError, match=said) as raised, remote.store_errors(InputError, url):
+        raise ValueError(f"there is no bucket {url.removeprefix('s3://').removesuffix('/clips')}")
+    assert "SECRET" not in display_text(str(raised.value))
 
 
 def test_footage_and_results_are_mirrored_by_their_names(store, tmp_path):
