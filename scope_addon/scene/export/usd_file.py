@@ -72,30 +72,32 @@ def has_content(path: Path, layer: Layer) -> bool:
 
 
 def _has_values(found: Any, spec: Any) -> bool:
-    return all(found.GetInfo(key) == spec.GetInfo(key) for key in spec.ListInfoKeys())
+    return all(_is_same(found.GetInfo(key), spec.GetInfo(key)) for key in spec.ListInfoKeys())
+
+
+def _is_same(found: Any, value: Any) -> bool:
+    if found == value:
+        return True
+    text = repr(value)  # NaN, as rigs may have it, differs from itself
+    return "nan" in text and repr(found) == text
 
 
 def _usd_module() -> Any:
-    """Return USD's module for layers; None if Blender comes without it."""
-    for folder in (None, _packages_of_blender()):
-        try:
-            if folder is not None:
-                sys.path.append(folder)
-            return importlib.import_module("pxr.Sdf")
-        except ImportError:
-            pass
-        finally:
-            if folder is not None:
-                sys.path.remove(folder)
-    return None
+    """Return USD's module for layers; None if Blender comes without it.
 
-
-def _packages_of_blender() -> str:
-    """Return the folder of the modules that come with Blender. Its Python finds them there, but not
-    another one into which Blender was installed as a module.
+    Blender's Python finds the modules that come with it, but not another Python, into which Blender
+    was installed as a module.
     """
-    python = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    return str(Path(bpy.utils.resource_path("LOCAL"), "python", "lib", python, "site-packages"))
+    python = Path(bpy.utils.resource_path("LOCAL"), "python", "lib")
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    before = list(sys.path)
+    sys.path += [str(python / version / "site-packages"), str(python / "site-packages")]
+    try:
+        return importlib.import_module("pxr.Sdf")
+    except ImportError:
+        return None
+    finally:
+        sys.path[:] = before
 
 
 def is_whole_crate(path: Path) -> bool:
