@@ -109,8 +109,8 @@ class OrientationField:
 
 @dataclass
 class PosePriors:
-    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3), weights
-    (n,) each.
+    """Known estimates of part poses in the camera frame: parts (n,), R (n, 3, 3), t (n, 3) in
+    metres, weights (n,) per radian^2 and per metre^2.
 
     A row without a positive weight is left out.
     """

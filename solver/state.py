@@ -38,7 +38,7 @@ class State:
 
     R_camera_root: Array  # (3, 3)
     t_camera_root: Array  # (3,), the pelvis
-    Omega: Array  # (K, 3, 3), states of joints 1..K
+    Omega: Array  # (K, 3, 3), states of joints 1..K relative to their parents
     beta: Array  # (P,)
 
     @classmethod

@@ -42,6 +42,7 @@ def fit_batch(
     :param measurements: of each frame; or of all, as arrays with an axis for the frames:
         `frames_of`.
     :param init: a state for each frame, None where there is none; or "multi" for all, as of `fit`.
+    :param priors, options: of `fit`, for all frames.
     :param threads: how many; 0 is one for each core.
     :raises ShapeError: an array does not fit the body, whichever frame it belongs to, or `init` has
         another length.

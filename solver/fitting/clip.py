@@ -50,8 +50,11 @@ def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
     """Return the priors of the next frame: the shape at this frame's estimate, with its information
     added.
 
-    `shape_weight` is `Weights.shape` of the fit, over which the information is kept.
+    The information is that of the measurements once the pose is eliminated, so that the sum over
+    frames is that of one shape for all, linearized where each frame was fitted.
 
+    :param fitted: by `fit` with these priors.
+    :param shape_weight: `Weights.shape` of the fit, over which the information is kept.
     :raises ShapeError: the shape's information in `priors` does not fit the shape.
     :raises InvalidValueError: `priors` or `fitted` is of another type, or the weight is negative,
         infinite or not a number.
@@ -95,6 +98,8 @@ def fit_clip(
 
     :param measurements: of each frame; or of the clip, as arrays with an axis for the frames:
         `frames_of`.
+    :param init: each frame's state, camera frame, metres.
+    :param priors, options: of `fit`; the shape's prior counts once for the clip.
     :return: the frames' fits and the shape they share.
     :raises ShapeError: when there is no frame, or when an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use.

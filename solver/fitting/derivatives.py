@@ -77,8 +77,10 @@ def solution_derivatives(
     priors: Priors | None = None,
     options: Options = Options(),  # noqa: B008 - frozen
 ) -> SolutionDerivatives:
-    """Return how the solution of a frame changes with its measurements and weights.
+    """Return how the solution x of a frame changes with its measurements and weights m.
 
+    By the implicit function theorem, dx/dm = -H^-1 dg/dm, with g and H the gradient and the Hessian
+    of the cost.
     For a loss L of the joints, np.tensordot(dL, derivatives.joints[name], 2) is its gradient.
 
     :param state: the solution: where the gradient of the cost vanishes. That of a fit whose

@@ -57,6 +57,8 @@ def fit(
     minimize 1/2 sum_i |r_i(T_i, Omega_i, beta)|^2 over T_0, Omega_1..K and beta (section 3 of the
     paper).
 
+    :param body: a `Body`, or any tree with the arrays of `BodyArrays`.
+    :param measurements: of one frame, in camera axes: x right, y down, z forward.
     :param init: where to start, camera frame, metres, in one stage; without it, as
         `initial_states` finds, in several. Where 2D keypoints alone are given, that is from twelve
         headings, of which the fit of the lowest cost is kept; "multi" does so always. Where 3D
@@ -64,6 +66,7 @@ def fit(
         exact points at first.
     :param priors: `default_priors(body)` unless given: the learned joint prior, joint limits, the
         population's shape.
+    :param options: weights, stages, robust kernels and damping.
     :return: the state and how it was reached; whatever values were measured, see `Status`.
     :raises ShapeError: when an array does not fit the body.
     :raises InvalidValueError: a value that no fit can use.
@@ -88,6 +91,11 @@ def fit_tree(
 ) -> Fit:
     """`fit` on a tree that has been made already. Calls in a row with the same tree work in the
     same memory.
+
+    :param measurements: with points as numbers. Others as of `fit`; there is no warning of a fit
+        that is bad.
+    :raises ShapeError: when an array does not fit the tree.
+    :raises InvalidValueError: a value that no fit can use.
     """
     solver = getattr(_last, "solver", None)
     if solver is None or solver.tree is not tree:
@@ -110,6 +118,7 @@ class FrameSolver:
     ) -> None:
         """Check the body and allocate the working memory.
 
+        :param priors, options: of `fit`, for all frames that are given no others.
         :raises ShapeError: when an array does not fit the others.
         :raises InvalidValueError: `priors` or `options` is of another type.
         """

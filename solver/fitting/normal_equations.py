@@ -64,6 +64,8 @@ def linearize(
 ) -> NormalEquations:
     """Return the normal equations of a frame at a state, as dense arrays.
 
+    Those of the paper's equation (20), with the twists of all parts but the root eliminated.
+
     :param state: camera frame, metres. :param priors: `default_priors(body)` unless given.
     :param options: weights and robust kernels are those of the last stage from a known state.
     :raises ShapeError: an array does not fit the body.
@@ -82,7 +84,8 @@ def gauss_newton_step(
     options: Options = Options(),  # noqa: B008 - frozen
     damping: float = 0.0,
 ) -> GaussNewtonStep:
-    """Return the Gauss-Newton step of a frame from a state, by the recursion in O(K) + O(N).
+    """Return the Gauss-Newton step of a frame from a state, by the recursion in O(K) + O(N) of
+    section 3 of the paper.
 
     :param damping: lambda of Lambda = lambda diag(1, 1, 1, s^2, s^2, s^2, 1, ..., 1, 0, ..., 0),
         with s = 1 / `Options.root_length` for the root's position and 0 for the shape. Unknowns of
