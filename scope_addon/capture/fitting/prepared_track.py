@@ -137,25 +137,16 @@ class PreparedTrack:
         if not seen:
             return [View(measured)]
         share = DIRECTIONS_OF_VIEWS / (len(seen) + 1)
-        own = replace(self._without_depth(measured, share), pose_priors=None)
+        own = replace(_without_depth(measured, share), pose_priors=None)
         if not self.track.seen[k]:
             own = replace(own, keypoints2d=None, orientation_field=None)
         views = [View(own)]
         for other in seen:
-            theirs = self._without_depth(other.measure_all(k) if whole else other.measure(k), share)
-            views.append(View(theirs, other.R_camera_first, other.t_camera_first))
+            theirs = other.measure_all(k) if whole else other.measure(k)
+            views.append(
+                View(_without_depth(theirs, share), other.R_camera_first, other.t_camera_first)
+            )
         return views
-
-    def _without_depth(self, measured: Measurements, share: float) -> Measurements:
-        """Return measurements without lifted points, and with a share of the weight of the body's
-        directions; a head or a hand has directions in one camera alone.
-        """
-        field = measured.orientation_field
-        if field is not None:
-            confidence = np.array(field.confidence, float)
-            confidence[: len(self.measurer.bone_starts)] *= share
-            field = replace(field, confidence=confidence)
-        return replace(measured, keypoints3d=None, orientation_field=field)
 
     def measure(self, k: int, root_cam: FloatArray | None = None) -> Measurements:
         """Return the measurements of the body in frame ``k``.
@@ -230,6 +221,14 @@ class PreparedTrack:
         return replace(
             self.priors, shape_mean=betas, shape_information=np.eye(self.body.P) * SHAPE_CERTAINTY
         )
+
+
+def _without_depth(measured: Measurements, share: float) -> Measurements:
+    """Return measurements without lifted points, and with directions of less weight."""
+    field = measured.orientation_field
+    if field is not None:
+        field = replace(field, confidence=share * np.asarray(field.confidence))
+    return replace(measured, keypoints3d=None, orientation_field=field)
 
 
 def _with_head_and_hands(

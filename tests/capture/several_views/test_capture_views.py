@@ -7,6 +7,7 @@ from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.several_views.capture_views import capture_views
+from scope.scope_addon.capture.tracking.chosen_person import ChosenPerson
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.footage_view import FootageView
 from scope.solver import load_body, rotations
@@ -80,6 +81,14 @@ def test_one_video_is_not_several(shared):
         capture_views(
             [video, video.parent / ".." / "pose2sim" / "cam1.mp4"], body, CaptureOptions()
         )
+
+
+def test_a_place_of_a_person_in_several_videos_is_refused(shared):
+    folder = shared / "data" / "pose2sim"
+    videos = [folder / "cam1.mp4", folder / "cam4.mp4"]
+    options = CaptureOptions(chosen=ChosenPerson(540.0, 960.0, None))
+    with pytest.raises(UsageError, match="--person is a place in one video"):
+        capture_views(videos, load_body("scope"), options)
 
 
 def test_what_is_given_of_cameras_has_to_suit_the_videos(shared, tmp_path):
