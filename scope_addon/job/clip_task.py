@@ -219,10 +219,14 @@ def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry
 def names_of_results(reported: Iterable[str], name: str) -> list[str]:
     """Return the names of a clip's results on the disk, of which a report may have `unicode_text`.
 
-    :param name: of the clip, with which they begin.
+    :param name: of the clip, with which they begin, unless they are of windows.
     """
     start = unicode_text(name)
-    return [name + unicode_text(each).removeprefix(start) for each in reported]
+    names = []
+    for each in reported:
+        text = unicode_text(each)
+        names.append(name + text.removeprefix(start) if text.startswith(start) else each)
+    return names
 
 
 def failure(task: ClipTask, message: str) -> Entry:
