@@ -49,6 +49,8 @@ _HOST = re.compile(r"(\[[^]]*\]|[^/?#@:]*)(:\d+)?([/?#]|$)")
 _AFTER_PATH = re.compile(r"[?#;&]")
 # Control characters, ends of lines, and marks of the direction of writing.
 _UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+# Surrogates that are not Python's escapes of bytes.
+_NO_BYTE = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 NUMBER_SIGN = re.compile(r"#+|%0?\d*d")  # stands for the number in a pattern of names
 
 
@@ -155,12 +157,14 @@ def unicode_text(path: str | Path) -> str:
     """Return a path as text for other programs: bytes that are not UTF-8 become U+FFFD.
 
     Old discs and archives hold such names, and Python keeps the bytes as lone surrogates. Text with
-    them can name a file, but cannot be printed, or be part of JSON or of Blender's names.
+    them can name a file, but cannot be printed, or be part of JSON or of Blender's names. The
+    escapes of JSON also give lone surrogates that stand for no byte.
     """
     if is_utf8(path):
         return str(path)
+    text = _NO_BYTE.sub("\N{REPLACEMENT CHARACTER}", str(path))
     # Not by the system's encoding, which may lack other letters of the text.
-    as_bytes = str(path).encode("utf-8", sys.getfilesystemencodeerrors())
+    as_bytes = text.encode("utf-8", sys.getfilesystemencodeerrors())
     return as_bytes.decode("utf-8", "replace")
 
 

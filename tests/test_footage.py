@@ -81,6 +81,8 @@ def test_names_that_are_no_text_can_be_shown() -> None:
     odd = os.fsdecode(b"caf\xe9.mp4")
     assert (is_utf8(odd), is_utf8("café.mp4")) == (False, True)
     assert display_text(odd) == "caf\N{REPLACEMENT CHARACTER}.mp4"
+    # As json reads the escape of half a pair, which stands for no byte.
+    assert display_text("caf\ud800.mp4") == "caf\N{REPLACEMENT CHARACTER}.mp4"
     assert display_text(Path("café.mp4")) == "café.mp4"
     text = json_text({odd: [odd, "é", 1.5, None]})
     assert text.isascii()
