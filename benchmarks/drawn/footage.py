@@ -125,8 +125,10 @@ def draw_clip(
                 if background is None or not is_background_static:
                     background = surroundings.draw(R, center, K, WIDTH, rows)
                 canvas = Canvas.blank(WIDTH, rows)
-                for skin, walker in zip(skins, walkers, strict=True):
-                    vertices = (walker.vertices(walker.pose(time_s + later_s)) - center) @ R
+                if later_s:
+                    poses = [walker.pose(time_s + later_s) for walker in walkers]
+                for skin, walker, pose in zip(skins, walkers, poses, strict=True):
+                    vertices = (walker.vertices(pose) - center) @ R
                     rasterize(canvas, vertices, *skin, K)
                 picture.append(blended(background, canvas))
             writer.write(change(time_s, np.concatenate(picture)))

@@ -10,15 +10,17 @@ there, for as long as the refit of a frame costs less than was gained.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ....solver import Fit, Measurements, Options, State, Status, fit_tree, make_tree
 from ....solver.tree import with_fixed_shape
-from ...arrays import BoolArray, FloatArray
+from ...arrays import BoolArray, Float64Array, FloatArray
+from ..perception.hand_landmarks import SIDES
 from .hand_measurements import smooth_fingers
-from .prepared_track import PreparedTrack
+from .prepared_track import OtherView, PreparedTrack
 from .weights import ROBUST, WEIGHTS, cold_stages, warm_stages
 
 LONGEST_COAST_S = 0.5  # the last pose says little about a person who has not been seen for longer
@@ -128,17 +130,11 @@ class FrameSequence:
     def fitted(self) -> FittedTrack:
         """Return the states of all frames."""
         prepared = self._prepared
-        rotations = self._rotations
         valid = self._valid
         confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
-        if prepared.hand_measurer is not None and prepared.hands is not None:
-            confidence = np.maximum(
-                confidence, prepared.hand_measurer.joint_confidence(prepared.hands)
-            )
-            seen = (prepared.hands[:, :, 0, 2] > 0) & valid[:, None]
-            rotations = smooth_fingers(
-                rotations, prepared.hand_measurer.fingers, seen, prepared.track.times
-            )
+        rotations, confidence = with_hands(
+            [prepared], self._rotations, confidence, valid, prepared.track.times
+        )
         return FittedTrack(
             rotations=rotations,
             t_camera_root=self._root,
@@ -201,6 +197,32 @@ class FrameSequence:
         self._rotations[k, 1:] = fit.state.Omega
         self._root[k] = fit.state.t_camera_root
         self._cost[k] = fit.cost
+
+
+def with_hands(
+    cameras: Sequence[PreparedTrack | OtherView],
+    rotations: FloatArray,
+    confidence: Float64Array,
+    valid: BoolArray,
+    times: Float64Array,
+) -> tuple[FloatArray, Float64Array]:
+    """Return rotations (T, K+1, 3, 3) with smooth fingers where no camera sees a hand, and the
+    confidence (T, K+1) of joints with that of hands.
+
+    :param cameras: that see the person, in T frames at these times.
+    :param valid: (T,) which frames were fitted.
+    """
+    seen = np.zeros((len(valid), len(SIDES)), bool)
+    fingers = None
+    for camera in cameras:
+        if camera.hand_measurer is None or camera.hands is None:
+            continue
+        fingers = camera.hand_measurer.fingers
+        confidence = np.maximum(confidence, camera.hand_measurer.joint_confidence(camera.hands))
+        seen |= camera.hands[:, :, 0, 2] > 0
+    if fingers is not None:
+        rotations = smooth_fingers(rotations, fingers, seen & valid[:, None], times)
+    return rotations, confidence
 
 
 def is_usable(fit: Fit) -> bool:

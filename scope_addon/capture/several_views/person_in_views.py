@@ -18,8 +18,8 @@ from ...kinematics.frame_blocks import to_single_precision
 from ..camera.intrinsics import Camera
 from ..clock import Progress
 from ..fitting.frame_measurements import Measurer
-from ..fitting.frame_sequence import FittedTrack
-from ..fitting.hand_measurements import HandMeasurer, smooth_fingers
+from ..fitting.frame_sequence import FittedTrack, with_hands
+from ..fitting.hand_measurements import HandMeasurer
 from ..fitting.outline import fit_shape_to_outline, usable_masks
 from ..fitting.prepared_track import (
     OtherView,
@@ -30,7 +30,6 @@ from ..fitting.prepared_track import (
 )
 from ..fitting.stature import mean_shape, stature_sigma
 from ..fitting.weights import ROBUST, clip_stages, motion_priors
-from ..perception.hand_landmarks import SIDES
 from ..perception.landmark_network import HIPS
 from ..solve import Person, with_face_expressions
 from ..tracking.track import Track
@@ -290,21 +289,12 @@ def _fitted(prepared: PreparedTrack, frames: IndexArray, found: MotionFit) -> Fi
     row = np.maximum(np.searchsorted(frames, np.arange(T), side="right") - 1, 0)
     rotations = np.array([[state.R_camera_root, *state.Omega] for state in found.states])
     root = np.array([state.t_camera_root for state in found.states])
-    rotations = rotations[row]
     confidence = prepared.measurer.joint_confidence(prepared.track.confidence)
     for other in prepared.others:
         confidence = np.maximum(confidence, other.measurer.joint_confidence(other.confidence))
-    if prepared.hand_measurer is not None:
-        seen = np.zeros((T, len(SIDES)), bool)
-        cameras: list[PreparedTrack | OtherView] = [prepared, *prepared.others]
-        for view in cameras:
-            if view.hands is not None and view.hand_measurer is not None:
-                of_hands = view.hand_measurer.joint_confidence(view.hands)
-                confidence = np.maximum(confidence, of_hands)
-                seen |= view.hands[:, :, 0, 2] > 0.0
-        fingers = prepared.hand_measurer.fingers
-        seen &= valid[:, None]
-        rotations = smooth_fingers(rotations, fingers, seen, prepared.track.times)
+    rotations, confidence = with_hands(
+        [prepared, *prepared.others], rotations[row], confidence, valid, prepared.track.times
+    )
     return FittedTrack(
         rotations=rotations,
         t_camera_root=root[row],
