@@ -290,6 +290,8 @@ class DaskRunner:
         except (ScopeError, OSError) as error:
             text = system_error_message(error) if isinstance(error, OSError) else str(error)
             entry = failure(task, text)
+        if entry["status"] == "done" and (others := self._staging.left_over(task, entry["outputs"])):
+            entry["report"]["warnings"].append(others)
         self._forget(key)
         return self._ended(task, attempt.worker, entry)
 
