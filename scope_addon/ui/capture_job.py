@@ -62,7 +62,7 @@ class CaptureJob:
         self.cancelled = False
         self.messages = 0  # of the worker so far
         self._scene_uid = scene.session_uid
-        self._selection = _Selection(scene)
+        self._selection = Selection(scene)
         self._options = build_options(scene)
         self._request = capture_request(scene)
         self._kind = kind_of(self._request.values)
@@ -153,8 +153,8 @@ class CaptureJob:
         report = Report.from_json(captured.report)
         views = report.placed_videos(self._request.views)
         view_footage = [path if path.is_file() else None for path in views]
-        is_busy = _Selection(scene).shows_work(since=self._selection)
-        with _selection_kept(scene) if is_busy else nullcontext():
+        is_busy = Selection(scene).shows_work(since=self._selection)
+        with selection_kept(scene) if is_busy else nullcontext():
             build_capture(
                 scene,
                 [(path, path.read_bytes()) for path in captured.motions],
@@ -165,7 +165,7 @@ class CaptureJob:
             )
 
 
-class _Selection:
+class Selection:
     """The selected objects of the view layer that a scene is shown in, the active one, and its
     mode.
     """
@@ -178,7 +178,7 @@ class _Selection:
         self._active = active.session_uid if active else 0
         self._mode = active.mode if active else "OBJECT"
 
-    def shows_work(self, since: _Selection) -> bool:
+    def shows_work(self, since: Selection) -> bool:
         """Return whether the user has begun to work on something else: what is selected is not what
         was selected before, or is being edited.
         """
@@ -196,7 +196,7 @@ def _selected_objects(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
 
 
 @contextmanager
-def _selection_kept(scene: bpy.types.Scene) -> Iterator[None]:
+def selection_kept(scene: bpy.types.Scene) -> Iterator[None]:
     """Keep the selection, the active object, its mode and the current frame while a capture is
     built, and show other captures that something is selected of.
     """

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,14 @@ from ..scene.rig_retarget import usable_guess
 from ..scene.visibility import SceneBefore, hide, select_only
 from ..temporary import remove
 from ..untrusted.body_file import load_body
-from .capture_job import build_capture, build_options, chosen_values, window_shows
+from .capture_job import (
+    Selection,
+    build_capture,
+    build_options,
+    chosen_values,
+    selection_kept,
+    window_shows,
+)
 from .live_properties import with_login
 from .preferences import cache, python_command
 from .retarget_maps import listed_map
@@ -96,6 +104,7 @@ class LiveJob:
         ]
         self._bodies = [LiveBody(scene, name, self._scene_body) for name in names]
         self._before = SceneBefore()
+        self._selection = Selection(scene)  # as the user or the first live body has left it
         follows = scene.scope_live.with_rig and unfinished is None
         self._rig = live_rig(scene, self._scene_body) if follows else None
         self._result: dict[str, Any] | None = None  # the recording's message
@@ -256,6 +265,7 @@ class LiveJob:
         if created and not self._was_created:
             self.created = self._was_created = True
             select_only(bpy.context.view_layer, body.armature)
+            self._selection = Selection(scene)
         if self._rig is not None and pose.person == 0:
             if created and scene.scope_retarget.captured == "hide":
                 hide(body.armature, bpy.context.view_layer)
@@ -291,9 +301,11 @@ class LiveJob:
             # Capture then captures the take once more
             self._footage = scene.scope.footage = str(self._kept)
             scene.scope.views.clear()  # which are of other footage
-        built = build_capture(
-            scene, contents, body, self._footage, Report.from_json(result["report"]), options
-        )
+        is_busy = Selection(scene).shows_work(since=self._selection)
+        with selection_kept(scene) if is_busy else nullcontext():
+            built = build_capture(
+                scene, contents, body, self._footage, Report.from_json(result["report"]), options
+            )
         self._remove_bodies()
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()

@@ -310,6 +310,18 @@ def test_a_recorded_file_that_ends_by_itself_becomes_a_capture(live):
     job.record()
     to_end(job)
     assert bpy.context.scene.scope.capture is not None
+    assert "scope_motion" in bpy.context.view_layer.objects.active
+
+
+def test_what_was_selected_during_a_live_capture_stays_selected(live):
+    job = live('pose(1); assert receive() == "record"; pose(2); finish()')
+    until(job, lambda: job.has_body)
+    bpy.ops.object.empty_add()
+    job.record()
+    to_end(job)
+    assert bpy.context.scene.scope.capture is not None
+    assert [obj.name for obj in bpy.context.selected_objects] == ["Empty"]
+    assert bpy.context.view_layer.objects.active.name == "Empty"
 
 
 def test_a_file_that_ends_leaves_the_last_pose(live, tmp_path):
