@@ -23,7 +23,7 @@ from .job_operator import JobOperator, clear_status_bar
 from .live_properties import state as live_state
 from .reporting import iface_, refuse, restore_libraries, rpt_, sentence, tip_
 from .sidebar import redraw_sidebars, redraw_sidebars_twice, show_tab
-from .view_operators import show_new_capture
+from .view_operators import hide_startup_cube, show_new_capture
 
 if TYPE_CHECKING:
     from .capture_job import CaptureJob
@@ -368,6 +368,8 @@ class SCOPE_OT_capture_queue(CapturingOperator):
                 clip.status = DONE
                 clip.message = self._write_files(scene) if scene is not None else ""
             stop_job()
+            if scene == bpy.context.scene:
+                hide_startup_cube(bpy.context)  # as a part of what can be undone
             if not bpy.app.background:  # so that each capture can be undone alone
                 bpy.ops.ed.undo_push(message="Capture")
         if scene is not None and self.begin(scene):

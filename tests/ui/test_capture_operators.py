@@ -239,6 +239,27 @@ def test_clips_of_a_queue_are_captured_one_after_the_other_and_a_bad_one_stops_n
     assert queued() == [("a.png", "DONE"), ("c.png", "DONE")]
 
 
+def test_the_startup_cube_is_hidden_by_what_a_clip_of_the_queue_adds_to_the_undo_history(
+    fake_worker, footage, monkeypatch
+):
+    paths = [footage.with_name(f"{name}.png") for name in ("a", "b")]
+    for path in paths:
+        shutil.copy(footage, path)
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    hidden = []
+    begin = SCOPE_OT_capture_queue.begin
+    monkeypatch.setattr(
+        SCOPE_OT_capture_queue,
+        "begin",
+        lambda self, scene: hidden.append(cube.hide_get()) or begin(self, scene),
+    )
+    fake_worker("finish()")
+    choose_several(paths)
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert hidden == [False, True, True]
+
+
 @pytest.mark.parametrize(("kind", "suffix"), [("BVH", ".bvh"), ("NPZ", ".npz"), ("GLB", ".glb")])
 def test_clips_of_a_queue_are_written_as_files_beside_those_that_exist(
     fake_worker, footage, tmp_path, kind, suffix
