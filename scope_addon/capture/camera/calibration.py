@@ -67,6 +67,7 @@ _LENS_KEY = re.compile(
     r"|[kp]_?\d|f_?[xy]?|c_?[xy]|[wh]",
     re.I | re.S,
 )
+METADATA = "metadata"  # Pose2Sim's table that is none of a camera
 _OPENCV_COUNTS = (0, 4, 5, 8, 12, 14)
 _BROWN_COUNT = 5  # k1, k2, p1, p2, k3, as in a motion file
 # Focal lengths in longer sides of the picture: fields of view of 178 and 0.6 degrees.
@@ -257,7 +258,7 @@ def calibration_text(motion: Motion) -> str:
     seen = [motion, *(motion.from_view(number) for number in range(motion.view_count))]
     view = motion.view
     lines: list[str] = []
-    names = ["metadata"]
+    names = [METADATA]
     for number, each in enumerate(seen, 1):
         size = each.image_size.tolist()
         turned = np.linalg.inv(each.world_from_camera[0])
@@ -284,7 +285,7 @@ def calibration_text(motion: Motion) -> str:
         ]
         lines.append("")
     lines += [
-        f"[{names[0]}]",
+        f"[{METADATA}]",
         "adjusted = false",
         f"error = {float(np.mean(motion.residual_px))}",
         "",
