@@ -14,6 +14,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ...solver.errors import ScopeError
+from ..errors import UsageError
 from ..scene.datablocks import found
 from . import preview_picture, warm_up
 from .captures import shown_capture, unit_text
@@ -311,6 +312,10 @@ class SCOPE_OT_capture_queue(CapturingOperator):
     bl_label = "Capture All"
 
     _finished = 0  # clips so far
+    _clip = ""  # footage of the clip that is being captured
+    # State and message of the clips that have ended, by their footage: what the user undoes
+    # meanwhile takes the list back to an earlier state, too.
+    _ended: dict[str, tuple[str, str]]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -328,6 +333,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
 
     def start(self, context: bpy.types.Context) -> bool:
         """Start the first clip; those that failed before are tried again."""
+        self._ended = {}
         for clip in context.scene.scope.queue:
             if clip.status == FAILED:
                 clip.status = WAITING
@@ -336,23 +342,35 @@ class SCOPE_OT_capture_queue(CapturingOperator):
     def begin(self, scene: bpy.types.Scene) -> bool:
         """Start the first clip that waits and can be started; return whether there is one."""
         for clip in scene.scope.queue:
-            if _waits(clip):
+            if clip.footage in self._ended:
+                clip.status, clip.message = self._ended[clip.footage]
+            elif _waits(clip):
                 clip.status = CAPTURING
                 clip.message = ""
-                scene.scope.footage = clip.footage
+                self._clip = scene.scope.footage = clip.footage
                 if super().begin(scene):
                     return True
         return False
 
     def fail(self, error: Exception | str) -> bool:
         """Note why the clip cannot be captured, and go on; return False."""
-        clip = _clip_of_job()
-        if clip is not None:
-            clip.status = FAILED
-            clip.message = sentence(error)
+        self._end_clip(FAILED, sentence(error))
         stop_job()
         self.report({"WARNING"}, sentence(error))
         return False
+
+    def _end_clip(self, status: str, message: str) -> None:
+        """Note what has become of the clip that was being captured."""
+        self._ended[self._clip] = status, message
+        if (clip := self._listed_clip()) is not None:
+            clip.status = status
+            clip.message = message
+
+    def _listed_clip(self) -> Any | None:
+        """Return the list's entry of the clip that is being captured; None if it was removed."""
+        scene = _scene_of_job()
+        clips = [] if scene is None else scene.scope.queue
+        return next((clip for clip in clips if clip.footage == self._clip), None)
 
     def _advance(self) -> set[str] | None:
         """Advance the clip's job, and begin the next clip when it has ended."""
@@ -363,10 +381,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         scene = _scene_of_job()
         if "FINISHED" in outcome:
             self._finished += 1
-            clip = _clip_of_job()
-            if clip is not None:
-                clip.status = DONE
-                clip.message = self._write_files(scene) if scene is not None else ""
+            self._end_clip(DONE, self._write_files(scene) if scene is not None else "")
             stop_job()
             if scene == bpy.context.scene:
                 hide_startup_cube(bpy.context)  # as a part of what can be undone
@@ -388,8 +403,14 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         if kind == NO_FILES or capture is None:
             return ""
         try:
+            folder = _folder_of_files(settings)
+            if not os.path.isdir(folder):
+                raise UsageError(
+                    f"no file was written, because there is no folder '{folder}' any more; choose "
+                    "another one, and export the capture"
+                )
             with window_shows(scene):
-                path = unused_path(Path(_folder_of_files(settings)), capture, kind)
+                path = unused_path(Path(folder), capture, kind)
                 write_captures(path, kind, [capture])
         except (ScopeError, OSError) as error:
             self.report({"WARNING"}, sentence(error))
@@ -405,8 +426,8 @@ class SCOPE_OT_capture_queue(CapturingOperator):
 
     def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         """Let a cancelled clip wait again, and end as a single capture does."""
-        clip = _clip_of_job()
-        if clip is not None:
+        clip = self._listed_clip()
+        if clip is not None and self._clip not in self._ended:
             clip.status = WAITING
         return super().end(context, outcome)
 
@@ -432,14 +453,6 @@ def _waits(clip: Any) -> bool:
     captured holds it as such.
     """
     return clip.status in (WAITING, CAPTURING)
-
-
-def _clip_of_job() -> Any | None:
-    """Return the clip of the list that is being captured; None if it was removed from the list."""
-    scene = _scene_of_job()
-    if scene is None:
-        return None
-    return next((clip for clip in scene.scope.queue if clip.status == CAPTURING), None)
 
 
 def _scene_of_job() -> bpy.types.Scene | None:

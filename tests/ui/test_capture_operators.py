@@ -329,6 +329,55 @@ def test_a_clip_that_is_removed_while_it_is_captured_marks_no_other_as_done(fake
     assert sorted(each.name for each in captures_of(bpy.context.scene)) == ["a", "b"]
 
 
+def test_what_the_user_undoes_during_a_queue_repeats_no_clip_and_loses_no_file(
+    fake_worker, footage, tmp_path, monkeypatch
+):
+    """Undo takes the list's states back with everything else in the scene."""
+    paths = [footage.with_name(f"{name}.png") for name in ("a", "b", "c")]
+    for path in paths:
+        shutil.copy(footage, path)
+    choose_several(paths)
+    fake_worker("finish()")
+    settings = bpy.context.scene.scope
+    settings.queue_format = "BVH"
+    settings.queue_folder = str(tmp_path)
+    step = CaptureJob.step
+
+    def undone_meanwhile(job):
+        for clip in settings.queue:
+            clip.status = "WAITING"
+        return step(job)
+
+    monkeypatch.setattr(CaptureJob, "step", undone_meanwhile)
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert queued() == [("a.png", "DONE"), ("b.png", "DONE"), ("c.png", "DONE")]
+    assert sorted(each.name for each in captures_of(bpy.context.scene)) == ["a", "b", "c"]
+    assert sorted(path.name for path in tmp_path.glob("*.bvh")) == ["a.bvh", "b.bvh", "c.bvh"]
+
+
+def test_a_folder_that_is_gone_is_said_and_nothing_is_written_elsewhere(
+    fake_worker, footage, tmp_path, monkeypatch
+):
+    other = footage.with_name("other.png")
+    shutil.copy(footage, other)
+    choose_several([footage, other])
+    fake_worker("finish()")
+    settings = bpy.context.scene.scope
+    settings.queue_format = "BVH"
+    settings.queue_folder = str(tmp_path)
+    step = CaptureJob.step
+
+    def cleared_meanwhile(job):
+        settings.queue_folder = ""
+        return step(job)
+
+    monkeypatch.setattr(CaptureJob, "step", cleared_meanwhile)
+    monkeypatch.chdir(tmp_path)
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    assert all("there is no folder" in clip.message for clip in settings.queue)
+    assert list(tmp_path.glob("*.bvh")) == []
+
+
 def test_a_clip_saved_while_it_was_captured_waits(fake_worker, footage):
     other = footage.with_name("other.png")
     shutil.copy(footage, other)
