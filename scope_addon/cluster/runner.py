@@ -290,8 +290,9 @@ class DaskRunner:
         except (ScopeError, OSError) as error:
             text = system_error_message(error) if isinstance(error, OSError) else str(error)
             entry = failure(task, text)
-        if entry["status"] == "done" and (others := self._staging.left_over(task, entry["outputs"])):
-            entry["report"]["warnings"].append(others)
+        if entry["status"] == "done":
+            others = self._staging.left_over(task, entry["outputs"])
+            entry["report"]["warnings"] += [others] if others else []
         self._forget(key)
         return self._ended(task, attempt.worker, entry)
 
