@@ -444,10 +444,11 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         given = non_default_arguments(args)
         if args.window_seconds is not None:
             given[WINDOW_SECONDS] = f"{args.window_seconds:g}"
-        files = [file for rig in rigs for file in rig.files]
+        # absolute, because a worker of a cluster may have another current folder
+        files = [os.path.abspath(file) for rig in rigs for file in rig.files]
         batch = Batch(folder, out, args.program, given, formats, extras, is_url(args.out), files)
         footage = batch.clips(args.recursive, args.views)
-        read = [*files_to_read(vars(args)), *files]
+        read = [*files_to_read(vars(args)), *map(Path, files)]
         for path in footage.values():
             read += [path] if path.is_file() else files_of_footage(path)
         refuse_inputs([batch.report_file, *batch.results(footage)], read)

@@ -153,6 +153,7 @@ class DaskRunner:
             "options": dict(task.settings.options),
             "suffixes": list(task.settings.suffixes),
             "extras": list(task.settings.extras),
+            "further_files": list(task.settings.further_files),
             "basis": task.basis,
         }
 

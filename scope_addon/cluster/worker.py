@@ -76,12 +76,15 @@ def _problem(wanted: dict[str, Any]) -> str:
             f"same path"
         )
     settings = CaptureSettings(
-        wanted["options"], tuple(wanted["suffixes"]), Extras(*wanted["extras"])
+        wanted["options"],
+        tuple(wanted["suffixes"]),
+        Extras(*wanted["extras"]),
+        tuple(wanted["further_files"]),
     )
     if settings.basis(ours) != wanted["basis"]:
         return (
-            "a file that the options name is missing or different there; all machines need the "
-            "same under its path"
+            "a file that the options name, or one to which it refers, is missing or different "
+            "there; all machines need the same under its path"
         )
     return ""
 

@@ -56,7 +56,7 @@ class Batch:
     :param extras: what else to write of each clip.
     :param is_mirror: the output folder stands for a store and has files of the same sizes, so that
         results of an earlier batch are compared by their sizes alone.
-    :param further_files: that decide the results, besides those that the options name.
+    :param further_files: see `CaptureSettings`.
     :raises InputError: the folder of footage does not exist.
     """
 
@@ -69,17 +69,17 @@ class Batch:
         suffixes: Sequence[str],
         extras: Extras = NO_EXTRAS,
         is_mirror: bool = False,
-        further_files: Sequence[Path] = (),
+        further_files: Sequence[str] = (),
     ) -> None:
         if not folder.is_dir():
             raise InputError(f"{folder} is not a folder; give the folder with the footage")
         self.folder = folder.resolve()
         self.out = out.resolve()
         self.report_file = out / REPORT_NAME
-        self.settings = CaptureSettings(options, tuple(suffixes), extras)
+        self.settings = CaptureSettings(options, tuple(suffixes), extras, tuple(further_files))
         self._program = list(program)
         self._is_mirror = is_mirror
-        self._basis = self.settings.basis(program_version(ROOT), further_files)
+        self._basis = self.settings.basis(program_version(ROOT))
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
 

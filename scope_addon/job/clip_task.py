@@ -72,17 +72,19 @@ class CaptureSettings(NamedTuple):
     :param options: arguments of every capture: flag to text; None for a flag that takes no value.
     :param suffixes: suffixes of the result files, such as ``.npz``.
     :param extras: what else to write of each clip.
+    :param further_files: paths of files that decide the results, besides those that the options
+        name: what these refer to, such as a rig's textures.
     """
 
     options: dict[str, str | None]
     suffixes: tuple[str, ...]
     extras: Extras = NO_EXTRAS
+    further_files: tuple[str, ...] = ()
 
-    def basis(self, program_version: str, further_files: Sequence[Path] = ()) -> str:
-        """Return the part of the clips' keys that is the same for all: program, options, and files
-        that these name.
+    def basis(self, program_version: str) -> str:
+        """Return the part of the clips' keys that is the same for all: program, options, and the
+        contents of the files that decide the results.
 
-        :param further_files: to which those refer, such as textures.
         :raises OSError: a file cannot be read.
         """
         values = {k: v for k, v in self.options.items() if k != "--threads"}
@@ -100,7 +102,7 @@ class CaptureSettings(NamedTuple):
                 files = files_of_calibration(Path(value))
             # unlike Path's, False for what is too long for a name
             _add_files(digest, filter(os.path.isfile, files))
-        _add_files(digest, filter(os.path.isfile, further_files))
+        _add_files(digest, map(Path, filter(os.path.isfile, self.further_files)))
         return digest.hexdigest()
 
 

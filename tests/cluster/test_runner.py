@@ -11,6 +11,8 @@ import subprocess
 import sys
 import threading
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import pytest
@@ -281,6 +283,43 @@ def test_workers_that_see_other_folders_get_no_clips(
     monkeypatch.setattr(DaskRunner, "_wanted", wanted)
     assert run(cluster, folder) == (1, None)
     assert says in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_workers_know_a_clip_by_the_files_to_which_a_rig_refers(
+    cluster, folder, monkeypatch, capsys
+):
+    """A batch whose rig has a texture of its own could not run on a cluster."""
+    (folder / "a.mp4").write_text("a")
+    (folder.parent / "texture.png").write_text("red")
+    monkeypatch.chdir(folder.parent)
+    rig = SimpleNamespace(files=[Path("texture.png")])
+    monkeypatch.setattr("scope.scope_addon.cli.checked_rigs", lambda *_: [rig])
+    for count in (1, 1, 2):
+        assert run(cluster, folder)[0] == 0, capsys.readouterr().err
+        assert len(calls(folder / "a.mp4")) == count
+        if capsys.readouterr().err.splitlines()[0].endswith(" skipped"):
+            (folder.parent / "texture.png").write_text("blue")
+
+
+def test_workers_without_a_file_to_which_a_rig_refers_get_no_clips(
+    cluster, folder, monkeypatch, capsys
+):
+    (folder / "a.mp4").write_text("a")
+    (folder.parent / "texture.png").write_text("red")
+    from scope.scope_addon.cluster.runner import DaskRunner
+
+    ask = DaskRunner._wanted
+
+    def wanted(self, task):
+        (folder.parent / "texture.png").unlink()
+        return ask(self, task)
+
+    monkeypatch.setattr(DaskRunner, "_wanted", wanted)
+    rig = SimpleNamespace(files=[folder.parent / "texture.png"])
+    monkeypatch.setattr("scope.scope_addon.cli.checked_rigs", lambda *_: [rig])
+    assert run(cluster, folder) == (1, None)
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "or one to which it refers, is missing or different there" in said
 
 
 def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
