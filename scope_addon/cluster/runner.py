@@ -28,6 +28,7 @@ from ..footage import display_address, is_url
 from ..job.batch import ROOT
 from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
+from ..scene.export.output_paths import WITHOUT_SCENE
 from ..temporary import remove
 from . import worker as worker_side
 from .remote import RemoteStaging, Staging
@@ -145,7 +146,7 @@ class DaskRunner:
         return {
             "program": program_version(ROOT),
             "bpy": self._program is None
-            and any(suffix != ".npz" for suffix in task.settings.suffixes),
+            and any(suffix not in WITHOUT_SCENE for suffix in task.settings.suffixes),
             "folder": self._folder,
             "out": self._out,
             "attempts": str(self._staging.folder),

@@ -18,6 +18,7 @@ from unittest.mock import MagicMock
 import pytest
 from scope.scope_addon.cli import main
 from scope.scope_addon.job.batch import REPORT_NAME
+from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask
 
 from ..job.processes import runs, wait_for
 from ..required import package
@@ -283,6 +284,31 @@ def test_workers_that_see_other_folders_get_no_clips(
     monkeypatch.setattr(DaskRunner, "_wanted", wanted)
     assert run(cluster, folder) == (1, None)
     assert says in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("suffixes", "needed"),
+    [
+        ((".npz",), False),
+        ((".trc", ".c3d", ".vrma", ".mot", ".csv"), False),
+        ((".trc", ".bvh"), True),
+        ((".npz", ".glb"), True),
+    ],
+)
+def test_workers_need_blender_only_for_what_it_writes(tmp_path, suffixes, needed):
+    package("distributed")
+    from scope.scope_addon.cluster.runner import DaskRunner
+
+    client = MagicMock(status="running")
+    client.sync.return_value = {"workers": ["tcp://worker"]}
+    runner = DaskRunner(client, str(tmp_path), str(tmp_path / "out"), 1, None, print)
+    task = ClipTask("a", "a.mp4", "", "", "basis", CaptureSettings({}, suffixes))
+    outcomes = runner.outcomes([task])
+    next(outcomes)  # begun
+    next(outcomes)
+    runner.close()
+    _, wanted = client.submit.call_args.args
+    assert wanted["bpy"] is needed
 
 
 def test_workers_know_a_clip_by_the_files_to_which_a_rig_refers(
