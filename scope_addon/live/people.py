@@ -3,8 +3,9 @@
 
 Who is tracked from frame to frame keeps their session. Somebody who is found again gets the session
 of the person whose position, motion, size and clothes match best, by the costs with which offline
-captures link tracklets, but decided at once. Otherwise a new person gets the first session that has
-followed nobody yet, then one whose person has been away for long, and else none.
+captures link tracklets, but decided anew in each frame, by the clothes seen so far. Whoever was in
+the picture while that person was still seen is somebody else. Otherwise a new person gets the first
+session that has followed nobody yet, then one whose person has been away for long, and else none.
 
 The first person is who was largest when the capture began. Camera and floor are estimated from
 them, and the others stand in the same world.
@@ -34,6 +35,18 @@ _NEW_SHARE = 0.3  # of the newest frame in the velocity of somebody who is seen
 
 
 @dataclass(eq=False)
+class _Newcomer:
+    """Somebody without a session: where their tracklet began, when they were seen last, and the sum
+    of appearances.
+    """
+
+    tracklet: int
+    start: End
+    last_s: float
+    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(SIZE))
+
+
+@dataclass(eq=False)
 class _FollowedPerson:
     """A session, and who is followed by it: their tracklet, where they were seen last, and the sum
     of appearances.
@@ -49,19 +62,30 @@ class _FollowedPerson:
         """When the person was seen last; -inf before there was one."""
         return -np.inf if self.end is None else self.end.time
 
-    def update(self, tracklet: int, observation: Observation, time_s: float) -> None:
-        """Note that the person was seen."""
-        before = self.end if self.tracklet == tracklet else None
-        self.tracklet = tracklet
-        self.end = _end(observation, time_s, before)
+    def update(self, observation: Observation, time_s: float) -> None:
+        """Note that the person was seen, in the same tracklet as before."""
+        self.end = _end(observation, time_s, self.end)
         if observation.appearance is not None:
             self.appearance = self.appearance + observation.appearance
 
-    def link_cost(self, observation: Observation, time_s: float) -> float:
-        """Return what it costs to take somebody who was found for the person; see `association`."""
+    def take(self, newcomer: _Newcomer, observation: Observation, time_s: float) -> None:
+        """Go on with the tracklet of somebody who was found, and is seen now."""
+        self.tracklet = newcomer.tracklet
+        self.end = _end(observation, time_s)
+        self.appearance = self.appearance + newcomer.appearance
+
+    def link_cost(self, newcomer: _Newcomer, time_s: float) -> float:
+        """Return what it costs to take somebody who was found for the person, as in
+        `tracking.people`; as much as no link if both were seen at once.
+        """
         assert self.end is not None
-        appearance = np.zeros(SIZE) if observation.appearance is None else observation.appearance
-        return link_cost(self.end, _end(observation, time_s), distance(self.appearance, appearance))
+        start = newcomer.start
+        if start.time <= self.end.time:
+            return MAX_LINK_COST
+        # From then on anybody may have the session, so that clothes alone decide who goes first.
+        if time_s - self.end.time > LONG_GAP_S:
+            start = replace(start, time=time_s)
+        return link_cost(self.end, start, distance(self.appearance, newcomer.appearance))
 
 
 class LivePeople:
@@ -94,6 +118,7 @@ class LivePeople:
             LiveSession(body, camera, size, height, executor, first) for height in heights[1:]
         ]
         self._followed = [_FollowedPerson(session) for session in (first, *others)]
+        self._newcomers: dict[int, _Newcomer] = {}  # by tracklet
 
     @property
     def sessions(self) -> list[LiveSession]:
@@ -105,14 +130,11 @@ class LivePeople:
         image_rgb = self._exposure.brighten(frame.image_rgb)
         observations = dict(self._tracker.step(image_rgb, None, frame.timestamp_s))
         # who stays the same while they are seen, and then is the largest one
-        if len(self._followed) == 1:
-            if self._followed[0].tracklet not in observations:
-                largest = max(
-                    observations, key=lambda k: observations[k].region.side_px, default=None
-                )
-                self._followed[0].tracklet = largest
-        else:
+        if len(self._followed) > 1:
             self._assign_people(observations, frame.timestamp_s)
+        elif observations and self._followed[0].tracklet not in observations:
+            largest = max(observations, key=lambda k: observations[k].region.side_px)
+            self._followed[0].tracklet = largest
         poses = []
         for number, person in enumerate(self._followed):
             observation = None if person.tracklet is None else observations.get(person.tracklet)
@@ -126,28 +148,42 @@ class LivePeople:
         by_tracklet: dict[int | None, _FollowedPerson] = {
             person.tracklet: person for person in self._followed
         }
-        new = [tracklet for tracklet in observations if tracklet not in by_tracklet]
-        new.sort(key=lambda tracklet: -observations[tracklet].region.side_px)
+        unknown = {k: seen for k, seen in observations.items() if k not in by_tracklet}
+        self._note_newcomers(unknown, time_s)
+        new = sorted(unknown, key=lambda tracklet: -unknown[tracklet].region.side_px)
         away = [person for person in self._followed if person.tracklet not in observations]
         known = [person for person in away if person.end is not None]
         cost = np.array(
-            [
-                [person.link_cost(observations[tracklet], time_s) for tracklet in new]
-                for person in known
-            ]
+            [[person.link_cost(self._newcomers[k], time_s) for k in new] for person in known]
         )
         links = cheapest_links(cost.reshape(len(known), len(new)), MAX_LINK_COST)
-        found_again = {new[j]: known[i] for i, j in links.items()}
-        free = [p for p in away if p not in found_again.values() and time_s - p.last_s > LONG_GAP_S]
+        people = {new[j]: known[i] for i, j in links.items()}
+        free = [p for p in away if p not in people.values() and time_s - p.last_s > LONG_GAP_S]
         free.sort(key=lambda person: person.last_s)
-        people = by_tracklet | found_again
         for tracklet in new:
             if tracklet not in people and free:
                 people[tracklet] = free.pop(0)
                 people[tracklet].appearance = np.zeros(SIZE)
         for tracklet, observation in observations.items():
-            if tracklet in people:
-                people[tracklet].update(tracklet, observation, time_s)
+            if tracklet in by_tracklet:
+                by_tracklet[tracklet].update(observation, time_s)
+            elif tracklet in people:
+                people[tracklet].take(self._newcomers.pop(tracklet), observation, time_s)
+
+    def _note_newcomers(self, unknown: Mapping[int, Observation], time_s: float) -> None:
+        """Note who was seen without a session, and forget those who have been away for long."""
+        for tracklet, observation in unknown.items():
+            newcomer = self._newcomers.setdefault(
+                tracklet, _Newcomer(tracklet, _end(observation, time_s), time_s)
+            )
+            newcomer.last_s = time_s
+            if observation.appearance is not None:
+                newcomer.appearance = newcomer.appearance + observation.appearance
+        self._newcomers = {
+            tracklet: newcomer
+            for tracklet, newcomer in self._newcomers.items()
+            if time_s - newcomer.last_s <= LONG_GAP_S
+        }
 
 
 def _end(observation: Observation, time_s: float, before: End | None = None) -> End:

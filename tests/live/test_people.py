@@ -5,6 +5,7 @@ world.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 from types import SimpleNamespace
 
@@ -48,26 +49,29 @@ def person(x_px, clothes, side_px=300.0):
 
 @pytest.fixture
 def followed(body, monkeypatch):
-    """Return a function that follows two people through a scripted clip: whom each session follows
-    by frame.
+    """Return a function that follows people, two unless told, through a scripted clip: whom each
+    session follows by frame, or with ``acquired``, in which frames it was told of somebody new.
     """
 
     class Session:
         def __init__(self, *_):
             self.seen = []
+            self.acquired = []
 
         def step(self, frame, observation):
             self.seen.append(None if observation is None else observation.region.center_px[0])
+            self.acquired.append(observation is not None and observation.acquired)
             return pose_of(body)
 
-    def run(*frames, every_s=0.1):
+    def run(*frames, every_s=0.1, count=2, acquired=False):
         monkeypatch.setattr(module, "LiveSession", Session)
         script = iter(frames)
         tracker = SimpleNamespace(step=lambda *_: list(next(script).items()))
-        people = LivePeople(body, tracker, None, (800, 800), count=2)
+        people = LivePeople(body, tracker, None, (800, 800), count=count)
         for k in range(len(frames)):
-            assert [pose.person for pose in people.step(Frame(k, every_s * k, GREY))] == [0, 1]
-        return [session.seen for session in people.sessions]
+            poses = people.step(Frame(k, every_s * k, GREY))
+            assert [pose.person for pose in poses] == list(range(count))
+        return [session.acquired if acquired else session.seen for session in people.sessions]
 
     return run
 
@@ -86,6 +90,46 @@ def test_a_stranger_gets_a_session_only_when_its_person_has_been_away_for_long(f
     assert seen[1] == [500, None, None]
     seen = followed({0: a, 1: b}, *[{0: a}] * 40, {0: a, 5: person(700, 3)})
     assert seen[1][-1] == 700
+
+
+def test_a_stranger_in_other_clothes_is_not_who_left_there_in_frames_without_clothes(followed):
+    """The tracker looks at the clothes in every fourth frame only."""
+    a = person(100, 0)
+    stranger = person(510, 3)
+    unlooked = replace(stranger, appearance=None)
+    frames = [{0: a, 1: person(500, 1, 290.0)}, *[{0: a}] * 4]
+    frames += [{0: a, 5: stranger}, *[{0: a, 5: unlooked}] * 3] * 2
+    assert followed(*frames)[1] == [500, *[None] * 12]
+
+
+def test_who_returns_is_known_as_soon_as_the_clothes_are_seen_well(followed):
+    a = person(100, 0)
+    mixed = person(500, 3)
+    back = person(500, 1)
+    unlooked = replace(back, appearance=None)
+    frames = [{0: a, 1: person(500, 1, 290.0)}, *[{0: a}] * 4]
+    frames += [{0: a, 5: mixed}, {0: a, 5: unlooked}, *[{0: a, 5: back}] * 2]
+    seen = followed(*frames)[1]
+    assert seen[:7] == [500, *[None] * 6]
+    assert seen[-1] == 500
+
+
+def test_of_two_people_who_left_each_gets_their_session_back_by_clothes(followed):
+    """They come back elsewhere, a little before two seconds have passed, which is too far for a
+    walk.
+    """
+    frames = [{0: person(100, 0), 1: person(500, 1, 290.0)}, *[{}] * 18]
+    frames += [{5: person(2100, 1), 6: person(2500, 0, 250.0)}] * 4
+    assert [seen[-1] for seen in followed(*frames)] == [2500, 2100]
+
+
+def test_a_bystander_who_was_seen_beside_somebody_is_never_that_person(followed):
+    """Not even in the same clothes, a step away."""
+    a = person(100, 0)
+    b = person(500, 1, 290.0)
+    bystander = person(560, 1, 250.0)
+    seen = followed({0: a, 1: b, 5: bystander}, *[{0: a, 5: bystander}] * 22)
+    assert seen[1] == [500, *[None] * 20, 560, 560]
 
 
 @pytest.fixture(scope="module")
