@@ -129,6 +129,7 @@ class LivePeople:
         """Return the poses in the next frame, one of each person."""
         image_rgb = self._exposure.brighten(frame.image_rgb)
         observations = dict(self._tracker.step(image_rgb, None, frame.timestamp_s))
+        before = [person.tracklet for person in self._followed]
         # who stays the same while they are seen, and then is the largest one
         if len(self._followed) > 1:
             self._assign_people(observations, frame.timestamp_s)
@@ -138,6 +139,9 @@ class LivePeople:
         poses = []
         for number, person in enumerate(self._followed):
             observation = None if person.tracklet is None else observations.get(person.tracklet)
+            # The tracker may have followed them for long: to the session, they are new.
+            if observation is not None and person.tracklet != before[number]:
+                observation = replace(observation, acquired=True)
             poses.append(replace(person.session.step(frame, observation), person=number))
         return poses
 

@@ -132,6 +132,19 @@ def test_a_bystander_who_was_seen_beside_somebody_is_never_that_person(followed)
     assert seen[1] == [500, *[None] * 20, 560, 560]
 
 
+def test_a_session_is_told_that_somebody_it_has_not_followed_is_new(followed):
+    """The tracker has followed them for a while, and says so."""
+    a = person(100, 0)
+    b = person(500, 1, 290.0)
+    gap = {}
+    script = ({0: a, 1: b}, {0: a, 1: b}, {1: b}, {1: b}, gap, {1: b}, {0: a})
+    (told,) = followed(*script, count=1, acquired=True)
+    assert told == [True, False, True, False, False, False, True]
+    bystander = person(560, 1, 250.0)
+    told = followed({0: a, 1: b, 5: bystander}, *[{0: a, 5: bystander}] * 22, acquired=True)
+    assert told[1] == [True, *[False] * 20, True, False]
+
+
 @pytest.fixture(scope="module")
 def beside(body, networks):
     """People and poses of the sample clip beside itself."""
