@@ -192,9 +192,13 @@ def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
     return End(time, centers[0], velocity, float(np.median([tracklet.sides_px[k] for k in index])))
 
 
-MIN_SHARE = 0.02  # of the frames; a person who was seen in fewer is a mistake of the detector
+# Of the frames; a person who was seen in fewer, and never followed for `CERTAIN_S`, is a mistake of
+# the detector.
+MIN_SHARE = 0.02
+CERTAIN_S = 3.0
 MIN_INTERVAL_S = 0.3  # the same for the longest time without interruption
-MIN_PROMINENCE = 0.05  # of the most prominent person's
+MIN_PROMINENCE = 0.05  # of the most prominent person's, of whose frames only so many seconds count
+_MAX_COUNTED_S = CERTAIN_S / MIN_SHARE
 # Speed of hands and feet, in sides of the region per second, from which somebody counts as moving
 # throughout: half that of walking. People who sit or stand and watch have less than 0.05.
 ACTIVE = 0.2
@@ -224,24 +228,46 @@ def people_of(times: Sequence[float], tracklets: Sequence[Tracklet]) -> list[lis
     counted = _plausible(people, times)
     prominence = [_prominence(person, times) for person in counted]
     order = sorted(range(len(counted)), key=lambda k: prominence[k], reverse=True)
-    least = MIN_PROMINENCE * max(prominence, default=0.0)
+    if not order:
+        return []
+    seen = _seen_frames(counted[order[0]])
+    share = min(1.0, _frames_in(_MAX_COUNTED_S, times) / seen)
+    least = MIN_PROMINENCE * share * prominence[order[0]]
     return [counted[k] for k in order if prominence[k] >= least]
 
 
 def _plausible(people: list[list[Tracklet]], times: Sequence[float]) -> list[list[Tracklet]]:
     """Select the people who were seen in enough frames, and for long enough without interruption.
 
+    In a long clip, whoever was followed for `CERTAIN_S` was seen in enough: a share of an hour is
+    longer than many who pass through are in the picture.
+
     At a low frame rate somebody may be elsewhere in every frame: where nobody was followed from
     frame to frame, one frame is enough.
     """
+    certain = _frames_in(CERTAIN_S, times)
     frequent = [
-        person for person in people if sum(len(t.rows) for t in person) >= MIN_SHARE * len(times)
+        person
+        for person in people
+        if _seen_frames(person) >= MIN_SHARE * len(times)
+        or max(len(t.rows) for t in person) >= certain
     ]
     longest = [max(times[t.rows[-1]] - times[t.rows[0]] for t in person) for person in frequent]
     least = min(MIN_INTERVAL_S, 0.5 * (times[-1] - times[0]))
     if max(longest, default=0.0) < least and np.median(np.diff(times)) >= MIN_INTERVAL_S:
         least = 0.0
     return [person for person, s in zip(frequent, longest, strict=True) if s >= least]
+
+
+def _seen_frames(person: list[Tracklet]) -> int:
+    return sum(len(tracklet.rows) for tracklet in person)
+
+
+def _frames_in(seconds: float, times: Sequence[float]) -> float:
+    """Return how many frames a clip has in a time, by its usual rate; inf for a single frame."""
+    if len(times) < 2:
+        return np.inf
+    return seconds / max(float(np.median(np.diff(times))), 1e-6)
 
 
 def frames_before_merger(

@@ -301,6 +301,27 @@ def test_frames_in_which_a_target_drifts_onto_another_one_are_cut_off(
     assert track.seen.sum() == kept
 
 
+def test_who_passes_through_a_long_clip_is_a_person_and_a_flicker_is_none() -> None:
+    """Somebody is followed for 4 s of 10 minutes; something else for 2 s, and 2 s later on."""
+    rate = 5
+    times = (np.arange(600 * rate) / rate).tolist()
+    passes = seen_at([300.0 + 5.0 * k for k in range(4 * rate)], first=100)
+    flickers = [seen_at([900.0] * 2 * rate, first) for first in (1000, 2000)]
+    assert people_of(times, [passes, *flickers]) == [[passes]]
+    assert people_of(times, flickers) == []
+
+
+def test_who_passes_by_the_main_person_of_a_long_clip_is_kept() -> None:
+    """For 10 s of 10 minutes, as large; but not who is seen as briefly and tiny."""
+    rate = 5
+    times = (np.arange(600 * rate) / rate).tolist()
+    main = seen_at([300.0] * 600 * rate)
+    passes = seen_at([700.0] * 10 * rate, first=1000)
+    tiny = seen_at([900.0] * 10 * rate, first=2000)
+    tiny.sides_px = [20.0] * 10 * rate
+    assert people_of(times, [main, passes, tiny]) == [[main], [passes]]
+
+
 @pytest.mark.usefixtures("networks")
 def test_identities_of_real_people_are_not_switched_where_they_cross(shared: Path) -> None:
     """The same man twice, so that appearance does not help; occluded for a third of a second where
