@@ -297,7 +297,7 @@ def with_camera_path(shot: Shot, first: Person) -> Shot:
     placed = first.fitted_places(shot)
     up = world_of(shot, [placed]).up
     if shot.travel is not None:
-        scaled = scaled_travel(placed, up, shot.travel)
+        scaled = scaled_travel(placed, up, shot.travel, shot.treadmill)
         shot = replace(shot, floor_up=scaled.floor_up, travel_source=scaled.source)
         center = scaled.center
         if shot.belt_m_s:

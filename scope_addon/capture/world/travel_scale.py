@@ -89,13 +89,16 @@ class ScaledTravel:
     source: str
 
 
-def scaled_travel(placed: PlacedTrack, up: FloatArray, travel: Odometry) -> ScaledTravel:
+def scaled_travel(
+    placed: PlacedTrack, up: FloatArray, travel: Odometry, treadmill: bool = False
+) -> ScaledTravel:
     """Return the camera's travel in metres. Where ``travel`` shows none, the camera stays where it
     is.
 
     :param placed: the person, relative to the camera's centre, in the first frame's axes.
     :param up: (3,) unit vector, as far as it is known.
     :param travel: of the camera, up to scale.
+    :param treadmill: whether feet move with a belt, so that the floor alone tells the scale.
     """
     soles = placed.soles
     valid = placed.valid
@@ -109,7 +112,7 @@ def scaled_travel(placed: PlacedTrack, up: FloatArray, travel: Odometry) -> Scal
         part = slice(int(rows[0]), int(rows[-1]) + 1)
         path = travel.center[part]
         seen = valid[part]
-        scale = scale_by_feet(placed, part, up, path)
+        scale = 0.0 if treadmill else scale_by_feet(placed, part, up, path)
         source = FEET if scale > 0.0 else NOTHING
         floor = find_floor(places, path, up)
         if floor is not None and seen.any():
@@ -178,7 +181,7 @@ def _on_floor(
 
 def _fitted_plane(places: Float64Array, up: FloatArray) -> Plane:
     mean = places.mean(axis=0)
-    normal = np.linalg.svd(places - mean)[2][2]
+    normal = np.linalg.svd(places - mean, full_matrices=False)[2][2]
     normal = normal * np.sign(normal @ up)
     return Plane(normal, float(normal @ mean))
 

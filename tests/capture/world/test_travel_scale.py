@@ -12,6 +12,7 @@ from scope.scope_addon.capture.world.travel_scale import (
     NOTHING,
     contradicting_strides,
     find_floor,
+    _fitted_plane,
     scaled_travel,
     walking_speed,
 )
@@ -134,6 +135,26 @@ def test_a_scale_that_nobody_tells_is_said_to_be_unknown():
     found = scaled_travel(unseen, UP, odometry)
     assert found.source == NOTHING
     np.testing.assert_array_equal(found.center, 0.0)
+
+
+def test_on_a_treadmill_the_floor_alone_tells_it():
+    without, _ = travel(room(np.random.default_rng(0), with_floor=False))
+    found = scaled_travel(follower(), UP, without, treadmill=True)
+    assert found.source == NOTHING
+    np.testing.assert_array_equal(found.center, 0.0)
+    odometry, center = travel(room(np.random.default_rng(0)))
+    found = scaled_travel(follower(), UP, odometry, treadmill=True)
+    assert found.source == FLOOR
+    assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+
+
+def test_the_floor_of_a_long_path_takes_little_memory():
+    """All pairs of 60,000 corners would take 27 GiB."""
+    rng = np.random.default_rng(3)
+    flat = rng.normal(size=(60_000, 3)) * [5.0, 0.01, 5.0]
+    floor = _fitted_plane(flat + [0.0, -1.0, 0.0], np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(floor.normal, [0.0, 1.0, 0.0], atol=1e-3)
+    assert floor.offset == pytest.approx(-1.0, abs=1e-3)
 
 
 def test_strides_on_the_spot_contradict_a_path_that_stands_still():
