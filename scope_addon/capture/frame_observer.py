@@ -97,16 +97,18 @@ class Observed:
         return len(self.timestamps)
 
     def tracks(
-        self, most: int, chosen: ChosenPerson | None = None
+        self, most: int, chosen: ChosenPerson | None = None, speed: float = 1.0
     ) -> tuple[list[Track], list[ChosenPerson]]:
         """Return the tracks of at most ``most`` people, and where others are, who are left out.
 
         :param chosen: who comes first; None: the most prominent one.
+        :param speed: how many times as fast as it plays the footage was recorded, so that the gaps
+            at scene cuts are `SCENE_GAP_S` of what was filmed.
         :raises UsageError: the chosen person was not found.
         """
         cuts = np.zeros(len(self))
         cuts[self.cut_rows] = 1.0
-        times = np.array(self.timestamps) + SCENE_GAP_S * np.cumsum(cuts)
+        times = np.array(self.timestamps) + SCENE_GAP_S * speed * np.cumsum(cuts)
         seen = [tracklet for tracklet in self.tracklets.values() if tracklet.rows]
         in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
         people = people_of(times.tolist(), in_order)

@@ -181,7 +181,8 @@ def observe(
         )
         with clock.stage("solver"):
             footage = _footage(job, path, observed)
-            tracks, left_out = observed.tracks(most_people(options.people), options.chosen)
+            speed = options.speed or video.recorded_speed
+            tracks, left_out = observed.tracks(most_people(options.people), options.chosen, speed)
     if not tracks:
         raise _no_person_error(video, options, len(observed.timestamps))
     footage.warnings.extend(_warnings_about_people(video, tracks, left_out))
