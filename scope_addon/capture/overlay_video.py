@@ -333,11 +333,11 @@ def _write_video(
     start_s = None
     shown_s = -1.0
     with VideoWriter(temporary, video.fps, *painter.size, path) as writer:
-        for frame in video:
+        for done, frame in enumerate(video, 1):
             start_s = frame.timestamp_s if start_s is None else start_s
             shown_s = _shown_s(frame.timestamp_s - start_s, video.fps, shown_s)
             writer.write(painter.paint(frame), shown_s)
             if progress is not None:
-                progress(frame.index + 1, max(video.frame_count, frame.index + 1))
+                progress(done, max(video.expected_frames, done))
         if start_s is None:
             raise no_frames_error(video)
