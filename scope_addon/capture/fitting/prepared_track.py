@@ -127,8 +127,9 @@ class PreparedTrack:
     def views(self, k: int, measured: Measurements, whole: bool) -> list[View]:
         """Return what all cameras measured of frame ``k``, each in its own axes.
 
-        Where another camera sees the person, depth follows from both: the lifted points, and the
-        pelvis as it follows from the floor, are left out, and directions weigh less.
+        Where two cameras see the person, depth follows from both: the lifted points, and the
+        pelvis as it follows from the floor, are left out, and directions weigh less. What another
+        camera alone sees counts as it does for a single one.
 
         :param measured: what the track's own camera measured.
         :param whole: with the other cameras' heads and hands.
@@ -136,16 +137,17 @@ class PreparedTrack:
         seen = [other for other in self.others if other.sees(k)]
         if not seen:
             return [View(measured)]
-        share = DIRECTIONS_OF_VIEWS / (len(seen) + 1)
+        watching = len(seen) + int(self.track.seen[k])
+        share = DIRECTIONS_OF_VIEWS / watching
         own = replace(_without_depth(measured, share), pose_priors=None)
         if not self.track.seen[k]:
             own = replace(own, keypoints2d=None, orientation_field=None)
         views = [View(own)]
         for other in seen:
             theirs = other.measure_all(k) if whole else other.measure(k)
-            views.append(
-                View(_without_depth(theirs, share), other.R_camera_first, other.t_camera_first)
-            )
+            if watching > 1:
+                theirs = _without_depth(theirs, share)
+            views.append(View(theirs, other.R_camera_first, other.t_camera_first))
         return views
 
     def measure(self, k: int, root_cam: FloatArray | None = None) -> Measurements:

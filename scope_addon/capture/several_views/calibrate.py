@@ -10,7 +10,7 @@ Where cameras stand is first known roughly, from each one's own estimate of a pe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -76,18 +76,20 @@ def calibrate(
     people: Sequence[Sequence[SeenPerson]],
     given: Sequence[Given],
     mean_lengths: Float64Array,
+    tick: Callable[[], None] = lambda: None,
 ) -> list[Match | None]:
     """Find clocks and places of all cameras, as far as they are not given.
 
     :param people: (V,) of each camera, the people that it shows, the most prominent one first.
     :param given: (V,) what is known of each camera.
     :param mean_lengths: (B,) bones of the mean body, metres.
+    :param tick: called from time to time; what it raises, such as `CancelledError`, is passed on.
     :return: (V,) of each camera, the first one included; None: it could not be placed.
     """
     first = people[0][0]
     matches: list[Match | None] = [Match(CameraPlace.first(), 0.0, 0, Clock.GIVEN)]
     matches += [
-        _best_match(first, seen, (given[0], known), mean_lengths)
+        _best_match(first, seen, (given[0], known), mean_lengths, tick)
         for seen, known in zip(people[1:], given[1:], strict=True)
     ]
     used = [(v, match) for v, match in enumerate(matches) if match is not None]
@@ -116,7 +118,10 @@ class _Guess:
 
 
 def _guesses(
-    first: SeenPerson, people: Sequence[SeenPerson], given: tuple[Given, Given]
+    first: SeenPerson,
+    people: Sequence[SeenPerson],
+    given: tuple[Given, Given],
+    tick: Callable[[], None],
 ) -> list[_Guess]:
     """Return who another camera's people may be, and when."""
     offset_s = given[1].offset_s
@@ -130,7 +135,7 @@ def _guesses(
                 continue
         guesses += [
             _Guess(number, unknown, likely_s, Clock.MOTION)
-            for likely_s in likely_offsets(first, person)
+            for likely_s in likely_offsets(first, person, tick)
         ]
     return guesses
 
@@ -140,13 +145,15 @@ def _best_match(
     people: Sequence[SeenPerson],
     given: tuple[Given, Given],
     mean_lengths: Float64Array,
+    tick: Callable[[], None],
 ) -> Match | None:
     """Return another camera's place by the one of its people who is the first camera's person; None
     if nobody may be them.
     """
-    guesses = everything = _guesses(first, people, given)
+    guesses = everything = _guesses(first, people, given, tick)
 
     def tried(guess: _Guess, frames: int, turns: Float64Array) -> Match | None:
+        tick()
         return _adjusted_pair(first, people[guess.number], guess, frames, turns, mean_lengths)
 
     if len(guesses) > 1:
@@ -168,7 +175,9 @@ def _best_match(
         if pair.number == best.number and abs(pair.place.offset_s - best.place.offset_s) > APART_S
     ]
     # Where a person hardly moves, everything fits.
-    likely = sum(guess.number == best.number for guess in everything)
+    likely = sum(
+        guess.number == best.number and guess.clock == Clock.MOTION for guess in everything
+    )
     is_certain = likely < MOST_LIKELY and all(
         other.cost > best.cost * (1.0 + _MARGIN) for other in others
     )

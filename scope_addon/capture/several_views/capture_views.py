@@ -18,6 +18,7 @@ from ...arrays import Float32Array, Float64Array
 from ...errors import UsageError
 from ...footage import display_text
 from ...notices import Notice, notice
+from ...options.capture import ALL
 from ..camera.calibration import placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
 from ..clock import FINDING, PLACING, Progress, StageClock
@@ -29,7 +30,7 @@ from ..observe import Footage, Watch, observe
 from ..options import CaptureOptions, check_options
 from ..perception.landmark_network import KEYPOINT_NAMES
 from ..pipeline import Capture, repaired, shot_of
-from ..reporting import make_report
+from ..reporting import make_report, speed_warnings
 from ..solve import progress_of_person, solve_people
 from ..tracking.track import Track
 from ..world.assemble import Shot
@@ -63,6 +64,7 @@ class _View:
     footage: Footage
     tracks: list[Track]
     people: list[SeenPerson]
+    speed: float  # how many times as fast as it plays it was recorded
 
     @property
     def name(self) -> str:
@@ -98,7 +100,8 @@ def capture_views(
         _observe_view(
             Path(path),
             body,
-            replace(options, calibration=file),
+            # Who is captured is known from the first video; the others may show anybody nearer.
+            replace(options, calibration=file, people=ALL if number else options.people),
             clock,
             _progress_of_view(progress, number, len(paths)),
             watch,
@@ -109,7 +112,10 @@ def capture_views(
         progress(PLACING, 0, 0)
         given = _given(views, options, [T for _, T in files])
         matches = calibrate(
-            [view.people for view in views], given, bone_lengths(_rest_keypoints(body, options))
+            [view.people for view in views],
+            given,
+            bone_lengths(_rest_keypoints(body, options)),
+            lambda: progress(PLACING, 0, 0),
         )
         doubts = _doubts_about_file(views, given, matches, options)
         places = [None if match is None else match.place for match in matches]
@@ -128,7 +134,14 @@ def capture_views(
         first.video, body, options, footage, replace(solved, motions=motions), rates
     )
     warnings = [*_about_cameras(views, matches), *doubts, *notices, *report.warnings]
+    warnings += _about_footage(views[1:], options, warnings)
     about = [_about_view(view, match) for view, match in zip(views, matches, strict=True)]
+    if places[0] is not None and places[0].log_focal:
+        report = replace(
+            report,
+            camera=f"{first.camera.source}, adjusted to the other cameras",
+            focal_deviation=round(places[0].focal_sigma, 3),
+        )
     return Capture(motions, replace(report, views=about, warnings=warnings))
 
 
@@ -158,13 +171,20 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
             "further videos: give one for each, or auto"
         )
     seen: set[Path] = set()
+    speeds: list[float] = []
     for path in paths:
         real = Path(path).resolve()
         if real in seen:
             raise UsageError(f"{path} was given twice; each camera has a video of its own")
         seen.add(real)
-        with open_video(Path(path), options.wanted):
-            pass
+        with open_video(Path(path), options.wanted) as video:
+            speeds.append(options.speed or video.recorded_speed)
+        if speeds[-1] != speeds[0]:
+            raise UsageError(
+                f"{path} was recorded {speeds[-1]:g} times as fast as it plays, and {paths[0]} "
+                f"{speeds[0]:g} times; videos of several cameras need the same speed: export the "
+                "slow motion at its true speed"
+            )
 
 
 def _progress_of_view(progress: Progress, number: int, count: int) -> Progress:
@@ -219,8 +239,8 @@ def _given(
             known = replace(known, T_camera_first=T @ np.linalg.inv(T_first))
         if v == 0:
             known = replace(known, offset_s=0.0)
-        elif options.offsets_s:
-            known = replace(known, offset_s=options.offsets_s[v - 1])
+        elif options.offsets_s and (played_s := options.offsets_s[v - 1]) is not None:
+            known = replace(known, offset_s=played_s / view.speed)
         given.append(known)
     unknown = [v for v, known in enumerate(given) if known.offset_s is None]
     first_sound = _sound_of(views[0]) if unknown else None
@@ -243,7 +263,7 @@ def _sound_of(view: _View) -> Float32Array | None:
     """Return how loud a video is; None without sound, and of slow motion, whose sound is stretched
     in several ways.
     """
-    return loudness(view.video.path) if view.video.recorded_speed == 1.0 else None
+    return loudness(view.video.path) if view.speed == 1.0 else None
 
 
 def _doubts_about_file(
@@ -341,7 +361,7 @@ def _observe_view(
             seen_person(prepare_track(body, track, footage.camera, None, False), footage.camera)
             for track in tracks
         ]
-    return _View(video, footage, tracks, people)
+    return _View(video, footage, tracks, people, shot.speed)
 
 
 def _rest_keypoints(body: Body, options: CaptureOptions) -> Float64Array:
@@ -393,7 +413,7 @@ def _people_in_views(
                         "unseen_in_view",
                         footage=views[v].name,
                         person=person,
-                        times=[start for start, _ in missed_s],
+                        times=[start * shot.speed for start, _ in missed_s],
                     )
                 )
             if spans[v]:
@@ -402,7 +422,7 @@ def _people_in_views(
                         "view_contradicts",
                         footage=views[v].name,
                         person=person,
-                        times=[start for start, _ in spans[v]],
+                        times=[start * shot.speed for start, _ in spans[v]],
                     )
                 )
             track = _without(views[v].tracks[number], spans[v], place)
@@ -441,11 +461,23 @@ def _about_cameras(views: Sequence[_View], matches: Sequence[Match | None]) -> l
             warnings.append(notice("view_without_place", footage=name))
             continue
         if not match.is_offset_certain:
-            offset_s = match.place.offset_s
+            offset_s = match.place.offset_s * view.speed
             warnings.append(notice("uncertain_offset", footage=name, offset_s=offset_s))
         if match.place.rotation_sigma > WEAK_ROTATION:
             degrees = float(np.degrees(match.place.rotation_sigma))
             warnings.append(notice("weak_place", footage=name, degrees=degrees))
+    return warnings
+
+
+def _about_footage(
+    views: Sequence[_View], options: CaptureOptions, said: Sequence[Notice]
+) -> list[Notice]:
+    """Return what is to be said of the further videos themselves, and is not said yet."""
+    warnings: list[Notice] = []
+    for view in views:
+        for warning in (*view.footage.warnings, *speed_warnings(view.video, options)):
+            if warning not in said and warning not in warnings:
+                warnings.append(warning)
     return warnings
 
 
@@ -459,8 +491,8 @@ def _about_view(view: _View, match: Match | None) -> dict[str, Any]:
         "source": source,
         "is_used": True,
         "clock": str(match.clock),
-        "offset_s": round(place.offset_s, 4),
-        "offset_sigma_s": round(place.offset_sigma_s, 4),
+        "offset_s": round(place.offset_s * view.speed, 4),
+        "offset_sigma_s": round(place.offset_sigma_s * view.speed, 4),
         "clock_drift": round(place.drift, 7),
         "focal_px": round(float(with_focal_scale(view.camera, place).intrinsics[0, 0]), 1),
         "focal_deviation": round(place.focal_sigma, 3),

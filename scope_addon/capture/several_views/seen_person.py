@@ -44,7 +44,10 @@ _ROWS = [
 # Rows of bones: both ends, as numbers of `KEYPOINTS`, and the bone's own number.
 BONE_STARTS, BONE_ENDS, BONE_OF_ROW = (np.array(column) for column in zip(*_ROWS, strict=True))
 MIN_CONFIDENCE = 0.3  # of a keypoint that counts
-LONGEST_GAP_S = 0.12  # between two frames between which keypoints are interpolated
+# Between two frames between which keypoints are interpolated; at low frame rates, half a frame more
+# than the usual time between two.
+LONGEST_GAP_S = 0.12
+LONGEST_GAP = 1.5
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ class Between:
     before: IndexArray  # (n,) the frame before
     after: IndexArray  # (n,) the frame after
     share: Float64Array  # (n,) 0..1 from the one to the other
-    # (n,) whether the person is seen in both, and they are at most `LONGEST_GAP_S` apart; False
-    # before the first frame and after the last one
+    # (n,) whether the person is seen in both, and they are no farther apart than `LONGEST_GAP_S` or
+    # `LONGEST_GAP`; False before the first frame and after the last one
     seen: BoolArray
 
     @classmethod
@@ -70,7 +73,9 @@ class Between:
         after = np.minimum(after, len(own) - 1)
         gap = own[after] - own[before]
         share = (times - own[before]) / np.maximum(gap, 1e-9)
-        both: BoolArray = seen[before] & seen[after] & (gap <= LONGEST_GAP_S)
+        usual_s = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
+        longest_s = max(LONGEST_GAP_S, LONGEST_GAP * usual_s)
+        both: BoolArray = seen[before] & seen[after] & (gap <= longest_s)
         both &= (share >= -1e-9) & (share <= 1 + 1e-9)
         return cls(before, after, np.clip(share, 0.0, 1.0), both)
 
@@ -103,7 +108,7 @@ class SeenPerson:
     def at(self, times: Float64Array) -> SeenPerson:
         """Return the person at other times (n,), by linear interpolation between frames.
 
-        Times before the first frame, after the last one, in gaps of more than `LONGEST_GAP_S`, or
+        Times before the first frame, after the last one, in longer gaps than `Between` allows, or
         beside a frame in which the person is not seen are those of an unseen person.
         """
         between = Between.of(self.times, self.seen, times)

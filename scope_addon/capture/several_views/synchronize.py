@@ -25,6 +25,7 @@ line through them the drift.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,7 @@ MIN_OVERLAP = 0.3
 # Between minima that count as different ones.
 APART_S = 0.2
 MOST_LIKELY = 4  # minima that are returned
+_LAGS_PER_TICK = 100
 _WORSE = 1.25  # than the best one, as which others are not returned
 _ROBUST = 1.0  # of the difference of standardized signals
 _TO_OWN_SIDE = ("wrist", "shoulder"), ("wrist", "hip"), ("elbow", "hip"), ("ankle", "hip")
@@ -60,12 +62,12 @@ _SHOULDERS = [NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
 _HIPS = [NAMES.index(f"{side}_hip") for side in ("left", "right")]
 _LEAST_DEVIATION = 0.05  # of a signal, in lengths of the trunk, so that noise is not standardized
 _ONSET_STEPS = 5  # between the two moments whose loudness is compared: 10 ms
-_MIN_OVERLAP_S = 2.0
+SOUND_OVERLAP_S = 2.0
 # The largest correlation, in deviations of all: chance reaches 6 in an hour. And in parts of the
 # largest one at another offset.
 _STANDS_OUT = 9.0
 _MARGIN = 1.3
-_APART_S = 0.1  # of another offset
+SOUND_APART_S = 0.1  # of another offset
 _PART_S = 10.0  # the least length of a part
 _MOST_PARTS = 40
 _NEAR_S = 0.06  # from the whole sound's offset, within which a part's is looked for
@@ -75,9 +77,13 @@ _LEAST_SIGMA_S = 0.002  # of one part
 _ROUNDS = 10
 
 
-def likely_offsets(first: SeenPerson, second: SeenPerson) -> list[float]:
+def likely_offsets(
+    first: SeenPerson, second: SeenPerson, tick: Callable[[], None] = lambda: None
+) -> list[float]:
     """Return the time in the second camera's file less that in the first one's, of one and the same
-    moment, seconds: what fits best first. None where no overlap is long enough.
+    moment, seconds: what fits best first. The list is empty where no overlap is long enough.
+
+    :param tick: called from time to time, because an hour of footage takes minutes.
     """
     clock = np.arange(first.times[0], first.times[-1], STEP_S)
     second_clock = np.arange(second.times[0], second.times[-1], STEP_S)
@@ -92,6 +98,8 @@ def likely_offsets(first: SeenPerson, second: SeenPerson) -> list[float]:
         offset_s = second.times[0] - first.times[0] - lag * STEP_S
         if abs(offset_s) > LONGEST_OFFSET_S:
             continue
+        if lag % _LAGS_PER_TICK == 0:
+            tick()
         begin = max(0, lag)
         end = min(len(clock), len(second_clock) + lag)
         both = seen[begin:end] & second_seen[begin - lag : end - lag]
@@ -155,12 +163,12 @@ def offset_by_sound(first: Float32Array, second: Float32Array) -> SoundOffset | 
     """
     a = _onsets(first)
     b = _onsets(second)
-    least = round(_MIN_OVERLAP_S / SOUND_STEP_S)
+    least = round(SOUND_OVERLAP_S / SOUND_STEP_S)
     if min(len(a), len(b)) < least:
         return None
     lags, correlation = _correlation(a, b, round(LONGEST_OFFSET_S / SOUND_STEP_S), least)
     best = int(np.argmax(correlation))
-    others = np.abs(lags - lags[best]) * SOUND_STEP_S > _APART_S
+    others = np.abs(lags - lags[best]) * SOUND_STEP_S > SOUND_APART_S
     if not others.any():
         return None
     deviation = 1.4826 * np.median(np.abs(correlation - np.median(correlation)))

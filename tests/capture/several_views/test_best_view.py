@@ -113,6 +113,26 @@ def test_each_hand_comes_from_the_camera_that_sees_it(body):
         assert np.degrees(abs(found - grip).mean()) < 10.0
 
 
+def test_what_one_other_camera_sees_counts_as_from_one_camera(body):
+    place = beside(60.0)
+    points = points_of(body)
+    first = track_of(body, points, (0.9, 0.9))
+    second = track_of(body, points @ place.R_camera_first.T + place.t_camera_first, (0.9, 0.9))
+    first.seen[10:] = False
+    first.confidence[10:] = 0.0
+    shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
+    prepared = PersonInViews(shot, first, [(second, CAMERA, place)], None, lambda *_: None).prepared
+    (other,) = prepared.others
+    _, both = prepared.views(5, prepared.measure(5), False)
+    _, alone = prepared.views(15, prepared.measure(15), False)
+    assert both.measurements.keypoints3d is None
+    whole = other.measure(15)
+    np.testing.assert_array_equal(alone.measurements.keypoints3d.points, whole.keypoints3d.points)
+    np.testing.assert_array_equal(
+        alone.measurements.orientation_field.confidence, whole.orientation_field.confidence
+    )
+
+
 def test_a_hand_does_not_change_between_cameras_that_see_it_equally_well():
     rng = np.random.default_rng(1)
     times = np.arange(120) / 30.0

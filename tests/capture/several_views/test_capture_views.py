@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Captures of two real cameras, and footage that several cameras cannot use."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
+from scope.scope_addon.capture.several_views import capture_views as several
 from scope.scope_addon.capture.several_views.capture_views import capture_views
 from scope.scope_addon.capture.tracking.chosen_person import ChosenPerson
-from scope.scope_addon.errors import UsageError
+from scope.scope_addon.errors import CancelledError, UsageError
 from scope.scope_addon.footage_view import FootageView
+from scope.scope_addon.notices import notice
 from scope.solver import load_body, rotations
 from scope.solver.errors import InputError
 
@@ -69,6 +74,61 @@ def test_two_cameras_halve_the_error_of_one(shared):
     error = error - error[:, hips].mean(axis=1, keepdims=True)
     assert 1000 * np.nanmean(np.linalg.norm(error, axis=-1)) < 45.0
     assert not [each for each in captured.report.warnings if "view" in each.code]
+
+
+def test_everybody_in_the_further_videos_may_be_the_person_of_the_first(shared, monkeypatch):
+    """Somebody else may be nearer there."""
+    folder = shared / "data" / "pose2sim"
+    asked = []
+
+    def observed(path, body, options, *_):
+        asked.append((path.name, options.people))
+        if len(asked) == 2:
+            raise CancelledError
+
+    monkeypatch.setattr(several, "_observe_view", observed)
+    with pytest.raises(CancelledError):
+        capture_views(
+            [folder / "cam1.mp4", folder / "cam4.mp4"], load_body("scope"), CaptureOptions()
+        )
+    assert asked == [("cam1.mp4", "largest"), ("cam4.mp4", "all")]
+
+
+def test_warnings_about_every_video_are_said_once():
+    damaged = notice("decoding_stopped", footage="b.mp4", decoded=40, total=100)
+    slower = notice("execution", text="slow")
+    views = [
+        SimpleNamespace(
+            footage=SimpleNamespace(warnings=warnings),
+            video=SimpleNamespace(path=f"{name}.mp4", recorded_speed=speed),
+        )
+        for name, warnings, speed in (("b", [damaged, slower], 1.0), ("c", [slower], 8.0))
+    ]
+    found = several._about_footage(views, CaptureOptions(), [slower])
+    assert [each.code for each in found] == ["decoding_stopped", "slow_motion"]
+    assert several._about_footage(views, CaptureOptions(speed=1.0), [slower]) == [damaged]
+
+
+def test_offsets_are_given_in_the_times_of_the_videos_as_they_play():
+    first, second = (
+        SimpleNamespace(camera=SimpleNamespace(focal_deviation=0.1), speed=8.0) for _ in range(2)
+    )
+    given = several._given([first, second], CaptureOptions(offsets_s=(1.6,)), [None, None])
+    assert given[1].offset_s == pytest.approx(0.2)
+
+
+def test_videos_of_different_speeds_are_refused(shared, monkeypatch):
+    folder = shared / "data" / "pose2sim"
+    speeds = {"cam1.mp4": 1.0, "cam4.mp4": 8.0}
+    monkeypatch.setattr(
+        several,
+        "open_video",
+        lambda path, _: nullcontext(SimpleNamespace(recorded_speed=speeds[path.name])),
+    )
+    with pytest.raises(UsageError, match=r"cam4.mp4 was recorded 8 times as fast .* 1 times"):
+        capture_views(
+            [folder / "cam1.mp4", folder / "cam4.mp4"], load_body("scope"), CaptureOptions()
+        )
 
 
 def test_one_video_is_not_several(shared):

@@ -19,10 +19,12 @@ from scope.scope_addon.capture.several_views.calibrate import (
 )
 from scope.scope_addon.capture.several_views.seen_person import (
     KEYPOINTS,
+    Between,
     SeenPerson,
     bone_lengths,
 )
 from scope.scope_addon.capture.several_views.synchronize import likely_offsets
+from scope.scope_addon.errors import CancelledError
 from scope.solver import load_body, rotations
 
 SECONDS = 4.0
@@ -102,6 +104,33 @@ def test_offset_of_clocks(offset_s, rate):
     second = seen(place, points, rate, seed=2)
     found = likely_offsets(first, second)
     assert found[0] == pytest.approx(offset_s, abs=0.05)
+
+
+def test_offset_of_clocks_at_low_frame_rates():
+    points = moving_points()
+    first = seen(CameraPlace.first(), points, 6.0)
+    second = seen(replace(beside(60.0), offset_s=0.5), points, 5.0, seed=2)
+    assert likely_offsets(first, second)[0] == pytest.approx(0.5, abs=0.06)
+
+
+def test_a_frame_that_is_missing_is_a_gap_at_low_frame_rates():
+    own = np.array([0.0, 0.2, 0.4, 0.8, 1.0, 1.2])
+    between = Between.of(own, np.ones(6, bool), np.array([0.1, 0.4, 0.6, 1.1]))
+    assert between.seen.tolist() == [True, True, False, True]
+
+
+def test_waiting_for_the_clock_can_be_cancelled():
+    points = moving_points()
+
+    def cancelled():
+        raise CancelledError
+
+    first = seen(CameraPlace.first(), points, 30.0)
+    second = seen(beside(60.0), points, 30.0, seed=2)
+    with pytest.raises(CancelledError):
+        calibrate(
+            [[first], [second]], [Given(0.1, offset_s=0.0), Given(0.1)], mean_lengths(), cancelled
+        )
 
 
 def test_offset_of_somebody_who_stands_still_is_uncertain():
