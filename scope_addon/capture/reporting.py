@@ -73,15 +73,17 @@ def make_report(
         focal_deviation=round(camera.focal_deviation, 3),
         frame_rate=[video.fps.numerator, video.fps.denominator],
         fps=rates,
-        reprojection_px=float(motions[0].residual_px[motions[0].valid].mean()),
+        reprojection_px=_reprojection_px(motions[0]),
         iterations=solved.iterations,
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
         + speed_warnings(video, options)
         + up_warnings(Path(video.path).name, solved.up_source, is_still)
-        + capture_warnings(Path(video.path).name, body, options, footage.cuts_s, motions)
+        + capture_warnings(Path(video.path).name, body, options, footage, motions)
         + camera_warnings(Path(video.path).name, footage, solved)
-        + floor_warnings(Path(video.path).name, body, motions, len(options.heights_m)),
+        + floor_warnings(
+            Path(video.path).name, body, motions, footage.timestamps, len(options.heights_m)
+        ),
     )
 
 
@@ -89,13 +91,13 @@ def capture_warnings(
     name: str,
     body: Body,
     options: CaptureOptions,
-    cuts_s: list[float],
+    footage: Footage,
     motions: list[Motion],
 ) -> list[Notice]:
     """List what a user should know about the result; ``name`` is the footage's."""
     warnings = []
-    if cuts_s:
-        warnings.append(notice("cuts", footage=name, times=cuts_s))
+    if footage.cuts_s:
+        warnings.append(notice("cuts", footage=name, times=footage.cuts_s))
     heights = len(options.heights_m)
     people = len(motions)
     if heights > people == 1:
@@ -112,7 +114,7 @@ def capture_warnings(
             )
         if _legs_confidence(motion) < MIN_LEG_CONFIDENCE:
             warnings.append(notice("unseen_legs", footage=name, person=person))
-        warnings += _plausibility_warnings(name, person, motion)
+        warnings += _plausibility_warnings(name, person, motion, footage.timestamps)
         if options.hands == ON and not any(hand_frames(body, motion).values()):
             warnings.append(notice("no_hands", footage=name, person=person))
         if options.face and not face_frames(motion).get("face_frames"):
@@ -120,13 +122,18 @@ def capture_warnings(
     return warnings
 
 
-def _plausibility_warnings(name: str, person: int, motion: Motion) -> list[Notice]:
-    """List when a person does what nobody can do; see `review_spans`."""
+def _plausibility_warnings(
+    name: str, person: int, motion: Motion, times_s: Float64Array
+) -> list[Notice]:
+    """List when a person does what nobody can do; see `review_spans`.
+
+    :param times_s: see `floor_warnings`.
+    """
     warnings = []
     for reason, frames in implausible(motion).items():
         begins = [first for first, _ in runs(frames)]
         if begins:
-            times = motion.footage_times_s[begins].tolist()
+            times = times_s[begins].tolist()
             warnings.append(
                 notice("implausible", footage=name, person=person, reason=reason, times=times)
             )
@@ -238,13 +245,21 @@ def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
             "valid_frames": len(seen),
             "first_frame": int(seen[0]),
             "last_frame": int(seen[-1]),
-            "reprojection_px": float(motion.residual_px[motion.valid].mean()),
+            "reprojection_px": _reprojection_px(motion),
             "height_m": round(body.stature(motion.betas), 3),
             "height_sigma_m": round(motion.height_sigma_m, 3)
             if np.isfinite(motion.height_sigma_m)
             else None,
         }
     )
+
+
+def _reprojection_px(motion: Motion) -> float:
+    """Return the mean residual in pixels, over the frames in which the first camera saw the
+    person; 0 if there are none.
+    """
+    seen = motion.valid & (motion.residual_px > 0.0)
+    return float(motion.residual_px[seen].mean()) if seen.any() else 0.0
 
 
 def _legs_confidence(motion: Motion) -> float:
@@ -256,12 +271,17 @@ def _legs_confidence(motion: Motion) -> float:
 
 
 def floor_warnings(
-    name: str, body: Body, motions: list[Motion], heights_given: int = 0
+    name: str,
+    body: Body,
+    motions: list[Motion],
+    times_s: Float64Array,
+    heights_given: int = 0,
 ) -> list[Notice]:
     """List where people stand on other floors or on steps, and where feet are under the floor.
 
     There are none on uneven ground, which has no floor.
 
+    :param times_s: (n,) of the frames in the footage; the motions' own have gaps at scene cuts.
     :param heights_given: of how many people the height was known.
     """
     warnings = []
@@ -275,15 +295,19 @@ def floor_warnings(
             wrong_scale = "given_heights" if all_given else "estimated_heights"
         of_person: dict[str, Value] = {"footage": name, "person": person}
         warnings += [
-            *_other_floors(of_person, heights, motion, wrong_scale),
-            *_steps(of_person, body, motion),
+            *_other_floors(of_person, heights, motion, times_s, wrong_scale),
+            *_steps(of_person, body, motion, times_s),
             *_under_floor(of_person, heights, motion),
         ]
     return warnings
 
 
 def _other_floors(
-    of_person: dict[str, Value], heights: Float64Array, motion: Motion, wrong_scale: str
+    of_person: dict[str, Value],
+    heights: Float64Array,
+    motion: Motion,
+    times_s: Float64Array,
+    wrong_scale: str,
 ) -> list[Notice]:
     """List the other floors of a person.
 
@@ -304,14 +328,16 @@ def _other_floors(
                     **of_person,
                     height_m=height,
                     side=side,
-                    times=[float(motion.footage_times_s[first]) for first, _ in spans],
+                    times=[float(times_s[first]) for first, _ in spans],
                     cause=wrong_scale if wrong_scale and from_the_start else "several_floors",
                 )
             )
     return warnings
 
 
-def _steps(of_person: dict[str, Value], body: Body, motion: Motion) -> list[Notice]:
+def _steps(
+    of_person: dict[str, Value], body: Body, motion: Motion, times_s: Float64Array
+) -> list[Notice]:
     if np.array_equal(motion.poses, motion.poses_raw):
         return []
     rests = steps(foot_heights(motion, body, raw=True), motion.foot_contact, motion.timestamps)
@@ -324,7 +350,7 @@ def _steps(of_person: dict[str, Value], body: Body, motion: Motion) -> list[Noti
             **of_person,
             height_cm=100 * abs(float(height)),
             side="above" if height > 0 else "below",
-            times=[float(motion.footage_times_s[first])],
+            times=[float(times_s[first])],
         )
     ]
 

@@ -90,8 +90,9 @@ def from_second(second, height):
     return np.where(np.arange(90) >= 30 * second, height, 0.0)
 
 
-def floor_warnings(*arguments) -> list[str]:
-    return list(map(str, reporting.floor_warnings(*arguments)))
+def floor_warnings(name, body, motions, *arguments) -> list[str]:
+    times_s = motions[0].footage_times_s
+    return list(map(str, reporting.floor_warnings(name, body, motions, times_s, *arguments)))
 
 
 def test_nothing_is_said_of_somebody_on_the_floor(body):
@@ -106,6 +107,22 @@ def test_another_floor(body, height, where):
         "floor: capture the "
         "part that matters, with a start and end time, or with uneven ground"
     ]
+
+
+def test_times_are_those_of_the_footage_after_a_cut(body):
+    """A motion's own times have a gap there, across which nothing is interpolated."""
+    motion = standing(body, from_second(2, 0.8))
+    footage_times_s = motion.timestamps.copy()
+    motion.timestamps[45:] += 10.0
+    (found,) = reporting.floor_warnings("a.mp4", body, [motion], footage_times_s)
+    assert "the floor at 2.0 s" in str(found)
+
+
+def test_the_reprojection_error_is_that_of_frames_the_first_camera_sees(body):
+    motion = standing(body, np.zeros(90))
+    motion.residual_px[:] = 0.0
+    motion.residual_px[:30] = 4.0
+    assert reporting._reprojection_px(motion) == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,6 @@ def test_feet_rest_on_a_step_only_where_the_ground_is_uneven(
 
 def test_nothing_is_under_uneven_ground(captured: Motion) -> None:
     sunk = replace(captured, trans=captured.trans - np.array([0.0, 0.0, 0.3], np.float32))
-    warned = floor_warnings("made.mp4", BODY, [sunk])
+    warned = floor_warnings("made.mp4", BODY, [sunk], sunk.timestamps)
     assert bool(warned) != captured.uneven_ground
     assert under_floor(sunk, BODY).any() != captured.uneven_ground
