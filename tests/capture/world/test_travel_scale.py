@@ -10,9 +10,9 @@ from scope.scope_addon.capture.world.travel_scale import (
     FEET,
     FLOOR,
     NOTHING,
+    _fitted_plane,
     contradicting_strides,
     find_floor,
-    _fitted_plane,
     scaled_travel,
     walking_speed,
 )
