@@ -39,14 +39,13 @@ class PictureSequence:
     warnings: list[Notice]
 
     @classmethod
-    def from_paths(cls, paths: list[Path], name: str) -> PictureSequence:
-        """Derive the slots from the last number of each file name.
+    def from_numbers(cls, paths: list[Path], numbers: list[int], name: str) -> PictureSequence:
+        """Derive the slots from the numbers of the pictures.
 
-        :param paths: pictures, ordered by their last numbers.
+        :param paths: pictures, ordered by their numbers.
+        :param numbers: of each.
         :param name: of the sequence, for warnings.
         """
-        found = [LAST_NUMBER.search(path.stem) for path in paths]
-        numbers = [int(match.group()) if match else 0 for match in found]
         step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
         slots = [(number - numbers[0]) // step for number in numbers]
         missing = slots[-1] + 1 - len(paths)
@@ -76,6 +75,7 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
     :raises VideoError: a folder's pictures differ in more than their last number.
     """
     found: list[Path] = []
+    numbers: list[int] = []
     if path.is_dir():
         found = pictures_in(path)
         if len(found) > 1 and not is_sequence(found):
@@ -86,11 +86,21 @@ def find_sequence(path: Path, rate_given: bool) -> PictureSequence | None:
                 "give the pattern you mean, such as walk_####.png, or a single image"
             )
     elif (sign := NUMBER_SIGN.search(path.name)) and not path.exists() and path.parent.is_dir():
-        found = numbered(path.parent, path.name[: sign.start()], path.name[sign.end() :])
+        after = path.name[sign.end() :]
+        found = numbered(path.parent, path.name[: sign.start()], after)
+        numbers = [int(p.name[sign.start() :].removesuffix(after)) for p in found]
     elif rate_given and path.is_file():
         following = numbered_from(path)
         found = following if len(following) > 1 else []
-    return PictureSequence.from_paths(found, path.name) if found else None
+    if not found:
+        return None
+    return PictureSequence.from_numbers(found, numbers or _last_numbers(found), path.name)
+
+
+def _last_numbers(paths: list[Path]) -> list[int]:
+    """Return the last number of each file name, 0 where there is none."""
+    found = [LAST_NUMBER.search(path.stem) for path in paths]
+    return [int(match.group()) if match else 0 for match in found]
 
 
 class SequenceReader:

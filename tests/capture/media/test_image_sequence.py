@@ -92,6 +92,19 @@ def test_missing_pictures_leave_gaps_and_give_a_warning(
         assert video.expected_frames == len(wanted)
 
 
+@pytest.mark.parametrize("name", ["walk_####_v2.png", "walk_%04d_v2.png"])
+def test_the_number_of_a_pattern_is_where_its_sign_stands(tmp_path: Path, name: str) -> None:
+    for number in (98, 99, 101, 102):
+        image = np.full((20, 30, 3), number, np.uint8)
+        cv2.imwrite(str(tmp_path / f"walk_{number}_v2.png"), image)
+    with open_video(tmp_path / name, VideoRange(fps=Fraction(10))) as video:
+        assert [f.timestamp_s for f in video] == pytest.approx([0.0, 0.1, 0.3, 0.4])
+        (warning,) = map(str, video.warnings)
+        assert "1 numbers between 98 and 102 have no image" in warning
+        assert video.expected_frames == 4
+    assert brightness(tmp_path / name, VideoRange(0.1, 0.35, Fraction(10))) == [99, 101]
+
+
 def test_pictures_are_decoded_alike_alone_and_in_a_sequence(tmp_path: Path) -> None:
     clear = np.zeros((20, 30, 4), np.uint8)
     deep = np.full((20, 30, 3), 70 * 257, np.uint16)
