@@ -405,11 +405,7 @@ class _Decoder:
         :raises VideoError: it ended early because the disk or the server does not give it.
         """
         video = self._video
-        # Both tests: a container that counts frames from its duration is wrong for a variable frame
-        # rate.
-        missing = video.frame_count - index
-        last = min(float((video.frame_count - 1) / video.average_fps), video.wanted.end_s)
-        if missing > max(1, video.frame_count // 50) and time < 0.95 * last:
+        if self._ended_early(index, time):
             if video._bytes is not None:
                 _check_readable(video.path)
             self._warn(
@@ -422,6 +418,20 @@ class _Decoder:
             )
         if time <= video.wanted.end_s and self._has_grown():
             self._warn(notice("growing_file", footage=video.path.name))
+
+    def _ended_early(self, index: int, time: float) -> bool:
+        """Return whether a frame of the range was left out at its end; see `_warn_of_end`."""
+        video = self._video
+        if video._sequence is not None:  # whose pictures are counted
+            return (
+                index < video.frame_count
+                and video._sequence.time(index, video.fps) <= video.wanted.end_s + 1e-6
+            )
+        # Both tests: a container that counts frames from its duration is wrong for a variable frame
+        # rate.
+        missing = video.frame_count - index
+        last = min(float((video.frame_count - 1) / video.average_fps), video.wanted.end_s)
+        return missing > max(1, video.frame_count // 50) and time < 0.95 * last
 
     def _has_grown(self) -> bool:
         """Return whether the file is still being written, as .mkv and .ts files are by

@@ -122,6 +122,25 @@ def test_a_damaged_picture_ends_the_sequence_with_a_warning(folder: Path) -> Non
         assert any("stopped after 2" in warning for warning in map(str, video.warnings))
 
 
+@pytest.mark.parametrize(
+    ("numbers", "damaged", "decoded"), [(range(0, 60, 2), 58, 29), ([*range(40), 60, 61], 60, 40)]
+)
+def test_a_damaged_picture_near_the_end_is_told(
+    tmp_path: Path, numbers: list[int], damaged: int, decoded: int
+) -> None:
+    """One picture of many is missing, or those after a gap; not where the range ends before."""
+    for number in numbers:
+        cv2.imwrite(str(tmp_path / f"a_{number:02}.png"), np.zeros((20, 30, 3), np.uint8))
+    (tmp_path / f"a_{damaged}.png").write_bytes(b"no picture any more")
+    with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
+        assert len(list(video)) == decoded
+        says = f"stopped after {decoded} of about {len(numbers)}"
+        assert any(says in warning for warning in map(str, video.warnings))
+    with open_video(tmp_path, VideoRange(end_s=2.5, fps=Fraction(10))) as video:
+        assert len(list(video)) == 26
+        assert not any("stopped" in warning for warning in map(str, video.warnings))
+
+
 def test_missing_pictures_are_errors(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for path, words in (
