@@ -55,7 +55,8 @@ def store_errors(error: type[InputError] | type[OutputError], url: str) -> Itera
         if not cause or display_address(url) != url:
             cause = type(failure).__name__
         raise error(
-            f"{url} cannot be used ({cause}); check the address and the credentials"
+            f"{display_address(url)} cannot be used ({cause}); check the address and the "
+            "credentials"
         ) from failure
 
 
@@ -67,7 +68,7 @@ def _open(url: str) -> tuple[Any, str]:
     try:
         file_system, path = fsspec.core.url_to_fs(url)
     except (ImportError, ValueError) as error:
-        raise UsageError(f"{url} cannot be used: {error}") from error
+        raise UsageError(f"{display_address(url)} cannot be used: {error}") from error
     return file_system, path.rstrip("/")
 
 
@@ -165,7 +166,7 @@ def upload(file: Path, url: str) -> None:
     file_system.put_file(str(file), path)
     file_system.invalidate_cache()
     if file_system.size(path) != file.stat().st_size:
-        raise OSError(f"{url} is not as large as what was written")
+        raise OSError(f"{display_address(url)} is not as large as what was written")
 
 
 def read_text(url: str) -> str:

@@ -213,7 +213,10 @@ class DaskRunner:
             task.windows or task.windows_folder or is_url(self._folder) or is_url(self._out)
         )
         remote = task._replace(
-            footage=footage, out=folder, final=self._out, windows=COUNT if divides else task.windows
+            footage=footage,
+            out=folder,
+            final=display_address(self._out),
+            windows=COUNT if divides else task.windows,
         )
         arguments = (self._program, self._jobs, program_version(ROOT))
         self._submit(task, address, folder, worker_side.capture_on_worker, remote, *arguments)

@@ -19,7 +19,7 @@ from distributed import Status, Worker, get_worker
 
 from ...solver.errors import InputError, ScopeError
 from ..errors import OutputError
-from ..footage import is_url
+from ..footage import display_address, is_url
 from ..installed import CAPTURE, check_installed
 from ..job.batch import ROOT
 from ..job.clip_runner import ClipProcesses
@@ -62,7 +62,10 @@ def _problem(wanted: dict[str, Any]) -> str:
     attempts = wanted["attempts"]
     with remote.store_errors(InputError, folder):
         if not (remote.is_folder(folder) if is_url(folder) else Path(folder).is_dir()):
-            return f"it has no folder {folder}; all machines need the footage under the same path"
+            return (
+                f"it has no folder {display_address(folder)}; all machines need the footage under "
+                f"the same path"
+            )
     token = Path(attempts, TOKEN)
     with remote.store_errors(OutputError, attempts):
         text = (
@@ -72,8 +75,8 @@ def _problem(wanted: dict[str, Any]) -> str:
         )
     if text != wanted["token"]:
         return (
-            f"it does not see the output folder {wanted['out']}; all machines need it under the "
-            f"same path"
+            f"it does not see the output folder {display_address(wanted['out'])}; all machines "
+            f"need it under the same path"
         )
     settings = CaptureSettings(
         wanted["options"],
@@ -130,7 +133,9 @@ def capture_on_worker(
             local = local._replace(out=str(scratch / "results"))
         entry = capture_clip(local, program or PROGRAM, run, threads)
         if "message" in entry:
-            entry["message"] = entry["message"].replace(local.footage, task.footage)
+            entry["message"] = entry["message"].replace(
+                local.footage, display_address(task.footage)
+            )
         try:
             if entry["status"] == "done" and is_url(task.out):
                 _upload(Path(local.out), entry["outputs"], task.out)

@@ -18,6 +18,7 @@ from distributed import Client
 
 from ...solver.errors import InputError
 from ..errors import ClusterError, UsageError
+from ..footage import display_text
 from ..job.clip_task import Entry
 from ..json_file import read_json_object
 
@@ -76,7 +77,10 @@ class Workers:
         self.log: list[dict[str, Any]] = []
 
     def event(self, address: str, text: str, *, tell: bool = False) -> None:
-        """Add a line to the log, and tell the user if it matters to them."""
+        """Add a line to the log, without passwords of addresses, and tell the user if it matters to
+        them.
+        """
+        text = display_text(text)
         self.log.append(
             {"second": round(time.monotonic() - self._start, 1), "worker": address, "event": text}
         )

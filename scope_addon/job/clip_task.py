@@ -24,6 +24,7 @@ from ..footage import (
     FOOTAGE_SUFFIXES,
     PICTURE_SUFFIXES,
     VIDEO_SUFFIXES,
+    display_text,
     is_sequence,
     numbered_from,
     pictures_in,
@@ -116,7 +117,8 @@ class ClipTask(NamedTuple):
     :param out: output folder.
     :param basis: see `CaptureSettings.basis`.
     :param previous: entry of the previous report, if its files still exist.
-    :param final: folder to which the results are moved later; empty if they stay in ``out``.
+    :param final: folder to which the results are moved later, or its address as it may be shown;
+        empty if they stay in ``out``.
     :param windows: `COUNT`, or a range ``FIRST:END`` of windows that are to be observed; empty: the
         clip is captured.
     :param windows_folder: of a clip that is captured, with windows that were observed before.
@@ -176,7 +178,10 @@ def capture_clip(
             remove_finished(out, task.name)
             arguments.append(f"{FINISHED_FILE}={record}")
         if task.final:  # a page about the capture shows its command
-            shown = _arguments(footage, Path(task.final) / task.name, task.settings, threads)
+            # as text, because a path would take one of the slashes from an address
+            shown = _arguments(
+                footage, f"{task.final.rstrip('/')}/{task.name}", task.settings, threads
+            )
             arguments += [
                 SHOWN_COMMAND,
                 shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)]),
@@ -232,8 +237,15 @@ def names_of_results(reported: Iterable[str], name: str) -> list[str]:
 
 
 def failure(task: ClipTask, message: str) -> Entry:
-    """Return the entry of a clip that could not be captured."""
-    return {"file": task.file, "name": task.name, "status": "failed", "message": message}
+    """Return the entry of a clip that could not be captured, without passwords of addresses: it
+    becomes a part of the batch's report.
+    """
+    return {
+        "file": task.file,
+        "name": task.name,
+        "status": "failed",
+        "message": display_text(message),
+    }
 
 
 def _outcome(report: dict[str, Any], out: Path, name: str) -> Entry:
@@ -251,10 +263,10 @@ def _outcome(report: dict[str, Any], out: Path, name: str) -> Entry:
 
 
 def _arguments(
-    footage: Path, target: Path, settings: CaptureSettings, threads: int | None
+    footage: Path, target: Path | str, settings: CaptureSettings, threads: int | None
 ) -> list[str]:
-    """Return the arguments that capture a clip; ``target`` is the path of its results without
-    suffix.
+    """Return the arguments that capture a clip; ``target`` is the path or address of its results
+    without suffix.
     """
     videos = [str(path) for path in videos_of_take(footage)] or [str(footage)]
     arguments = ["capture", *videos, "--json", "--quiet", STOP_WITH_STDIN]
