@@ -106,7 +106,11 @@ def capture_page(
             *over_time(clip.motions, marked_spans(clip.motions, spans, warnings)),
             note=thinned,
         ),
-        page.section("Warnings", *warning_list(warnings), review_table(clip.motions, spans)),
+        page.section(
+            "Warnings",
+            *warning_list(warnings, first.footage_speed),
+            review_table(clip.motions, spans),
+        ),
         page.section("Figures", figures_table(clip.motions, clip.body)),
         page.section(
             "How it was made",
@@ -232,9 +236,10 @@ def marked_spans(
     in warnings.
     """
     times = motions[0].timestamps
+    speed = motions[0].footage_speed
     marked = [_marked(span, times, n, motions) for n, of_one in enumerate(spans) for span in of_one]
     for warning in warnings:
-        named = [part.seconds for part in warning.parts() if isinstance(part, TimeText)]
+        named = [part.seconds / speed for part in warning.parts() if isinstance(part, TimeText)]
         marked += [
             MarkedSpan(time, time, "warned", str(warning))
             for time in named
@@ -250,14 +255,18 @@ def time_axis(times: NDArray[np.float64]) -> Axis:
     return Axis(first, last if last > first else first + 1.0, unit="s")
 
 
-def warning_list(warnings: Sequence[Notice]) -> list[Markup]:
-    """Return the warnings as the command line prints them; a time in one moves the page there."""
+def warning_list(warnings: Sequence[Notice], footage_speed: float = 1.0) -> list[Markup]:
+    """Return the warnings as the command line prints them; a time in one moves the page there.
+
+    :param footage_speed: of the motions, whose clock the page has; warnings say times in the
+        footage as it plays.
+    """
     if not warnings:
         return [Markup('<p class="none">None.</p>\n')]
     items = []
     for warning in warnings:
         parts = [
-            page.seek_button(part.text, part.seconds)
+            page.seek_button(part.text, part.seconds / footage_speed)
             if isinstance(part, TimeText)
             else escape(part)
             for part in warning.parts()

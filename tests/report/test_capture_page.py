@@ -178,6 +178,23 @@ def test_warnings_are_marked_at_their_times(body):
     assert marks == [("750.0", "1.5", str(warning))] * 2  # in both plots of lines
 
 
+def test_warnings_of_slow_motion_lead_to_the_frames_that_they_mean(body):
+    """Played four times as slowly as it was recorded, frame 8 is at 8/30 s, and the motion has it
+    at 2/30 s; the marks were on the clock of the footage.
+    """
+    about = clip(body, Path("a.mp4"))
+    (motion,) = about.motions
+    slow = replace(motion, timestamps=motion.timestamps / 4, footage_speed=4.0)
+    warning = notice("cuts", footage="a.mp4", times=[0.2])
+    said = report(warnings=[warning])
+    text = capture_page(replace(about, motions=[slow], report=said), np.arange(FRAMES), [])
+    marks = re.findall(r'<rect class="span warned" x="([\d.]+)"', text)
+    assert marks == ["750.0"] * 2  # the sixth of eight steps, in both plots of lines
+    buttons = [a for tag, a in Page(text).elements if tag == "button" and "data-time" in a]
+    assert buttons[0]["data-time"] == "0.0500"
+    assert "at 0.2 s" in text  # as the footage plays
+
+
 def test_frames_without_the_person_are_listed_and_marked(body):
     text = capture_page(clip(body, Path("a.mp4")), np.arange(FRAMES), [])
     assert "not visible: the pose is filled in" in text
