@@ -134,11 +134,12 @@ def header_facts(clip: CapturedClip) -> dict[str, str]:
     """Return the facts at the head of the page."""
     report = clip.report
     motion = clip.motions[0]
-    rate = report.frame_rate[0] / report.frame_rate[1]
+    rate = motion.mocap_framerate
+    # Frames may be missing or unevenly spaced; the last one is shown as long as others.
+    duration_s = float(motion.timestamps[-1] - motion.timestamps[0]) + 1.0 / rate
     width, height = motion.image_size.tolist()
     return {
-        "Duration": f"{len(motion) / rate:.2f} s, {counted(len(motion), 'frame')} at {rate:.6g} "
-        "per second",
+        "Duration": f"{duration_s:.2f} s, {counted(len(motion), 'frame')} at {rate:.6g} per second",
         "Image": f"{width} × {height}",
         "People": counted(report.people, "person", "people"),
         "Preset": report.quality,

@@ -22,6 +22,7 @@ from scope.scope_addon.report.capture_page import (
     CapturedClip,
     capture_page,
     face_rows,
+    header_facts,
     over_time,
     warning_list,
     write_capture_page,
@@ -193,6 +194,24 @@ def test_warnings_of_slow_motion_lead_to_the_frames_that_they_mean(body):
     buttons = [a for tag, a in Page(text).elements if tag == "button" and "data-time" in a]
     assert buttons[0]["data-time"] == "0.0500"
     assert "at 0.2 s" in text  # as the footage plays
+
+
+@pytest.mark.parametrize(
+    ("times_s", "rate", "speed", "shown"),
+    [
+        (np.arange(FRAMES) / 30, 30.0, 1.0, "0.30 s, 9 frames at 30 per second"),
+        # every second picture of a sequence is missing
+        (np.arange(FRAMES) / 15, 30.0, 1.0, "0.57 s, 9 frames at 30 per second"),
+        # recorded twice as fast as it plays, at 30 frames per second
+        (np.arange(FRAMES) / 60, 60.0, 2.0, "0.15 s, 9 frames at 60 per second"),
+        (10.0 + np.arange(FRAMES) / 30, 30.0, 1.0, "0.30 s, 9 frames at 30 per second"),
+    ],
+)
+def test_the_duration_is_that_in_which_the_motion_happened(body, times_s, rate, speed, shown):
+    about = clip(body, Path("a.mp4"))
+    (motion,) = about.motions
+    timed = replace(motion, timestamps=times_s, mocap_framerate=rate, footage_speed=speed)
+    assert header_facts(replace(about, motions=[timed]))["Duration"] == shown
 
 
 def test_frames_without_the_person_are_listed_and_marked(body):
