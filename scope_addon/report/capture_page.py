@@ -333,8 +333,9 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     error = motion.residual_px[seen]
     contact = motion.foot_contact > _CONTACT
     sigma = np.asarray(motion.joint_sigma_m, float)[seen]
-    spans = find_review_spans(motion)
-    review = sum(span.last - span.first + 1 for span in spans)
+    review = np.zeros(len(motion), bool)
+    for span in find_review_spans(motion, under_floor=under_floor(motion, body)):
+        review[span.first : span.last + 1] = True
     return {
         "Frames seen": f"{int(seen.sum())} of {len(motion)}",
         "Height": height_text(body.stature(motion.betas.astype(float)), motion.height_sigma_m),
@@ -351,7 +352,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
         else "–",
         "Left foot in contact": f"{100 * contact[:, :2].any(axis=1).mean():.0f} % of frames",
         "Right foot in contact": f"{100 * contact[:, 2:].any(axis=1).mean():.0f} % of frames",
-        "Frames to review": f"{review}",
+        "Frames to review": f"{int(review.sum())}",
     }
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from scope.scope_addon import installed
 from scope.scope_addon.report.capture_page import height_text, highest_speed, motion_figures
 from scope.scope_addon.report.page import Picture, bounded, small_picture, spread_rows
+from scope.scope_addon.review_spans import find_review_spans
 
 from ..made_motion import made_motion
 
@@ -83,6 +84,31 @@ def test_a_walk_of_known_length_and_speed(body):
     assert figures["Right foot in contact"] == "0 % of frames"
     assert figures["Frames to review"] == "1"
     assert figures["Height"] == f"{100 * np.ptp(body.v_template[:, 1]):.0f} cm"
+
+
+def test_each_frame_to_review_counts_once_whatever_the_reasons(body):
+    """A person floats for two seconds, at first away from where the footage shows them, then stands
+    under the floor for one.
+    """
+    T = 91
+    standing = -body.rest_vertices(np.zeros(body.P))[:, 1].min() - body.rest_joints()[0, 1]
+    trans = np.zeros((T, 3))
+    trans[:, 2] = standing
+    trans[60:, 2] -= 0.05
+    upright = np.zeros((T, body.K + 1, 3))
+    upright[:, 0, 0] = np.pi / 2  # from y up to z up
+    joints = np.zeros((T, body.K + 1, 3))
+    joints[60:, :, 1] = 0.9  # below a camera that is 1 m above the floor
+    motion = made_motion(
+        body,
+        upright,
+        trans,
+        joints_cam=joints,
+        residual_px=np.where(np.arange(T) < 20, 100.0, 0.0),
+    )
+    reasons = {span.reason for span in find_review_spans(motion)}
+    assert reasons == {"far", "floating"}
+    assert motion_figures(motion, body)["Frames to review"] == "91"
 
 
 def test_the_height_with_its_deviation():
