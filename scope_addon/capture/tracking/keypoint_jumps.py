@@ -2,10 +2,10 @@
 """Keypoint jumps: keypoints that leave their path for a few frames and return, because the network
 was mistaken.
 
-To deviate from the straight line by D, and to be back on it n + 1 frames after the last point on
-it, takes an acceleration of at least
+To deviate from the straight line by D, and to be back on it a time τ after the last point on it,
+takes an acceleration of at least
 
-    a = 8 D / ((n + 1) Δt)²,
+    a = 8 D / τ²,
 
 as for a ball thrown up. If that is more than a person's limbs can reach, the keypoint is an
 outlier. It is replaced by the point on the line, with less confidence. The largest network rarely
@@ -26,6 +26,10 @@ MAX_ACCELERATION_M_S2 = 200.0  # a boxer's fist; more only at the moment in whic
 MIN_JUMP_M = 0.06  # less is noise
 MAX_JUMP_S = 0.12
 MAX_JUMP_FRAMES = 8  # at a high frame rate
+# By which the time from a frame to the next may differ from the usual one and still count as it:
+# a share of it, or what the rounding of containers to milliseconds makes.
+_SAME_STEP = 0.1
+_SAME_STEP_S = 1.1e-3
 CONFIDENCE = 0.3  # factor for a replaced keypoint
 SPREAD_M = 0.5  # root mean square distance of a standing adult's limbs from their middle
 SPREAD_S = 1.0  # window of the scale: people who bend for a moment do not shrink
@@ -37,22 +41,21 @@ def repair_keypoint_jumps(track: Track) -> Track:
     """
     if len(track) < 3:
         return track
-    step_s = float(np.median(np.diff(track.times)))
     in_image = find_keypoint_jumps(
-        track.keypoints_px / scale_px_per_m(track)[:, None, None], track.seen, step_s
+        track.keypoints_px / scale_px_per_m(track)[:, None, None], track.seen, track.times
     )
-    in_space = in_image | find_keypoint_jumps(track.world_landmarks, track.seen, step_s)
+    in_space = in_image | find_keypoint_jumps(track.world_landmarks, track.seen, track.times)
     if not in_space.any():
         return track
     return replace(
         track,
-        keypoints_px=_interpolated(track.keypoints_px, in_image, track.seen),
+        keypoints_px=_interpolated(track.keypoints_px, in_image, track.seen, track.times),
         confidence=np.where(in_image, np.float32(CONFIDENCE) * track.confidence, track.confidence),
-        world_landmarks=_interpolated(track.world_landmarks, in_space, track.seen),
+        world_landmarks=_interpolated(track.world_landmarks, in_space, track.seen, track.times),
     )
 
 
-def find_keypoint_jumps(points: FloatArray, seen: BoolArray, step_s: float) -> BoolArray:
+def find_keypoint_jumps(points: FloatArray, seen: BoolArray, times: Float64Array) -> BoolArray:
     """Find the points that jump.
 
     Only points that are seen without a gap from the frame before to the frame after count. They
@@ -61,25 +64,53 @@ def find_keypoint_jumps(points: FloatArray, seen: BoolArray, step_s: float) -> B
 
     :param points: (T, J, n) metres.
     :param seen: (T,)
+    :param times: (T,) seconds.
     :return: (T, J)
     """
     T, J = points.shape[:2]
     jumps = np.zeros((T, J), bool)
-    for n in range(1, min(MAX_JUMP_FRAMES, int(MAX_JUMP_S / max(step_s, 1e-6)), T - 2) + 1):
-        least = max(MAX_ACCELERATION_M_S2 * ((n + 1) * step_s) ** 2 / 8, MIN_JUMP_M)
-        is_seen = np.lib.stride_tricks.sliding_window_view(seen, n + 2).all(axis=1)
+    if T < 3:
+        return jumps
+    step_s = _usual_step_s(times)
+    place = _places(times)
+    for n in range(1, min(MAX_JUMP_FRAMES, T - 2) + 1):
+        starts = place[: T - n - 1]
+        length = place[n + 1 :] - starts
+        # Of n frames at the rate that the window has.
+        most = np.floor(MAX_JUMP_S / np.maximum(length / (n + 1) * step_s, 1e-6))
+        possible = np.lib.stride_tricks.sliding_window_view(seen, n + 2).all(axis=1) & (n <= most)
+        if not possible.any():
+            continue
+        least = np.maximum(MAX_ACCELERATION_M_S2 * (length * step_s) ** 2 / 8, MIN_JUMP_M)
         for j in range(J):
             p = points[:, j]
             before = p[: T - n - 1]
             after = p[n + 1 :]
-            off = is_seen.copy()
+            off = possible.copy()
             limit = np.maximum(np.linalg.norm(after - before, axis=1), least)
             for i in range(1, n + 1):
-                line = before + (i / (n + 1)) * (after - before)
+                share = (place[i : T - n - 1 + i] - starts) / length
+                line = before + share.astype(points.dtype)[:, None] * (after - before)
                 off &= np.linalg.norm(p[i : T - n - 1 + i] - line, axis=1) > limit
             for start in np.flatnonzero(off) + 1:
                 jumps[start : start + n, j] = True
     return jumps
+
+
+def _usual_step_s(times: Float64Array) -> float:
+    """Return the time from most frames (T,) to the next, T > 1."""
+    return max(float(np.median(np.diff(times))), 1e-6)
+
+
+def _places(times: Float64Array) -> Float64Array:
+    """Return when each of the frames (T,) is shown, in usual steps after the first one: their
+    numbers at a constant frame rate, however the container rounds times.
+    """
+    usual_s = _usual_step_s(times)
+    steps_s = np.diff(times)
+    is_usual = np.abs(steps_s - usual_s) <= max(_SAME_STEP * usual_s, _SAME_STEP_S)
+    steps = np.where(is_usual, 1.0, np.maximum(steps_s / usual_s, 1e-6))
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def scale_px_per_m(track: Track) -> Float64Array:
@@ -96,15 +127,17 @@ def scale_px_per_m(track: Track) -> Float64Array:
     return scale
 
 
-def _interpolated(values: FloatArray, jumps: BoolArray, seen: BoolArray) -> FloatArray:
-    """Return values (T, J, n) with those that jump interpolated between the frames before and
-    after.
+def _interpolated(
+    values: FloatArray, jumps: BoolArray, seen: BoolArray, times: Float64Array
+) -> FloatArray:
+    """Return values (T, J, n) with those that jump interpolated in time between the frames before
+    and after.
     """
     out = values.copy()
-    rows = np.arange(len(values))
+    place = _places(times)
     for j in np.flatnonzero(jumps.any(axis=0)):
         good = np.flatnonzero(seen & ~jumps[:, j])
         bad = np.flatnonzero(jumps[:, j])
         for k in range(values.shape[2]):
-            out[bad, j, k] = np.interp(rows[bad], good, values[good, j, k])
+            out[bad, j, k] = np.interp(place[bad], place[good], values[good, j, k])
     return out
