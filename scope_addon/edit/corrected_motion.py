@@ -47,6 +47,7 @@ _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
 # Smoothing has mixed left and right within this time of a span's end.
 _MIXED_S = 0.12
 _NOTICED_M = 0.002
+_OTHER_FOOT = [2, 3, 0, 1]  # the columns of `Motion.foot_contact`, of the other foot
 
 
 def corrections_of(motion: Motion) -> tuple[Correction, ...]:
@@ -215,12 +216,15 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
     raw = clip_from_motion(body, base, raw=True)
     finished = clip_from_motion(body, base, raw=False)
     mixed = np.zeros(len(base), bool)
+    contact = base.foot_contact.copy()
     for exchange in exchanges:
         span = np.flatnonzero((base.frames >= exchange.first) & (base.frames <= exchange.last))
         if len(span):
             first, last = base.timestamps[span[[0, -1]]]
             raw = swap_sides(raw, body, first, last, exchange.limbs)
             finished = swap_sides(finished, body, first, last, exchange.limbs)
+            if exchange.limbs != "arms":
+                contact[span] = contact[span][:, _OTHER_FOOT]
             for k, neighbour in ((span[0], span[0] - 1), (span[-1], span[-1] + 1)):
                 if 0 <= neighbour < len(base):
                     mixed |= np.abs(base.timestamps - base.timestamps[k]) < _MIXED_S
@@ -232,7 +236,7 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
         _poses(clip, getattr(base, poses))
         for clip, poses in ((raw, "poses_raw"), (finished, "poses"))
     )
-    return replace(base, poses_raw=new_raw, poses=new)
+    return replace(base, poses_raw=new_raw, poses=new, foot_contact=contact)
 
 
 def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Corrections that stay with a motion: through files, smoothing and removal."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip, clip_from_motion
@@ -101,6 +103,27 @@ def test_sides_are_exchanged_before_pins(pin_first):
         assert np.linalg.norm(joints - right, axis=-1).max() < 0.005
     wrong = clip_from_motion(BODY, captured, raw=False).joints(BODY, captured.betas)
     assert np.linalg.norm(wrong - right, axis=-1)[40].max() > 0.1
+
+
+@pytest.mark.parametrize("limbs", ["legs", "both", "arms"])
+def test_the_foot_that_rests_in_the_users_eyes_is_held_when_smoothed(limbs):
+    """A walker whose left foot rests, of whom a span was captured with left and right exchanged."""
+    rests = np.tile([1.0, 1.0, 0.0, 0.0], (len(TRUTH), 1))
+    right = replace(motion_of(TRUTH), foot_contact=rests)
+    span = slice(20, 71)
+    wrong = swap_sides(TRUTH, BODY, TRUTH.times[20], TRUTH.times[70], limbs)
+    contact = rests.copy()
+    if limbs != "arms":
+        contact[span] = [0.0, 0.0, 1.0, 1.0]
+    captured = replace(motion_of(wrong), foot_contact=contact)
+    corrected = with_corrections(captured, BODY, (Exchange(20, 70, limbs),))
+    ankles = [NAMES.index(f"{side}_ankle") for side in ("left", "right")]
+    found, expected = (
+        smoothed(BODY, motion, 2.5).joints(BODY, motion.betas)[35:56, ankles]
+        for motion in (corrected, right)
+    )
+    assert np.linalg.norm(found - expected, axis=-1).max() < 0.001
+    np.testing.assert_array_equal(corrected.foot_contact, contact)
 
 
 def test_damaged_corrections_are_an_error():
