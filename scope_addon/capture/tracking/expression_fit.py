@@ -53,6 +53,7 @@ from ..perception.face_record import (
     with_expression,
 )
 from ..perception.lifter import camera_towards
+from .scene_cuts import SCENE_GAP_S
 
 FILE = Path(__file__).resolve().parents[3] / "assets" / "face" / "response.npz"
 # The time, and the number of frames, that tell a person's face at rest.
@@ -151,10 +152,12 @@ def is_known(rows: FloatArray, times: Float64Array) -> bool:
 
     :param rows: (T, RECORD) see `face_record`.
     :param times: (T,) seconds; those since the frame before are added up over the frames in which
-        it was seen.
+        it was seen, but not across a cut.
     """
     seen = rows[:, 0] > 0
-    seconds = float(np.diff(times, prepend=times[:1])[seen].sum())
+    steps_s = np.diff(times, prepend=times[:1])
+    steps_s[steps_s > SCENE_GAP_S] = 0.0
+    seconds = float(steps_s[seen].sum())
     return int(seen.sum()) >= MIN_FRAMES and seconds >= MIN_S - _TIME_TOLERANCE_S
 
 

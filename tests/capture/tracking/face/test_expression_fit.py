@@ -26,10 +26,12 @@ from scope.scope_addon.capture.tracking import expression_fit
 from scope.scope_addon.capture.tracking.expression_fit import (
     aligned,
     fitted,
+    is_known,
     load_response,
     view_terms,
     with_expressions,
 )
+from scope.scope_addon.capture.tracking.scene_cuts import SCENE_GAP_S
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.solver.body_file import load_body
 from scope.solver.errors import ModelFileError
@@ -203,6 +205,16 @@ def test_the_expression_network_is_not_opened_for_a_face_that_is_seen_for_longer
     times = np.arange(len(rows)) / EXPRESSIONS_FPS
     np.testing.assert_array_equal(with_expressions(rows, times), fitted(rows, times))
     assert not with_expressions(np.zeros_like(rows), times).any()
+
+
+@pytest.mark.parametrize(("fps", "known"), [(30, False), (6, True)])
+def test_the_gap_at_a_cut_is_no_time_for_which_a_face_was_seen(fps, known):
+    """It is seen in 13 frames, from the first one after a cut on."""
+    rows = np.zeros((20, RECORD))
+    rows[7:, 0] = 1.0
+    times = np.arange(20) / fps
+    times[7:] += SCENE_GAP_S
+    assert is_known(rows, times) == known
 
 
 Y_UP = np.array([1.0, -1.0, -1.0])
