@@ -124,6 +124,16 @@ class SCOPE_OT_smooth(EditOperator):
             return [active]
         return [person for person in people_of(capture) if library_of(person) is None]
 
+    def work(self, context: bpy.types.Context) -> str:
+        """Smooth everybody, and only then remove what a failure could not bring back."""
+        from ..scene.character.root_object import remove_root_object
+
+        people = self.people(context)
+        message = super().work(context)
+        for armature in people:
+            remove_root_object(armature)
+        return message
+
     def edit(
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
@@ -133,7 +143,6 @@ class SCOPE_OT_smooth(EditOperator):
         from ..scene.actions import animated_together, remove_cycles
         from ..scene.character.keys import bake_whole_frames, write_clip
         from ..scene.character.other_curves import restore_whole_motion
-        from ..scene.character.root_object import remove_root_object
         from ..scene.character.uncorrected_keys import write_both
         from ..scene.timing import is_cycle, key_frames, restore_scene_range, store_rate
 
@@ -157,7 +166,6 @@ class SCOPE_OT_smooth(EditOperator):
         if armature.get("scope_resampled"):
             bake_whole_frames(armature, body, rate)
         restore_scene_range(context.scene, armature)
-        remove_root_object(armature)
         return ""
 
 

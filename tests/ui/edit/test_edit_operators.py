@@ -8,6 +8,7 @@ from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.keys import read_clip
 from scope.scope_addon.scene.character.root_object import root_object
+from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.captured_person import body_of
 from scope.solver.body_file import BUILT_IN, load_body
 from scope.solver.rotations import exp, log
@@ -273,6 +274,25 @@ def test_all_people_are_smoothed_at_once_on_request(tmp_path):
     for person, motion in zip(people, motions, strict=True):
         raw = exp(motion.poses_raw.reshape(len(motion), -1, 3).astype(float))
         assert turned(keys(person)[0].rotations, raw) < 0.01
+
+
+def test_smoothing_everyone_changes_nobody_if_somebody_cannot_be_smoothed():
+    built = build_scene([motion_of(walk(1.0), noise=0.05)] * 2, BODY, None, BuildOptions())
+    first, second = (person.armature for person in built.people)
+    for person in (first, second):
+        pack_motion(person, built.people[0].motion.to_bytes())
+    layer = bpy.context.view_layer
+    layer.objects.active = second
+    bpy.ops.scope.push_to_nla()
+    layer.objects.active = first
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    empty = root_object(first)
+    before = seen(first)
+    with pytest.raises(RuntimeError, match="NLA"):
+        bpy.ops.scope.smooth(strength=3.0, everyone=True)
+    assert root_object(first) == empty
+    assert "scope_smoothing" not in first
+    np.testing.assert_array_equal(seen(first), before)
 
 
 def test_smoothing_a_loop_restores_the_motion_and_the_frame_range(rig):
