@@ -158,7 +158,7 @@ def edit_clip(
 ) -> None:
     """Replace the keys of a captured armature on the same frames.
 
-    :param rate: of the scene, frames per second.
+    :param rate: for which the keys were written, frames per second.
     :param change: returns the new poses, given the present ones and the scene frame of each, (T,).
     """
     from ..scene.character.keys import read_clip, write_clip
@@ -204,18 +204,23 @@ class EditOperator(ReportingOperator):
         def edit(
             self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
         ) -> str:
-            """Change the keys and return a message for the user, which may be empty."""
+            """Change the keys and return a message for the user, which may be empty.
+
+            :param rate: for which the keys were written, frames per second.
+            """
 
     def work(self, context: bpy.types.Context) -> str:
         """Edit the keys; if that fails, restore them."""
-        from ..scene.timing import scene_rate
+        from ..scene.timing import keyed_rate
         from ..scene.transaction import all_or_nothing
 
         message = ""
         people = self.people(context)
-        rate = scene_rate(context.scene)
-        with all_or_nothing(context.scene, *people):
+        scene = context.scene
+        with all_or_nothing(scene, *people):
             for armature in people:
+                # not the scene's rate, which an importer may have changed since: that moves no key
+                rate = keyed_rate(armature, scene)
                 message = self.edit(context, armature, body_of(armature), rate)
         return message
 

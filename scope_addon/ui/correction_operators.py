@@ -60,7 +60,7 @@ def change_corrections(
 ) -> Motion:
     """Change the corrections of a captured person: of the motion, the keys and the list.
 
-    :param rate: scene frames per second.
+    :param rate: for which the keys were written, frames per second.
     :param change: returns the new corrections for the present ones.
     :param added: the one that this adds; a pin or an edit holds even if edited keys differ from the
         motion.
@@ -86,14 +86,12 @@ def change_corrections(
 def change_world(
     scene: bpy.types.Scene,
     armature: bpy.types.Object,
-    rate: float,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
     rise: float = 0.0,
 ) -> None:
     """Change the upright line or floor of everybody that the same camera has captured, and move the
     camera with them.
 
-    :param rate: scene frames per second.
     :param change: returns the new corrections for the present ones, and changes the same of
         everybody.
     :param rise: metres by which the keys of this person are raised.
@@ -105,6 +103,7 @@ def change_world(
     from ..edit.corrections import world_of
     from ..scene.camera import same_camera, view_number
     from ..scene.character.upright_scene import turn_camera
+    from ..scene.timing import keyed_rate
     from ..scene.transaction import all_or_nothing
 
     motion = motion_of(armature)
@@ -119,6 +118,7 @@ def change_world(
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
     with all_or_nothing(scene, *together[1:], *cameras):
         for person in together:
+            rate = keyed_rate(person, scene)
             change_corrections(
                 person, body_of(person), rate, change, rise=rise if person == armature else 0.0
             )
@@ -143,10 +143,10 @@ def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Moti
     :raises UsageError: the motion has none there.
     """
     from ..scene.character.corrected_keys import source_frame
-    from ..scene.timing import scene_rate
+    from ..scene.timing import keyed_rate
 
     return source_frame(
-        armature, motion, scene.frame_current + scene.frame_subframe, scene_rate(scene)
+        armature, motion, scene.frame_current + scene.frame_subframe, keyed_rate(armature, scene)
     )
 
 
@@ -539,9 +539,7 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
         kinds = [entry["kind"] for entry in listed_corrections(armature)]
         removed = set(kinds if self.index < 0 else kinds[self.index : self.index + 1])
         if shared := removed & {"UPRIGHT", "FLOOR"}:  # which others of the capture have too
-            change_world(
-                context.scene, armature, rate, lambda present: without_kinds(present, shared)
-            )
+            change_world(context.scene, armature, lambda present: without_kinds(present, shared))
         if removed - shared:
             change_corrections(
                 armature,

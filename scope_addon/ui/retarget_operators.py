@@ -138,7 +138,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     :raises ScopeError: the rig or its bones cannot be used; nothing is changed.
     """
     from ..scene.rig_retarget import retarget, usable_guess
-    from ..scene.timing import scene_rate
+    from ..scene.timing import keyed_rate
     from ..scene.visibility import hide, select_only, show
 
     settings = context.scene.scope_retarget
@@ -151,7 +151,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
         betas_of(source, body),
         settings.rig,
         guessed or listed_map(settings),
-        scene_rate(context.scene),
+        keyed_rate(source, context.scene),
         retarget_options(settings, face),
     )
     if guessed is not None:  # not before: what fails changes nothing

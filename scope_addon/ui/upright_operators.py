@@ -57,7 +57,7 @@ class SCOPE_OT_set_upright(CorrectionOperator):
         motion = motion_of(armature)
         frame = shown_frame(scene, armature, motion)
         transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
-        change_world(scene, armature, rate, lambda present: added(present, Upright.of(transform)))
+        change_world(scene, armature, lambda present: added(present, Upright.of(transform)))
         return ""
 
 
@@ -101,7 +101,7 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
         current = scene.frame_current + scene.frame_subframe
         start, end, beyond = captured_points(armature, current, points)
         transform = upright_transform_in_view(motion, body, (start, end), beyond - start)
-        change_world(scene, armature, rate, lambda present: added(present, Upright.of(transform)))
+        change_world(scene, armature, lambda present: added(present, Upright.of(transform)))
         return ""
 
 
@@ -310,7 +310,7 @@ class SCOPE_OT_floor_here(CorrectionOperator):
         floor = Floor(frame, height)
         # Edited keys may have the foot elsewhere than the motion.
         rise = height - shown if abs(height - shown) > _SAME_M else 0.0
-        change_world(scene, armature, rate, lambda present: added(present, floor), rise)
+        change_world(scene, armature, lambda present: added(present, floor), rise)
         if warning := _others_under_floor(motion_of(armature), body):
             self.report({"WARNING"}, warning)
         return ""

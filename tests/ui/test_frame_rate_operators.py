@@ -7,11 +7,12 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.capture_report import Report
+from scope.scope_addon.edit.corrected_motion import corrections_of
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
-from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.scene.packed_motion import pack_motion, stored_motion
 from scope.scope_addon.ui.capture_job import show_result
 from scope.scope_addon.ui.frame_rate_operators import keyed_for, rate_warnings
 
@@ -99,9 +100,35 @@ def test_a_rate_that_an_importer_has_changed_is_noticed_and_restored(scene):
     bpy.ops.scope.match_frame_rate()
     assert keyed_for(scene) == 0
     np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+
+
+def key_times(owner):
+    """Return the scene frames of all keys of an object, curve by curve."""
+    return [read_keys(curve)[:, 0].tolist() for curve in fcurves(owner)]
+
+
+def test_smoothing_moves_no_key_to_a_rate_that_an_importer_has_changed(scene):
+    person = built()
+    keys = key_times(person)
+    before = at_times(person, NAMES)
     scene.render.fps = 24
-    bpy.ops.scope.smooth(strength=1.0)  # which writes keys at the scene's rate
-    assert keyed_for(scene) == 0
+    bpy.ops.scope.smooth(strength=1.0)
+    assert key_times(person) == keys  # of the bones and of what only Match Frame Rate moves
+    assert keyed_for(scene) == 20
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-3)
+
+
+def test_corrections_name_the_footage_that_is_shown_after_an_importer_has_changed_the_rate(scene):
+    person = built()
+    place = at_times(person, ["left_wrist"])[2, 0]
+    scene.render.fps = 24
+    scene.frame_set(31)  # a second after the start for the keys, which are 20 in a second
+    bpy.ops.scope.add_pin(joint="left_wrist", location=place)
+    bpy.ops.scope.foot_stands(start=31, end=33, foot="left")
+    bpy.ops.scope.floor_here(foot="left")
+    pin, stands, floor = corrections_of(stored_motion(person))
+    assert (pin.frame, stands.first, stands.last, floor.frame) == (30, 30, 33, 30)
 
 
 def test_a_frame_range_of_the_users_stays(scene):

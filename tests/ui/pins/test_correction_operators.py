@@ -19,6 +19,7 @@ from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.foot_skin import foot_heights
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.match_rate import change_rate
 from scope.scope_addon.scene.packed_motion import pack_motion, stored_motion
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 from scope.scope_addon.ui.correction_operators import last_pin_warnings
@@ -268,7 +269,7 @@ def test_keys_that_were_edited_after_a_correction_keep_the_edit_when_it_is_remov
 
 
 def test_removal_is_exact_at_another_frame_rate_too(rig):
-    bpy.context.scene.render.fps = 24
+    change_rate(bpy.context.scene, 24.0, {rig: stored_motion(rig)}, [])
     bpy.ops.scope.smooth(strength=1.0)  # keys between frames
     before = keys(rig)
     CORRECTIONS["pin"](seen(rig)[0, WRIST])
@@ -381,7 +382,7 @@ def test_the_last_frame_can_be_pinned_and_the_frame_after_it_moves_nothing(rig):
     bpy.ops.scope.add_pin(joint="left_wrist", frame=91, location=last[WRIST] + [0.1, 0.0, 0.1])
     assert np.linalg.norm(seen(rig, [91])[0, WRIST] - last[WRIST] - [0.1, 0.0, 0.1]) < 0.01
     # frames of the scene between those of the motion, and half a frame after it
-    bpy.context.scene.render.fps = 60
+    change_rate(bpy.context.scene, 60.0, {rig: None}, [])
     bpy.context.scene.frame_set(182)
     with pytest.raises(RuntimeError, match="Frame 182 is outside .* frames 1 to 181"):
         bpy.ops.scope.add_pin(joint="left_wrist", location=(0, 0, 1))
