@@ -44,12 +44,13 @@ def smoothed(body: Body, motion: Motion, strength: float) -> Clip:
     """
     if not np.isfinite(strength) or strength < 0:
         raise UsageError(f"the smoothing strength must be 0 or more, not {strength}")
-    raw = clip_from_motion(body, motion, raw=True)
-    if strength == 0 or len(raw) < 3:
-        return raw
     finished = clip_from_motion(body, motion, raw=False)
-    if strength == 1:
+    is_unfiltered = len(finished) < 3  # too few frames for a filter
+    if strength == 1 or (strength > 1 and is_unfiltered):
         return finished
+    raw = clip_from_motion(body, motion, raw=True)
+    if strength == 0 or is_unfiltered:
+        return raw
     if not motion.corrections:
         return _smoothed(motion, body, raw, finished, strength)
     captured = before_smoothing(motion, body)

@@ -16,7 +16,7 @@ from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.motion import Motion
 from scope.solver.rotations import exp, log
 
-from .walking import BETAS, BODY, NAMES, motion_of, walk
+from .walking import BETAS, BODY, NAMES, RATE, motion_of, walk
 
 ELBOW = NAMES.index("left_elbow")
 
@@ -38,9 +38,19 @@ def amplitude(clip: Clip) -> float:
     return float(np.sqrt(2) * angles[inner].std())
 
 
-def test_strength_zero_is_the_raw_motion_and_one_the_finished() -> None:
-    motion = motion_of(walk(), noise=0.05)
-    for strength, raw in ((0, True), (1, False)):
+@pytest.mark.parametrize(
+    ("seconds", "raw_at"),
+    [
+        (4.0, {0.0: True, 1.0: False}),
+        # two frames, which no filter changes
+        (1 / RATE, {0.0: True, 0.5: True, 1.0: False, 2.0: False}),
+    ],
+)
+def test_strength_zero_is_the_raw_motion_and_one_the_finished(
+    seconds: float, raw_at: dict[float, bool]
+) -> None:
+    motion = motion_of(walk(seconds), noise=0.05)
+    for strength, raw in raw_at.items():
         found = smoothed(BODY, motion, strength)
         expected = clip_from_motion(BODY, motion, raw=raw)
         np.testing.assert_array_equal(found.rotations, expected.rotations)
