@@ -122,11 +122,10 @@ def load_response() -> FaceResponse:
         raise ModelFileError(f"{FILE} is damaged ({error}); install Scope again") from error
 
 
-def fitted(rows: FloatArray, times: Float64Array) -> FloatArray:
+def fitted(rows: FloatArray) -> FloatArray:
     """Return rows whose weights and gaze are fitted to the landmarks.
 
     :param rows: (T, RECORD) see `face_record`, for which `is_known`.
-    :param times: (T,) seconds.
     :raises ModelFileError: the response of the landmarks is missing or damaged.
     """
     seen = np.flatnonzero(rows[:, 0] > 0)
@@ -259,7 +258,7 @@ def with_expressions(rows: FloatArray, times: Float64Array) -> FloatArray:
     """
     seen = np.flatnonzero(rows[:, 0] > 0)
     if is_known(rows, times):
-        return fitted(rows, times)
+        return fitted(rows)
     if not len(seen):
         return rows
     # It runs on the CPU, whatever the other networks run on: it takes a millisecond.

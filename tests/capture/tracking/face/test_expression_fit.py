@@ -103,7 +103,7 @@ def modelled(weights: np.ndarray, noise: float, size: float = 120.0) -> np.ndarr
 def test_expressions_are_found_whatever_the_face_at_rest():
     truth = talk()
     truth[60:, INDEX["browDownLeft"]] = truth[60:, INDEX["browDownRight"]] = 0.6
-    _, _, weights, gaze, _ = parts(fitted(modelled(truth, 0.002), TIMES))
+    _, _, weights, gaze, _ = parts(fitted(modelled(truth, 0.002)))
     np.testing.assert_allclose(weights[:, [JAW, *BLINKS]], truth[:, [JAW, *BLINKS]], atol=0.12)
     assert np.abs(weights - truth).mean() < 0.01
     assert (
@@ -148,7 +148,7 @@ def test_a_rendered_face_that_the_network_sees(tmp_path):
         estimate = network.estimate(image, region)
         region = estimate.next_region
         rows.append(record(estimate))
-    _, _, weights, _, _ = parts(fitted(np.array(rows), clip.seconds))
+    _, _, weights, _, _ = parts(fitted(np.array(rows)))
     error = np.abs(weights - truth)
     assert error[:, JAW].mean() < 0.06
     assert error[:, BLINKS].mean() < 0.06
@@ -203,7 +203,7 @@ def test_the_expression_network_is_not_opened_for_a_face_that_is_seen_for_longer
     monkeypatch.setattr(expression_fit, "ExpressionNetwork", None)
     rows = clip[1]
     times = np.arange(len(rows)) / EXPRESSIONS_FPS
-    np.testing.assert_array_equal(with_expressions(rows, times), fitted(rows, times))
+    np.testing.assert_array_equal(with_expressions(rows, times), fitted(rows))
     assert not with_expressions(np.zeros_like(rows), times).any()
 
 
