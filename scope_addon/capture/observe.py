@@ -202,7 +202,7 @@ def _given_path(video: Video, options: CaptureOptions) -> GivenPath | None:
         return None
     path = read_camera_path(options.camera_path)
     start_s = video.wanted.start_s
-    length_s = max(0.0, video.expected_frames / float(video.fps) - LENGTH_TOLERANCE_S)
+    length_s = max(0.0, video.length_s - LENGTH_TOLERANCE_S)
     path.at(np.array([start_s, start_s + length_s]))
     return path
 

@@ -38,8 +38,7 @@ def plan_windows(video: Video, window_s: float) -> list[Window]:
     The last window has whatever is left, also of footage that is longer than its container says.
     """
     start_s = video.wanted.start_s
-    length_s = video.expected_frames / float(video.fps)
-    count = max(1, min(int(length_s / window_s + 1e-9), MAX_WINDOWS))
+    count = max(1, min(int(video.length_s / window_s + 1e-9), MAX_WINDOWS))
     if count > 1 and video.wanted.fps is None:
         count = max(1, min(count, video.most_frames // _LEAST_FRAMES))
     begins = [start_s + k * window_s for k in range(count)]

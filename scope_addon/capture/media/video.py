@@ -99,18 +99,34 @@ class Video:
     def expected_frames(self) -> int:
         """Number of frames that an iteration yields, if the container's frame count is right."""
         if self._sequence is not None:
-            times = [self._sequence.time(k, self.fps) for k in range(self.frame_count)]
-            return max(
-                1, sum(self.wanted.start_s - 1e-6 <= t <= self.wanted.end_s + 1e-6 for t in times)
-            )
+            return max(1, len(self._wanted_slots()))
         length = self.frame_count / self.average_fps
         start = Fraction(self.wanted.start_s)
         end = Fraction(min(self.wanted.end_s, float(length)))
+        return max(1, round((min(end, length) - start) * self._expected_rate))
+
+    @property
+    def length_s(self) -> float:
+        """For how many seconds the range is shown, to a whole frame, if the container is right."""
+        slots = self._wanted_slots()
+        if slots:
+            return (slots[-1] - slots[0] + 1) / float(self.fps)
+        return self.expected_frames / float(self._expected_rate)
+
+    @property
+    def _expected_rate(self) -> Fraction:
+        """Number of frames per second of those that are expected."""
         # Where the rate varies, there can be more frames than at the usual rate, and all count.
         rate = self.average_fps
-        if self.wanted.fps is not None:
-            rate = min(self.wanted.fps, rate)
-        return max(1, round((min(end, length) - start) * rate))
+        return rate if self.wanted.fps is None else min(self.wanted.fps, rate)
+
+    def _wanted_slots(self) -> list[int]:
+        """Return the slots of a sequence's pictures in the range; none of other footage."""
+        if self._sequence is None:
+            return []
+        start_s = self.wanted.start_s - 1e-6
+        end_s = self.wanted.end_s + 1e-6
+        return [slot for slot in self._sequence.slots if start_s <= float(slot / self.fps) <= end_s]
 
     @property
     def most_frames(self) -> int:

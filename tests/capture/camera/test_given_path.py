@@ -2,11 +2,17 @@
 """The file with the path of a camera that another program has solved."""
 
 import json
+from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.given_path import read_camera_path
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
+from scope.scope_addon.capture.media.video import Video
+from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.observe import _given_path
+from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.errors import UsageError
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp, log
@@ -46,6 +52,19 @@ def test_poses_between_those_of_the_file_are_interpolated(tmp_path, rows):
     np.testing.assert_allclose(found[:, :3, 3], true[:, :3, 3], atol=1e-9)
     off = log(np.swapaxes(found[:, :3, :3], 1, 2) @ true[:, :3, :3])
     np.testing.assert_allclose(off, 0.0, atol=1e-9)
+
+
+def test_a_path_of_all_frames_is_accepted_where_the_frame_rate_varies(tmp_path):
+    """Most frames come at 24 frames/s, but 50 are in a second on average: 40 s, not 83."""
+    video = Video(Path("clip.mp4"), 640, 480, Fraction(24), 50 * 40)
+    video._average_fps = Fraction(50)
+    times_s = np.arange(41.0)
+    path = written(
+        tmp_path, times_s=times_s.tolist(), world_from_camera=true_poses(times_s).tolist()
+    )
+    assert _given_path(video, CaptureOptions(camera_path=path)) is not None
+    video.wanted = VideoRange(start_s=20.0, end_s=30.0)
+    assert video.length_s == 10.0
 
 
 def test_one_pose_is_that_of_a_camera_that_stands(tmp_path):

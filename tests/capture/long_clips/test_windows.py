@@ -46,6 +46,13 @@ def test_windows_begin_where_the_range_does() -> None:
     assert windows[0].anchor_s == 1000
 
 
+def test_windows_are_as_long_where_the_frame_rate_varies() -> None:
+    """Most frames come at 30 frames/s, but some so late that there are only 24 in a second."""
+    varying = Video(Path("clip.mp4"), 640, 480, Fraction(30), 24 * 250)
+    varying._average_fps = Fraction(24)
+    assert [w.begin_s for w in plan_windows(varying, WINDOW_S)] == [0, 120]
+
+
 def test_short_windows_do_not_warm_up_before_the_one_before() -> None:
     windows = plan_windows(video(10), 1.0)
     assert all(b.anchor_s > a.begin_s for a, b in zip(windows, windows[1:], strict=False))

@@ -102,7 +102,10 @@ def test_the_number_of_a_pattern_is_where_its_sign_stands(tmp_path: Path, name: 
         (warning,) = map(str, video.warnings)
         assert "1 numbers between 98 and 102 have no image" in warning
         assert video.expected_frames == 4
+        assert video.length_s == pytest.approx(0.5)
     assert brightness(tmp_path / name, VideoRange(0.1, 0.35, Fraction(10))) == [99, 101]
+    with open_video(tmp_path / name, VideoRange(0.1, 0.35, Fraction(10))) as video:
+        assert video.length_s == pytest.approx(0.3)
 
 
 def test_pictures_are_decoded_alike_alone_and_in_a_sequence(tmp_path: Path) -> None:
