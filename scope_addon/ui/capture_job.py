@@ -46,6 +46,7 @@ from .reporting import add_warning
 from .scene_camera import scene_camera_path
 
 _ENDING_S = 5.0  # after which a worker that has sent its result is killed
+_AUTOMATIC = "AUTO"  # the setting of the frame rate that depends on what the scene contains
 _MAX_SPANS = 12  # buttons of one warning in the panel
 
 
@@ -64,6 +65,7 @@ class CaptureJob:
         self._scene_uid = scene.session_uid
         self._selection = Selection(scene)
         self._options = build_options(scene)
+        self._is_automatic = scene.scope.frame_rate == _AUTOMATIC
         self._request = capture_request(scene)
         self._kind = kind_of(self._request.values)
         self.progress = JobProgress(earlier=load_stage_times(self._cache.root, self._kind))
@@ -151,6 +153,9 @@ class CaptureJob:
 
     def _build(self, scene: bpy.types.Scene, captured: CachedCapture) -> None:
         report = Report.from_json(captured.report)
+        options = self._options
+        if self._is_automatic:  # the user may have begun to animate during the capture
+            options = replace(options, frame_rate=_automatic_frame_rate(scene))
         views = report.placed_videos(self._request.views)
         view_footage = [path if path.is_file() else None for path in views]
         is_busy = Selection(scene).shows_work(since=self._selection)
@@ -161,7 +166,7 @@ class CaptureJob:
                 self._request.values["body"],
                 self._request.footage,
                 report,
-                replace(self._options, view_footage=view_footage),
+                replace(options, view_footage=view_footage),
             )
 
 
@@ -335,8 +340,8 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     """Make the options of building the scene from its settings."""
     settings = scene.scope
     frame_rate = settings.frame_rate.lower()
-    if frame_rate == "auto":
-        frame_rate = "keep" if _is_animated(scene) else "set"
+    if settings.frame_rate == _AUTOMATIC:
+        frame_rate = _automatic_frame_rate(scene)
     return BuildOptions(
         name=settings.take.strip(),
         frame_rate=frame_rate,
@@ -353,6 +358,10 @@ def store_motions(result: BuildResult, contents: Sequence[bytes], body: str) -> 
     for person, content in zip(result.people, contents, strict=True):
         pack_motion(person.armature, content)
         person.armature["scope_body_file"] = body
+
+
+def _automatic_frame_rate(scene: bpy.types.Scene) -> str:
+    return "keep" if _is_animated(scene) else "set"
 
 
 def _is_animated(scene: bpy.types.Scene) -> bool:

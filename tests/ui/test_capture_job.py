@@ -410,6 +410,19 @@ def test_the_automatic_frame_rate_respects_other_animation(fake_worker, footage,
     assert scene.render.fps == rate
 
 
+def test_what_is_animated_during_a_capture_keeps_its_frame_rate(fake_worker, footage):
+    fake_worker(FINISH)
+    scene = bpy.context.scene
+    scene.render.fps = 24
+    scene.scope.footage = str(footage)
+    job = CaptureJob(scene)
+    cube = bpy.data.objects.new("cube", None)
+    scene.collection.objects.link(cube)
+    cube.keyframe_insert("location", frame=1)
+    run_to_end(job)
+    assert scene.render.fps == 24
+
+
 def test_real_worker_on_a_picture(footage):
     """It runs in Blender's Python, isolated, with only the folders that it is given."""
     scene = bpy.context.scene
