@@ -293,7 +293,7 @@ class CapturingOperator(JobOperator):
     def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         """Stop the job and the timer, show what was built, and return the outcome."""
         if "FINISHED" in outcome:
-            show_new_capture(context)
+            show_new_capture(context, _scene_of_job())
         return super().end(context, outcome)
 
 

@@ -82,7 +82,7 @@ class SCOPE_OT_import_motion(ReportingOperator):
                 _build(context.scene, path, imported, self._build_options(context.scene))
         new = [each for each in captures_of(context.scene) if each not in before]
         hide_others(context.scene, new)
-        show_new_capture(context)
+        show_new_capture(context, context.scene)
         notes = list(dict.fromkeys(note for _, imported in found for note in imported.notes))
         if notes:
             self.report({"WARNING"}, sentence("; ".join(note.text(iface_) for note in notes)))

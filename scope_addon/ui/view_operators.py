@@ -50,12 +50,18 @@ def frame_selected(context: bpy.types.Context) -> None:
             bpy.ops.view3d.view_selected()
 
 
-def show_new_capture(context: bpy.types.Context) -> None:
-    """Show the capture that was just added: the viewports leave the comparison of an earlier
-    one.
+def show_new_capture(context: bpy.types.Context, scene: bpy.types.Scene | None) -> None:
+    """Show the capture that was just added to a scene: the viewports leave the comparison of an
+    earlier one.
+
+    Where another scene is shown by now, its viewports and objects stay as they are.
+
+    :param scene: None if it was removed.
     """
     from ..scene.visibility import hide_again
 
+    if scene != context.scene:
+        return
     hide_startup_cube(context)
     shown = context.scene.scope.result.collection
     if shown is not None:

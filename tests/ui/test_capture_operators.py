@@ -24,6 +24,7 @@ from scope.scope_addon.ui.capture_operators import (
     state,
 )
 from scope.scope_addon.ui.job_operator import JobOperator
+from scope.scope_addon.ui.view_operators import show_new_capture
 
 
 def window_with_sidebar(category="Scope", width=200):
@@ -258,6 +259,16 @@ def test_the_startup_cube_is_hidden_by_what_a_clip_of_the_queue_adds_to_the_undo
     choose_several(paths)
     assert bpy.ops.scope.capture_queue() == {"FINISHED"}
     assert hidden == [False, True, True]
+
+
+def test_a_capture_that_ends_in_another_scene_hides_no_startup_cube_of_the_shown_one():
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    captured = bpy.data.scenes.new("captured")
+    show_new_capture(bpy.context, captured)
+    assert not cube.hide_get()
+    show_new_capture(bpy.context, bpy.context.scene)
+    assert cube.hide_get()
 
 
 @pytest.mark.parametrize(("kind", "suffix"), [("BVH", ".bvh"), ("NPZ", ".npz"), ("GLB", ".glb")])

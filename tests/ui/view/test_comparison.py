@@ -90,7 +90,7 @@ def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(m
     monkeypatch.setattr(comparison, "side_area", lambda screen: side)
     monkeypatch.setattr(comparison, "_close_later", closed.append)
     with bpy.context.temp_override(window=window, area=area):
-        show_new_capture(bpy.context)
+        show_new_capture(bpy.context, scene)
     assert space.local_view is None
     assert space.region_3d.view_perspective != "CAMERA"
     assert space.overlay.show_bones
@@ -100,7 +100,7 @@ def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(m
     space.camera = own
     space.region_3d.view_perspective = "CAMERA"
     with bpy.context.temp_override(window=window, area=area):
-        show_new_capture(bpy.context)
+        show_new_capture(bpy.context, scene)
     assert space.region_3d.view_perspective == "CAMERA"
 
 
