@@ -329,23 +329,24 @@ class PyavReader:
         image = rgb(frame, "ITU601")
         return self._time(frame), upright(self._path, image, self._aspect, *shown)
 
-    def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, float | None]:
-        """Skip to the first frame at or after a time.
+    def skip_to(
+        self, seconds: float, fps: Fraction, may_seek: bool = True
+    ) -> tuple[int, float | None]:
+        """Skip to the first frame at or after a time, which has to be called before the first frame
+        is read.
 
-        Seeks if the timestamps tell which frame the seek has led to, which saves decoding; else
-        decodes frame by frame. It has to be called before the first frame is read.
-
-        :param fps: rate by which an index is converted to a time.
+        :param fps: rate by which a time is converted to an index.
+        :param may_seek: whether to seek where that saves decoding. The index then follows from the
+            time, so that it is right at a constant frame rate only; else all frames are decoded.
         :return: index of the frame that is read next, or the number of frames if the video ends
             before; and the time of the frame before, None if it was not decoded.
         """
-        if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
+        if may_seek and seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
             frame = next(self._decoded, None)
             time = None if frame is None else self._time(frame)
             if frame is not None and time is not None and time < seconds:
-                index = round(time * fps)
-                if abs(time - index / fps) < 0.5 / fps:
-                    return self._skip(itertools.chain([frame], self._decoded), index, seconds, fps)
+                frames = itertools.chain([frame], self._decoded)
+                return self._skip(frames, round(time * fps), seconds, fps)
             self._seek(0.0)
         return self._skip(self._decoded, 0, seconds, fps)
 

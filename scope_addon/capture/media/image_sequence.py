@@ -126,8 +126,8 @@ class SequenceReader:
         self._next += 1
         return time, picture.rgb
 
-    def skip_to(self, seconds: float, fps: Fraction) -> tuple[int, None]:
-        """Skip to the first picture at or after a time, and return its index."""
+    def skip_to(self, seconds: float, fps: Fraction, may_seek: bool = True) -> tuple[int, None]:
+        """Skip to the first picture at or after a time, and return its index, which is exact."""
         while (
             self._next < len(self._sequence.paths)
             and self._sequence.time(self._next, fps) < seconds - 1e-6

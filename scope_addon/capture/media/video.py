@@ -82,6 +82,7 @@ class Video:
     _average_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: Uint8Array | None = field(default=None, repr=False)
+    _is_part: bool = field(default=False, repr=False)  # see `frames_from`
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
@@ -160,7 +161,7 @@ class Video:
 
         :param start_s: within the range; it must have no frame rate of its own.
         """
-        return iter(replace(self, wanted=replace(self.wanted, start_s=start_s)))
+        return iter(replace(self, wanted=replace(self.wanted, start_s=start_s), _is_part=True))
 
     def close(self) -> None:
         """Stop the decoding threads of this video; a running iteration ends."""
@@ -394,7 +395,10 @@ class _Decoder:
         sampler = FrameSampler(video.wanted.fps)
         resized = False
         if video.wanted.start_s > 0:
-            index, time = reader.skip_to(video.wanted.start_s, video.source_fps)
+            # Indices have to be those of the whole footage, whichever part is chosen.
+            is_constant = video.average_fps == video.source_fps
+            may_seek = is_constant or video._is_part
+            index, time = reader.skip_to(video.wanted.start_s, video.source_fps, may_seek)
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
             time = next_time(time, decoded[0], float(1 / video.source_fps))
             image = video.wanted.view.show(decoded[1])

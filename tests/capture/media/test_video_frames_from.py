@@ -84,6 +84,20 @@ def test_frames_from_the_middle_are_those_of_the_whole(tmp_path: Path, name: str
             assert len({b.index - a.index for a, b in zip(found, expected, strict=True)}) == 1
 
 
+def test_frames_have_their_indices_where_the_range_begins_late_in_a_varying_rate(
+    tmp_path: Path,
+) -> None:
+    """Most frames come a quarter of a second after the one before, but every fourth one later."""
+    times = np.concatenate([[0.0], np.cumsum(np.tile([0.25, 0.25, 0.25, 0.75], 30))]).tolist()
+    path = write(tmp_path / "varying.mp4", "mpeg4", "yuv420p", times, {"g": "20"})
+    with open_video(path) as video:
+        assert (video.fps, float(video.average_fps)) == (4, pytest.approx(8 / 3, rel=0.02))
+        whole = [(frame.index, frame.timestamp_s) for frame in video]
+    with open_video(path, VideoRange(start_s=30.0)) as video:
+        found = [(frame.index, frame.timestamp_s) for frame in video]
+    assert found == [each for each in whole if each[1] >= 30.0]
+
+
 def test_the_end_of_the_range_is_kept(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", "mpeg4", "yuv420p", EVEN, {"g": "30"})
     with open_video(path, VideoRange(5.0, 40.0)) as video:
