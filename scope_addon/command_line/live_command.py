@@ -167,7 +167,7 @@ def _save(recording: PeopleRecording | None, footage: Footage | None) -> list[Pa
                 failures.append(str(error))
                 raise
     if footage is not None and footage.missing:
-        print_message(f"{footage.missing} in {video[0]}, since the computer was too busy")
+        print_message(footage.missing)
     return [*motions, *(path for path in video if path)]
 
 

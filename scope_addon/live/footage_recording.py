@@ -37,7 +37,10 @@ class Footage:
         self._target = Target(path)
         self._fps = fps
         self.origin: tuple[int, float] | None = None  # number and time of the first picture
-        self.lost = 0  # pictures that were left out
+        # Pictures that were left out: those that could not be encoded in time, and those of another
+        # size than the first one, as after a reconnection or of a phone that was turned.
+        self.lost = 0
+        self.resized = 0
         self.unfinished: Path | None = None  # the growing file
         self._size: tuple[int, ...] = ()
         self._waiting: queue.Queue[Picture | None] = queue.Queue(_WAITING)
@@ -57,19 +60,23 @@ class Footage:
                 self._thread.start()
         if self._problem:
             return
+        if picture.image_rgb.shape != self._size:
+            self.resized += 1
+            return
         try:
-            if picture.image_rgb.shape != self._size:  # after a reconnection; a video has one size
-                raise queue.Full
             self._waiting.put_nowait(picture)
         except queue.Full:
             self.lost += 1
 
     @property
     def missing(self) -> str:
-        """Say how many pictures were left out; empty if none were."""
-        if not self.lost:
-            return ""
-        return f"{counted(self.lost, 'frame')} {'is' if self.lost == 1 else 'are'} missing"
+        """Say how many pictures were left out, and why; empty if none were."""
+        reasons = {
+            "for which the computer was too busy": self.lost,
+            "of another size than the first one, which a video cannot hold": self.resized,
+        }
+        lacks = [f"{counted(count, 'frame')} {why}" for why, count in reasons.items() if count]
+        return f"{self._path} lacks {' and '.join(lacks)}" if lacks else ""
 
     def save(self) -> Path | None:
         """Finish the file; None if no picture came.

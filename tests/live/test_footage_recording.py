@@ -3,6 +3,7 @@
 
 import subprocess
 import sys
+import threading
 import time
 from fractions import Fraction
 
@@ -28,7 +29,7 @@ def test_pictures_keep_their_times_and_order(tmp_path):
     for k in range(len(TIMES)):
         footage.add(picture(k))
     assert footage.save() == path
-    assert (footage.origin, footage.lost) == ((20, 7.0), 0)
+    assert (footage.origin, footage.missing) == ((20, 7.0), "")
     with av.open(str(path)) as video:
         frames = list(video.decode(video=0))
     assert [frame.time for frame in frames] == pytest.approx([t - 7.0 for t in TIMES], abs=1e-3)
@@ -128,5 +129,27 @@ def test_pictures_of_another_size_are_left_out_and_counted(tmp_path):
     footage = Footage(tmp_path / "take.mp4", Fraction(30))
     footage.add(picture(0))
     footage.add(picture(1, (60, 80, 3)))
-    footage.save()
-    assert footage.lost == 1
+    path = footage.save()
+    assert footage.missing.startswith(f"{path} lacks 1 frame of another size than the first one")
+
+
+def test_pictures_that_come_too_fast_are_told_from_those_of_another_size(tmp_path, monkeypatch):
+    write = VideoWriter.write
+    is_over = threading.Event()
+
+    def slow(*arguments):
+        is_over.wait(30.0)
+        write(*arguments)
+
+    monkeypatch.setattr(VideoWriter, "write", slow)
+    footage = Footage(tmp_path / "take.mp4", Fraction(30))
+    for k in range(40):
+        footage.add(Picture(k, k / 30, 0.0, np.full((48, 64, 3), k, np.uint8)))
+    footage.add(picture(1, (64, 48, 3)))
+    is_over.set()
+    path = footage.save()
+    with open_video(path) as video:
+        written = len(list(video))
+    assert 0 < written < 40
+    busy = f"{path} lacks {40 - written} frames for which the computer was too busy and 1 frame of"
+    assert footage.missing.startswith(busy)
