@@ -31,6 +31,7 @@ from .character.keys import bake_whole_frames
 from .character.root_object import ROOT_TAG
 from .datablocks import (
     CAPTURE_TAG,
+    NAME_TAG,
     SOURCE_TAG,
     captures_of,
     check_local,
@@ -151,6 +152,7 @@ def _build(
         timing.set_scene_rate(scene, motions[0].mocap_framerate)
     rate = timing.scene_rate(scene)
     collection = bpy.data.collections.new(name)
+    collection[NAME_TAG] = name = collection.name  # numbered if there is one of that name
     collection[CAPTURE_TAG] = motions[0].source or name
     camera.store_resolution(collection, motions[0])
     scene.collection.children.link(collection)

@@ -5,12 +5,14 @@ NLA, asset browser.
 
 from __future__ import annotations
 
+import re
+
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ...solver.errors import ScopeError
 from ..errors import UsageError
-from ..scene.datablocks import SOURCE_TAG, short_name
+from ..scene.datablocks import NAME_TAG, SOURCE_TAG, short_name
 from ..scene.stored_values import start_frame, stored_text
 from . import comparison
 from .captured_person import PERSON, captured_armature, motion_of
@@ -158,18 +160,23 @@ class SCOPE_OT_delete_capture(CaptureOperator):
 
 
 def _rename(collection: bpy.types.Collection, name: str) -> None:
-    """Rename a capture, and its objects, their data and actions whose names begin with the
-    capture's.
+    """Rename a capture, and its objects, their data and actions whose names begin with its name, or
+    with the one that it was built or renamed with: in the Outliner, its collection alone is
+    renamed.
     """
     from ..scene.rig_action import follow_renaming
 
-    former = collection.name
+    # Files from before the name was stored have objects of a numbered capture without the number.
+    unnumbered = re.sub(r"(?<=.)\.\d{3,}$", "", collection.name)
+    former = [collection.name, stored_text(collection, NAME_TAG) or unnumbered]
+    collection.name = name
+    collection[NAME_TAG] = name = collection.name  # numbered if there is one of that name
     armatures = {
         obj.name: obj
         for obj in collection.all_objects
         if obj.type == "ARMATURE" and obj.library is None
     }
-    blocks: list[bpy.types.ID] = [collection]
+    blocks: list[bpy.types.ID] = []
     for obj in collection.all_objects:
         data = [obj, obj.data, getattr(obj.data, "shape_keys", None)]
         blocks += [block for block in data if block is not None]
@@ -179,8 +186,9 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
             if block is not None and block.animation_data
         ]
     for block in dict.fromkeys(block for block in blocks if block is not None):
-        if block.library is None and block.name.startswith(former):
-            block.name = name + block.name.removeprefix(former)
+        begins = next((each for each in former if block.name.startswith(each)), None)
+        if block.library is None and begins is not None:
+            block.name = name + block.name.removeprefix(begins)
     follow_renaming({before: obj.name for before, obj in armatures.items()})
 
 

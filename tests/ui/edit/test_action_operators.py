@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.face_retarget import captured_expressions
 
-from ...edit.walking import NAMES, motion_of, walk
+from ...edit.walking import BODY, NAMES, motion_of, walk
 from ...made_motion import made_face
 from ...scene import made_rigs
 from ...scene.made_rigs import captured
@@ -66,6 +67,34 @@ def test_renaming_a_take_renames_its_objects_and_actions(rig):
     assert collection.name == rig.name == rig.animation_data.action.name == "Scene 3, take 2"
     with pytest.raises(RuntimeError, match="no name"):
         bpy.ops.scope.rename_take(name=" ")
+
+
+def names_of(collection):
+    """Return the names of a capture's objects, their data and their actions."""
+    names = set()
+    for obj in collection.all_objects:
+        for block in filter(None, (obj, obj.data, getattr(obj.data, "shape_keys", None))):
+            animation = block.animation_data
+            names |= {block.name, *([animation.action.name] if animation else [])}
+    return {name for name in names if not name.startswith("Key")}  # Blender's name of shape keys
+
+
+@pytest.mark.parametrize("outliner", ["", "Hero"])
+def test_renaming_a_further_take_of_the_same_footage_renames_all_of_it(outliner):
+    motions = [motion_of(walk(0.2))] * 2
+    first, second = (
+        build_scene(motions, BODY, None, BuildOptions(name="walk")).collection for _ in range(2)
+    )
+    before = names_of(first)
+    if outliner:
+        second.name = outliner
+    bpy.context.scene.scope.capture = second
+    bpy.ops.scope.rename_take(name="Take 2")
+    assert {name[:6] for name in names_of(second)} == {"Take 2"}
+    assert {name[6:] for name in names_of(second)} == {name[4:] for name in before}
+    assert names_of(first) == before
+    bpy.ops.scope.rename_take(name="Take 3")
+    assert {name[:6] for name in names_of(second)} == {"Take 3"}
 
 
 def test_an_armature_without_size_keeps_its_root_motion(rig):
