@@ -521,14 +521,14 @@ class PeopleTracker:
         )
         if not body.is_sure and any(share > MAX_SHARE_WITHIN for share in overlaps):
             return
+        largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
+        if self._largest_only and estimate.region.side_px < RIVAL_SIDE * largest:
+            return
         if len(self._live) >= self._max_live:
             smallest = min(self._live, key=lambda f: f.estimate.region.side_px)
             if estimate.region.side_px < REPLACING_SIDE * smallest.estimate.region.side_px:
                 return
             self._live.remove(smallest)
-        largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
-        if self._largest_only and estimate.region.side_px < RIVAL_SIDE * largest:
-            return
         just_lost = (
             f for f in self._lost if f.frames_lost <= _JUST_LOST_FRAMES and not f.is_occluded
         )

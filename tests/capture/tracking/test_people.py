@@ -6,6 +6,7 @@ other.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,27 @@ def test_a_small_person_next_to_the_most_prominent_one_costs_nothing(
     tracker = PeopleTracker("best", 1, people=2)
     assert [len(tracker.step(image)) for image in pictures(people, 3)] == [2, 2, 2]
     assert networks.batches[-1] == 2  # both in one batch
+
+
+def test_nobody_makes_room_for_a_person_who_does_not_come_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Somebody looks large to the detector, but is too small to become the most prominent one."""
+    first = Person(lambda t: (300, 200), BLUE, size_px=20)
+    main = Person(lambda t: (600, 200) if t >= 5 else None, BLUE)
+    refused = Person(lambda t: (900, 200) if t >= 30 else None, RED, size_px=35)
+    people = [first, main, refused]
+    seeming = [first, main, replace(refused, size_px=60)]
+    monkeypatch.setattr(
+        landmark_estimator, "LandmarkNetwork", lambda name, *_: FakeLandmarks(people)
+    )
+    monkeypatch.setattr(landmark_estimator, "PersonDetector", lambda *_: FakeDetector(seeming))
+    tracker = PeopleTracker("fast", 1)
+    places = [
+        [round(float(seen.region.center_px[0])) for _, seen in tracker.step(image, time_s=t / FPS)]
+        for t, image in enumerate(pictures(people, 90))
+    ]
+    assert places[30:] == [[300, 600]] * 60
 
 
 @pytest.mark.parametrize("jump", [0, 90], ids=["steady", "jumps"])
