@@ -139,11 +139,11 @@ class JoinedWindows:
         before = self._parts[-1]
         joined = self._people[place]
         last = before.tracklets[number]
-        behind = len(joined.rows) - len([row for row in last.rows if row >= before.first])
-        skipped = len([row for row in last.rows if row < before.first])
+        # Both end with the same frame.
+        behind = len(joined.rows) - len(last.rows)
         for k, value in faded(last, tracklet, before.anchor, overlap).items():
-            joined.values[behind + k - skipped] = value
-            joined.centers_px[behind + k - skipped] = trunk_px(value[:, :2])
+            joined.values[behind + k] = value
+            joined.centers_px[behind + k] = trunk_px(value[:, :2])
         joined.extend(own)
 
 
