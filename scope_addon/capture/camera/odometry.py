@@ -376,7 +376,7 @@ class _Tracker:
         bundle = Bundle(
             part.R[begin:], part.t[begin:], self._places[corners], frame[known], corner, rays[known]
         )
-        bundle = adjust(bundle, fixed if begin or fixed == 1 else 1, self._seen.tolerance)
+        bundle = adjust(bundle, fixed if begin else 1, self._seen.tolerance)
         part.R[begin:] = bundle.R
         part.t[begin:] = bundle.t
         self._places[corners] = bundle.places
