@@ -96,13 +96,11 @@ class NewestFrame:
         self._began_s = 0.0
         self._size: tuple[int, int] | None = None  # of the pictures that are given
         self._last_image: NDArray[Any] | None = None  # as it came
-        # when it last differed from the one before
-        self._changed_s = 0.0
+        self._changed_s = 0.0  # when it last differed from the one before
         self._is_frozen = False
-        self._arrived_s = 0.0  # of the last one
-        # when the last one was taken
+        self._arrived_s = 0.0  # when the last one arrived
         self._pace = Pace()
-        self._taken_s = 0.0
+        self._taken_s = 0.0  # when the last one was taken
         self._damage_said_s = -np.inf
         self.received = self.dropped = self.damaged = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)

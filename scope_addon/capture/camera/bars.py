@@ -27,9 +27,8 @@ MAX_BRIGHT_SHARE = 0.01  # of a line of a black bar
 MIN_EDGE_SHARE = 0.25
 EDGE_PX = 6  # width of a black bar's edge
 # Any other bar ends in a step along one line of pixels, and has little detail.
-# of 255; and the share of the line
-MIN_STEP = 8
-MIN_STEP_SHARE = 0.7
+MIN_STEP = 8  # of 255
+MIN_STEP_SHARE = 0.7  # of the line
 MAX_DETAIL = 0.2  # of the picture's, on average
 
 

@@ -93,7 +93,7 @@ def upright(
     :param clockwise_deg: a multiple of 90; others do not rotate.
     :param is_mirrored: whether top and bottom are exchanged before the rotation, of which every
         mirroring consists.
-    :raises VideoError: it is too large or too long (see `image_size`).
+    :raises VideoError: it is too large or too long (see `guards`).
     """
     if is_mirrored:
         image = cast(Uint8Array, cv2.flip(image, 0))
@@ -242,7 +242,7 @@ class PyavReader:
     the last frame that was read had to be mirrored, and by how much it was rotated then.
 
     :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large
-        or too long (see `image_size`).
+        or too long (see `guards`).
     """
 
     def __init__(self, path: Path) -> None:

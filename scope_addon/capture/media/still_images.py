@@ -73,7 +73,7 @@ def read_picture(path: Path) -> Picture | None:
     """Decode a picture; None if that fails. Transparent parts become white, except in AVIF and
     HEIC.
 
-    :raises VideoError: it is too large, deep or long (see `image_size`), or AVIF or HEIC, and PyAV
+    :raises VideoError: it is too large, deep or long (see `guards`), or AVIF or HEIC, and PyAV
         is not installed.
     """
     check_regular(path, VideoError, "picture", _MAX_BYTES)

@@ -190,7 +190,7 @@ def open_video(path: str | Path, wanted: FootageRange | None = None) -> Video:
 
     :param wanted: the range of frames and their rate; None for all.
     :raises VideoError: it does not exist, is not a file, is a list of files, holds nothing that can
-        be decoded, holds images that are too large or too long (see `image_size`), or ends before
+        be decoded, holds images that are too large or too long (see `guards`), or ends before
         the range.
     :raises UsageError: a timecode of the range does not exist at the footage's rate.
     """
