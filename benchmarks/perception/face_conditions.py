@@ -75,7 +75,7 @@ def in_pieces(seen: SeenFaces, seconds: float) -> SeenFaces:
 
 
 def _capture(rows: NDArray[np.float64], times: NDArray[np.float64]) -> Found:
-    return smoothed(fitted(rows, times), times)
+    return smoothed(fitted(rows), times)
 
 
 def _confidence(seen: SeenFaces, scale: float) -> dict[str, float]:

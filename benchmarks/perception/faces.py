@@ -67,9 +67,9 @@ def faces(quick: bool) -> dict[str, Any]:
             "network, calibrated": lambda rows, _: _values(
                 _with_weights(rows, calibrate(parts(rows)[2]))
             ),
-            "fit": lambda rows, times: _values(fitted(rows, times)),
+            "fit": lambda rows, _: _values(fitted(rows)),
             "network, smoothed": lambda rows, times: smoothed(rows, times),
-            "fit, smoothed: the capture": lambda rows, times: smoothed(fitted(rows, times), times),
+            "fit, smoothed: the capture": lambda rows, times: smoothed(fitted(rows), times),
         }
         figures[label] = {way: measure(seen, scale, function) for way, function in ways.items()}
         rows = [[way, *(row[key] for key in SHOWN)] for way, row in figures[label].items()]
@@ -222,7 +222,6 @@ def _rises(weight: NDArray[np.float64]) -> NDArray[np.intp]:
 
 def _fit_ms(seen: SeenFaces, scale: float) -> float:
     rows = rows_of(seen, np.arange(len(seen.presence)), scale)
-    times = np.arange(len(seen.presence)) / 30
     begin = time.perf_counter()
-    fitted(rows, times)
+    fitted(rows)
     return 1000 * (time.perf_counter() - begin) / len(rows)
