@@ -91,7 +91,8 @@ def test_frames_have_their_indices_where_the_range_begins_late_in_a_varying_rate
     times = np.concatenate([[0.0], np.cumsum(np.tile([0.25, 0.25, 0.25, 0.75], 30))]).tolist()
     path = write(tmp_path / "varying.mp4", "mpeg4", "yuv420p", times, {"g": "20"})
     with open_video(path) as video:
-        assert (video.fps, float(video.average_fps)) == (4, pytest.approx(8 / 3, rel=0.02))
+        assert video.fps == 4
+        assert float(video.average_fps) == pytest.approx(8 / 3, rel=0.02)
         whole = [(frame.index, frame.timestamp_s) for frame in video]
     with open_video(path, VideoRange(start_s=30.0)) as video:
         found = [(frame.index, frame.timestamp_s) for frame in video]
