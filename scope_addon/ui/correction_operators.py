@@ -19,7 +19,7 @@ from bpy.props import (
 
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
-from ..scene.datablocks import is_person
+from ..scene.datablocks import captures_of, holds, is_person
 from ..scene.stored_values import LAST_FRAME
 from .captured_person import (
     EditOperator,
@@ -101,18 +101,20 @@ def change_world(
 
     from ..edit.corrected_motion import corrections_of
     from ..edit.corrections import world_of
-    from ..scene.camera import same_camera, view_number
+    from ..scene.camera import same_camera
+    from ..scene.capture_parts import cameras_of_clip
     from ..scene.character.upright_scene import turn_camera
     from ..scene.timing import keyed_rate
     from ..scene.transaction import all_or_nothing
 
     motion = motion_of(armature)
-    near = [obj for c in armature.users_collection for obj in c.all_objects]
-    people = [obj for obj in near if obj != armature and is_person(obj)]
-    together = [armature, *(obj for obj in people if same_camera(motion_of(obj), motion))]
-    every_camera = [obj for obj in near if obj.type == "CAMERA"]
-    further = [obj for obj in every_camera if view_number(obj) is not None]
-    cameras = [*[obj for obj in every_camera if obj not in further][:1], *further]
+    captures = [capture for capture in captures_of(scene) if holds(capture, armature)]
+    near = captures or armature.users_collection
+    # each once, though it may be in several collections
+    others = dict.fromkeys(obj for c in near for obj in c.all_objects if is_person(obj))
+    others.pop(armature, None)
+    together = [armature, *(obj for obj in others if same_camera(motion_of(obj), motion))]
+    cameras = list(dict.fromkeys(camera for c in near for camera in cameras_of_clip(c)))
     was = world_of(corrections_of(motion))
     now = world_of(change(corrections_of(motion)))
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
