@@ -24,27 +24,24 @@ from ..notices import Notice, notice
 from . import camera, timing
 from .actions import Channels
 from .budget import check_content, check_last_frame
+from .capture_parts import parts_of, tag_part
 from .character import animation, armature, body_mesh, expression_keys, other_curves
 from .character.armature import remove_unused_ring
 from .character.correction_list import store_corrections
 from .character.keys import bake_whole_frames
-from .character.root_object import ROOT_TAG
 from .datablocks import (
     CAPTURE_TAG,
+    MARKERS,
     NAME_TAG,
     SOURCE_TAG,
     captures_of,
     check_local,
     enter_object_mode,
-    is_person,
     remove_blocks,
     short_name,
 )
 from .packed_motion import motion_texts
 from .transaction import all_or_nothing
-
-# Custom property of a capture's collection: the names of its markers on the timeline, by lines.
-MARKERS = "scope_markers"
 
 
 @dataclass(frozen=True)
@@ -216,6 +213,7 @@ def _build_person(
     drawn = body_with_mouth(body) if motion.face else body
     vertices = body_mesh.rest_vertices_world(drawn, rest.lift, motion.betas if baked else None)
     mesh = body_mesh.build_mesh(f"{label}_body", drawn, vertices, collection)
+    tag_part(mesh)
     frames = timing.key_frames(motion.timestamps, rate, options.start_frame)
     check_last_frame(frames[-1])
     shaped = body_mesh.rest_vertices_world(body, rest.lift, motion.betas)
@@ -272,6 +270,7 @@ def _build_cameras(
         person.camera = camera.build_camera(
             f"{name}_camera", person.motion, collection, person.frames
         )
+        tag_part(person.camera)
         if camera.pixel_aspect(person.motion) != (1.0, 1.0) and options.resolution == "keep":
             warnings.append(notice("pixel_aspect"))
         if footage is not None:
@@ -291,6 +290,7 @@ def _build_views(
     for number in range(person.motion.view_count):
         label = f"{name}_camera{number + 2}"
         obj = camera.build_view(label, person.motion, number, collection, person.frames)
+        tag_part(obj)
         if number < len(footage) and (path := footage[number]) is not None:
             seen = person.motion.from_view(number)
             warnings += camera.show_footage(obj, path, seen, person.frames)
@@ -329,7 +329,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     so does data that something else uses.
     """
     enter_object_mode(bpy.context.view_layer)
-    own = [obj for obj in collection.all_objects if _is_ours(obj)]
+    own = parts_of(collection)
     used = [*_data_of(own), *motion_texts(own)]
     for child in [child for obj in own for child in obj.children if child not in own]:
         place = child.matrix_world.copy()
@@ -349,15 +349,6 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
         used = [block for block in used if block not in unused]
         bpy.data.batch_remove(unused)
     remove_unused_ring()
-
-
-def _is_ours(obj: bpy.types.Object) -> bool:
-    """Return whether an object of a capture's collection is a person, a root object or a camera: a
-    body knows its bones, also after its armature was deleted.
-    """
-    if obj.type == "MESH":
-        return "left_hip" in obj.vertex_groups and "spine1" in obj.vertex_groups
-    return is_person(obj) or ROOT_TAG in obj or obj.type == "CAMERA"
 
 
 def _data_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:

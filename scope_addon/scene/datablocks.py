@@ -19,6 +19,8 @@ SUFFIX_BYTES = 24  # room for what is appended to a capture's name, such as ``_p
 CAPTURE_TAG = "scope_capture"  # custom property that marks a capture's collection
 # custom property of a capture's collection: what the names of its objects begin with
 NAME_TAG = "scope_name"
+# custom property of a capture's collection: the names of its markers on the timeline, by lines
+MARKERS = "scope_markers"
 SOURCE_TAG = "scope_source"  # custom property of a captured armature: what it was captured from
 # Kinds of datablock that a file or a capture may contain, users before the datablocks that they
 # use. Shape keys go with their mesh, and ``temporary_scene`` removes scenes.

@@ -54,13 +54,11 @@ _sides: set[int] = set()  # areas that showed a capture from its side
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Return the cameras of the scene's last capture, the one of its first video first."""
     from ..scene.camera import view_number
+    from ..scene.capture_parts import cameras_of_clip
 
     collection = scene.scope.result.collection
-    cameras = [o for o in collection.all_objects if o.type == "CAMERA"] if collection else []
-    first = [camera for camera in cameras if view_number(camera) is None][:1]
-    further = [camera for camera in cameras if view_number(camera) is not None]
-    further.sort(key=lambda camera: view_number(camera) or 0)
-    return [*first, *further] if first else []
+    cameras = cameras_of_clip(collection) if collection else []
+    return cameras if cameras and view_number(cameras[0]) is None else []
 
 
 def camera_of(scene: bpy.types.Scene) -> bpy.types.Object | None:

@@ -16,6 +16,7 @@ from scope.scope_addon.ui.captures import (
     shown_capture,
     unit_text,
 )
+from scope.scope_addon.ui.comparison import camera_of
 
 from ..edit.walking import BODY, motion_of, walk
 
@@ -364,6 +365,32 @@ def test_a_deleted_capture_leaves_nothing_and_the_one_before_it_is_shown(two, co
     assert [marker.name for marker in scene.timeline_markers] == ["mine"]
     assert not bpy.data.texts
     assert not bpy.ops.scope.delete_capture.poll()
+
+
+@pytest.mark.parametrize("is_tagged", [True, False], ids=["now", "from an earlier version"])
+def test_what_the_user_has_put_into_a_capture_is_not_deleted_with_it(
+    fake_worker, footage, is_tagged
+):
+    collection = capture(fake_worker, footage)
+    body = bpy.data.objects["person_body"]
+    garment = body.copy()
+    garment.data = body.data.copy()
+    garment.name = "coat"
+    camera = bpy.data.objects.new("Close-up", bpy.data.cameras.new("Close-up"))
+    path = bpy.data.objects.new("Rig_root", None)
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    rig.parent = path
+    path["scope_root"] = "Rig"
+    for obj in (garment, camera, path, rig):
+        collection.objects.link(obj)
+    for obj in collection.objects:
+        if obj == garment or not is_tagged:
+            obj.pop("scope_part", None)
+    assert camera_of(bpy.context.scene).name == "person_camera"
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    bpy.ops.scope.delete_capture()
+    assert sorted(bpy.context.scene.objects.keys()) == ["Close-up", "Rig", "Rig_root", "coat"]
+    assert rig.parent == path
 
 
 def test_a_capture_whose_armature_was_deleted_can_be_deleted(fake_worker, footage, contents):
