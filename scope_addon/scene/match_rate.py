@@ -21,14 +21,15 @@ from ..notices import Notice
 from . import timing
 from .actions import fcurves, frame_range
 from .camera import same_camera, show_footage_again, view_number
+from .capture_parts import cameras_in, parts_of
 from .character.body_mesh import shape_key_name
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
 from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
-from .datablocks import holds, shape_keys_of
+from .datablocks import MARKERS, captures_of, holds, shape_keys_of
 from .rig_action import is_retargeted, retime_written_keys, source_of
-from .stored_values import FrameSpan, parse_spans, start_frame
+from .stored_values import FrameSpan, parse_spans, start_frame, stored_text
 from .timing import Retiming, action_strips, retime_keys, retime_strip
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")
@@ -59,9 +60,9 @@ def change_rate(
         if (root := root_object(person)) is not None:
             retime_unused_trajectory(root, retiming)
     _retime_rigs(rigs, moves, done)
-    for collection in scene.collection.children_recursive:
+    for collection in captures_of(scene):
         here = [person for person in people if holds(collection, person)]
-        for camera in [obj for obj in collection.objects if obj.type == "CAMERA"] if here else ():
+        for camera in cameras_in(collection) if here else ():
             _retime(camera, moves[here[0]], done)
             _retime(camera.data, moves[here[0]], done)  # Its lens may zoom.
     _retime_markers(scene, own, moves)
@@ -208,8 +209,21 @@ def _retime_markers(
         if found is None or [span.first for span in spans] != [marker.frame] or not inside:
             continue
         (moved,) = retimed(spans, moves[inside[-1]])
+        former = marker.name
         marker.name = f"{found[1]} {moved}"
         marker.frame = moved.first
+        _rename_marker(scene, inside[-1], former, marker.name)
+
+
+def _rename_marker(
+    scene: bpy.types.Scene, person: bpy.types.Object, former: str, name: str
+) -> None:
+    """Let the capture of a person know a marker by its new name, to remove it with the capture."""
+    for collection in captures_of(scene):
+        names = stored_text(collection, MARKERS).split("\n")
+        if holds(collection, person) and former in names:
+            names[names.index(former)] = name
+            collection[MARKERS] = "\n".join(names)
 
 
 def _show_footage(
@@ -217,13 +231,16 @@ def _show_footage(
 ) -> list[Notice]:
     """Show the footage of every capture's cameras in step with the moved keys."""
     warnings: list[Notice] = []
-    for collection in scene.collection.children_recursive:
+    for collection in captures_of(scene):
         seen: list[Motion] = []
-        own = list(collection.objects)
-        every_camera = [obj for obj in own if obj.type == "CAMERA"]
+        every_camera = cameras_in(collection)
         cameras = [obj for obj in every_camera if view_number(obj) is None]
         for person, motion in people.items():
-            if motion is None or person not in own or any(same_camera(motion, m) for m in seen):
+            if (
+                motion is None
+                or not holds(collection, person)
+                or any(same_camera(motion, m) for m in seen)
+            ):
                 continue
             if len(seen) < len(cameras):
                 frames = timing.key_frames(motion.timestamps, rate, start_frame(person))
@@ -244,7 +261,8 @@ def other_animation(
     """Return whether anything else in the scene has keys, which keep their frames at another
     rate.
     """
-    moved = {obj for person in people for c in person.users_collection for obj in c.objects}
+    moved = {obj for collection in captures_of(scene) for obj in parts_of(collection)}
+    moved |= {obj for person in people for obj in (person, root_object(person))}
     moved |= {rig for rig, _ in rigs}
     others = [obj for obj in scene.objects if obj not in moved]
     blocks = (

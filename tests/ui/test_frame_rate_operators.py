@@ -240,6 +240,26 @@ def test_review_frames_and_corrections_name_the_moved_frames(scene):
     )
     assert [w.spans for w in scene.scope.result.warnings if w.spans] == ["41-54"]
     assert [e["first"] for e in listed_corrections(person)] == [41]
+    bpy.ops.scope.delete_capture()
+    assert not scene.timeline_markers
+
+
+@pytest.mark.parametrize("is_beside", [True, False])
+def test_the_users_own_camera_keeps_its_keys(scene, is_beside):
+    built()
+    capture = scene.scope.capture
+    shot = bpy.data.collections.new("Shot")
+    scene.collection.children.link(shot)
+    scene.collection.children.unlink(capture)
+    shot.children.link(capture)
+    data = bpy.data.cameras.new("own")
+    camera = bpy.data.objects.new("own", data)
+    (shot if is_beside else capture).objects.link(camera)
+    for frame in (3, 40):
+        camera.keyframe_insert("location", index=0, frame=frame)
+        data.keyframe_insert("lens", frame=frame)
+    bpy.ops.scope.match_frame_rate()
+    assert key_times(camera) == key_times(data) == [[3, 40]]
 
 
 def test_two_captures_keep_their_starts_and_speeds(scene):
