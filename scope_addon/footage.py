@@ -5,6 +5,7 @@ load it quickly.
 
 import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 VIDEO_SUFFIXES = (
@@ -93,12 +94,37 @@ def numbered(folder: Path, before: str, after: str, first: int = 0) -> list[Path
 
 def numbered_from(first: Path) -> list[Path]:
     """Return a picture and those that continue its sequence; empty if its name has no number."""
-    number = LAST_NUMBER.search(first.stem)
-    if number is None:
+    parts = _around_number(first)
+    if parts is None:
         return []
-    before = first.stem[: number.start()]
-    after = first.stem[number.end() :] + first.suffix
-    return numbered(first.parent, before, after, int(number.group()))
+    before, number, after = parts
+    return numbered(first.parent, before, after, number)
+
+
+def without_continued(pictures: Iterable[Path]) -> list[Path]:
+    """Return pictures without those that continue the sequence of another of them."""
+    first: dict[tuple[Path, str, str], tuple[int, Path]] = {}
+    kept = []
+    for picture in pictures:
+        parts = _around_number(picture)
+        if parts is None:
+            kept.append(picture)
+        else:
+            before, number, after = parts
+            sequence = picture.parent, before, after
+            first[sequence] = min(first.get(sequence, (number, picture)), (number, picture))
+    return [*kept, *(picture for _, picture in first.values())]
+
+
+def _around_number(picture: Path) -> tuple[str, int, str] | None:
+    """Return what a picture's name has before its last number, the number, and what is after it;
+    None without a number.
+    """
+    number = LAST_NUMBER.search(picture.stem)
+    if number is None:
+        return None
+    before = picture.stem[: number.start()]
+    return before, int(number.group()), picture.stem[number.end() :] + picture.suffix
 
 
 def files_of_footage(path: Path) -> list[Path]:

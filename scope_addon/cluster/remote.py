@@ -27,7 +27,7 @@ import fsspec
 from ...solver.errors import InputError, ScopeError
 from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError, UsageError
-from ..footage import display_address, is_url
+from ..footage import PICTURE_SUFFIXES, display_address, is_url, sequence_pattern
 from ..job.batch import REPORT_NAME
 from ..job.clip_task import ClipTask
 from ..job.finished_clip import file_hash
@@ -139,9 +139,10 @@ def _touch(folder: Path, names: list[str]) -> None:
         path.touch()
 
 
-def download(url: str, folder: Path) -> Path:
+def download(url: str, folder: Path, *, with_sequence: bool = False) -> Path:
     """Download a file, or a folder of images, into a folder, and return its path.
 
+    :param with_sequence: download the further images of a numbered image's sequence, too.
     :raises UsageError: the URL cannot be used.
     """
     file_system, path = _open(url)
@@ -150,6 +151,11 @@ def download(url: str, folder: Path) -> Path:
         target.mkdir()
         for each in file_system.find(path, maxdepth=1):
             file_system.get_file(each, str(target / PurePosixPath(each).name))
+    elif with_sequence and target.suffix.lower() in PICTURE_SUFFIXES:
+        for each in file_system.find(path.rpartition("/")[0], maxdepth=1):
+            beside = folder / PurePosixPath(each).name
+            if sequence_pattern(beside) == sequence_pattern(target):
+                file_system.get_file(each, str(beside))
     else:
         file_system.get_file(path, str(target))
     return target

@@ -23,7 +23,7 @@ from ..footage import display_address, is_url
 from ..installed import CAPTURE, check_installed
 from ..job.batch import ROOT
 from ..job.clip_runner import ClipProcesses
-from ..job.clip_task import CaptureSettings, ClipTask, Entry, Extras, capture_clip, failure
+from ..job.clip_task import RATE, CaptureSettings, ClipTask, Entry, Extras, capture_clip, failure
 from ..job.request import program_version
 from ..temporary import remove_abandoned, system_folder, temporary_folder
 from . import remote
@@ -125,8 +125,10 @@ def capture_on_worker(
         local = task
         try:
             if is_url(task.footage):
+                rate_given = RATE in task.settings.options
                 with remote.store_errors(InputError, task.footage):
-                    local = local._replace(footage=str(remote.download(task.footage, scratch)))
+                    path = remote.download(task.footage, scratch, with_sequence=rate_given)
+                local = local._replace(footage=str(path))
         except ScopeError as error:
             return failure(task, str(error))
         if is_url(task.out):

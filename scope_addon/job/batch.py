@@ -28,6 +28,7 @@ from .clip_task import (
     FINISHED,
     NO_EXTRAS,
     OVERLAY,
+    RATE,
     REPORT,
     CaptureSettings,
     ClipTask,
@@ -87,7 +88,12 @@ class Batch:
         """Return the clips by the name of their results; see `find_clips`."""
         several = self.settings.options.get("--people") not in (None, "1", "largest")
         return find_clips(
-            self.folder, self.out, recursive=recursive, several_people=several, views=views
+            self.folder,
+            self.out,
+            recursive=recursive,
+            several_people=several,
+            views=views,
+            rate_given=RATE in self.settings.options,
         )
 
     def results(self, names: Iterable[str]) -> list[Path]:

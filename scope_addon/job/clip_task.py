@@ -29,6 +29,7 @@ from ..footage import (
     numbered_from,
     pictures_in,
     unicode_text,
+    without_continued,
 )
 from .finished_clip import (
     FINISHED_FILE,
@@ -47,6 +48,7 @@ WINDOWS = "--windows"
 WINDOWS_FOLDER = "--windows-folder"
 # value of WINDOWS: capture the clip, or only say into how many windows it can be divided
 COUNT = "count"
+RATE = "--fps"  # option with which a picture stands for those that continue its sequence
 FINISHED = ("done", "skipped", "no_person")  # statuses of clips that need not be captured again
 DIVIDED = "divided"  # status of a clip that has several
 REPORT = ".report"  # between a clip's name and the suffix of its page
@@ -158,7 +160,7 @@ def capture_clip(
     out = Path(task.out)
     entry: Entry = {"file": task.file, "name": task.name}
     try:
-        entry["key"] = task.key or _key(task.basis, footage, "--fps" in task.settings.options)
+        entry["key"] = task.key or _key(task.basis, footage, RATE in task.settings.options)
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
     # on a cluster, results are moved when they are finished
@@ -275,13 +277,18 @@ def _arguments(
     if settings.extras.reports:
         arguments += ["--report", f"{target}{REPORT}.html"]
     if settings.extras.overlays:
-        suffix = ".png" if footage.suffix.lower() in PICTURE_SUFFIXES else ".mp4"
+        begins = RATE in settings.options and len(numbered_from(footage)) > 1
+        suffix = ".png" if _is_picture(footage) and not begins else ".mp4"
         arguments += ["--overlay", f"{target}{OVERLAY}{suffix}"]
     given: dict[str, str | None] = {} if threads is None else {"--threads": str(threads)}
     for option, value in (given | settings.options).items():
         # one argument: a value may begin with -
         arguments.append(option if value is None else f"{option}={value}")
     return arguments
+
+
+def _is_picture(path: Path) -> bool:
+    return path.suffix.lower() in PICTURE_SUFFIXES and not path.is_dir()
 
 
 def _window_arguments(task: ClipTask) -> list[str]:
@@ -341,7 +348,13 @@ def _error_message(stderr: str) -> str:
 
 
 def find_clips(
-    folder: Path, out: Path, *, recursive: bool, several_people: bool, views: bool = False
+    folder: Path,
+    out: Path,
+    *,
+    recursive: bool,
+    several_people: bool,
+    views: bool = False,
+    rate_given: bool = False,
 ) -> dict[str, Path]:
     """Return the clips in ``folder`` by the name of their results, without suffix, in alphabetical
     order of the files.
@@ -350,8 +363,14 @@ def find_clips(
     :param recursive: include subfolders.
     :param several_people: whether a clip may have one result per person.
     :param views: whether the videos of a subfolder are views of one take, which is a clip then.
+    :param rate_given: whether a frame rate is given, so that the first one of numbered pictures
+        stands for all.
     """
     found = sorted(_footage_below(folder, out, recursive, views))
+    if rate_given:
+        pictures = [path for path in found if _is_picture(path)]
+        continued = set(pictures).difference(without_continued(pictures))
+        found = [path for path in found if path not in continued]
     stems = Counter(_stem(folder, path) for path in found)
     names = {}
     for path in found:

@@ -80,10 +80,10 @@ def test_no_file_message_or_process_has_the_password_of_a_store(
     remote = importlib.import_module("scope.scope_addon.cluster.remote")
     download, upload = remote.download, remote.upload
 
-    def without_access(url, folder):
+    def without_access(url, folder, **given):
         if "withheld" in url:
             raise PermissionError(f"no access to {url}")
-        return download(url, folder)
+        return download(url, folder, **given)
 
     def cut(file, url):
         if "lost" in url:

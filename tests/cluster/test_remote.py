@@ -61,6 +61,20 @@ def test_names_that_lead_elsewhere_are_left_out(store, tmp_path, monkeypatch):
     assert files(mirror_footage("memory://bucket", "", tmp_path / "clips")) == ["a.mp4"]
 
 
+def test_a_numbered_picture_is_downloaded_with_its_sequence_if_that_is_wanted(store, tmp_path):
+    for name in ("f_08.png", "f_09.png", "f_10.png", "g_09.png", "f_09.mp4", "f_below/f_11.png"):
+        store.pipe_file(f"/bucket/pictures/{name}", name.encode())
+    url = "memory://bucket/pictures/f_08.png"
+    sequence = ["f_08.png", "f_09.png", "f_10.png"]
+    for with_sequence, names in ((True, sequence), (False, sequence[:1])):
+        folder = tmp_path / str(with_sequence)
+        folder.mkdir()
+        path = remote.download(url, folder, with_sequence=with_sequence)
+        assert path == folder / "f_08.png"
+        assert files(folder) == names
+        assert (folder / names[-1]).read_text("utf-8") == names[-1]
+
+
 def test_results_replace_earlier_ones_and_nothing_else_stays(store, tmp_path):
     out = "memory://bucket/out"
     file = tmp_path / "a.npz"

@@ -11,10 +11,10 @@ from scope.scope_addon.job.clip_task import find_clips, videos_of_take
 
 
 def found_in(
-    folder: Path, *, recursive: bool = False, several_people: bool = False, views: bool = False
+    folder: Path, *, recursive: bool = False, several_people: bool = False, **given: bool
 ) -> dict[str, Path]:
     return find_clips(
-        folder, folder / "out", recursive=recursive, several_people=several_people, views=views
+        folder, folder / "out", recursive=recursive, several_people=several_people, **given
     )
 
 
@@ -43,6 +43,23 @@ def test_videos_images_and_sequences_are_found_and_results_are_not(tmp_path):
     assert flat["walk"] == tmp_path / "walk"
     below = ["below/c", "below/deep/d", "photos/house_2", "photos/tree_1"]
     assert list(found_in(tmp_path, recursive=True)) == ["a.mov", "a.mp4", "b", *below, "walk"]
+
+
+def test_numbered_pictures_are_one_clip_if_a_rate_is_given(tmp_path):
+    """With a rate, a capture of the first one reads all that continue it, and each of the others
+    was captured with the rest as well.
+    """
+    loose = [f"IMG_{number:04}.jpg" for number in range(8, 12)]
+    others = ["IMG_0009.png", "walk_2.jpg", "walk_3.JPG", "still.jpg", "take2.mp4", "take3.mp4"]
+    below = ["below/a_2.png", "below/a_3.png"]
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "cut.mp4").touch()  # so that it is no folder of one sequence
+    for name in [*loose, *others, *below]:
+        (tmp_path / name).touch()
+    found = found_in(tmp_path, recursive=True, rate_given=True)
+    names = {path.relative_to(tmp_path).as_posix() for path in found.values()}
+    assert names == {loose[0], *others, below[0], "below/cut.mp4"}
+    assert len(found_in(tmp_path, recursive=True)) == len([*loose, *others, *below]) + 1
 
 
 def test_unreadable_pictures_are_clips_too(tmp_path):

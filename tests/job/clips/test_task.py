@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.footage import is_sequence, pictures_in
-from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask, capture_clip
+from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask, Extras, capture_clip
 
 
 def basis(**options: str | None) -> str:
@@ -43,6 +43,35 @@ def key(footage: Path, out: Path, **options: str | None) -> str:
 
     capture_clip(task, ["scope"], run)
     return found[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "suffix"),
+    [
+        ("f_1.png", {"--fps": "30"}, ".mp4"),  # with f_2.png
+        ("f_2.png", {"--fps": "30"}, ".png"),
+        ("f_1.png", {}, ".png"),
+        ("still.png", {"--fps": "30"}, ".png"),
+        ("frames", {}, ".mp4"),
+        ("a.mp4", {"--fps": "30"}, ".mp4"),
+    ],
+)
+def test_the_overlay_of_a_sequence_is_a_video(
+    tmp_path: Path, name: str, options: dict[str, str | None], suffix: str
+) -> None:
+    (tmp_path / "frames").mkdir()
+    for each in ("f_1.png", "f_2.png", "still.png", "a.mp4"):
+        (tmp_path / each).touch()
+    settings = CaptureSettings(options, (".npz",), Extras(overlays=True))
+    footage = str(tmp_path / name)
+    found: list[str] = []
+
+    def run(arguments: list[str]) -> tuple[int, str, str]:
+        found.extend(arguments)
+        return 1, "", ""
+
+    capture_clip(ClipTask("clip", name, footage, str(tmp_path), "", settings), ["scope"], run)
+    assert found[found.index("--overlay") + 1] == str(tmp_path / f"clip.overlay{suffix}")
 
 
 @pytest.mark.parametrize("first_alone", [False, True])
