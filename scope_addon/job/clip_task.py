@@ -434,12 +434,18 @@ def _footage_below(
             continue
         if path.is_dir():
             videos = videos_of_take(path) if views else []
-            if _is_sequence_folder(path) or len(videos) > 1:
+            is_take = len(videos) > 1
+            is_sequence_folder = _is_sequence_folder(path)
+            if is_take or is_sequence_folder:
                 found.append(path)
-            elif recursive and path.resolve() not in above:
-                found += _footage_below(path, out, recursive, views, above)
-            else:
+            elif not recursive:
                 found += videos
+            if recursive and not is_sequence_folder and path.resolve() not in above:
+                below = _footage_below(path, out, recursive, views, above)
+                # of a take's folder, only what lies in its subfolders
+                found += [
+                    each for each in below if not is_take or each.is_dir() or each.parent != path
+                ]
         # Pipes are skipped, because opening one would block; a broken link is kept, to be reported
         # as a failed clip.
         elif suffix in FOOTAGE_SUFFIXES and (path.is_file() or not path.exists()):

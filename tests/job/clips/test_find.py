@@ -150,6 +150,12 @@ def test_videos_of_a_subfolder_are_one_clip_if_they_are_views(tmp_path):
     found = found_in(tmp_path, views=True)
     assert sorted(found) == ["alone", "single/only", "walk"]
     assert [path.name for path in videos_of_take(found["walk"])] == ["left.mov", "right.mp4"]
-    deep = ["alone", "day/jump", "single/only", "walk"]
+    for name in ("again/c.mp4", "again/d.mp4", "close/e.mp4", "frames/1.png", "frames/2.png"):
+        (tmp_path / "walk" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "walk" / name).write_text("x")
+    (tmp_path / "walk" / "poster.png").write_text("x")  # no view, and no clip of its own
+    assert sorted(found_in(tmp_path, views=True)) == ["alone", "single/only", "walk"]
+    within = ["walk/again", "walk/close/e", "walk/frames"]
+    deep = ["alone", "day/jump", "single/only", "walk", *within]
     assert sorted(found_in(tmp_path, views=True, recursive=True)) == deep
     assert sorted(found_in(tmp_path)) == ["alone"]
