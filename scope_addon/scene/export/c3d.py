@@ -36,6 +36,7 @@ def c3d_bytes(
     points_mm: NDArray[np.float64],
     residuals_mm: NDArray[np.float64],
     rate: float,
+    first: int,
 ) -> bytes:
     """Return the content of a file.
 
@@ -45,17 +46,18 @@ def c3d_bytes(
     :param residuals_mm: (T, M); negative where a point is missing, NaN where it is not known, which
         is written as 0.
     :param rate: frames per second.
+    :param first: number of the first frame, from 1.
     """
     frames, count = points_mm.shape[:2]
-    stated_frames = min(frames, _LARGEST_COUNT)
+    last = first + frames - 1
     # The number of the block of data is the same length whatever it is.
-    parameters = _parameter_section(labels, descriptions, frames, rate, 0)
+    parameters = _parameter_section(labels, descriptions, frames, rate, first, 0)
     data_block = _PARAMETER_BLOCK + len(parameters) // _BLOCK
-    parameters = _parameter_section(labels, descriptions, frames, rate, data_block)
+    parameters = _parameter_section(labels, descriptions, frames, rate, first, data_block)
     header = struct.pack(
         "<BBHHHHHfHHf",
         *(_PARAMETER_BLOCK, _MAGIC),
-        *(count, 0, 1, stated_frames),
+        *(count, 0, min(first, _LARGEST_COUNT), min(last, _LARGEST_COUNT)),
         *(0, _SCALE_MM, data_block, 0, rate),
     )
     is_missing = residuals_mm < 0
@@ -69,9 +71,15 @@ def c3d_bytes(
 
 
 def _parameter_section(
-    labels: Sequence[str], descriptions: Sequence[str], frames: int, rate: float, data_block: int
+    labels: Sequence[str],
+    descriptions: Sequence[str],
+    frames: int,
+    rate: float,
+    first: int,
+    data_block: int,
 ) -> bytes:
     """Return the groups of parameters, in whole blocks."""
+    last = first + frames - 1
     groups: dict[str, dict[str, Parameter]] = {
         "POINT": {
             "USED": _integers(len(labels)),
@@ -88,8 +96,8 @@ def _parameter_section(
             "Y_SCREEN": _texts(["+Z"]),
         },
         "TRIAL": {
-            "ACTUAL_START_FIELD": _integers(1, 0),
-            "ACTUAL_END_FIELD": _integers(frames & 0xFFFF, frames >> 16),
+            "ACTUAL_START_FIELD": _integers(first & 0xFFFF, first >> 16),
+            "ACTUAL_END_FIELD": _integers(last & 0xFFFF, last >> 16),
         },
         "ANALOG": {"USED": _integers(0)},
     }

@@ -29,10 +29,11 @@ _JSON_CHUNK = b"JSON"
 _BINARY_CHUNK = b"BIN\x00"
 
 
-def vrma_bytes(motion: Motion, body: Body) -> bytes:
+def vrma_bytes(motion: Motion, body: Body, start_s: float) -> bytes:
     """Return the content of a file.
 
     :param body: that the motion was fitted with.
+    :param start_s: timestamp at which the file begins, seconds.
     """
     # It loads numba, and the command line starts without it.
     from ...kinematics.smoothing import continuous_quaternions
@@ -55,7 +56,7 @@ def vrma_bytes(motion: Motion, body: Body) -> bytes:
         node = {"name": named[body.joint_names[joint]], "translation": [float(v) for v in offset]}
         nodes.append(node | ({"children": below} if below else {}))
     file = _Buffers()
-    times = file.add(np.asarray(motion.timestamps - motion.timestamps[0]), "SCALAR", bounds=True)
+    times = file.add(np.asarray(motion.timestamps - start_s), "SCALAR", bounds=True)
     outputs = [(0, "translation", file.add(hips, "VEC3"))]
     turns = continuous_quaternions(local)[..., [1, 2, 3, 0]]  # glTF has the real part last.
     for node_number, joint in enumerate(joints):

@@ -64,6 +64,8 @@ def write_without_scene(
     """
     targets = person_paths(path, len(motions))
     suffix = path.suffix.lower()
+    # of the first of them, so that files that count from their beginning are in step
+    start_s = min((float(motion.timestamps[0]) for motion in motions), default=0.0)
     if suffix != ".npz":
         for motion in motions:
             check_rows(motion)
@@ -71,9 +73,9 @@ def write_without_scene(
         if suffix == ".trc":
             write_trc(target, motion, body)
         elif suffix == ".c3d":
-            write_c3d(target, motion, body)
+            write_c3d(target, motion, body, start_s)
         elif suffix == ".vrma":
-            write_result(target, vrma_bytes(motion, body))
+            write_result(target, vrma_bytes(motion, body, start_s))
         elif suffix in (".mot", ".csv"):
             write_angles(target, motion, body)
         else:
@@ -132,10 +134,11 @@ def trc_text(name: str, motion: Motion, body: Body) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_c3d(path: Path, motion: Motion, body: Body) -> None:
+def write_c3d(path: Path, motion: Motion, body: Body, start_s: float) -> None:
     """Write the markers of a motion; they are missing where the person was not seen.
 
     :param body: that the motion was fitted with.
+    :param start_s: timestamp of the file's frame 1, seconds.
     :raises OutputError: the file cannot be written.
     """
     names, markers, joints = world_markers(motion, body)
@@ -143,13 +146,15 @@ def write_c3d(path: Path, motion: Motion, body: Body) -> None:
     if deviations is None:
         deviations = np.full((len(motion), len(body.joint_names)), np.nan)
     columns = [*markers.reshape(len(motion), -1).T, *np.asarray(deviations, float)[:, joints].T]
-    _, rows = at_one_rate(motion, [*columns, motion.valid.astype(float)])
+    times_s, rows = at_one_rate(motion, [*columns, motion.valid.astype(float)])
     places, residuals, is_seen = np.split(rows, [3 * len(names), rows.shape[1] - 1], axis=1)
     # A moment between a frame with the person and one without has none.
     residuals_mm = np.where(is_seen > 1.0 - 1e-6, 1000.0 * residuals, -1.0)
     parts = [body.joint_names[joint].replace("_", " ") for joint in joints]
     points_mm = 1000.0 * places.reshape(len(rows), len(names), 3)
-    write_result(path, c3d_bytes(names, parts, points_mm, residuals_mm, motion.mocap_framerate))
+    rate = motion.mocap_framerate
+    first = 1 + round(float(times_s[0] - start_s) * rate)
+    write_result(path, c3d_bytes(names, parts, points_mm, residuals_mm, rate, first))
 
 
 def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.float64], list[int]]:

@@ -121,6 +121,23 @@ def test_a_variable_rate_becomes_constant_and_gaps_stay_missing(whole_body, make
     assert (points[:6, :, 3] >= 0.0).all()
 
 
+@pytest.mark.parametrize(("late_s", "first"), [(5.0, 151), (3000.0, 90_001)])
+def test_somebody_who_enters_later_begins_in_a_later_frame(
+    whole_body, make_motion, tmp_path, late_s, first
+):
+    motion = make_motion(whole_body, 12)
+    motion = replace(motion, timestamps=motion.timestamps + 2.0)
+    late = replace(motion, timestamps=motion.timestamps + late_s)
+    paths = write_without_scene(tmp_path / "walk.c3d", [late, motion], [whole_body] * 2)
+    for path, begins in zip(paths, (first, 1), strict=True):
+        header, found, points = read(path.read_bytes())
+        assert header[2:4] == (min(begins, 65_535), min(begins + 11, 65_535))
+        for name, frame in {"START": begins, "END": begins + 11}.items():
+            low, high = found["TRIAL", f"ACTUAL_{name}_FIELD"].tolist()
+            assert low + (high << 16) == frame
+        assert found["POINT", "FRAMES"] == len(points) == 12
+
+
 @pytest.mark.filterwarnings("ignore:No analog data")
 def test_another_reader_agrees(whole_body, make_motion, tmp_path):
     c3d = pytest.importorskip("c3d", reason="the library c3d is not installed")

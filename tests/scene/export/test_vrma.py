@@ -26,6 +26,11 @@ JOINTS |= {"leftLowerLeg": "left_knee", "rightLowerArm": "right_elbow", "upperCh
 
 def written(motion, body, folder: Path) -> tuple[Path, dict, bytes]:
     (path,) = write_without_scene(folder / "walk.vrma", [motion], [body])
+    return (path, *read(path))
+
+
+def read(path: Path) -> tuple[dict, bytes]:
+    """Return the description and the binary part of a file."""
     content = path.read_bytes()
     magic, version, length, json_bytes, kind = struct.unpack_from("<4sIII4s", content)
     assert (magic, version, length, kind) == (b"glTF", 2, len(content), b"JSON")
@@ -34,7 +39,7 @@ def written(motion, body, folder: Path) -> tuple[Path, dict, bytes]:
     binary = content[28 + json_bytes :]
     assert kind == b"BIN\0"
     assert binary_bytes == len(binary) == gltf["buffers"][0]["byteLength"]
-    return path, gltf, binary
+    return gltf, binary
 
 
 @pytest.mark.parametrize("name", ["scope", "scope_h"])
@@ -89,3 +94,14 @@ def test_times_are_those_of_the_frames_and_begin_at_zero(body, make_motion, tmp_
         quaternions = np.frombuffer(binary, "<f4", 16, start).reshape(4, 4)
         np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-6)
         assert ((quaternions[1:] * quaternions[:-1]).sum(axis=1) >= 0.0).all()
+
+
+def test_somebody_who_enters_later_begins_to_move_later(body, make_motion, tmp_path):
+    motion = make_motion(body, 4)
+    motion = replace(motion, timestamps=motion.timestamps + 2.0)
+    late = replace(motion, timestamps=motion.timestamps + 5.0)
+    paths = write_without_scene(tmp_path / "walk.vrma", [late, motion], [body] * 2)
+    for path, begins in zip(paths, (5.0, 0.0), strict=True):
+        gltf, _ = read(path)
+        times = gltf["accessors"][gltf["animations"][0]["samplers"][0]["input"]]
+        assert (times["min"], times["max"]) == ([begins], [pytest.approx(begins + 0.1)])
