@@ -418,7 +418,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
     """
     check_installed(CAPTURE)
     from .capture.options import check_networks
-    from .job.batch import Batch, worker_table
+    from .job.batch import Batch, how_to_continue, worker_table
 
     formats = [f".{f.strip().lstrip('.').lower()}" for f in args.formats.split(",") if f.strip()]
     for suffix in formats or ["."]:
@@ -453,9 +453,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
             read += [path] if path.is_file() else files_of_footage(path)
         refuse_inputs([batch.report_file, *batch.results(footage)], read)
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
-        stack.enter_context(
-            interrupted("finished clips are kept; run the same command again to continue")
-        )
+        stack.enter_context(interrupted(how_to_continue(args.again)))
         report = batch.run(
             args.jobs,
             recursive=args.recursive,

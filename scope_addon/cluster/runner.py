@@ -25,7 +25,7 @@ from distributed import Client, Future
 from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
 from ..footage import display_address, is_url
-from ..job.batch import ROOT
+from ..job.batch import ROOT, how_to_continue
 from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
 from ..scene.export.output_paths import WITHOUT_SCENE
@@ -87,6 +87,7 @@ class DaskRunner:
         self._count = 0
         self._looked = -_POLLING_INTERVAL_S
         self._told_to_wait = False
+        self._again = False  # whether finished clips are captured as well
 
     def outcomes(self, tasks: Iterable[ClipTask]) -> Iterator[dict[str, Entry]]:
         """See `Runner.outcomes`.
@@ -95,6 +96,7 @@ class DaskRunner:
         :raises OutputError: the folder of the attempts cannot be created.
         """
         self._waiting.extend(tasks)
+        self._again = self._waiting[0].again
         self._staging = RemoteStaging(self._out) if is_url(self._out) else Staging(Path(self._out))
         wanted = self._wanted(self._waiting[0])
         yield {}
@@ -170,9 +172,7 @@ class DaskRunner:
             return {}
         if self._client.status != "running":
             raise ClusterError(
-                "the connection to the Dask scheduler was lost; finished clips are kept, run the "
-                "same command again to "
-                "continue"
+                "the connection to the Dask scheduler was lost; " + how_to_continue(self._again)
             )
         # not scheduler_info(), which may return a list without workers if the scheduler does not
         # answer

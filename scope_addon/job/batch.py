@@ -261,6 +261,15 @@ class Batch:
         return report
 
 
+def how_to_continue(again: bool) -> str:
+    """Return what to do about a batch that ended early.
+
+    :param again: whether it captures finished clips as well, which would begin anew.
+    """
+    command = "the same command without --again" if again else "the same command again"
+    return f"finished clips are kept; run {command} to continue"
+
+
 def _in_order(entries: dict[str, Entry], clips: dict[str, Path]) -> dict[str, Entry]:
     """Return the entries in the order of the clips, not in that in which they were finished."""
     return {name: entries[name] for name in clips if name in entries}

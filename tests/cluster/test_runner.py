@@ -17,6 +17,7 @@ from unittest.mock import MagicMock
 
 import pytest
 from scope.scope_addon.cli import main
+from scope.scope_addon.errors import ClusterError
 from scope.scope_addon.job.batch import REPORT_NAME
 from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask
 
@@ -309,6 +310,22 @@ def test_workers_need_blender_only_for_what_it_writes(tmp_path, suffixes, needed
     runner.close()
     _, wanted = client.submit.call_args.args
     assert wanted["bpy"] is needed
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_lost_scheduler_is_told_with_the_command_that_continues(tmp_path, again):
+    package("distributed")
+    from scope.scope_addon.cluster.runner import DaskRunner
+
+    runner = DaskRunner(MagicMock(status="closed"), "clips", str(tmp_path), 1, None, print)
+    task = ClipTask("a", "a.mp4", "", "", "", CaptureSettings({}, (".npz",)), again=again)
+    outcomes = runner.outcomes([task])
+    next(outcomes)  # begun
+    with pytest.raises(
+        ClusterError, match=f"{'without --again' if again else 'again'} to continue"
+    ):
+        next(outcomes)
+    runner.close()
 
 
 def test_workers_know_a_clip_by_the_files_to_which_a_rig_refers(

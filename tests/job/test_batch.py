@@ -408,6 +408,29 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
             assert sum(1 for _ in video.decode(video=0)) == FRAMES
 
 
+@pytest.mark.parametrize("again", [False, True])
+def test_what_is_said_of_an_interrupted_batch_continues_it(
+    folder, tmp_path, monkeypatch, capsys, again
+):
+    command = ["batch", str(folder), "--out", str(tmp_path / "out"), "--formats", "npz"]
+    program = [sys.executable, "-c", PROGRAM]
+
+    def interrupt(self, stage, done, total):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("scope.scope_addon.cli.ProgressBar.__call__", interrupt)
+        assert main([*command, *(["--again"] if again else [])], program=program) == 130
+    said = capsys.readouterr().err.splitlines()[-1]
+    how = "without --again" if again else "again"
+    assert said.endswith(f"; run the same command {how} to continue")
+    main(command, program=program)
+    first, second = capsys.readouterr().err.splitlines()[:2]
+    assert first.endswith(" skipped")
+    assert not second.endswith(" skipped")
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_batch_and_its_clips_despite_an_earlier_handler(folder, tmp_path, number):
