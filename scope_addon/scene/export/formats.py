@@ -34,10 +34,12 @@ from typing import Any
 import addon_utils
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...errors import OutputError
 from .. import timing
+from ..character.root_object import parent_transform, root_object
 from . import bvh
 from .fbx_file import correct_fbx
 from .usd_file import has_content, is_whole_crate, saved_layers
@@ -203,7 +205,7 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
             world = np.array(evaluated.matrix_world)
             for column, name in enumerate(names):
                 posed[row, column] = world @ np.array(evaluated.pose.bones[name].matrix)
-    world = np.array(rig.matrix_world)
+    world = np.array(_place_at_rest(rig))
     rest_world = world @ rest
     tails = np.array([world[:3, :3] @ np.array(bone.tail_local) + world[:3, 3] for bone in bones])
     return bvh.SampledPose(
@@ -216,6 +218,16 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
         joints=posed[..., :3, 3],
         rate=timing.scene_rate(scene),
     )
+
+
+def _place_at_rest(rig: bpy.types.Object) -> Matrix:
+    """Return an armature's transform to the world (4, 4) without its root object's, which is part
+    of the motion and would turn the rest pose.
+    """
+    empty = root_object(rig)
+    if empty is None:
+        return rig.matrix_world
+    return parent_transform(empty) @ empty.matrix_world.inverted_safe() @ rig.matrix_world
 
 
 def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:

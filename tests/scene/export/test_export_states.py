@@ -3,6 +3,7 @@
 objects.
 """
 
+import re
 from dataclasses import replace
 
 import bpy
@@ -11,6 +12,7 @@ import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.root_object import move_root_motion_to_object
 from scope.scope_addon.scene.export.export import export
 
 from ...made_motion import made_face
@@ -147,6 +149,31 @@ def test_a_capture_with_a_parent_moves_with_it_in_the_file(
     np.testing.assert_allclose(blender.joints(person.armature, body.joint_names), wanted, atol=1e-6)
     first = read_back(tmp_path / f"walk{suffix}")
     assert not bpy.data.objects.get("Cube")
+    blender.go_to(first + 3)
+    seen = blender.joints(blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_the_t_pose_of_a_bvh_faces_forwards_with_root_motion_on_an_object(
+    body, make_motion, tmp_path, blender, in_place
+):
+    (person,) = build_scene(
+        [make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")
+    ).people
+    export(tmp_path / "bones.bvh")
+    move_root_motion_to_object(person.armature, body, 30.0, in_place=in_place, heading=True)
+    blender.go_to(3)
+    wanted = blender.joints(person.armature, body.joint_names)
+    export(tmp_path / "object.bvh")
+    hierarchies = [
+        re.findall(r"\S+", (tmp_path / f"{name}.bvh").read_text("utf-8").partition("MOTION")[0])
+        for name in ("bones", "object")
+    ]
+    for one, other in zip(*hierarchies, strict=True):
+        is_number = re.fullmatch(r"-?\d+\.\d+", one)
+        assert float(other) == pytest.approx(float(one), abs=1e-3) if is_number else other == one
+    first = read_back(tmp_path / "object.bvh")
     blender.go_to(first + 3)
     seen = blender.joints(blender.only("ARMATURE"), body.joint_names)
     np.testing.assert_allclose(seen, wanted, atol=JOINT_TOLERANCE)
