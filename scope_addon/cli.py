@@ -73,9 +73,9 @@ from .installed import CAPTURE, check_installed, check_memory_limit
 from .job.clip_task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.finished_clip import FINISHED_FILE, write_finished
 from .options.capture import OFF
+from .output_paths import SUFFIXES, WITHOUT_SCENE
 from .parent import end_with_parent
 from .private_folder import lasting_folder
-from .scene.export.output_paths import SUFFIXES, WITHOUT_SCENE
 
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 PROGRAM = (sys.executable, "-m", str(__package__))

@@ -15,7 +15,7 @@ import pytest
 from scope.scope_addon import atomic_write
 from scope.scope_addon.atomic_write import atomic_path, write_npz
 from scope.scope_addon.errors import OutputError
-from scope.scope_addon.scene.export.output_paths import check_output
+from scope.scope_addon.output_paths import check_output
 
 
 def write(path, text="new"):

@@ -17,11 +17,11 @@ from ...scope_addon.atomic_write import atomic_path, reason
 from ...scope_addon.errors import SetupError, exit_status
 from ...scope_addon.installed import machine, versions
 from ...scope_addon.motion import Motion
+from ...scope_addon.output_paths import check_output
 from ...scope_addon.report import page
 from ...scope_addon.report.capture_page import figures_table, over_time
 from ...scope_addon.report.page import overlay_pictures
 from ...scope_addon.report.viewer_data import shown_rows, viewer_data
-from ...scope_addon.scene.export.output_paths import check_output
 from ...scope_addon.untrusted.body_file import load_body
 from ...solver.body import Body
 from ...solver.errors import InputError, ScopeError

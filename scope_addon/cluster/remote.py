@@ -31,8 +31,8 @@ from ..footage import PICTURE_SUFFIXES, display_address, is_url, sequence_patter
 from ..job.batch import REPORT_NAME
 from ..job.clip_task import ClipTask
 from ..job.finished_clip import file_hash
+from ..output_paths import left_over
 from ..private_folder import lasting_folder
-from ..scene.export.output_paths import left_over
 from ..temporary import claim, discard, hold, is_abandoned, release, remove
 
 ATTEMPTS = ".scope-attempts"  # folder of all batches in a store of results

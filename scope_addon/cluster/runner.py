@@ -28,7 +28,7 @@ from ..footage import display_address, is_url
 from ..job.batch import ROOT, how_to_continue
 from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
-from ..scene.export.output_paths import WITHOUT_SCENE
+from ..output_paths import WITHOUT_SCENE
 from ..temporary import remove
 from . import worker as worker_side
 from .remote import RemoteStaging, Staging

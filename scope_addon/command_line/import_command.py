@@ -12,7 +12,7 @@ from ..capture_report import warnings_as_json
 from ..footage import display_text
 from ..notices import counted
 from ..options import Place
-from ..scene.export.output_paths import SUFFIXES
+from ..output_paths import SUFFIXES
 from .arguments import add_options, path_argument, values_in_range
 from .outputs import (
     check_blender,

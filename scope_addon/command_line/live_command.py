@@ -24,7 +24,7 @@ from ..live.unfinished import (
 from ..notices import counted
 from ..options import Place
 from ..options.body_choice import chosen_body
-from ..scene.export.output_paths import check_output, left_over, person_paths
+from ..output_paths import check_output, left_over, person_paths
 from ..temporary import is_held
 from .arguments import add_options, values_in_range
 from .outputs import check_outputs, confine

@@ -19,7 +19,7 @@ from ..installed import check_installed
 from ..motion import Motion
 from ..notices import OTHER, Notice, counted, notice
 from ..options import option
-from ..scene.export.output_paths import WITHOUT_SCENE, check_output, files_of_people, left_over
+from ..output_paths import WITHOUT_SCENE, check_output, files_of_people, left_over
 from ..scene.export.without_scene import write_without_scene
 from .blender_module import bounded_import, load_blender
 

@@ -26,7 +26,7 @@ from ..installed import machine, versions
 from ..json_file import read_json_object
 from ..notices import PHRASES, SENTENCES
 from ..options import option
-from ..scene.export.output_paths import check_output
+from ..output_paths import check_output
 from .arguments import path_argument
 from .outputs import refuse_inputs
 

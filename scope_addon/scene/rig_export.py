@@ -15,12 +15,12 @@ from ...solver.body import Body
 from ..errors import UsageError
 from ..motion import Motion
 from ..notices import Notice, notice
+from ..output_paths import check_output
 from ..retarget.expression_map import ExpressionMap
 from ..retarget.rig_source import RigSource
 from .build import BuildOptions, build_scene
 from .export.export import ExportOptions, export
 from .export.export_states import temporary_scene
-from .export.output_paths import check_output
 from .face_retarget import (
     captured_expressions,
     faces_of,

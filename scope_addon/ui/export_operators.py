@@ -15,8 +15,8 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..errors import UsageError
 from ..options import Place
+from ..output_paths import person_paths
 from ..scene.datablocks import captures_of, holds
-from ..scene.export.output_paths import person_paths
 from .captured_person import PERSON, body_of, motion_of
 from .captures import people_of, shown_capture
 from .comparison import cameras_of
@@ -286,7 +286,7 @@ def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[
 
     :raises UsageError: nobody is left of the captures.
     """
-    from ..scene.export.output_paths import check_output
+    from ..output_paths import check_output
     from ..scene.export.without_scene import write_without_scene
 
     people = [person for capture in collections for person in people_of(capture)]
@@ -330,7 +330,7 @@ class SCOPE_OT_save_calibration(SavingOperator):
         :raises UsageError: the file has no name or folder, or the captured person was deleted.
         """
         from ..capture.camera.calibration import write_calibration
-        from ..scene.export.output_paths import check_output
+        from ..output_paths import check_output
 
         path = check_output(output_file(self.filepath, self.suffix()), (self.suffix(),))
         people = people_of(shown_capture(context.scene))

@@ -38,7 +38,7 @@ from scope.scope_addon.edit.corrections import (
 )
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import CORRECTION_KEYS, FACE_KEYS, VIEW_KEYS, Motion
-from scope.scope_addon.scene.export.output_paths import check_output
+from scope.scope_addon.output_paths import check_output
 from scope.solver.body_file import BUILT_IN
 
 from ..made_motion import made_face, made_motion, made_views

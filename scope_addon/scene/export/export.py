@@ -25,6 +25,7 @@ from ...atomic_write import atomic_path, reason
 from ...errors import OutputError, UsageError
 from ...motion import Motion
 from ...notices import Notice
+from ...output_paths import WITHOUT_SCENE, check_output, person_paths
 from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
@@ -47,7 +48,6 @@ from .export_states import (
     temporary_scene,
     unit_of_captures,
 )
-from .output_paths import WITHOUT_SCENE, check_output, person_paths
 
 SHAPES = ("auto", "keys", "baked")
 

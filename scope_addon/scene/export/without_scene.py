@@ -29,9 +29,9 @@ from ...atomic_write import write_result
 from ...footage import display_text
 from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
+from ...output_paths import person_paths
 from ..budget import check_rows
 from .c3d import c3d_bytes
-from .output_paths import person_paths
 from .vrma import vrma_bytes
 
 if TYPE_CHECKING:

@@ -10,11 +10,11 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.output_paths import SUFFIXES, WITHOUT_SCENE
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, export, export_motions
-from scope.scope_addon.scene.export.output_paths import SUFFIXES, WITHOUT_SCENE
 
 from ...required import package
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, glb_json, read_back

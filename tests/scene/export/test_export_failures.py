@@ -10,9 +10,9 @@ from pathlib import Path
 import bpy
 import pytest
 from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.output_paths import SUFFIXES, WITHOUT_SCENE, person_paths
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import export, export_motions
-from scope.scope_addon.scene.export.output_paths import SUFFIXES, WITHOUT_SCENE, person_paths
 from scope.scope_addon.scene.export.without_scene import write_without_scene
 
 SCENE_SUFFIXES = [suffix for suffix in SUFFIXES if suffix not in WITHOUT_SCENE]

@@ -11,14 +11,14 @@ import sys
 import bpy
 import pytest
 from scope.scope_addon.errors import OutputError, UsageError
+from scope.scope_addon.output_paths import check_output, person_paths
 from scope.scope_addon.scene.export.export import export_motions
 from scope.scope_addon.scene.export.formats import is_whole_blend
-from scope.scope_addon.scene.export.output_paths import check_output, person_paths
 from scope.scope_addon.scene.export.usd_file import is_whole_crate
 
 
 def test_the_check_needs_no_blender():
-    code = "import sys, scope.scope_addon.scene.export.output_paths; sys.exit('bpy' in sys.modules)"
+    code = "import sys, scope.scope_addon.output_paths; sys.exit('bpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

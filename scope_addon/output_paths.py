@@ -12,8 +12,8 @@ import re
 from collections.abc import Collection
 from pathlib import Path
 
-from ...atomic_write import reason, resolve_link
-from ...errors import OutputError, UsageError
+from .atomic_write import reason, resolve_link
+from .errors import OutputError, UsageError
 
 # Formats that are written from the motion, without Blender.
 WITHOUT_SCENE = (".trc", ".c3d", ".vrma", ".mot", ".csv", ".npz")
