@@ -158,7 +158,8 @@ def set_lens(data: bpy.types.Camera, motion: Motion) -> None:
     data.shift_x = 0.5 - cx / width
     data.shift_y = (cy - 0.5 * height) / width * fx / fy
     data.clip_start = 0.01
-    data.clip_end = 1000.0
+    # People may be scaled to the scene's unit; where it is a long one, they may be not yet.
+    data.clip_end = max(1000.0, 1000.0 / bpy.context.scene.unit_settings.scale_length)
 
 
 def same_camera(a: Motion, b: Motion) -> bool:

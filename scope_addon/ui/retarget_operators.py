@@ -152,7 +152,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
         settings.rig,
         guessed or listed_map(settings),
         keyed_rate(source, context.scene),
-        retarget_options(settings, face),
+        retarget_options(settings, face, source.matrix_world.median_scale),
     )
     if guessed is not None:  # not before: what fails changes nothing
         fill_list(settings, guessed)
@@ -179,15 +179,19 @@ def face_map(settings: bpy.types.PropertyGroup) -> ExpressionMap | None:
 
 
 def retarget_options(
-    settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None
+    settings: bpy.types.PropertyGroup, face: ExpressionMap | None = None, metre: float = 1.0
 ) -> RetargetOptions:
     """Return the options of the settings.
 
     :param face: the expression map of the bones that move the rig's face, if any.
+    :param metre: of the captured person, in units of the scene, in which they may be scaled.
     """
     from ..scene.rig_retarget import RetargetOptions
 
-    offset = _SIDE_OFFSET_M if settings.captured == "beside" else (0.0, 0.0, 0.0)
+    offset = (0.0, 0.0, 0.0)
+    if settings.captured == "beside":
+        x, y, z = _SIDE_OFFSET_M
+        offset = metre * x, metre * y, metre * z
     travel = settings.travel or None
     return RetargetOptions(
         feet=settings.feet, root=settings.root, offset=offset, face=face, travel=travel

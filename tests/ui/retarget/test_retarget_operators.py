@@ -146,6 +146,19 @@ def test_the_captured_body_is_hidden_side_by_side_or_overlapping(rig):
     assert body.hide_render
 
 
+def test_side_by_side_is_as_far_for_a_person_of_a_scene_in_centimetres(rig):
+    scene = bpy.context.scene
+    source = next(obj for obj in scene.objects if "scope_source" in obj)
+    scene.unit_settings.scale_length = 0.01
+    source.scale = rig.scale = (100.0,) * 3
+    bpy.ops.scope.retarget()
+    there = seen(rig, ["pelvis"])
+    scene.scope_retarget.captured = "beside"
+    bpy.ops.scope.retarget()
+    expected = np.broadcast_to([150.0, 0, 0], there.shape)
+    np.testing.assert_allclose(seen(rig, ["pelvis"]) - there, expected, atol=1e-2)
+
+
 @pytest.mark.parametrize("captured", ["hide", "beside"])
 def test_the_captured_persons_collection_may_be_excluded_from_the_view_layer(rig, captured):
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
