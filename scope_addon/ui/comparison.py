@@ -27,7 +27,7 @@ from bpy.app.handlers import persistent
 from mathutils import Matrix, Quaternion, Vector
 
 from ...solver.errors import ScopeError
-from ..scene.datablocks import captures_of, enter_object_mode, holds, is_person
+from ..scene.datablocks import captures_of, enter_object_mode, holds, is_in_layer, is_person
 from .captured_person import body_of, captured_armature
 from .captures import people_of
 from .sidebar import viewport_at, viewports
@@ -228,8 +228,7 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
 
 
 def _span(shown: tuple[float, float], aspect: float) -> float:
-    """Return what a viewport must show across its longer side for a width and height, metres, to
-    fit.
+    """Return what a viewport must show across its longer side for a width and height to fit.
 
     :param aspect: width divided by height of the viewport.
     """
@@ -292,7 +291,8 @@ def _show_alone(
         for obj in list(collection.all_objects):
             if is_person(obj):  # it may be hidden because of a retargeted rig
                 show(obj, context.view_layer, temporarily=True)
-            obj.select_set(True)
+            if is_in_layer(context.view_layer, obj):  # not where its collection is excluded
+                obj.select_set(True)
         bpy.ops.view3d.localview(frame_selected=False)
         bpy.ops.object.select_all(action="DESELECT")
     for obj in selected:
@@ -389,8 +389,8 @@ def side_extent(
     people: Sequence[bpy.types.Object],
     R_world_view: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Return the width and height, metres, that a view along -z must show around the pelvis of
-    ``followed``.
+    """Return the width and height that a view along -z must show around the pelvis of ``followed``,
+    in units of the scene, in which people may be scaled.
 
     :param people: captured armatures; one whose keys are missing is left out.
     :param R_world_view: (3, 3), view axes to world.
@@ -407,7 +407,9 @@ def side_extent(
                 [np.interp(path[:, 0], their[:, 0], their[:, k]) for k in (1, 2, 3)], axis=1
             )
             far = np.maximum(far, np.abs((place - path[:, 1:]) @ R_world_view[:, :2]).max(axis=0))
-    return 2.0 * (float(far[0]) + _HALF_WIDTH_M), 2.0 * (float(far[1]) + _HALF_HEIGHT_M)
+    size = followed.matrix_world.median_scale
+    width = 2.0 * (float(far[0]) + size * _HALF_WIDTH_M)
+    return width, 2.0 * (float(far[1]) + size * _HALF_HEIGHT_M)
 
 
 def _pelvis_path(armature: bpy.types.Object, rate: float) -> NDArray[np.float64] | None:
@@ -422,7 +424,10 @@ def _pelvis_path(armature: bpy.types.Object, rate: float) -> NDArray[np.float64]
     except ScopeError:
         return None
     empty = root_object(armature)
-    M = np.array(armature.matrix_world if empty is None else parent_transform(empty))
+    M = np.array(armature.matrix_world)
+    if empty is not None:  # whose transform is in the clip, in the armature's units
+        size = armature.matrix_basis.median_scale
+        M = np.array(parent_transform(empty) @ Matrix.Scale(size, 4))
     return np.column_stack(
         [frames, clip_as_displayed(armature, clip, frames).root @ M[:3, :3].T + M[:3, 3]]
     )

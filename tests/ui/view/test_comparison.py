@@ -61,6 +61,22 @@ def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
         assert overlay.show_bones is shown
 
 
+def test_a_capture_is_compared_without_what_is_excluded_from_the_view_layer():
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    window = bpy.context.window_manager.windows[0]
+    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    collection, bpy.context.scene.camera = capture_with_camera("capture")
+    child = bpy.data.collections.new("props")
+    child.objects.link(bpy.data.objects.new("prop", None))
+    collection.children.link(child)
+    layer = bpy.context.view_layer.layer_collection.children["capture"]
+    layer.children["props"].exclude = True
+    with bpy.context.temp_override(window=window, area=area):
+        comparison.begin(bpy.context, area, collection)
+    assert area.spaces.active.local_view
+    comparison.end(window, area)
+
+
 def capture_with_camera(name):
     """Return a capture's collection with a camera, linked to the scene, and the camera."""
     collection = bpy.data.collections.new(name)

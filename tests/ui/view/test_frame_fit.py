@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.character.root_object import move_root_motion_to_object
 from scope.scope_addon.ui import comparison, sidebar
 from scope.scope_addon.ui.comparison import fit_frame, side_extent, unfit_frame
 from scope.scope_addon.ui.view_operators import hide_startup_cube
@@ -132,6 +133,19 @@ def test_the_view_is_wide_enough_for_the_person_who_walks_away():
     second.matrix_world = Matrix.Translation((0.0, 0.0, 1.0)) @ second.matrix_world
     bpy.context.view_layer.update()
     assert side_extent(first, [first, second], ALONG_X)[1] == pytest.approx(4.6, abs=0.05)
+
+
+@pytest.mark.parametrize("on_object", [False, True])
+def test_people_of_a_scene_in_centimetres_are_shown_as_wide(on_object):
+    found = people(walk(2.0, speed=0.0), walk(2.0))
+    for person in found:
+        person.scale = (100.0,) * 3
+        if on_object:
+            move_root_motion_to_object(person, BODY, 30.0, in_place=False, heading=True)
+    bpy.context.view_layer.update()
+    width, height = side_extent(found[0], found, ALONG_X)
+    assert width == pytest.approx(100 * (1.0 + 2 * 2.4), abs=5)
+    assert height == pytest.approx(260, abs=5)
 
 
 def test_a_person_without_keys_does_not_prevent_the_view():
