@@ -171,6 +171,9 @@ SENTENCES = {
     "other_body": "the poses were applied as they are to Scope's own body, whose rest pose and "
     "proportions differ from SMPL's; with your SMPL, SMPL+H or SMPL-X file as the body, the motion "
     "is exact",
+    "other_model": "the file's body is of another model than '{body}', so its shape was left out "
+    "and the feet were put on the floor; with your file of that model as the body, the motion is "
+    "exact",
     "parts_left_out": "the body '{body}' has no {parts}, whose motion was left out",
     "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
     "no_translation": "the file holds no translation: the pelvis stays in place",

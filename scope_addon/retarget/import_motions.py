@@ -154,7 +154,9 @@ def convert(
 
     :param path: names the motion.
     """
-    exact = body.name in ("smpl", "smplh", "smplx", "star") or source.body_model == body.name
+    exact = source.body_model == body.name or _shape_space(body.name) in map(
+        _shape_space, source.models
+    )
     notes: list[Notice] = []
     betas = np.zeros(body.P)
     if exact:
@@ -170,8 +172,10 @@ def convert(
                     body_gender=body.gender,
                 )
             )
-    else:
+    elif body.name in BUILT_IN:
         notes.append(notice("other_body"))
+    else:
+        notes.append(notice("other_model", body=body.name))
     poses, missing = _for_body(source, body)
     if missing:
         notes.append(notice("parts_left_out", body=body.name, parts=missing))
@@ -198,6 +202,11 @@ def convert(
     motion.gender = source.gender
     motion.source = path.name
     return Imported(motion, body, notes)
+
+
+def _shape_space(model: str) -> str:
+    """Return the model whose shape coefficients a model has."""
+    return "smpl" if model == "smplh" else model
 
 
 def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]:

@@ -96,6 +96,7 @@ class SmplMotion:
     gender: str
     body_model: str  # as our own files name it; empty in those of other tools
     usual_up: str  # the axis that points up in files with these names: "z", "y" or "camera"
+    models: tuple[str, ...]  # the published bodies of which the file may be, as ours are named
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -208,7 +209,24 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         gender=gender_of(arrays.get(_GENDER), Path("neutral")),
         body_model=_text(arrays.get(_MODEL)),
         usual_up=usual_up,
+        models=_models(arrays, len(names)),
     )
+
+
+def _models(arrays: Mapping[str, NDArray[Any]], joint_count: int) -> tuple[str, ...]:
+    """Return the published bodies of which a file may be: the one that it states, or whose joints
+    it has.
+
+    A file with the body and the hands apart may leave out the face, so that SMPL-X looks like
+    SMPL+H.
+    """
+    stated = _text(arrays.get(_MODEL)).lower()
+    if stated:
+        return (stated.replace("-", "").replace("+", ""),)
+    all_models = {skeleton.name: count for count, skeleton in SKELETONS.items()}
+    is_whole = _first(arrays, _ALL_JOINTS) is not None or joint_count == all_models["smpl"]
+    fitting = tuple(name for name, count in all_models.items() if count == joint_count)
+    return fitting if is_whole and fitting else tuple(all_models)
 
 
 def _poses(

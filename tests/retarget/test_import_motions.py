@@ -171,6 +171,49 @@ def test_invalid_arguments(tmp_path, arguments):
         import_motion(tmp_path / "walk.npz", **arguments)
 
 
+def spread(joint_count: int) -> dict[str, np.ndarray]:
+    """A file with an array of all joints, which stand still, and a shape."""
+    poses = np.zeros((9, joint_count, 3))
+    poses[:, 0] = [np.pi / 2, 0, 0]  # the model's y axis is up
+    trans = np.tile([0.0, 0.0, 1.3], (9, 1))
+    return {"poses": poses.reshape(9, -1), "trans": trans, "betas": np.array([0.5, -1.0, 0.3])}
+
+
+PIECES = {"root_orient": np.zeros((9, 3)), "pose_body": np.zeros((9, 63))}
+
+
+@pytest.mark.parametrize(
+    ("arrays", "model", "is_exact"),
+    [
+        (spread(24), "smpl", True),
+        (spread(24), "smplh", True),
+        (spread(24), "smplx", False),
+        (spread(24), "star", False),
+        (spread(52), "smpl", True),
+        (spread(52), "smplx", False),
+        (spread(55), "smplx", True),
+        (spread(55), "smplh", False),
+        (PIECES, "smplx", True),  # it may be of either
+        (PIECES, "smplh", True),
+        (PIECES, "star", False),
+        ({**PIECES, "pose_hand": np.zeros((9, 90))}, "smplx", True),
+        ({**spread(52), "body_model": np.array("SMPL-X")}, "smplx", True),
+        ({**spread(24), "body_model": np.array("star")}, "star", True),
+        ({**spread(24), "body_model": np.array("star")}, "smpl", False),
+    ],
+)
+def test_a_shape_is_only_that_of_the_model_that_it_is_of(arrays, model, is_exact):
+    """SMPL+H is SMPL with fingers; the coefficients of the others stand for other shapes."""
+    body = replace(BODY, name=model)
+    betas = np.array([0.5, -1.0, 0.3])
+    found = convert(smpl_motion({**arrays, "betas": betas}, FILE), body, FILE, up="z")
+    expected = betas if is_exact else np.zeros(3)
+    np.testing.assert_allclose(found.motion.betas[:3], expected, atol=1e-6)
+    said = f"the file's body is of another model than '{model}'"
+    assert any(said in note for note in map(str, found.notes)) is not is_exact
+    assert not any("Scope's own body" in note for note in map(str, found.notes))
+
+
 @pytest.mark.parametrize("axis", R_FILE_WORLD)
 def test_on_the_users_own_smpl_body_shape_and_pelvis_are_exact(axis):
     """Its rest pelvis is not at the model's origin, unlike ours; SMPL adds it in the file's
