@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
+from ...solver.errors import ScopeError
 from ..scene.datablocks import holds
 from ..scene.stored_values import start_frame
 from . import comparison
-from .captured_person import captured_people
+from .captured_person import captured_people, motion_of
 from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .reporting import ReportingOperator, refuse, rpt_, tip_
@@ -233,14 +236,15 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
         scene = context.scene
         result = context.scene.scope.result
-        armatures = (o for o in result.collection.all_objects if "scope_start" in o)
+        armatures = [o for o in result.collection.all_objects if "scope_start" in o]
         start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
         camera = camera_of(scene)
         if camera is not None and camera.data.background_images:
             turn_strip(strips[-1], camera.data.background_images[0])
-        rate = getattr(strips[-1], "fps", 0.0)
+        # of what happened, which slow motion plays more slowly
+        rate = getattr(strips[-1], "fps", 0.0) * _speed_of_footage(armatures)
         if rate and abs(rate - scene_rate(scene)) > 0.01:
             self.report(
                 {"WARNING"},
@@ -254,6 +258,16 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
             )
             return ""
         return rpt_("The footage is already in the sequencer") if strips[-1] in known else ""
+
+
+def _speed_of_footage(people: list[bpy.types.Object]) -> float:
+    """Return how many times as fast as the footage plays everything happened; 1 if the motions are
+    lost.
+    """
+    for person in people:
+        with suppress(ScopeError):
+            return motion_of(person).footage_speed
+    return 1.0
 
 
 CLASSES = (

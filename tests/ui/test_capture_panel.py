@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings in .blend files, export buttons, the camera button, progress."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
+import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.job.job_progress import JobProgress, duration
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.footage_strip import strips_of
+from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.scene.stored_values import parse_spans
 from scope.scope_addon.ui import capture_job
-from scope.scope_addon.ui.capture_operators import end_capture, state
+from scope.scope_addon.ui.capture_operators import SAMPLE, end_capture, state
 from scope.scope_addon.ui.preferences import cache
+from scope.solver.body_file import load_body
 
 from ..job.processes import wait_for
 from ..scene.test_footage_strip import start_of
@@ -281,6 +286,24 @@ def test_the_footage_is_added_to_the_sequencer(fake_worker, footage):
     footage.unlink()
     with pytest.raises(RuntimeError, match="does not exist"):
         bpy.ops.scope.footage_to_sequencer()
+
+
+@pytest.mark.parametrize(("factor", "warns"), [(4, False), (1, True)])
+def test_slow_motion_stays_synchronized_at_the_rate_of_what_happened(
+    standing, capfd, factor, warns
+):
+    """It plays four times as slowly, so each frame of a scene of four times its rate shows one."""
+    scene = bpy.context.scene
+    rate = cv2.VideoCapture(str(SAMPLE)).get(cv2.CAP_PROP_FPS)
+    scene.render.fps = round(factor * rate)
+    scene.render.fps_base = round(factor * rate) / (factor * rate)
+    motion = replace(standing, footage_speed=4.0)
+    built = build_scene([motion], load_body("scope"))
+    pack_motion(built.people[0].armature, motion.to_bytes())
+    built.collection.scope_result.footage = str(SAMPLE)
+    scene.scope.capture = built.collection
+    assert bpy.ops.scope.footage_to_sequencer() == {"FINISHED"}
+    assert ("synchronized" in capfd.readouterr().out) == warns
 
 
 def test_the_part_of_the_video_is_sent_to_the_worker(fake_worker, footage):
