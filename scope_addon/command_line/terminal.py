@@ -13,6 +13,7 @@ from typing import Self, TextIO
 from ..footage import display_text
 from . import signals
 
+_USUAL_COLUMNS = 80  # of a terminal that does not say how many it has
 _CLEAR_LINE = "\r\x1b[K"
 
 
@@ -39,6 +40,14 @@ def open_standard_streams() -> None:
     sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
 
 
+def _columns(stream: TextIO) -> int:
+    """Return how many characters a terminal's line has."""
+    with suppress(OSError, ValueError):
+        if columns := os.get_terminal_size(stream.fileno()).columns:
+            return columns
+    return _USUAL_COLUMNS
+
+
 class ProgressLine:
     """One line on a terminal, each text of which replaces the one before; silent elsewhere. Stops
     after a signal.
@@ -56,7 +65,8 @@ class ProgressLine:
         if signals.received:
             raise KeyboardInterrupt
         if self._show:
-            self._stream.write(f"{_CLEAR_LINE}{display_text(text)[:100]}")
+            # A line that wraps would stay above the next one.
+            self._stream.write(f"{_CLEAR_LINE}{display_text(text)[: _columns(self._stream) - 1]}")
             self._stream.flush()
 
     def __enter__(self) -> Self:

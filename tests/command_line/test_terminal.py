@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import os
+import struct
 import subprocess
 import sys
 
@@ -29,6 +30,19 @@ def test_a_bar_is_replaced_by_the_next_and_removed_at_the_end() -> None:
     assert lines[1] == f"{'Finding':<20} [{'#' * 7}{'.' * 23}] 15/60"
     assert "[" + "#" * 30 + "] 60/60" in lines[2]
     assert lines[3].rstrip() == "Writing"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a terminal of POSIX")
+@pytest.mark.parametrize(("columns", "shown"), [(80, 79), (40, 39), (200, 120), (0, 79)])
+def test_a_line_does_not_reach_the_end_of_the_terminals(columns: int, shown: int) -> None:
+    """It would wrap, and stay above the next ones. A terminal that says 0 does not know."""
+    fcntl = pytest.importorskip("fcntl")
+    termios = pytest.importorskip("termios")
+    reader, writer = os.openpty()
+    with open(reader, "rb"), open(writer, "w", encoding="utf-8") as stream:
+        fcntl.ioctl(writer, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        ProgressLine(stream, show=True).write("x" * 120)
+        assert os.read(reader, 1000) == b"\r\x1b[K" + b"x" * shown
 
 
 def test_elsewhere_nothing_is_shown() -> None:
