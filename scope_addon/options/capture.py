@@ -377,8 +377,8 @@ class CaptureDeclaration:
         "height)",
         argument=Argument(
             metavar="FILE",
-            help="JSON file with intrinsics, dist and size, or TOML file of Pose2Sim or Caliscope, "
-            "of several cameras FILE.toml#CAMERA",
+            help="JSON file with intrinsics, dist and size, or a file of Pose2Sim, Caliscope, "
+            "FreeMoCap, EasyMocap or OpenCap; one of several cameras is FILE.toml#CAMERA",
         ),
         blender=Property(
             "calibration_file",

@@ -113,8 +113,8 @@ OUTPUT_OPTIONS = (
         Path,
         None,
         Place.COMMAND_LINE | Place.IMPORT,
-        "retarget the motion to the rig in this .blend, .fbx, .glb or .vrm file; given several "
-        "times, each rig has an output of its own, in the same order",
+        "retarget the motion to the rig in this .blend, .fbx, .glb, .gltf or .vrm file; given "
+        "several times, each rig has an output of its own, in the same order",
         argument=Argument(metavar="RIG", repeated=True),
     ),
     Option(
