@@ -18,7 +18,7 @@ from ..options.body_choice import chosen_body
 if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
 
-BODY_SUFFIXES = (".npz", ".pkl")
+BODY_SUFFIXES = (".npz", ".pkl", ".pickle")
 _LONGEST_SHOWN = 60  # characters of a value in a message
 
 

@@ -100,5 +100,8 @@ def test_processes_with_another_current_folder_find_the_files_of_the_options(tmp
         "--body": str(tmp_path / "my" / "SMPL.npz"),
         "--detector": os.path.abspath("/a.onnx"),
     }
+    for name in ("SMPL.pkl", "SMPL.pickle"):
+        args = build_parser().parse_args(["batch", ".", "--out", "out", "--body", f"my/{name}"])
+        assert non_default_arguments(args) == {"--body": str(tmp_path / "my" / name)}
     args = build_parser().parse_args(["batch", ".", "--out", "out", "--body", "scope_h"])
     assert non_default_arguments(args) == {"--body": "scope_h"}
