@@ -146,6 +146,8 @@ def read_npz(
     try:
         with zipfile.ZipFile(source) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
+        if isinstance(source, io.BytesIO):
+            source.seek(0)  # numpy looks for the file's kind where it is, not at the beginning
         if size > LARGEST_BYTES:
             raise error(f"{path} would unpack to {size >> 20} MiB, too large for a {what}")
         with np.load(source, allow_pickle=False) as file:

@@ -30,6 +30,17 @@ def saved(path: Path, **more: np.ndarray) -> Path:
     return path
 
 
+def test_bytes_may_be_an_archive_of_the_larger_kind(tmp_path, monkeypatch):
+    """Its directory is followed by another mark, by which numpy did not know it."""
+    monkeypatch.setattr(zipfile, "ZIP_FILECOUNT_LIMIT", 1)
+    path = saved(tmp_path / "a.npz")
+    monkeypatch.undo()
+    content = path.read_bytes()
+    assert b"PK\x06\x06" in content
+    found = read_npz(Path("named.npz"), OwnError, "motion file", content=content)
+    assert set(found) == set(ARRAYS)
+
+
 def test_arrays_come_back_with_their_types(tmp_path):
     found = read_npz(saved(tmp_path / "a.npz"), OwnError, "motion file")
     assert set(found) == set(ARRAYS)
