@@ -14,11 +14,12 @@ import bpy
 from mathutils import Vector
 
 from ..scene.character.correction_list import listed_corrections
+from ..scene.datablocks import is_in_layer
 from .captured_person import captured_armature, may_edit
 from .comparison import camera_of
 from .correction_operators import last_pin_warnings
 from .drawing import Pointer, draw_disc, draw_line, viewport_of
-from .reporting import iface_
+from .reporting import iface_, rpt_
 from .sidebar import redraw_sidebars, viewports
 
 _SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
@@ -182,8 +183,16 @@ class SCOPE_OT_pin_limb(bpy.types.Operator):
             return
         screen = at + Vector(session.mouse) - Vector(session.start)
         location = region_2d_to_location_3d(region, view, screen, was)
-        # something else was selected
-        if (person := bpy.data.objects[session.armature]) != captured_armature(context):
+        person = bpy.data.objects[session.armature]
+        if not is_in_layer(context.view_layer, person):  # another scene is shown by now
+            text = rpt_(
+                "'{rig}' is not in the scene's view layer: add it to the scene, or enable its "
+                "collection in the Outliner",
+                rig=person.name,
+            )
+            self.report({"ERROR"}, text)
+            return
+        if person != captured_armature(context):  # something else was selected
             context.view_layer.objects.active = person
         in_image = view.view_perspective == "CAMERA" and context.scene.camera == camera_of(
             context.scene

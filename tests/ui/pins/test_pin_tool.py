@@ -90,6 +90,16 @@ def test_a_pin_that_was_met_leaves_the_status_bar_as_it_is(rig, monkeypatch):
     assert (tool.status, tool.reported) == ([], [])
 
 
+def test_a_drag_in_a_scene_without_the_person_is_refused_with_the_reason(rig, monkeypatch):
+    tool = Tool(rig)
+    bpy.context.window.scene = bpy.data.scenes.new("other")
+    tool.drop(monkeypatch, Vector((0.0, 0.0, 1.0)))
+    ((kind, text),) = tool.reported
+    assert kind == {"ERROR"}
+    assert text.startswith("'walk' is not in the scene's view layer: ")
+    assert listed_corrections(rig) == []
+
+
 def test_a_late_press_was_where_the_mouse_had_moved_before():
     pointer = Pointer()
     events = (
