@@ -111,11 +111,19 @@ class LiveJob:
         self._last_pose_s = self._notice_s = self._stopped_s = self._result_s = time.monotonic()
         # whether the last step, or one before, created the body
         self.created = self._was_created = False
-        python = python or python_command()
         self._cache = cache()
-        self._worker = LiveProcess(
-            self._request, self._cache.new_job_folder(), self._cache.kernels, python, START_SCRIPT
-        )
+        try:
+            self._worker = LiveProcess(
+                self._request,
+                self._cache.new_job_folder(),
+                self._cache.kernels,
+                python or python_command(),
+                START_SCRIPT,
+            )
+        except BaseException:
+            if self._rig is not None:  # which is ready to follow
+                self._rig.restore()
+            raise
 
     @property
     def worker(self) -> LiveProcess:

@@ -401,6 +401,23 @@ def test_cancelling_leaves_the_scene_as_it_was(live, recording):
     assert not job.worker.job_folder.exists()
 
 
+def test_a_process_that_cannot_be_started_leaves_the_rig_as_it_was(live, monkeypatch):
+    rig, _ = build_rig("mixamo")
+    rig.data.pose_position = "REST"
+    bpy.context.scene.scope_live.with_rig = True
+    bpy.context.scene.scope_retarget.rig = rig
+    live("receive()").cancel()
+    assert rig.data.pose_position == "REST"
+
+    def fail(*_):
+        raise OSError("no more processes")
+
+    monkeypatch.setattr(live_job, "LiveProcess", fail)
+    with pytest.raises(OSError, match="no more processes"):
+        LiveJob(bpy.context.scene, [sys.executable])
+    assert rig.data.pose_position == "REST"
+
+
 def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
     rig, _ = build_rig("mixamo")
     scene = bpy.context.scene
