@@ -234,14 +234,17 @@ class SCOPE_OT_mark_asset(ActionOperator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask for the details; suggest those of the action if it is an asset."""
+        from ..scene.action_asset import catalogs
+
         armature = animated_armature(context)
         assert armature is not None  # checked by poll
         data = armature.animation_data.action.asset_data
+        self.description_text = self.catalog = ""  # not those of the last action
         if data is not None:
             self.author = data.author
             self.description_text = data.description
-        else:
-            self.description_text = self.catalog = ""
+            paths = {uid: path for path, uid in catalogs().items()}
+            self.catalog = paths.get(data.catalog_id, "")
         outcome: set[str] = context.window_manager.invoke_props_dialog(self)
         return outcome
 

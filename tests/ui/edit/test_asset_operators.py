@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Marking captured motion as an asset: picture, metadata, catalog."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.ui.action_operators import SCOPE_OT_mark_asset
 
 from ...edit.walking import motion_of, walk
 from ...scene.made_rigs import build_rig, captured
@@ -84,3 +87,21 @@ def test_a_catalog_of_the_file_is_assigned_and_an_unknown_one_changes_nothing(ri
             bpy.ops.scope.mark_asset(catalog=unknown)
     bpy.ops.scope.mark_asset(catalog="Motions/Walks")
     assert rig.animation_data.action.asset_data.catalog_id == uid
+    other = captured(motion_of(walk(1.0, speed=0.5)))
+    assert suggested(other) == ""
+    assert suggested(rig) == "Motions/Walks"
+
+
+def suggested(rig):
+    """Return the catalog that the dialog suggests for an armature, after it was used for another
+    one.
+    """
+    bpy.context.view_layer.objects.active = rig
+    operator = SimpleNamespace(catalog="Motions/Runs")
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        view_layer=bpy.context.view_layer,
+        window_manager=SimpleNamespace(invoke_props_dialog=lambda _: {"RUNNING_MODAL"}),
+    )
+    assert SCOPE_OT_mark_asset.invoke(operator, context, None) == {"RUNNING_MODAL"}
+    return operator.catalog
