@@ -186,7 +186,17 @@ def _is_side(space: bpy.types.SpaceView3D) -> bool:
 
 
 def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
-    """Split a viewport, and show the capture from its side in the new one."""
+    """Split a viewport, and show the capture from its side in the new one; if nobody of it is left,
+    do nothing.
+    """
+    collection = context.scene.scope.result.collection
+    cameras = cameras_of(context.scene)
+    compared = [each for each in cameras if each == context.scene.camera]
+    camera = next(iter([*compared, *cameras]), None)
+    people = people_of(collection)
+    active = captured_armature(context)
+    if camera is None or not people:
+        return
     window = context.window
     screen = context.window.screen
     before = {each.as_pointer() for each in screen.areas}
@@ -201,14 +211,6 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     with _in(window, area):
         bpy.ops.screen.area_split(direction="VERTICAL", factor=factor)
     side = next(each for each in screen.areas if each.as_pointer() not in before)
-    collection = context.scene.scope.result.collection
-    cameras = cameras_of(context.scene)
-    compared = [each for each in cameras if each == context.scene.camera]
-    camera = next(iter([*compared, *cameras]), None)
-    people = people_of(collection)
-    active = captured_armature(context)
-    if camera is None or not people:
-        return
     _show_alone(context, side, collection)
     space = side.spaces.active
     space.show_region_ui = space.show_region_toolbar = False

@@ -87,6 +87,18 @@ def capture_with_camera(name):
     return collection, camera
 
 
+def test_a_capture_without_people_splits_no_viewport():
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    window = bpy.context.window_manager.windows[0]
+    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    scene = bpy.context.scene
+    scene.scope.capture, scene.camera = capture_with_camera("capture")
+    count = len(window.screen.areas)
+    with bpy.context.temp_override(window=window, area=area):
+        comparison.open_side_view(bpy.context, area)
+    assert len(window.screen.areas) == count
+
+
 def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(monkeypatch):
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     window = bpy.context.window_manager.windows[0]
