@@ -25,7 +25,7 @@ from distributed import Client, Future
 from ...solver.errors import ScopeError
 from ..errors import ClusterError, internal_error_message, system_error_message
 from ..footage import display_address, is_url
-from ..job.batch import ROOT, how_to_continue
+from ..job.batch import how_to_continue
 from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
 from ..output_paths import WITHOUT_SCENE
@@ -146,7 +146,7 @@ class DaskRunner:
         """Return what every worker is asked for before its first clip."""
         assert self._staging is not None
         return {
-            "program": program_version(ROOT),
+            "program": program_version(),
             "bpy": self._program is None
             and any(suffix not in WITHOUT_SCENE for suffix in task.settings.suffixes),
             "folder": self._folder,
@@ -218,7 +218,7 @@ class DaskRunner:
             final=display_address(self._out),
             windows=COUNT if divides else task.windows,
         )
-        arguments = (self._program, self._jobs, program_version(ROOT))
+        arguments = (self._program, self._jobs, program_version())
         self._submit(task, address, folder, worker_side.capture_on_worker, remote, *arguments)
         self._workers.records[address].running += 1
 

@@ -21,7 +21,6 @@ from ...solver.errors import InputError, ScopeError
 from ..errors import OutputError
 from ..footage import display_address, is_url
 from ..installed import CAPTURE, check_installed
-from ..job.batch import ROOT
 from ..job.clip_runner import ClipProcesses
 from ..job.clip_task import RATE, CaptureSettings, ClipTask, Entry, Extras, capture_clip, failure
 from ..job.request import program_version
@@ -50,7 +49,7 @@ def check_worker(wanted: dict[str, Any]) -> dict[str, Any]:
 
 
 def _problem(wanted: dict[str, Any]) -> str:
-    ours = program_version(ROOT)
+    ours = program_version()
     theirs = wanted["program"]
     if ours != theirs:
         return (
@@ -104,7 +103,7 @@ def capture_on_worker(
     :param version: the version of Scope, which a worker that was started again may not have any
         more.
     """
-    if program_version(ROOT) != version:
+    if program_version() != version:
         return {
             "status": REFUSED,
             "message": "it runs another version of Scope now; install the same version there",

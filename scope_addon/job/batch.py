@@ -42,7 +42,6 @@ from .request import program_version
 
 REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
-ROOT = Path(__file__).resolve().parents[2]
 # of the time that may be spent on writing the report, which grows with the number of clips
 _WRITING_SHARE = 0.1
 _QUICK_S = 0.1  # a report that is written faster is written after every clip
@@ -80,7 +79,7 @@ class Batch:
         self.settings = CaptureSettings(options, tuple(suffixes), extras, tuple(further_files))
         self._program = list(program)
         self._is_mirror = is_mirror
-        self._basis = self.settings.basis(program_version(ROOT))
+        self._basis = self.settings.basis(program_version())
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
 

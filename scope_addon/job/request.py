@@ -19,6 +19,7 @@ from ..content import add_content
 from ..errors import SetupError, UsageError
 from ..options import Place, option, options_at
 
+ROOT = Path(__file__).resolve().parents[2]  # of the installed program
 # the request to compile what a capture needs, without capturing anything
 WARM_UP = json.dumps({"warm_up": True})
 # What decides the result of a capture: folders, and how the names of the files end. The panel and
@@ -142,7 +143,7 @@ def _add_file(digest: hashlib._Hash, path: Path) -> None:
     add_content(digest, path, _MOST_BYTES)
 
 
-def code_version(root: Path) -> str:
+def code_version(root: Path = ROOT) -> str:
     """Hash the installed program: names, sizes and modification times of what decides the result of
     a capture.
     """
@@ -152,7 +153,7 @@ def code_version(root: Path) -> str:
 
 
 @cache
-def program_version(root: Path) -> str:
+def program_version(root: Path = ROOT) -> str:
     """Hash names and contents of what decides the result of a capture: equal on machines with the
     same program.
 

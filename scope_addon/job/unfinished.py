@@ -26,7 +26,6 @@ from .watched_footage import WatchedFootage
 FOLDER = "unfinished"
 _HASH = 32  # letters of a hash in a name
 _FOLDER_NAME = re.compile("[0-9a-f]{32}-[0-9a-f]{32}")
-ROOT = Path(__file__).resolve().parents[2]
 _ABANDONED_S = 7 * 24 * 3600.0
 _LARGEST = 2 << 30  # bytes of all captures
 
@@ -105,7 +104,7 @@ def _folder(root: Path, path: Path, footage: WatchedFootage) -> Path | None:
     """Return the folder of a capture of this footage with this program; None if the footage cannot
     be read.
     """
-    where = json.dumps([os.path.realpath(path), code_version(ROOT)])
+    where = json.dumps([os.path.realpath(path), code_version()])
     try:
         content = footage.content()
     except OSError:

@@ -23,8 +23,8 @@ from ..edit.corrections import Pin
 from ..machine_code.code_cache import compiled_kernels
 from ..untrusted.body_file import load_body
 from .preview import load_rasterizer
+from .request import ROOT
 
-ROOT = ASSETS.parent
 _GARBAGE = 10_000, 20, 20  # objects between two searches, and searches between two thorough ones
 _SECONDS = 0.3  # of the sample clip: a few frames, so that every stage has its work
 

@@ -253,7 +253,7 @@ def test_an_interrupt_ends_the_captures_on_the_workers(cluster, folder, monkeypa
 
 def test_workers_of_another_version_get_no_clips(cluster, folder, monkeypatch, capsys):
     (folder / "a.mp4").write_text("a")
-    monkeypatch.setattr("scope.scope_addon.cluster.runner.program_version", lambda root: "0" * 64)
+    monkeypatch.setattr("scope.scope_addon.cluster.runner.program_version", lambda: "0" * 64)
     assert run(cluster, folder) == (1, None)
     said = capsys.readouterr().err.splitlines()
     assert said[-1].startswith(

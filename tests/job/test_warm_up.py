@@ -20,9 +20,8 @@ CAPTURE = """
 import json, sys, tempfile, time
 from pathlib import Path
 from scope.scope_addon.cli import SAMPLE
-from scope.scope_addon.job.request import JobRequest
+from scope.scope_addon.job.request import ROOT, JobRequest
 from scope.scope_addon.job.worker import Reporter, run
-from scope.scope_addon.job.warm_up import ROOT
 from scope.scope_addon.machine_code.code_cache import compiled_kernels
 with tempfile.TemporaryDirectory() as folder:
     request = JobRequest(str(SAMPLE), quality="fast", end="0.5", threads=1)
