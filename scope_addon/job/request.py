@@ -212,10 +212,7 @@ class LiveRequest(LineRequest):
 
     def to_json(self) -> str:
         """Return the request as one line of JSON."""
-        values = {
-            name: str(v) if hasattr(v, "__fspath__") else v for name, v in self.values.items()
-        }
-        return json.dumps({"live": self.source, "online": self.online, **values})
+        return json.dumps({"live": self.source, "online": self.online, **self.values})
 
 
 class Commands:
