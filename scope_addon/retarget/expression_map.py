@@ -58,27 +58,24 @@ _OCULUS = {
     "ss": {name: 0.3 for name in _STRETCH},
 }
 _VRM = {
-    **{
-        "aa": _A,
-        "a": _A,
-        "ih": _OCULUS["i"],
-        "i": _OCULUS["i"],
-        "ou": _OCULUS["u"],
-        "u": _OCULUS["u"],
-    },
-    **{"ee": _OCULUS["e"], "e": _OCULUS["e"], "oh": _OCULUS["o"], "o": _OCULUS["o"]},
-    **{
-        "blink": _BOTH_BLINK,
-        "blinkleft": {"eyeBlinkLeft": 1.0},
-        "blinkright": {"eyeBlinkRight": 1.0},
-    },
-    **{
-        "happy": _SMILE,
-        "joy": _SMILE,
-        "angry": _BROWS_DOWN,
-        "sad": {"browInnerUp": 1.0},
-        "sorrow": {"browInnerUp": 1.0},
-    },
+    "aa": _A,
+    "a": _A,
+    "ih": _OCULUS["i"],
+    "i": _OCULUS["i"],
+    "ou": _OCULUS["u"],
+    "u": _OCULUS["u"],
+    "ee": _OCULUS["e"],
+    "e": _OCULUS["e"],
+    "oh": _OCULUS["o"],
+    "o": _OCULUS["o"],
+    "blink": _BOTH_BLINK,
+    "blinkleft": {"eyeBlinkLeft": 1.0},
+    "blinkright": {"eyeBlinkRight": 1.0},
+    "happy": _SMILE,
+    "joy": _SMILE,
+    "angry": _BROWS_DOWN,
+    "sad": {"browInnerUp": 1.0},
+    "sorrow": {"browInnerUp": 1.0},
     "surprised": {
         "eyeWideLeft": 0.5,
         "eyeWideRight": 0.5,
@@ -95,17 +92,13 @@ _VRM = {
 # VRoid Studio's names of the keys of VRM models, after the prefix.
 _VROID = {
     **{f"mth{vowel}": _VRM[vowel] for vowel in "aiueo"},
-    **{
-        "eyeclose": _BOTH_BLINK,
-        "eyecloseleft": {"eyeBlinkLeft": 1.0},
-        "eyecloseright": {"eyeBlinkRight": 1.0},
-    },
-    **{
-        "mthfun": _SMILE,
-        "brwangry": _BROWS_DOWN,
-        "brwsorrow": {"browInnerUp": 1.0},
-        "eyesurprised": _VRM["surprised"],
-    },
+    "eyeclose": _BOTH_BLINK,
+    "eyecloseleft": {"eyeBlinkLeft": 1.0},
+    "eyecloseright": {"eyeBlinkRight": 1.0},
+    "mthfun": _SMILE,
+    "brwangry": _BROWS_DOWN,
+    "brwsorrow": {"browInnerUp": 1.0},
+    "eyesurprised": _VRM["surprised"],
     "brwsurprised": {"browOuterUpLeft": 0.5, "browOuterUpRight": 0.5},
 }
 _ARKIT = {name.lower(): name for name in EXPRESSIONS}
