@@ -9,22 +9,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 VIDEO_SUFFIXES = (
-    *(
-        ".mp4",
-        ".mov",
-        ".m4v",
-        ".avi",
-        ".mkv",
-        ".webm",
-        ".mpg",
-        ".mpeg",
-        ".wmv",
-        ".mts",
-        ".m2ts",
-        ".ts",
-        ".3gp",
-        ".gif",
-    ),
+    ".mp4",
+    ".mov",
+    ".m4v",
+    ".avi",
+    ".mkv",
+    ".webm",
+    ".mpg",
+    ".mpeg",
+    ".wmv",
+    ".mts",
+    ".m2ts",
+    ".ts",
+    ".3gp",
+    ".gif",
 )
 PICTURE_SUFFIXES = (
     ".jpg",
