@@ -292,10 +292,10 @@ class PoseRefit:
                     or limb_of(name) == "trunk"
                     or name.endswith(("shoulder", "collar"))
                 )
-                weights[part] = min(
-                    weights[part], FREE if in_limb and limb_of(name) != "trunk" else STIFF
-                )
-                weights[part] = min(weights[part], GIRDLE if girdle else STIFF)
+                if in_limb and limb_of(name) != "trunk":
+                    weights[part] = FREE
+                elif girdle:
+                    weights[part] = min(weights[part], GIRDLE)
                 part = int(self.body.parents[part])
         return weights[1:]
 
