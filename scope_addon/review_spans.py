@@ -215,8 +215,8 @@ def _distance(
 
 def _held(motion: Motion, mask: NDArray[np.bool_], least_s: float) -> NDArray[np.bool_]:
     """Return the runs of a mask (T,) that last long enough."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    times = motion.timestamps
     held = np.zeros(len(mask), bool)
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
-        held[first:end] = motion.timestamps[end - 1] - motion.timestamps[first] >= least_s
+    for first, last in _spans(mask, times, 0.0):
+        held[first : last + 1] = times[last] - times[first] >= least_s
     return held
