@@ -127,7 +127,7 @@ def capture_on_worker(
                 rate_given = RATE in task.settings.options
                 with remote.store_errors(InputError, task.footage):
                     path = remote.download(task.footage, scratch, with_sequence=rate_given)
-                local = local._replace(footage=str(path))
+                local = local._replace(footage=str(path), address=display_address(task.footage))
         except ScopeError as error:
             return failure(task, str(error))
         if is_url(task.out):

@@ -121,6 +121,7 @@ class ClipTask(NamedTuple):
     :param previous: entry of the previous report, if its files still exist.
     :param final: folder to which the results are moved later, or its address as it may be shown;
         empty if they stay in ``out``.
+    :param address: of footage that was downloaded, as it may be shown; empty if it was not.
     :param windows: `COUNT`, or a range ``FIRST:END`` of windows that are to be observed; empty: the
         clip is captured.
     :param windows_folder: of a clip that is captured, with windows that were observed before.
@@ -136,6 +137,7 @@ class ClipTask(NamedTuple):
     settings: CaptureSettings
     previous: Entry | None = None
     final: str = ""
+    address: str = ""
     windows: str = ""
     windows_folder: str = ""
     key: str = ""
@@ -184,6 +186,8 @@ def capture_clip(
             shown = _arguments(
                 footage, f"{task.final.rstrip('/')}/{task.name}", task.settings, threads
             )
+            if task.address:
+                shown = [each.replace(task.footage, task.address) for each in shown]
             arguments += [
                 SHOWN_COMMAND,
                 shlex.join([*program, *(each for each in shown if each != STOP_WITH_STDIN)]),

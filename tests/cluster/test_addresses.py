@@ -100,7 +100,9 @@ def test_no_file_message_or_process_has_the_password_of_a_store(
     assert messages["withheld"].startswith("memory://bucket/clips/withheld.mp4 cannot be used")
     assert any("lost.mp4 is captured again" in each["event"] for each in report["log"])
     command = json.loads((tmp_path / "fine.json").read_text("utf-8"))
-    assert "-o memory://bucket/out/fine.npz" in command[-1]  # what a page shows
+    shown = command[-1]  # on a page, instead of the folder of a download
+    assert " capture memory://bucket/clips/fine.mp4 " in shown
+    assert "-o memory://bucket/out/fine.npz" in shown
     said = capsys.readouterr()
     assert "SECRET" not in "".join([text, *command, said.out, said.err])
 
