@@ -14,7 +14,7 @@ from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.camera import set_resolution
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.character.root_object import root_object
-from scope.scope_addon.scene.match_rate import retimed_spans
+from scope.scope_addon.scene.match_rate import change_rate, retimed_spans
 from scope.scope_addon.scene.stored_values import parse_spans, spans_text
 from scope.scope_addon.scene.timing import keyed_rate
 from scope.scope_addon.ui.captured_person import captured_armature
@@ -152,8 +152,7 @@ def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, val
     assert "smooth the motion" in tried(bpy.ops.scope.root_motion, mode="BONES")
     bpy.ops.scope.match_frame_rate()  # which has nothing to move there
     bpy.ops.scope.smooth(strength=1.0)
-    bpy.context.scene.render.fps = 30
-    bpy.ops.scope.smooth(strength=1.0)
+    change_rate(bpy.context.scene, 30.0, {rig: None}, [])
     np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [5, 20]), before, atol=1e-4)
 
 
