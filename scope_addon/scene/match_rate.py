@@ -82,13 +82,6 @@ def change_rate(
     return warnings
 
 
-def retimed_spans(
-    spans: Iterable[FrameSpan], person: bpy.types.Object, rate: float, former: float
-) -> list[FrameSpan]:
-    """Move the frames of a result's spans."""
-    return retimed(spans, Retiming(start_frame(person), rate / former))
-
-
 def retimed(spans: Iterable[FrameSpan], retiming: Retiming) -> list[FrameSpan]:
     """Move spans in time."""
     return [

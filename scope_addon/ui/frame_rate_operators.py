@@ -10,7 +10,7 @@ import bpy
 from ...solver.errors import ScopeError
 from ..notices import Notice, notice
 from ..scene.datablocks import holds
-from ..scene.stored_values import parse_spans, spans_text, stored_rate
+from ..scene.stored_values import parse_spans, spans_text, start_frame, stored_rate
 from .captured_person import PERSON, body_of, captured_people, library_of, motion_of
 from .captures import people_of, shown_capture
 from .reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning, tip_
@@ -157,21 +157,22 @@ def _update_results(
     warnings: list[Notice],
 ) -> None:
     """Move the frames that results name, and replace the warnings about the frame rate"""
-    from ..scene.match_rate import retimed_spans
+    from ..scene.match_rate import retimed
+    from ..scene.timing import Retiming
 
     for collection in scene.collection.children_recursive:
         result = collection.scope_result
         person = next((p for p in keyed if holds(collection, p)), None)
         if person is None:
             continue
+        retiming = Retiming(start_frame(person), rate / keyed[person])
         shown = result.warnings
         for index in reversed(range(len(shown))):
             if stored_warning(shown[index]).code in _OF_RATE:
                 shown.remove(index)
             elif shown[index].spans:
                 spans = parse_spans(shown[index].spans)
-                moved = retimed_spans(spans, person, rate, keyed[person])
-                shown[index].spans = spans_text(moved)
+                shown[index].spans = spans_text(retimed(spans, retiming))
         if not person.get("scope_resampled"):  # which has keys on every frame
             what = "footage" if result.footage else "motion"
             for warning in rate_warnings(rate, result.footage_rate, what):

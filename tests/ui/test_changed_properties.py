@@ -14,9 +14,9 @@ from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.camera import set_resolution
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.character.root_object import root_object
-from scope.scope_addon.scene.match_rate import change_rate, retimed_spans
+from scope.scope_addon.scene.match_rate import change_rate, retimed
 from scope.scope_addon.scene.stored_values import parse_spans, spans_text
-from scope.scope_addon.scene.timing import keyed_rate
+from scope.scope_addon.scene.timing import Retiming, keyed_rate
 from scope.scope_addon.ui.captured_person import captured_armature
 from scope.scope_addon.ui.frame_rate_operators import keyed_for
 
@@ -210,8 +210,8 @@ def test_a_changed_person_of_a_rig_is_none(rig, tmp_path, value):
     assert tried(bpy.ops.scope.match_frame_rate) == ""
 
 
-def test_changed_spans_have_no_button(rig):
+def test_changed_spans_have_no_button():
     texts = ("", "a", "-", "12-", "1-2-3", "9" * 20, "٣", "12-18", "-3--1")
     assert parse_spans(",".join(texts)) == [(12, 18), (-3, -1)]
-    moved = retimed_spans(parse_spans(f"a,{'9' * 500},1-11"), rig, 60.0, 30.0)
+    moved = retimed(parse_spans(f"a,{'9' * 500},1-11"), Retiming(1.0, 2.0))
     assert spans_text(moved) == "1-21"
