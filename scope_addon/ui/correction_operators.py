@@ -426,8 +426,11 @@ class SCOPE_OT_this_rests(CorrectSpanOperator):
         )
 
 
-class ExchangeOperator(CorrectSpanOperator):
-    """An exchange of left and right limbs. Not registered."""
+class SCOPE_OT_exchange_sides(CorrectSpanOperator):
+    """Exchange left and right from the first to the last frame; applying it again undoes it"""
+
+    bl_idname = "scope.exchange_sides"
+    bl_label = "Exchange Left and Right"
 
     limbs: EnumProperty(
         name="Limbs",
@@ -445,13 +448,6 @@ class ExchangeOperator(CorrectSpanOperator):
         from ..edit.corrections import Exchange
 
         return Exchange(first, last, self.limbs)
-
-
-class SCOPE_OT_exchange_sides(ExchangeOperator):
-    """Exchange left and right from the first to the last frame; applying it again undoes it"""
-
-    bl_idname = "scope.exchange_sides"
-    bl_label = "Exchange Left and Right"
 
 
 class SCOPE_OT_flip_limb(CorrectSpanOperator):
