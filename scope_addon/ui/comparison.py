@@ -18,7 +18,7 @@ side, in every frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import bpy
@@ -121,18 +121,18 @@ def end_others(scene: bpy.types.Scene, shown: bpy.types.Collection) -> None:
     """End every comparison of a capture other than the shown one: its footage would be behind the
     wrong body.
     """
-    for window, area in viewports():
-        if _compares_another(scene, area.spaces.active, shown):
-            end(window, area)
-            if side := side_area(window.screen):
-                _close_later(side)
+    _end_where(lambda space: _compares_another(scene, space, shown))
 
 
 def end_of(shown: bpy.types.Collection) -> None:
     """End every comparison of a capture."""
+    _end_where(lambda space: bool(space.local_view and space.camera and holds(shown, space.camera)))
+
+
+def _end_where(compares: Callable[[bpy.types.SpaceView3D], bool]) -> None:
+    """End the comparisons of some viewports, with the side views beside them."""
     for window, area in viewports():
-        space = area.spaces.active
-        if space.local_view and space.camera is not None and holds(shown, space.camera):
+        if compares(area.spaces.active):
             end(window, area)
             if side := side_area(window.screen):
                 _close_later(side)
