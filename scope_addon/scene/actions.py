@@ -44,6 +44,26 @@ def has_slots() -> bool:
     return "slots" in bpy.types.Action.bl_rna.properties
 
 
+def used_slot(animation: bpy.types.AnimData | None) -> str:
+    """Return the identifier of the slot by which a datablock uses its action; empty if there is
+    none.
+    """
+    slot = getattr(animation, "action_slot", None)
+    return slot.identifier if slot else ""
+
+
+def assign_action(
+    animation: bpy.types.AnimData, action: bpy.types.Action | None, slot: str
+) -> None:
+    """Let an action animate a datablock, by its slot of an identifier that ``used_slot`` has
+    returned; without one, by the slot that Blender chooses.
+    """
+    if animation.action != action:
+        animation.action = action
+    if action is not None and slot:
+        animation.action_slot = next(each for each in action.slots if each.identifier == slot)
+
+
 class Channels:
     """The F-curves of one datablock in one action."""
 
@@ -394,7 +414,7 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
     }
     shaped = [keys for keys in blocks if nla_strips(keys)]
     animations = [datablock.animation_data for datablock in (*blended, *shaped)]
-    kept = [(a, a.action, getattr(a, "action_slot", None), a.action_blend_type) for a in animations]
+    kept = [(a, a.action, used_slot(a), a.action_blend_type) for a in animations]
     baked: list[bpy.types.Action] = []
     try:
         frames = range(scene.frame_start, scene.frame_end + 1)
@@ -410,9 +430,7 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
     finally:
         for animation, action, slot, blend_type in kept:
             animation.use_nla = True
-            animation.action = action
-            if slot is not None:
-                animation.action_slot = slot
+            assign_action(animation, action, slot)
             animation.action_blend_type = blend_type
         bpy.data.batch_remove([action for action in baked if action is not None])
 

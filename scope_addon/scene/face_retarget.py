@@ -23,7 +23,16 @@ from ..retarget.face_controls import (
     has_face_controls,
 )
 from ..retarget.skeleton import BoneMotion
-from .actions import Channels, bone_path, check_not_in_nla, fcurves, read_keys, shape_key_path
+from .actions import (
+    Channels,
+    assign_action,
+    bone_path,
+    check_not_in_nla,
+    fcurves,
+    read_keys,
+    shape_key_path,
+    used_slot,
+)
 from .character.expression_keys import MOVES, has_expression_keys
 from .rig_action import channel_of_rotation, leave_tweak_mode, mark_written, override_nla, retire
 from .transaction import all_or_nothing
@@ -203,13 +212,7 @@ def retarget_face_bones(
         if former is None:
             Channels(rig, bpy.data.actions.new(rig.name))
         else:
-            slot = getattr(rig.animation_data, "action_slot", None)
-            rig.animation_data.action = former.copy()
-            if slot is not None:
-                same = (
-                    s for s in rig.animation_data.action.slots if s.identifier == slot.identifier
-                )
-                rig.animation_data.action_slot = next(same)
+            assign_action(rig.animation_data, former.copy(), used_slot(rig.animation_data))
         action = key_face(rig, keys, name)
         rig.data.pose_position = "POSE"
         override_nla(rig.animation_data)

@@ -24,6 +24,7 @@ from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import RestPose
 from ..retarget.skeleton import Skeleton
+from .actions import assign_action, used_slot
 from .character.root_object import root_object, topmost
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
@@ -293,7 +294,7 @@ class _RigState:
         self._position = rig.data.pose_position
         self._animation = rig.animation_data
         self._action = self._animation.action if self._animation else None
-        self._slot = getattr(self._animation, "action_slot", None)
+        self._slot = used_slot(self._animation)
         self._nla = self._animation.use_nla if self._animation else False
         self._bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
         self._top = topmost(rig)
@@ -330,9 +331,7 @@ class _RigState:
         if self._animation:
             self._animation.use_nla = self._nla
             if self._action is not None:
-                self._animation.action = self._action
-                if self._slot is not None:
-                    self._animation.action_slot = self._slot
+                assign_action(self._animation, self._action, self._slot)
 
 
 def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:

@@ -17,7 +17,15 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .actions import has_slots, read_modifiers, read_whole_keys, write_modifiers, write_whole_keys
+from .actions import (
+    assign_action,
+    has_slots,
+    read_modifiers,
+    read_whole_keys,
+    used_slot,
+    write_modifiers,
+    write_whole_keys,
+)
 from .datablocks import NewDatablocks, enter_object_mode
 
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
@@ -141,8 +149,7 @@ class _SavedAnimation:
         data = obj.animation_data
         self._had_data = data is not None
         self._action: bpy.types.Action | None = data.action if data else None
-        slot = getattr(data, "action_slot", None)
-        self._slot = slot.identifier if slot else None
+        self._slot = used_slot(data)
         self._fake_user = self._action.use_fake_user if self._action else False
         self._copy = self._action.copy() if self._action else None
 
@@ -159,10 +166,7 @@ class _SavedAnimation:
             return
         restore_content(action, copy)
         bpy.data.actions.remove(copy)
-        if data.action != action:
-            data.action = action
-        if self._slot is not None:
-            data.action_slot = next(slot for slot in action.slots if slot.identifier == self._slot)
+        assign_action(data, action, self._slot)
         action.use_fake_user = self._fake_user
 
     def discard_copy(self) -> None:
