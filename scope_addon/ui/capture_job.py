@@ -31,7 +31,6 @@ from ..options.body_choice import chosen_body
 from ..options.capture import AUTO
 from ..review_spans import Span, find_review_spans
 from ..scene.build import BuildOptions, BuildResult, build_scene
-from ..scene.camera import pixel_aspect
 from ..scene.datablocks import captures_of, check_local, found, holds
 from ..scene.packed_motion import pack_motion
 from ..scene.stored_values import FrameSpan, in_scene
@@ -397,7 +396,6 @@ def show_result(
     shown.footage = footage
     shown.people = len(result.people)
     shown.frames = max(len(p.motion) for p in result.people)
-    shown.valid_frames = int(sum(p.motion.valid.sum() for p in result.people))
     residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
     sigmas = np.concatenate(
@@ -414,7 +412,6 @@ def show_result(
     shown.camera = str(report.camera)
     shown.execution = str(report.execution)
     shown.resolution = [int(n) for n in first.image_size]
-    shown.pixel_aspect = pixel_aspect(first)
     shown.warnings.clear()
     for warning in report.warnings:
         # The frames of the first are among the spans; the panel itself says the second.

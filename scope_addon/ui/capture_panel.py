@@ -19,7 +19,6 @@ from bpy.props import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,
-    FloatVectorProperty,
     IntProperty,
     IntVectorProperty,
     PointerProperty,
@@ -474,7 +473,6 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     footage: StringProperty(subtype="FILE_PATH")
     people: IntProperty()
     frames: IntProperty()
-    valid_frames: IntProperty()
     reprojection_px: FloatProperty()
     # standard deviation of the joints' positions, median; 0 where it is not known
     sigma_cm: FloatProperty()
@@ -484,7 +482,6 @@ class SCOPE_PG_result(bpy.types.PropertyGroup):
     camera: StringProperty()
     execution: StringProperty()
     resolution: IntVectorProperty(size=2)
-    pixel_aspect: FloatVectorProperty(size=2)
     warnings: CollectionProperty(type=SCOPE_PG_warning)
 
     @property

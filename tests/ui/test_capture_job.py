@@ -16,6 +16,7 @@ from scope.scope_addon.job.job_progress import JobProgress
 from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
+from scope.scope_addon.scene.camera import pixel_aspect
 from scope.scope_addon.scene.packed_motion import stored_motion
 from scope.scope_addon.ui import capture_job
 from scope.scope_addon.ui.capture_job import CaptureJob, capture_request
@@ -53,7 +54,7 @@ def test_a_result_is_built_shown_and_cached(fake_worker, footage):
     scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
     result = scene.scope.result
-    assert (result.people, result.frames, result.valid_frames) == (1, 10, 7)
+    assert (result.people, result.frames) == (1, 10)
     assert result.reprojection_px == pytest.approx(2.0)
     shown = [(w.text, w.spans) for w in result.warnings]
     assert shown == [("A warning", ""), ("Not visible: the pose is filled in", "4-5,8")]
@@ -468,7 +469,7 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, 
     found = stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o))
     assert np.allclose(found.intrinsics, K)
     assert np.allclose(found.dist, dist)
-    assert scene.scope.result.pixel_aspect[:] == pytest.approx((720 / 700, 1.0))
+    assert pixel_aspect(found) == pytest.approx((720 / 700, 1.0))
     camera = next(o for o in captures()[0].objects if o.type == "CAMERA")
     assert camera.data.background_images[0].clip_user.use_render_undistorted
     fake_worker("send('error', message='asked again')")
