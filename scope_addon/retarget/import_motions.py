@@ -86,7 +86,15 @@ def import_motions(
         else "scope"
     )
     loaded = load_body(built_in if body == "scope" else body)
-    return [convert(source, loaded, path, up, rate) for source in sources]
+    if up == "auto" and len(sources) > 1:  # somebody who lies has the same up axis as the others
+        axis, is_sure = _up_axis(
+            np.concatenate([_for_body(source, loaded)[0] for source in sources]),
+            loaded,
+            sources[0].usual_up,
+        )
+        up = axis if is_sure else up
+    begin = min(int(source.frames[0]) for source in sources)
+    return [convert(source, loaded, path, up, rate, begin) for source in sources]
 
 
 def _own(motion: Motion, body: Body, path: Path) -> Imported:
@@ -148,11 +156,17 @@ def _from_bvh(path: Path, body: str, up: str) -> list[Imported]:
 
 
 def convert(
-    source: SmplMotion, body: Body, path: Path, up: str = "auto", rate: float = 0.0
+    source: SmplMotion,
+    body: Body,
+    path: Path,
+    up: str = "auto",
+    rate: float = 0.0,
+    begin: int | None = None,
 ) -> Imported:
     """Convert an SMPL-style motion to a motion of a body.
 
     :param path: names the motion.
+    :param begin: number of the footage's frame that is at 0 s; None: the person's first one.
     """
     exact = source.body_model == body.name or _shape_space(body.name) in map(
         _shape_space, source.models
@@ -192,13 +206,13 @@ def convert(
     J0 = body.rest_joints(betas)[0]
     poses[:, 0] = log(R @ exp(poses[:, 0]))
     root = (J0 + trans) @ R.T
-    times = np.arange(len(poses)) / frames_per_second
-    contact, floor = _standing(body, betas, poses, root, times)
+    frames = source.frames - (source.frames[0] if begin is None else begin)
+    contact, floor = _standing(body, betas, poses, root, frames / frames_per_second)
     if not exact or axis != "z":
         root[:, 2] -= floor
     if axis != "z":
         notes.append(notice("other_up", axis=_AXIS_TEXT[axis]))
-    motion = _motion(body, betas, poses, root - J0, contact, frames_per_second)
+    motion = _motion(body, betas, poses, root - J0, contact, frames_per_second, frames)
     motion.gender = source.gender
     motion.source = path.name
     return Imported(motion, body, notes)
@@ -263,11 +277,15 @@ def _motion(
     trans: NDArray[np.float64],
     contact: NDArray[np.float64],
     rate: float,
+    frames: NDArray[np.int64] | None = None,
 ) -> Motion:
     """Fill a motion. It was not seen by a camera: there are no keypoints, and the image has no
     size.
+
+    :param frames: (T,) their numbers; None: from 0 on.
     """
     count = len(poses)
+    frames = np.arange(count) if frames is None else frames
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = R_WORLD_LEVELCAMERA
     world_from_camera[1, 3] = trans[:, 1].min() - _CAMERA_DISTANCE_M
@@ -287,8 +305,8 @@ def _motion(
         body_model=body.name,
         gender=body.gender,
         mocap_framerate=rate,
-        frames=np.arange(count),
-        timestamps=np.arange(count) / rate,
+        frames=frames,
+        timestamps=frames / rate,
         valid=np.ones(count, bool),
         joints_cam=by_blocks(joints, poses, trans)[0],
         keypoints2d=np.zeros((count, 0, 3)),

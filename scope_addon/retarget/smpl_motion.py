@@ -28,6 +28,7 @@ from ..untrusted.tables import read_tables
 
 MAX_PEOPLE = 100  # of one file
 _LISTED = 8  # names of a table's content in a message
+MAX_FRAME = 10_000_000  # of the footage
 MAX_FRAMES = 500_000  # more than two hours at 60 frames per second
 _MAX_BETAS = 400
 # Frames per second.
@@ -58,6 +59,7 @@ _RIGHT_HAND = ("right_hand_pose",)
 _TRANS = ("trans_world", "trans", "transl", "smpl_trans", "translation", "pred_trans")
 _BETAS = ("betas", "beta", "smpl_betas", "shape", "pred_shape")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "frame_rate", "framerate", "fps")
+_FRAMES = ("frame_ids", "frame_id", "frames", "frame")
 _SCALE = ("smpl_scaling",)  # AIST++: by which smpl_trans is to be divided
 _GENDER = "gender"
 _MODEL = "body_model"
@@ -71,6 +73,7 @@ _READ = {
     *_TRANS,
     *_BETAS,
     *_RATES,
+    *_FRAMES,
     *_SCALE,
 }
 _READ |= {_GENDER, _MODEL}
@@ -97,6 +100,8 @@ class SmplMotion:
     body_model: str  # as our own files name it; empty in those of other tools
     usual_up: str  # the axis that points up in files with these names: "z", "y" or "camera"
     models: tuple[str, ...]  # the published bodies of which the file may be, as ours are named
+    # (T,) their numbers in the footage, increasing; from 0 on if the file does not say
+    frames: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -210,7 +215,22 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         body_model=_text(arrays.get(_MODEL)),
         usual_up=usual_up,
         models=_models(arrays, len(names)),
+        frames=_frames(arrays, count),
     )
+
+
+def _frames(arrays: Mapping[str, NDArray[Any]], count: int) -> NDArray[np.int64]:
+    """Return the (T,) numbers that trackers give to the frames in which they have seen a person;
+    from 0 on where there are none, or what has such a name is something else.
+    """
+    key = _first(arrays, _FRAMES)
+    numbers = None if key is None else np.squeeze(arrays[key])
+    if numbers is None or numbers.shape != (count,) or numbers.dtype.kind not in "iuf":
+        return np.arange(count)
+    is_number = np.isfinite(numbers) & (numbers >= 0) & (numbers <= MAX_FRAME)
+    if not is_number.all() or (numbers != np.round(numbers)).any() or (np.diff(numbers) <= 0).any():
+        return np.arange(count)
+    return numbers.astype(np.int64)
 
 
 def _models(arrays: Mapping[str, NDArray[Any]], joint_count: int) -> tuple[str, ...]:

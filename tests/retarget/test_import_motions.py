@@ -3,6 +3,7 @@
 floor, z up.
 """
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -162,6 +163,42 @@ def test_an_unclear_up_axis_is_said(tmp_path):
     told = import_motion(tmp_path / "lying.npz", up="z").notes
     assert any("up axis is not clear" in note for note in map(str, unsure))
     assert not any("not clear" in note for note in map(str, told))
+
+
+def test_somebody_who_lies_has_the_up_axis_of_the_others(tmp_path):
+    """The walk in camera axes, and the same clip of somebody whose trunk points away from it."""
+    arrays = in_file("camera")
+    lying = arrays | {"poses": arrays["poses"].copy()}
+    pelvis = lying["poses"][:, :3].astype(float)
+    lying["poses"][:, :3] = log(exp(np.array([np.pi / 2, 0.0, 0.0])) @ exp(pelvis))
+    people = {"0": arrays | {"mocap_framerate": RATE}, "1": lying | {"mocap_framerate": RATE}}
+    with (tmp_path / "people.pkl").open("wb") as file:
+        pickle.dump(people, file)
+    first, second = import_motions(tmp_path / "people.pkl")
+    trunk = [BODY.joint_names.index(name) for name in ("pelvis", "neck")]
+    for imported, rise in ((first, 0.9), (second, 0.0)):
+        along = np.diff(joints(imported.motion)[:, trunk], axis=1)[:, 0]
+        up = (along / np.linalg.norm(along, axis=1, keepdims=True))[:, 2].mean()
+        assert up == pytest.approx(rise, abs=0.15)
+
+
+def test_people_whom_a_tracker_saw_at_other_times_begin_then(tmp_path):
+    arrays = in_file("z")
+    count = len(arrays["poses"])
+    late = np.arange(count) + 100
+    late[count // 2 :] += 7  # somebody stood before them
+    people = {
+        "0": arrays | {"frame_ids": np.arange(count) + 40},
+        "1": arrays | {"frame_ids": late},
+        "2": arrays | {"frame_ids": np.zeros(count, int)},  # are no numbers of frames
+    }
+    with (tmp_path / "people.pkl").open("wb") as file:
+        pickle.dump(people, file)
+    first, second, _ = (each.motion for each in import_motions(tmp_path / "people.pkl"))
+    # The third one's begin at 0, as its file says nothing of them.
+    np.testing.assert_array_equal(first.frames, np.arange(count) + 40)
+    np.testing.assert_array_equal(second.frames, late)
+    np.testing.assert_allclose(second.timestamps, late / RATE)
 
 
 @pytest.mark.parametrize("arguments", [{"up": "x"}, {"rate": -1.0}, {"rate": np.nan}])
