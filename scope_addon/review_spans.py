@@ -27,6 +27,8 @@ from .motion import Motion
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 FAR_SHARE = 0.03
 LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
+# A longer step between two frames is a scene cut: a capture adds as much to the times there.
+CUT_S = 10.0
 SWING_S = 0.2  # within which a limb swings
 # Along the line of sight, relative to the shoulder or hip. In 23 real clips where no limb swings,
 # hands and feet move by 0.43 m at most.
@@ -214,8 +216,9 @@ def _distance(
 
 
 def _held(motion: Motion, mask: NDArray[np.bool_], least_s: float) -> NDArray[np.bool_]:
-    """Return the runs of a mask (T,) that last long enough."""
-    times = motion.timestamps
+    """Return the runs of a mask (T,) that last long enough, without the gap at a scene cut."""
+    steps_s = np.diff(motion.timestamps, prepend=motion.timestamps[0])
+    times = np.cumsum(np.where(steps_s < CUT_S, steps_s, 0.0))
     held = np.zeros(len(mask), bool)
     for first, last in _spans(mask, times, 0.0):
         held[first : last + 1] = times[last] - times[first] >= least_s

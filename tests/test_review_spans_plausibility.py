@@ -82,6 +82,12 @@ def test_a_lean_that_is_held_is_found_and_a_short_one_is_a_step() -> None:
     assert not implausible(leaning(8.0, slice(30, 150)))["lean"].any()
 
 
+def test_the_gap_at_a_scene_cut_is_no_time() -> None:
+    short = leaning(35.0, slice(70, 100))
+    short.timestamps[85:] += 10.0
+    assert not implausible(short)["lean"].any()
+
+
 def test_a_person_who_floats_is_found_but_not_one_who_jumps() -> None:
     def lifted(rows: slice) -> Motion:
         height = np.zeros((len(WALK), 3))

@@ -11,6 +11,7 @@ from scope.scope_addon.capture.world.travel_scale import (
     FLOOR,
     NOTHING,
     _fitted_plane,
+    belt_travel,
     contradicting_strides,
     find_floor,
     scaled_travel,
@@ -146,6 +147,15 @@ def test_on_a_treadmill_the_floor_alone_tells_it():
     found = scaled_travel(follower(), UP, odometry, treadmill=True)
     assert found.source == FLOOR
     assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+
+
+def test_a_belt_does_not_run_in_the_gap_at_a_scene_cut():
+    """A capture adds ten seconds to the times there."""
+    person = placed(walk(), np.tile([0.0, 0.6, 4.0], (T, 1)))
+    person.times = TIMES + np.where(np.arange(T) < 60, 0.0, 10.0)
+    travel = belt_travel(person, UP, 3.0)
+    assert np.linalg.norm(travel[-1]) == pytest.approx(3.0 * TIMES[-1], abs=0.2)
+    assert np.linalg.norm(np.diff(travel, axis=0), axis=1).max() < 0.11
 
 
 def test_the_floor_of_a_long_path_takes_little_memory():
