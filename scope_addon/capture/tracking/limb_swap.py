@@ -45,7 +45,8 @@ VELOCITY_S = 0.2  # τ
 MAX_STEP_S = 0.15
 LIMIT = 6.0  # of one joint's residual
 CHANGE_COST = 3.0
-SWAP_COST = 0.3
+SWAP_COST = 0.3  # of a frame; above this rate, of 1 / 60 s
+FASTEST_HZ = 60.0
 M_PER_CONFIDENCE = 0.6  # an occluded joint stays occluded
 REFERENCE_SIGMA_M = 0.1  # σ_j
 _PARTNER = np.array([1, 0, 3, 2])  # of the joints below
@@ -109,7 +110,9 @@ def find_limb_swaps(track: Track, limbs: _Limbs) -> BoolArray:
         return where
     features, reference = _features(track, limbs)
     f = np.stack([features, features[:, _PARTNER]])[:, rows]  # (2, N, 4, n): as detected, swapped
-    label_cost = np.array([0.0, SWAP_COST]) + _reference_cost(f, reference[rows])
+    step_s = float(np.median(np.diff(track.times)))
+    swap_cost = SWAP_COST * min(1.0, FASTEST_HZ * step_s)
+    label_cost = np.array([0.0, swap_cost]) + _reference_cost(f, reference[rows])
     cost = _continuity_cost(f, track.times[rows], track.acquired[rows])
     where[rows] = _cheapest(cost, label_cost)
     return where

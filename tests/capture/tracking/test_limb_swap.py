@@ -64,6 +64,13 @@ def test_an_interval_is_repaired(which: str, name: str, has_depth: bool) -> None
             ).sum() <= 2
 
 
+def test_an_interval_of_slow_motion_is_repaired() -> None:
+    right = walker(0.0, rate=240.0, count=480)
+    repaired = repair_limb_swaps(swapped(right, LEGS.all_points, slice(200, 300)))
+    off = np.linalg.norm(repaired.keypoints_px - right.keypoints_px, axis=-1).max(axis=1)
+    assert (off > 12.0).sum() <= 6
+
+
 @pytest.mark.parametrize("rate", [60.0, 15.0, 5.0])
 @pytest.mark.parametrize("heading", HEADINGS.values(), ids=HEADINGS)
 def test_walking_is_left_alone(heading: float, rate: float) -> None:
