@@ -50,6 +50,10 @@ _JOINTS = {
 _KEYPOINTS = {"BigToe": "foot_index", "Heel": "heel", "Eye": "eye", "Ear": "ear"}
 _SIDES = {"R": "right", "L": "left"}
 _SIDE_OF = {"r": "right", "l": "left"}
+# The distance from a frame, in parts of the usual one between two, up to which a moment is that
+# frame's; and the time between two frames after which frames are missing there.
+_ON_FRAME = 0.01
+_GAP_S = 0.25
 _PALM_AT_THIGH_DEG = 90.0  # of pronation, of which a palm that faces forward has none
 
 
@@ -98,6 +102,19 @@ def at_one_rate(
     times_s = start_s + np.arange(count) / rate
     rows = np.array([np.interp(times_s, motion.timestamps, column) for column in columns]).T
     return times_s, rows
+
+
+def _in_gap(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return (S,) whether frames are missing at times: those around are far apart."""
+    own_s = motion.timestamps
+    if len(own_s) < 2:
+        return np.zeros(len(times_s), bool)
+    usual_s = max(float(np.median(np.diff(own_s))), 1.0 / motion.mocap_framerate)
+    after = np.clip(np.searchsorted(own_s, times_s), 1, len(own_s) - 1)
+    before_s = times_s - own_s[after - 1]
+    after_s = own_s[after] - times_s
+    between: NDArray[np.bool_] = np.minimum(before_s, after_s) > _ON_FRAME * usual_s
+    return between & (before_s + after_s > max(_GAP_S, 1.5 * usual_s))
 
 
 def write_trc(path: Path, motion: Motion, body: Body) -> None:
@@ -149,7 +166,8 @@ def write_c3d(path: Path, motion: Motion, body: Body, start_s: float) -> None:
     times_s, rows = at_one_rate(motion, [*columns, motion.valid.astype(float)])
     places, residuals, is_seen = np.split(rows, [3 * len(names), rows.shape[1] - 1], axis=1)
     # A moment between a frame with the person and one without has none.
-    residuals_mm = np.where(is_seen > 1.0 - 1e-6, 1000.0 * residuals, -1.0)
+    is_known = (is_seen > 1.0 - 1e-6) & ~_in_gap(motion, times_s)[:, None]
+    residuals_mm = np.where(is_known, 1000.0 * residuals, -1.0)
     parts = [body.joint_names[joint].replace("_", " ") for joint in joints]
     points_mm = 1000.0 * places.reshape(len(rows), len(names), 3)
     rate = motion.mocap_framerate

@@ -121,6 +121,16 @@ def test_a_variable_rate_becomes_constant_and_gaps_stay_missing(whole_body, make
     assert (points[:6, :, 3] >= 0.0).all()
 
 
+def test_a_stretch_without_frames_is_missing(whole_body, make_motion, tmp_path):
+    motion = make_motion(whole_body, 9)
+    motion.timestamps[5:] += 0.5
+    gap = round(0.5 * motion.mocap_framerate)
+    _, _, points = read(written(motion, whole_body, tmp_path).read_bytes())
+    missing = (points[..., 3] == -1.0).all(axis=1)
+    assert np.flatnonzero(missing).tolist() == list(range(5, 5 + gap))
+    assert not (points[~missing, :, 3] == -1.0).any()
+
+
 @pytest.mark.parametrize(("late_s", "first"), [(5.0, 151), (3000.0, 90_001)])
 def test_somebody_who_enters_later_begins_in_a_later_frame(
     whole_body, make_motion, tmp_path, late_s, first
