@@ -49,6 +49,8 @@ from .seen_person import KEYPOINTS, SeenPerson, bone_lengths, seen_person
 from .synchronize import offset_by_sound
 
 MOST_VIEWS = 8
+# Of the speeds of slow motion: files state the rate at which they play with errors of a thousandth.
+MOST_SPEED_DIFFERENCE = 0.02
 # Of the standard deviation of a camera's rotation, from which on the report warns.
 WEAK_ROTATION = np.radians(5.0)
 # By given places, of a person's distance to that by the usual size of people: other units than
@@ -179,7 +181,7 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
         seen.add(real)
         with open_video(Path(path), options.wanted) as video:
             speeds.append(options.speed or video.recorded_speed)
-        if speeds[-1] != speeds[0]:
+        if abs(speeds[-1] / speeds[0] - 1.0) > MOST_SPEED_DIFFERENCE:
             raise UsageError(
                 f"{path} was recorded {speeds[-1]:g} times as fast as it plays, and {paths[0]} "
                 f"{speeds[0]:g} times; videos of several cameras need the same speed: export the "
@@ -322,7 +324,10 @@ def _further_cameras(
         "view_intrinsics": np.array([camera.intrinsics for camera in cameras]),
         "view_dist": np.array([camera.dist for camera in cameras]),
         "view_image_sizes": np.array([(view.video.width, view.video.height) for view, _ in placed]),
-        "view_frame_rates": np.array([float(view.video.source_fps) for view, _ in placed]),
+        # By which the motion's speed is multiplied, which is that of the first video.
+        "view_frame_rates": np.array(
+            [float(view.video.source_fps) * view.speed / views[0].speed for view, _ in placed]
+        ),
         "view_from_camera": T_view_camera,
         "view_offsets_s": np.array([place.offset_s for _, place in placed]),
     }

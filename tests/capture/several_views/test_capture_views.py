@@ -125,10 +125,11 @@ def test_videos_of_different_speeds_are_refused(shared, monkeypatch):
         "open_video",
         lambda path, _: nullcontext(SimpleNamespace(recorded_speed=speeds[path.name])),
     )
+    videos = [folder / "cam1.mp4", folder / "cam4.mp4"]
     with pytest.raises(UsageError, match=r"cam4.mp4 was recorded 8 times as fast .* 1 times"):
-        capture_views(
-            [folder / "cam1.mp4", folder / "cam4.mp4"], load_body("scope"), CaptureOptions()
-        )
+        capture_views(videos, load_body("scope"), CaptureOptions())
+    speeds |= {"cam1.mp4": 240 / 30.01, "cam4.mp4": 240 / 29.99}  # each right for its file
+    several._check_paths(videos, CaptureOptions())
 
 
 def test_one_video_is_not_several(shared):
