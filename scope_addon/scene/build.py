@@ -145,7 +145,7 @@ def _build(
         options.name or display_text(Path(str(footage or motions[0].source or "capture")).stem)
     )
     warnings = _face_warnings(motions, body)
-    if options.frame_rate == "set":
+    if options.frame_rate == "set" and len(motions[0]) > 1:  # a still image has none
         timing.set_scene_rate(scene, motions[0].mocap_framerate)
     rate = timing.scene_rate(scene)
     collection = bpy.data.collections.new(name)

@@ -276,7 +276,9 @@ class SCOPE_OT_loop(SpanOperator):
             add_cycles(armature, offset_curves={(location_path(body), 0), (location_path(body), 1)})
             for face in animated_together(armature, None)[1:]:
                 add_cycles(face)
-        play_cycle(context.scene, armature, math.ceil(first), math.floor(last) - 1)
+        # As many frames as the cycle has, also where its keys lie between frames.
+        shown = math.ceil(first)
+        play_cycle(context.scene, armature, shown, shown + max(round(last - first), 1) - 1)
         remove_root_object(armature)
         return rpt_(
             "Cycle of {seconds:.2f} s, whose ends were {distance:.1f} cm apart",

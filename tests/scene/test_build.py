@@ -41,6 +41,16 @@ def test_joints_and_skin_are_the_bodys(body, make_motion, truth, joints_world, b
         np.testing.assert_allclose(blender.vertices(person.mesh), expected.vertices(t), atol=1e-5)
 
 
+def test_a_still_image_leaves_the_scenes_frame_rate(body, make_motion):
+    scene = bpy.context.scene
+    scene.render.fps = 24
+    options = dataclasses.replace(NEW_SCENE, frame_rate="set")
+    build_scene([make_motion(body, 1)], body, options=options)
+    assert scene.render.fps == 24
+    build_scene([make_motion(body, 2)], body, options=options)
+    assert scene.render.fps == 30
+
+
 def test_the_body_with_fingers(make_motion, truth, blender):
     from scope.solver.body_file import load_body
 

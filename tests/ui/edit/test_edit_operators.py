@@ -230,6 +230,18 @@ def test_a_loop_in_place_stays_there(rig):
     np.testing.assert_allclose(later, once, atol=0.01)
 
 
+def test_a_loop_of_keys_between_frames_lasts_as_long_as_its_cycle(rig):
+    for curve in fcurves(rig):
+        for key in curve.keyframe_points:
+            key.co.x += 0.2
+            key.handle_left.x += 0.2
+            key.handle_right.x += 0.2
+    bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
+    times = sorted({key.co.x for curve in fcurves(rig) for key in curve.keyframe_points})
+    scene = bpy.context.scene
+    assert scene.frame_end + 1 - scene.frame_start == round(times[-1] - times[0])
+
+
 @pytest.mark.parametrize("root", ["bone", "object"])
 def test_each_cycle_of_a_loop_continues_on_a_rig_and_on_a_root_object(rig, root):
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
