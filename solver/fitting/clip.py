@@ -144,7 +144,8 @@ def fit_clip(
     joint.optimize()
     beta = joint.beta[: tree.shape].copy()
     scale = float(np.exp(joint.log_focal))
-    together = dict(zip(chosen, joint.fits(), strict=True))
+    joint_fits = joint.fits()
+    together = dict(zip(chosen, joint_fits, strict=True))
     fixed = with_fixed_shape(tree, beta)
     fits = [
         together[k]
@@ -156,7 +157,7 @@ def fit_clip(
         warn_of_mirrored_clip(
             given, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
         )
-    shares = joint.cost_by_term() if options.report else {}
+    shares = joint.cost_by_term(joint_fits) if options.report else {}
     return ClipFit(
         fits,
         beta,
@@ -370,10 +371,14 @@ class _Joint(SeveralFrames):
         """Return the frames' results."""
         out = []
         last = self.stages[-1]
+        # of one kind of residual at a time: the frames' own blocks are those of `information`
+        spare = make_blocks(self.tree)
         for f in self.frames:
             f.cost = linearize(self.tree, f.terms, last, f.pose, f.blocks, f.work.scratch)
             eliminate(self.tree, f.pose, f.blocks, MIN_DAMPING, self.settings.root_scale, f.work)
-            shares = self._shares(f) if self.report else {}
+            shares = {}
+            if self.report:
+                shares = cost_by_term(self.tree, f.terms, last, f.pose, spare, f.work.scratch)
             seen, measurements = usable(f.terms)
             out.append(
                 Fit(
@@ -392,23 +397,15 @@ class _Joint(SeveralFrames):
             )
         return out
 
-    def _shares(self, f: _Active) -> dict[str, float]:
-        return cost_by_term(
-            self.tree,
-            f.terms,
-            self.stages[-1],
-            f.pose,
-            f.blocks,
-            f.work.scratch,
-        )
-
-    def cost_by_term(self) -> dict[str, float]:
+    def cost_by_term(self, fits: Sequence[Fit]) -> dict[str, float]:
         """Return what the clip's cost is made of: the frames' sums, the shape prior once, the focal
         length's prior.
+
+        :param fits: of `fits`, with a report.
         """
         total: dict[str, float] = {}
-        for f in self.frames:
-            for name, cost in self._shares(f).items():
+        for fitted in fits:
+            for name, cost in fitted.cost_by_term.items():
                 total[name] = total.get(name, 0.0) + cost
         return total | self.shared.costs(self.shape_weights[-1], self.beta, self.log_focal)
 

@@ -289,3 +289,15 @@ def test_a_clip_is_deterministic_and_refuses_nonsense():
         fit_clip(body, [])
     with pytest.raises(ShapeError, match="one initial state per frame"):
         fit_clip(body, measurements, init=[a.frames[0].state])
+
+
+def test_a_report_changes_nothing_of_what_is_found():
+    """The shape's information with a report was that of the shape prior alone."""
+    body, _, measurements, _ = clip(13, noise=1.0, frames=3)
+    for focal in (False, True):
+        plain = fit_clip(body, measurements, focal=focal)
+        told = fit_clip(body, measurements, focal=focal, options=Options(report=True))
+        assert np.linalg.eigvalsh(plain.beta_information - Weights().shape * np.eye(P)).min() > 1.0
+        np.testing.assert_array_equal(told.beta_information, plain.beta_information)
+        for a, b in zip(told.frames, plain.frames, strict=True):
+            np.testing.assert_array_equal(a.beta_information, b.beta_information)
