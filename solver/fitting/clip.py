@@ -395,6 +395,7 @@ class _Joint(SeveralFrames):
                     cost_by_term=shares,
                 )
             )
+        raise_failure()
         return out
 
     def cost_by_term(self, fits: Sequence[Fit]) -> dict[str, float]:

@@ -298,4 +298,5 @@ def cost_by_term(
             alone = stage.copy()
             alone[0] = np.where(np.arange(len(stage[0])) == column, stage[0], 0.0)
             found[name] = float(linearize(tree, terms, alone, pose, blocks, scratch))
+    raise_failure()
     return found

@@ -150,15 +150,18 @@ class Registered:
         floats = self.FLOATS
 
         def call(address: int, weight: float) -> float:
+            if getattr(_failure, "error", None) is not None:
+                return math.nan  # the fit is lost, and ends the sooner
             try:
                 assert function is not None
                 values = _view(address, COUNT, whole=True).tolist()
                 values = dict(zip(VALUES, values, strict=True))
                 return accumulate_function(function, ints, floats, weight, values)
-            # it cannot pass through machine code: `raise_failure` does it
-            except Exception as error:
+            # It cannot pass through machine code: `raise_failure` does it. So too what interrupts:
+            # out of here, ctypes would drop it and return any number for the cost.
+            except BaseException as error:
                 _failure.error = name, error
-                return float("nan")
+                return math.nan
 
         return _CALLBACK(call)
 
@@ -176,12 +179,15 @@ def external_residuals() -> dict[str, Registered]:
 def raise_failure() -> None:
     """Pass on what a Python residual raised within the machine code.
 
-    :raises InvalidValueError: one has, since the last call.
+    :raises InvalidValueError: one has, since the last call. What interrupts a program, such as
+        KeyboardInterrupt, is raised as it is.
     """
     failed = getattr(_failure, "error", None)
     if failed is not None:
         _failure.error = None
         name, error = failed
+        if not isinstance(error, Exception):
+            raise error
         raise InvalidValueError(
             f"The residual {name!r} raised {type(error).__name__}: {error}"
         ) from error

@@ -376,3 +376,40 @@ def test_there_is_room_for_sixteen_and_each_can_be_replaced(monkeypatch):
     assert sorted(residual.slot for residual in external.external_residuals().values()) == list(
         range(16)
     )
+
+
+def test_an_interruption_within_a_python_residual_reaches_the_caller_as_it_is():
+    """ctypes dropped it, and any number that was in the register became the cost."""
+    calls = []
+
+    def interrupted(part, ints, floats):
+        calls.append(part)
+        raise KeyboardInterrupt
+
+    register_residual("interrupted", function=interrupted, floats=0)
+    m = replace(SEEN, tables={"interrupted": (np.array([[1]]), np.zeros((1, 0)))})
+    for attempt in (fit, lambda body, m: fit_clip(body, [m, m])):
+        calls.clear()
+        with pytest.raises(KeyboardInterrupt):
+            attempt(BODY, m)
+        assert len(calls) == 1
+    assert fit(BODY, SEEN).status is Status.CONVERGED
+
+
+def test_an_interruption_of_the_report_reaches_the_caller_of_that_fit():
+    def count(part, ints, floats):
+        calls.append(part)
+        if len(calls) == last:
+            raise KeyboardInterrupt
+        return part.t[:1]
+
+    register_residual("interrupted", function=count, floats=0)
+    m = replace(SEEN, tables={"interrupted": (np.array([[1]]), np.zeros((1, 0)))})
+    options = Options(stages=[Stage(max_iterations=0)], report=True)
+    calls = []
+    last = 0
+    fit(BODY, m, init=TRUTH, priors=Priors(), options=options)
+    last = len(calls)
+    calls.clear()
+    with pytest.raises(KeyboardInterrupt):
+        fit(BODY, m, init=TRUTH, priors=Priors(), options=options)
