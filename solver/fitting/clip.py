@@ -145,14 +145,25 @@ def fit_clip(
     beta = joint.beta[: tree.shape].copy()
     scale = float(np.exp(joint.log_focal))
     joint_fits = joint.fits()
-    together = dict(zip(chosen, joint_fits, strict=True))
+    by_frame = dict(zip(chosen, joint_fits, strict=True))
     fixed = with_fixed_shape(tree, beta)
-    fits = [
-        together[k]
-        if k in together
-        else _fit_with_shape(fixed, measurements[k], states[k], beta, scale, priors, options)
-        for k in range(len(terms))
-    ]
+
+    def alone(k: int, start: State) -> Fit:
+        return _fit_with_shape(fixed, measurements[k], start, beta, scale, priors, options)
+
+    for k in seen:
+        if k not in by_frame:
+            by_frame[k] = alone(k, states[k])
+    # that was measured: the pull towards the frame before does not say where anyone is
+    measured = (k for k in seen if usable(fill_terms(clip_tree, given[k], packed, None)[0])[1])
+    first = next(measured, None)
+    last = None if first is None else by_frame[first].state
+    for k, state in enumerate(states):
+        if k in by_frame:
+            last = by_frame[k].state
+        else:
+            by_frame[k] = alone(k, state if last is None else last)
+    fits = [by_frame[k] for k in range(len(states))]
     if by_default:
         warn_of_mirrored_clip(
             given, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)

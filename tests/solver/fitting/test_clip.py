@@ -301,3 +301,16 @@ def test_a_report_changes_nothing_of_what_is_found():
         np.testing.assert_array_equal(told.beta_information, plain.beta_information)
         for a, b in zip(told.frames, plain.frames, strict=True):
             np.testing.assert_array_equal(a.beta_information, b.beta_information)
+
+
+def test_a_gap_has_the_pose_of_the_frame_before_at_its_final_depth():
+    """With an unknown focal length, the depths of the first pass are those of the given one."""
+    body, _, measurements, _ = clip(14, frames=7)
+    gaps = {0: 1, 3: 2, 4: 2, 6: 5}  # the frame before the first measured one has that one's pose
+    for k in gaps:
+        measurements[k] = Measurements()
+    found = fit_clip(body, measurements, focal=True, shape_frames=2)
+    for k, of in gaps.items():
+        assert found.frames[k].status is Status.NO_MEASUREMENTS
+        expected = found.frames[of].t_camera_part
+        np.testing.assert_allclose(found.frames[k].t_camera_part, expected, atol=1e-9)
