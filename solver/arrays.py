@@ -56,6 +56,14 @@ def as_arrays(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     return array
 
 
+def as_numbers(value: ArrayLike, name: str) -> Array:
+    """Return `value` as float64 of its own shape; what numpy's masked arrays mask becomes NaN.
+
+    :raises ShapeError: it is not an array of numbers.
+    """
+    return _numbers(value, (...,), name)
+
+
 def as_integers(value: ArrayLike, name: str) -> Array:
     """Return `value` as contiguous int64 (n,).
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import as_array
+from ..arrays import as_array, as_numbers
 from ..errors import InvalidValueError
 from ..gauss_newton.terms import make_terms
 from ..measurements import Measurements
@@ -223,7 +223,7 @@ class _Problem:
                 f"of those that were among {', '.join(known)}, and weights, such as "
                 "'weights.keypoints3d'."
             )
-        values = np.array(value, dtype=float)
+        values = as_numbers(value, name)
         at_state = self._gradient_at(self.state)
         columns = np.empty((values.size, len(at_state)))
         for k in range(values.size):

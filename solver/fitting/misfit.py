@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import as_array
+from ..arrays import as_array, as_numbers
 from ..errors import ScopeWarning
 from ..measurements import LARGEST, Measurements
 from ..options import Priors
@@ -130,8 +130,8 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     is_done = found.status is Status.CONVERGED or found.iterations >= _MANY_ITERATIONS
     if seen is None or not is_done:
         return
-    points = np.asarray(seen.points, dtype=float)
-    confidence = np.asarray(seen.confidence, dtype=float)
+    points = as_numbers(seen.points, "Points of 3D keypoints")
+    confidence = as_numbers(seen.confidence, "Confidence of 3D keypoints")
     usable = (np.abs(points) < LARGEST).all(axis=1) & (confidence > 0.0)
     if usable.sum() < _FEWEST_POINTS:
         return

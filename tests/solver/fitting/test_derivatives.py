@@ -180,3 +180,27 @@ def test_what_has_no_derivative_is_named(solution):
     assert not solution_gradient(
         BODY, SEEN, solution, np.zeros((K + 1, 3)), NAMES[:1], priors=PRIORS
     )[NAMES[0]].any()
+
+
+@pytest.mark.parametrize("name", ["points", "confidence"])
+def test_what_is_masked_has_no_influence(name):
+    """As if its point were left out; the numbers below the mask were taken for measured ones."""
+    points = np.ma.array(SEEN.keypoints3d.points)
+    points[3] = np.ma.masked
+    seen = replace(SEEN, keypoints3d=replace(SEEN.keypoints3d, points=points))
+    others = np.delete(INDEX, 3)
+    left_out = Keypoints3D(
+        others, POINTS[others] + 0.02 * NOISE[others], np.full(M - 1, 0.8), sigma_m=0.02
+    )
+    state = solved(seen, TRUTH, options()).state
+    wrt = [f"keypoints3d.{name}"]
+    found = solution_derivatives(BODY, seen, state, wrt, priors=PRIORS, options=options())
+    expected = solution_derivatives(
+        BODY, replace(SEEN, keypoints3d=left_out), state, wrt, priors=PRIORS, options=options()
+    )
+    joints = found.joints[wrt[0]]
+    assert not joints[:, :, 3].any()
+    scale = np.abs(joints).max()
+    np.testing.assert_allclose(
+        joints[:, :, others], expected.joints[wrt[0]], rtol=0, atol=1e-6 * scale
+    )

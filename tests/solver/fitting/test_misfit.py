@@ -197,3 +197,18 @@ def test_cameras_at_one_height_that_measure_from_below_see_a_mirrored_person():
     body, everyone = people()
     with pytest.warns(ScopeWarning, match="y down"):
         solver.fit_motion(body, [seen_around(everyone[0], from_below, (0.0, 0.0, 0.0))], [0.0])
+
+
+def test_masked_points_are_no_misfit():
+    """Most are masked, and hold numbers that lie a metre beside the body."""
+    body = solver.load_body("scope")
+    state = solver.State.rest(body.K, body.P)
+    R = np.concatenate([state.R_camera_root[None], state.Omega])
+    root = state.t_camera_root - body.rest_joints(state.beta)[0]
+    points = np.ma.array(body.forward_kinematics(R, root, state.beta)[1])
+    points[8:] += 1.0
+    points[8:] = np.ma.masked
+    seen = solver.Measurements(keypoints3d=solver.Keypoints3D(body.joint_names, points))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        solver.fit(body, seen, init=state)
