@@ -6,7 +6,7 @@ assets/prior.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -116,11 +116,19 @@ def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
     :raises ModelFileError: the file is missing, or no prior that the solver can evaluate.
     :raises InvalidValueError: `path` is neither a string nor a path.
     """
-    return _read(as_path(path, "path, the file of a joint prior,"))
+    path = as_path(path, "path, the file of a joint prior,").absolute()
+    try:
+        status = path.stat()
+        changed = status.st_mtime_ns, status.st_size
+    except (OSError, ValueError):  # `read_arrays` says what is wrong
+        changed = 0, 0
+    prior = _read(path, changed)
+    return replace(prior, parameters=prior.parameters.copy())
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path) -> JointPrior:
+def _read(path: Path, changed: tuple[int, int]) -> JointPrior:
+    del changed  # another file of that name is read anew
     arrays = read_arrays(path, "joint prior")
     expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}
     for key in ("joint_names", "parameters", *expected):

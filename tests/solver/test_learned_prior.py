@@ -89,3 +89,27 @@ def test_flow_tables_of_another_body_are_refused(body):
     another = random_body(np.random.default_rng(0), K=5)
     with pytest.raises(ShapeError, match=r"'joint_flow' must lie in 0\.\.5"):
         fit(another, Measurements(), priors=Priors(flow=default_priors(body).flow))
+
+
+def test_a_prior_is_read_anew_where_its_file_is_another_and_belongs_to_its_reader(
+    tmp_path, monkeypatch
+):
+    with np.load(BUILT_IN) as file:
+        arrays = dict(file)
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        np.savez(tmp_path / folder / "prior.npz", **arrays)
+        arrays["parameters"] = 2.0 * arrays["parameters"]
+    once = load_joint_prior()
+    monkeypatch.chdir(tmp_path / "a")
+    first = load_joint_prior("prior.npz")
+    monkeypatch.chdir(tmp_path / "b")
+    second = load_joint_prior("prior.npz")
+    np.testing.assert_array_equal(second.parameters, 2.0 * first.parameters)
+    np.savez("prior.npz", **arrays, more=np.zeros(1))
+    again = load_joint_prior("prior.npz")
+    np.testing.assert_array_equal(again.parameters, 4.0 * first.parameters)
+    expected = again.parameters.copy()
+    again.parameters[:] = 0.0
+    np.testing.assert_array_equal(load_joint_prior("prior.npz").parameters, expected)
+    np.testing.assert_array_equal(load_joint_prior().parameters, once.parameters)
