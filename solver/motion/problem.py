@@ -60,9 +60,9 @@ class MotionTerms(NamedTuple):
 
     def part(self, frames: slice) -> "MotionTerms":
         """Return the terms of consecutive frames alone."""
-        return self._replace(
-            h=self.h[frames], probability=np.ascontiguousarray(self.probability[frames])
-        )
+        probability = self.probability[frames].copy()
+        probability[:1] = 0.0  # since a frame that is not among them
+        return self._replace(h=self.h[frames], probability=probability)
 
 
 # frames that are linearized and coupled before the next ones, while they are in the processor's

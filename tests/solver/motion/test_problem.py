@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A clip's objective and its gradient, against the definition and finite differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.solver import rotations
@@ -64,3 +66,27 @@ def test_a_weight_means_the_same_at_any_frame_rate():
         problem.linearize(0, poses, system)
         costs.append((problem.costs["acceleration"], problem.costs["contact"]))
     np.testing.assert_allclose(costs[0], costs[1], rtol=0.05)
+
+
+def test_a_part_of_a_clip_knows_nothing_of_the_frame_before_it():
+    """Its Hessian and gradient are those of a clip that begins there; standing points had added to
+    the first frame's Hessian, without a cost.
+    """
+    clip = noisy_clip(2, frames=7)
+    problem, _, _ = clip.problem()
+    first = 3
+    later = replace(
+        clip,
+        starts=clip.starts[first:],
+        times=clip.times[first:],
+        pixels=[each[first:] for each in clip.pixels],
+        points=clip.points[first:],
+        stands=replace(clip.stands, probability=clip.stands.probability[first:]),
+    )
+    alone, poses, expected = later.problem()
+    alone.linearize(0, poses, expected)
+    part, poses, found = later.problem()
+    part.motion = problem.motion.part(slice(first, 7))
+    part.linearize(0, poses, found)
+    np.testing.assert_allclose(found.D, expected.D, rtol=1e-12)
+    np.testing.assert_allclose(found.N, expected.N, rtol=1e-12)
