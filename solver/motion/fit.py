@@ -66,7 +66,8 @@ class MotionFit:
     cost: float  # with windows, their sum: frames in two of them count twice
     iterations: int
     rejected: int
-    # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only
+    # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only; NaN where the cost
+    # is not finite
     joint_covariance: Array | None = None
     # (T, K+1, 3, 3) of their positions relative to the root; likewise
     covariance_from_root: Array | None = None
@@ -352,6 +353,8 @@ class _Clip:
         for part in parts:
             optimizer = self._optimize(tree, part)
             self._keep_poses(optimizer.poses, part)
+            if not np.isfinite(optimizer.cost):
+                continue  # it says nothing
             estimates.append(np.append(optimizer.poses.beta[:P], optimizer.poses.log_focal)[:G])
             informations.append(optimizer.information())
         prior = np.zeros((G, G))
@@ -360,7 +363,7 @@ class _Clip:
         prior[:P, :P] = optimizer.problem.shape_weights[-1] * information
         if G > P:
             prior[P, P] = self.settings.focal_weight
-        self.information = sum(informations) - (len(parts) - 1) * prior
+        self.information = sum(informations) - (len(informations) - 1) * prior
         shared = combined(estimates, informations, mean, prior)
         self.beta = shared[:P]
         self.log_focal = float(shared[P]) if G > P else 0.0
@@ -383,13 +386,17 @@ class _Clip:
             self.beta = poses.beta[: tree.shape].copy()
             self.log_focal = float(poses.log_focal[0])
             self.information = shape_information(optimizer.information(), tree.shape)
-        if self.covariances is not None:
+        if self.covariances is None:
+            return
+        inner = window.inner
+        if np.isfinite(optimizer.cost):
             root_scale = optimizer.problem.settings.root_scale
             found = joint_covariances(
                 tree, optimizer.system, poses, root_scale, optimizer.factor, self.pool
             )
-            inner = window.inner
             self.covariances[:, window.kept] = found.joints[inner], found.from_root[inner]
+        else:
+            self.covariances[:, window.kept] = np.nan
 
     def _result(self) -> MotionFit:
         states = [

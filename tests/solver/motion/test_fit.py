@@ -344,3 +344,27 @@ def test_without_states_a_frame_that_cannot_be_used_is_told_too(frame, message):
     body, _, times = walk(np.random.default_rng(0), 3)
     with pytest.raises(InputError, match=re.escape(message)):
         fit_motion(body, [Measurements(), frame, Measurements()], times)
+
+
+@pytest.mark.parametrize("window", [10.0, 0.2])
+def test_a_state_of_no_number_gives_a_status_and_no_covariances(window):
+    rng = np.random.default_rng(9)
+    body, states, times = smooth_walk(rng, 20, 30.0)
+    frames = [Measurements(keypoints3d=points) for points in markers(body, states, rng)]
+    states[1] = replace(states[1], t_camera_root=np.full(3, np.nan))
+    found = fit_motion(
+        body,
+        frames,
+        times,
+        init=states,
+        priors=Priors(),
+        covariance=True,
+        window=window,
+        overlap=0.0,
+    )
+    assert found.status is Status.NON_FINITE
+    assert np.isnan(found.joint_covariance[1]).all()
+    assert np.isnan(found.covariance_from_root[1]).all()
+    if window < times[-1] - times[0]:
+        assert np.isfinite(found.joint_covariance[-1]).all()
+        assert np.isfinite(found.beta).all()
