@@ -8,8 +8,10 @@ The arrays of a file are taken as they are. Files of unknown origin go through
 from __future__ import annotations
 
 import os
+import tokenize
 import warnings
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -153,6 +155,19 @@ def _surprises(arrays: Mapping[str, NDArray[Any]], body: Body) -> list[str]:
     return found
 
 
+# What numpy and zipfile raise of a damaged file: RuntimeError where it seems to be encrypted.
+_DAMAGED = (
+    OSError,
+    ValueError,
+    EOFError,
+    KeyError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+    tokenize.TokenError,
+)
+
+
 def read_arrays(path: Path, what: str) -> dict[str, NDArray[Any]]:
     """Return the arrays of a .npz file, without those that are pickled.
 
@@ -169,7 +184,7 @@ def read_arrays(path: Path, what: str) -> dict[str, NDArray[Any]]:
                     continue
     except FileNotFoundError as error:
         raise ModelFileError(f"{path} does not exist; choose an existing {what}") from error
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
         raise ModelFileError(f"{path} is not a readable {what} ({error})") from error
     return arrays
 

@@ -2,12 +2,14 @@
 """Bodies in the format of the built-in ones, by name or as files of the user."""
 
 import shutil
+import warnings
+import zipfile
 from dataclasses import fields
 
 import numpy as np
 import pytest
 from scope.solver import body_file
-from scope.solver.body_file import BUILT_IN, load_body
+from scope.solver.body_file import BUILT_IN, load_body, read_arrays
 from scope.solver.errors import ModelFileError, ScopeWarning
 
 from ..untrusted.conftest import make_tables
@@ -100,3 +102,32 @@ def test_a_pickle_is_not_opened_but_the_way_to_read_it_is_told(tmp_path):
     (tmp_path / "model.pkl").write_bytes(b"cos\nsystem\n(S'true'\ntR.")
     with pytest.raises(ModelFileError, match=r"scope_addon\.untrusted\.body_file\.load_body"):
         load_body(tmp_path / "model.pkl")
+
+
+def test_a_damaged_file_is_refused_in_a_sentence_wherever_the_damage_is(tmp_path):
+    """One byte after the other is changed, of compressed data, of headers and of the directory."""
+    path = tmp_path / "body.npz"
+    np.savez_compressed(path, a=np.arange(50.0), b=np.array(["text"]))
+    whole = path.read_bytes()
+    refused = []
+    for k in range(len(whole)):
+        path.write_bytes(whole[:k] + bytes([whole[k] ^ 0x2A]) + whole[k + 1 :])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                read_arrays(path, "body file")
+            except ModelFileError as error:
+                refused.append(str(error))
+    assert len(refused) > len(whole) // 4
+    assert all("is not a readable body file" in message for message in refused)
+
+
+def test_a_header_that_ends_within_brackets_is_refused_in_a_sentence(tmp_path):
+    path = tmp_path / "body.npz"
+    np.savez(path, a=np.arange(3))
+    with zipfile.ZipFile(path) as file:
+        array = file.read("a.npy").replace(b"(3,)", b"(3, ")
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("a.npy", array)
+    with pytest.raises(ModelFileError, match="is not a readable body file"):
+        read_arrays(path, "body file")
