@@ -212,7 +212,7 @@ class Measurements:
             )
         K = as_array(self.intrinsics, (3, 3), "Intrinsics")
         check_intrinsics(K)
-        confidence = _confidence(m.confidence, n, "2D keypoints")
+        confidence = as_confidence(m.confidence, n, "2D keypoints")
         out = np.empty((n, 3))
         _normalize(K, pixels, confidence, out)
         warn_of_pixels(K, pixels, out)
@@ -237,7 +237,7 @@ class Measurements:
         points_3d = as_array(m.points, (len(indices), 3), "Points of 3D keypoints")
         out = np.empty((len(indices), 4))
         out[:, :3] = points_3d
-        out[:, 3] = _confidence(m.confidence, len(indices), "3D keypoints")
+        out[:, 3] = as_confidence(m.confidence, len(indices), "3D keypoints")
         warn_of_points(
             out, has_camera=self.intrinsics is not None, are_weights=m.sigma_m is not None
         )
@@ -266,7 +266,7 @@ class Measurements:
             )
         out = np.empty((n, 4))
         out[:, :3] = as_array(m.directions, (n, 3), "Directions of the orientation field")
-        out[:, 3] = _confidence(m.confidence, n, "the orientation field")
+        out[:, 3] = as_confidence(m.confidence, n, "the orientation field")
         return starts, ends, out
 
     def packed_tables(self, K: int, points: int) -> dict[str, tuple[Array, Array]]:
@@ -305,7 +305,12 @@ _KINDS = {
 }
 
 
-def _confidence(value: ArrayLike, n: int, of: str) -> Array:
+def as_confidence(value: ArrayLike, n: int, of: str) -> Array:
+    """Return confidences (n,).
+
+    :param of: what they belong to, for messages.
+    :raises ShapeError: they are neither one number nor (n,).
+    """
     if isinstance(value, (int, float)):
         return np.full(n, as_number(value, f"Confidence of {of}"))
     return as_array(value, (n,), f"Confidence of {of}")

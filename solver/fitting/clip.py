@@ -32,7 +32,7 @@ from ..gauss_newton.recursion import (
     substitute,
 )
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
-from ..measurements import Measurements
+from ..measurements import Measurements, as_confidence
 from ..options import Options, Priors, default_priors
 from ..part import Blocks, Pose
 from ..points import frames_of
@@ -147,9 +147,12 @@ def fit_clip(
     joint_fits = joint.fits()
     by_frame = dict(zip(chosen, joint_fits, strict=True))
     fixed = with_fixed_shape(tree, beta)
+    # in the normalized coordinates of the estimated focal length, squares are less by its square
+    rescaled = replace(options, robust_keypoints2d=options.robust_keypoints2d / scale**2)
 
     def alone(k: int, start: State) -> Fit:
-        return _fit_with_shape(fixed, measurements[k], start, beta, scale, priors, options)
+        m = _with_focal(measurements[k], scale)
+        return _fit_with_shape(fixed, m, start, beta, priors, rescaled)
 
     for k in seen:
         if k not in by_frame:
@@ -237,21 +240,34 @@ def _moved(state: State, R: NDArray[np.float64], t: NDArray[np.float64]) -> Stat
     )
 
 
+def _with_focal(m: Measurements, scale: float) -> Measurements:
+    """Return the measurements with a focal length that is `scale` times that of the intrinsics, and
+    the weights that 2D keypoints have with these.
+
+    The residuals' normalized coordinates are over the focal length; weights from `sigma_px` heed
+    that already.
+    """
+    if m.intrinsics is None or scale == 1.0:
+        return m
+    K = np.array(m.intrinsics, dtype=float)
+    K[0, :2] *= scale
+    K[1, 1] *= scale
+    seen = m.keypoints2d
+    if seen is not None and seen.sigma_px is None:
+        confidence = as_confidence(seen.confidence, np.size(seen.indices), "2D keypoints")
+        seen = replace(seen, confidence=scale**2 * confidence)
+    return replace(m, intrinsics=K, keypoints2d=seen)
+
+
 def _fit_with_shape(
     tree: Tree,
     m: Measurements,
     init: State,
     beta: NDArray[np.float64],
-    scale: float,
     priors: Priors,
     options: Options,
 ) -> Fit:
-    """Fit one frame with shape and focal length fixed; `tree` has them built in."""
-    if m.intrinsics is not None and scale != 1.0:
-        K = np.array(m.intrinsics, dtype=float)
-        K[0, :2] *= scale
-        K[1, 1] *= scale
-        m = replace(m, intrinsics=K)
+    """Fit one frame with the shape fixed, which `tree` has built in."""
     empty = np.zeros(0)
     without = replace(priors, shape_mean=None, shape_information=None)
     fitted = fit_tree(tree, m, replace(init, beta=empty), without, options)

@@ -314,3 +314,18 @@ def test_a_gap_has_the_pose_of_the_frame_before_at_its_final_depth():
         assert found.frames[k].status is Status.NO_MEASUREMENTS
         expected = found.frames[of].t_camera_part
         np.testing.assert_allclose(found.frames[k].t_camera_part, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("sigma_px", [None, 30.0])
+def test_frames_beyond_those_that_decide_are_weighted_as_they_are(sigma_px):
+    """Of a frame that occurs several times, each has the same pose, also with a focal length twice
+    the given one and 2D and 3D keypoints that contradict each other.
+    """
+    body, _, (seen,), _ = clip(15, noise=3.0, scale=2.0, frames=1)
+    image = replace(seen.keypoints2d, sigma_px=sigma_px, confidence=[0.5] * M)
+    seen = replace(seen, keypoints2d=image)
+    options = replace(WEAK, robust_keypoints2d=1e-3)
+    found = fit_clip(body, [seen] * 3, focal=True, shape_frames=2, options=options, priors=Priors())
+    assert found.focal_scale > 1.5
+    first, left_out, _ = found.frames
+    np.testing.assert_allclose(left_out.t_camera_part, first.t_camera_part, atol=1e-5)
