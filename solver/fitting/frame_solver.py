@@ -241,7 +241,12 @@ class FrameSolver:
     def _mean(self, priors: Priors) -> NDArray[np.float64]:
         if priors.joint_mean is None:
             return self._rest
-        return np.asarray(priors.joint_mean, dtype=np.float64)
+        mean = np.asarray(priors.joint_mean, dtype=np.float64)
+        if priors.joint_weights is None:
+            return mean
+        # a mean without weight may be anything, which no fit can start from
+        weigh = np.asarray(priors.joint_weights, dtype=np.float64) > 0.0
+        return np.where(weigh[:, None, None], mean, self._rest)
 
 
 _last = threading.local()

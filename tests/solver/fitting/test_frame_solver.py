@@ -320,3 +320,16 @@ def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
 def test_options_that_no_fit_could_use_are_refused(make, message):
     with pytest.raises(InvalidValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("nothing", [0.0, 7.0])
+def test_a_mean_without_weight_may_be_anything(nothing):
+    """Without a state, a fit starts from the means, from the rest pose where they weigh nothing."""
+    body, state = scene(3)
+    weights = np.ones(K)
+    weights[::2] = 0.0
+    mean = np.tile(np.eye(3), (K, 1, 1))
+    expected = fit(body, measured(body, state), priors=Priors(mean, weights))
+    mean[::2] = nothing
+    found = fit(body, measured(body, state), priors=Priors(mean, weights))
+    np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
