@@ -469,7 +469,7 @@ def combined(
     estimates: Sequence[Array], informations: Sequence[Array], mean: Array, prior: Array
 ) -> Array:
     """Return the minimum (G,) of the sum of quadratics, each with the same prior, which shall count
-    once.
+    once; of several, that of the least norm, where nothing fixes some direction.
 
     :param estimates: (G,) the minimum of each. :param informations: (G, G) its curvature, prior
         included.
@@ -479,5 +479,5 @@ def combined(
     right = prior @ mean + sum(
         I @ x - prior @ mean for I, x in zip(informations, estimates, strict=True)
     )
-    out: Array = np.linalg.solve(total, right)
+    out: Array = np.linalg.pinv(total, hermitian=True) @ right
     return out

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.solver.motion.fit import overlapping, tiles
+from scope.solver.motion.fit import combined, overlapping, tiles
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -63,3 +63,19 @@ def test_windows_without_overlap_lose_no_frame_to_rounding(rate: float, length: 
 def test_tiles_are_what_is_kept() -> None:
     windows = overlapping(np.arange(900) / 30, 8.0, 2.0)
     assert [(t.frames, t.kept) for t in tiles(windows)] == [(w.kept, w.kept) for w in windows]
+
+
+def test_a_shape_that_nothing_measures_stays_where_it_was() -> None:
+    """Without a prior, the windows' information of it is zero: the sum has no inverse."""
+    rng = np.random.default_rng(0)
+    A, B = (rng.standard_normal((4, 2)) for _ in range(2))
+    x, y = rng.standard_normal((2, 2))
+    nothing = np.zeros((3, 3))
+    informations = [nothing.copy(), nothing.copy()]
+    informations[0][:2, :2] = A.T @ A
+    informations[1][:2, :2] = B.T @ B
+    estimates = [np.append(x, 0.0), np.append(y, 0.0)]
+    found = combined(estimates, informations, np.zeros(3), nothing)
+    rows = np.concatenate([A, B])
+    expected = np.linalg.lstsq(rows, np.concatenate([A @ x, B @ y]), rcond=None)[0]
+    np.testing.assert_allclose(found, np.append(expected, 0.0), atol=1e-12)
