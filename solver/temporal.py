@@ -14,6 +14,7 @@ import numpy as np
 
 from .arrays import as_array, as_table
 from .measurements import Measurements, PosePriors, pose_prior_arrays
+from .points import has_names
 from .residuals import joint_prior
 from .state import State
 from .validation import check_rotations, check_type, check_weight
@@ -70,7 +71,10 @@ def with_previous(measurements: Measurements, previous: State, temporal: Tempora
     )
     weights = np.array([temporal.root_rotation]), np.array([temporal.root_position])
     pull = (np.zeros(1, np.int64), R[None], t[None], *weights)
-    root = PosePriors(
-        *(np.concatenate(both) for both in zip(pose_prior_arrays(own), pull, strict=True))
-    )
+    named = has_names(own.parts)  # until the body tells their numbers
+    parts = np.zeros(len(own.parts), np.int64) if named else own.parts  # type: ignore[arg-type]
+    arrays = pose_prior_arrays(replace(own, parts=parts))
+    root = PosePriors(*(np.concatenate(both) for both in zip(arrays, pull, strict=True)))
+    if named:
+        root = replace(root, parts=[*own.parts, 0])  # type: ignore[misc]
     return replace(measurements, pose_priors=root, tables=tables)

@@ -10,6 +10,7 @@ from scope.solver import (
     Keypoints3D,
     Measurements,
     Options,
+    PosePriors,
     Priors,
     ShapeError,
     Stage,
@@ -329,3 +330,20 @@ def test_frames_beyond_those_that_decide_are_weighted_as_they_are(sigma_px):
     assert found.focal_scale > 1.5
     first, left_out, _ = found.frames
     np.testing.assert_allclose(left_out.t_camera_part, first.t_camera_part, atol=1e-5)
+
+
+def test_the_pull_stands_beside_pose_priors_of_named_parts():
+    body = load_body("scope")
+    state = person.pose(body)
+    R, t = person.place(body, state)
+    own = PosePriors(["pelvis", "head"], R[[0, 15]], t[[0, 15]], [1.0, 1.0], [1.0, 1.0])
+    pulled = with_previous(Measurements(pose_priors=own), state, Temporal()).pose_priors
+    assert list(pulled.parts) == ["pelvis", "head", 0]
+    numbers = [body.joint_names.index(name) for name in own.parts]
+    assert numbers == [0, 15]
+    by_number = replace(own, parts=numbers)
+    a, b = (
+        fit(body, with_previous(Measurements(pose_priors=priors), state, Temporal()))
+        for priors in (own, by_number)
+    )
+    np.testing.assert_array_equal(a.t_camera_part, b.t_camera_part)
