@@ -80,7 +80,8 @@ def make_tree(body: BodyArrays, focal: bool = False) -> Tree:
             f"A body needs the arrays {', '.join(_ARRAYS)}, but {type(body).__name__} "
             f"lacks {missing[0]}."
         )
-    parents = as_integers(body.parents, "The body's parents")
+    # a copy, also because numba compiles anew for an array that cannot be written to
+    parents = as_integers(body.parents, "The body's parents").copy()
     n = parents.shape[0]
     if n == 0 or parents[0] != -1 or any(not 0 <= parents[i] < i for i in range(1, n)):
         raise ShapeError(

@@ -222,7 +222,10 @@ def pack_priors(tree: Tree, priors: "Priors") -> PackedPriors:
     """
     tables = empty_tables()
     for name, table in priors.packed_tables(len(tree.parents) - 1).items():
-        tables[name] = _checked_table(tree, name, table)
+        ints, floats = _checked_table(tree, name, table)
+        # copies, as the priors' own arrays may change or, what needs other machine code, be
+        # read-only
+        tables[name] = ints.copy(), floats.copy()
     W = tree.S.shape[2]
     mean, information = priors.packed_shape(tree.shape)
     return PackedPriors(tables, _padded(mean, (W,)), _padded(information, (W, W)))

@@ -16,10 +16,22 @@ from scope.solver import (
     Weights,
     fit,
     fit_clip,
+    make_tree,
     rotations,
 )
+from scope.solver.gauss_newton.optimizer import optimize
+from scope.solver.gauss_newton.terms import pack_priors
+from scope.solver.residuals import joint_flow, joint_limits
 
-from .synthetic import INTRINSICS, RandomBody, forward, project, random_body, random_state
+from .synthetic import (
+    INTRINSICS,
+    RandomBody,
+    forward,
+    project,
+    random_body,
+    random_flow,
+    random_state,
+)
 
 TIGHT = Options(stages=[Stage(Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0), 1e-14, 300)])
 
@@ -94,3 +106,25 @@ def test_three_hundred_coefficients_over_a_clip():
         for f, m in zip(found.frames, clip, strict=True)
     ]
     assert np.sqrt(np.mean(np.square(residual))) < 0.01
+
+
+def test_arrays_that_cannot_be_written_to_need_no_other_machine_code():
+    """Numba compiles anew for them, which takes minutes; and a body's own arrays may change."""
+    body = random_body(np.random.default_rng(3), 4, 2, 6)
+    points = forward(body, *random_state(np.random.default_rng(4), 4, 2))[2]
+    seen = Measurements(keypoints3d=Keypoints3D(np.arange(6), points))
+    limits = joint_limits.pack(np.array([2]), np.eye(3)[:1], *np.ones((5, 1)))
+    flow = joint_flow.pack([1], random_flow(np.random.default_rng(5), np.eye(3)), [1.0])
+    expected = fit(body, seen, priors=Priors(limits=limits, flow=flow))
+    compiled = len(optimize.signatures)
+    body.parents = body.parents.astype(np.int64)
+    for array in (body.parents, *limits, *flow):
+        array.flags.writeable = False
+    tree = make_tree(body)
+    assert tree.parents.flags.writeable
+    assert not np.shares_memory(tree.parents, body.parents)
+    packed = pack_priors(tree, Priors(limits=limits, flow=flow)).tables
+    assert all(each.flags.writeable for table in packed.values() for each in table)
+    found = fit(body, seen, priors=Priors(limits=limits, flow=flow))
+    assert len(optimize.signatures) == compiled
+    np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
