@@ -123,7 +123,8 @@ def _invert_frame(Z, n: int, S) -> None:  # type: ignore[no-untyped-def]
     """Fill the rows and columns of S (3 n + W, 3 n + W) of a frame, from those of what was
     eliminated after it.
 
-    An unknown without a pivot, of which Z holds the inverse 0, does not move.
+    An unknown without a pivot, of which Z holds the inverse 0, is fixed by nothing but a damping
+    that was lost in rounding: it varies as if by that alone.
     """
     size = S.shape[0]
     for i in range(n - 1, -1, -1):
@@ -133,7 +134,7 @@ def _invert_frame(Z, n: int, S) -> None:  # type: ignore[no-untyped-def]
         for k in range(i + 1, size):
             share = u * (Z[i, k] if k < 3 * n else Z[i, k + GLOBALS])
             subtract_row(S[k, i + 1 :], share, S[i, i + 1 :])
-        variance = u * u
+        variance = u * u if u > 0.0 else 1.0 / MIN_DAMPING
         for k in range(i + 1, size):
             share = u * (Z[i, k] if k < 3 * n else Z[i, k + GLOBALS])
             variance -= share * S[i, k]

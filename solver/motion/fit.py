@@ -66,8 +66,8 @@ class MotionFit:
     cost: float  # with windows, their sum: frames in two of them count twice
     iterations: int
     rejected: int
-    # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only; NaN where the cost
-    # is not finite
+    # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only. Millions and more
+    # where nothing fixes a joint's pose; NaN where the cost is not finite
     joint_covariance: Array | None = None
     # (T, K+1, 3, 3) of their positions relative to the root; likewise
     covariance_from_root: Array | None = None

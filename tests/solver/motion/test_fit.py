@@ -20,6 +20,7 @@ from scope.solver import (
     Weights,
     rotations,
 )
+from scope.solver.gauss_newton.optimizer import MIN_DAMPING
 from scope.solver.motion.fit import fit_motion
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 from scope.solver.motion.views import View
@@ -368,3 +369,37 @@ def test_a_state_of_no_number_gives_a_status_and_no_covariances(window):
     if window < times[-1] - times[0]:
         assert np.isfinite(found.joint_covariance[-1]).all()
         assert np.isfinite(found.beta).all()
+
+
+def test_what_nothing_fixes_is_not_taken_for_known_beside_what_is_known_well():
+    """A part turns freely about a point that is known to a tenth of a millimetre. The damping that
+    stands for it is lost in rounding, and its child seemed to be where it is without any error.
+    """
+    lever = np.array([0.2, 0.1, 0.3])
+    child = np.array([0.1, -0.2, 0.0])
+    levers = np.concatenate([0.3 * np.eye(3), [lever]])
+    parents = np.array([-1, 0, 1])
+    offsets = np.array([np.zeros(3), [0.4, 0.0, 0.0], child])
+    part = np.array([0, 0, 0, 1])
+    body = RandomBody(parents, np.zeros((3, 3, 0)), offsets, part, levers, np.zeros((4, 3, 0)))
+    state = State.rest(2, 0)
+    points = forward(body, state.R_camera_root, state.t_camera_root, state.Omega, state.beta)[2]
+    seen = Measurements(keypoints3d=Keypoints3D(np.arange(4), points, sigma_m=1e-4))
+    found = fit_motion(
+        body,
+        [seen],
+        [0.5],
+        init=[state],
+        priors=Priors(joint_weights=np.zeros(2)),
+        covariance=True,
+    )
+    known = found.joint_covariance[0, 1]
+    assert np.trace(known) < 1e-6
+    axis = lever / np.linalg.norm(lever)
+    across = state.R_camera_root @ np.cross(axis, child)
+    covariance = found.joint_covariance[0, 2]
+    variance = np.trace(covariance)
+    assert variance > 0.999 * (across @ across) / MIN_DAMPING
+    np.testing.assert_allclose(
+        covariance, variance * np.outer(across, across) / (across @ across), atol=1e-6 * variance
+    )
