@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_array, as_integers, described
+from .arrays import as_array, as_integers, as_numbers, described
 from .errors import InvalidValueError, ShapeError
 from .kernel import kernel
 from .part import Array
@@ -313,6 +313,8 @@ def as_confidence(value: ArrayLike, n: int, of: str) -> Array:
     """
     if isinstance(value, (int, float)):
         return np.full(n, as_number(value, f"Confidence of {of}"))
+    if isinstance(value, (np.ndarray, np.number)) and value.ndim == 0:
+        return np.full(n, as_numbers(value, f"Confidence of {of}"))
     return as_array(value, (n,), f"Confidence of {of}")
 
 

@@ -397,3 +397,13 @@ def test_a_wrong_argument_is_refused_in_a_sentence_of_the_solvers_own(name):
                 except Exception as error:
                     bare.append(f"{argument}, {kind}: {type(error).__name__}: {error}")
     assert not bare, "\n".join(["", *bare])
+
+
+@pytest.mark.parametrize("one", [np.float32(0.5), np.array(0.5), np.int64(1), np.ma.array(0.5)])
+def test_one_confidence_for_all_may_be_any_number_of_numpys(one):
+    seen = replace(SEEN, keypoints3d=replace(KEYPOINTS, confidence=one))
+    each = replace(SEEN, keypoints3d=replace(KEYPOINTS, confidence=np.full(M, float(one))))
+    found, expected = (solver.fit(BODY, m) for m in (seen, each))
+    np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
+    nothing = replace(SEEN, keypoints3d=replace(KEYPOINTS, confidence=np.ma.masked))
+    assert solver.fit(BODY, nothing).measurements == 0
