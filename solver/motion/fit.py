@@ -61,7 +61,7 @@ class MotionFit:
     beta_information: Array  # (P, P), shape prior included; zeros for a shape that was given
     # estimated focal length over that of the intrinsics; 1 if it was not estimated
     focal_scale: float
-    measurements: Array  # (T,) usable points, directions and rows of pose priors of each frame
+    measurements: Array  # (T,) of each frame, over its views, what `Fit.measurements` counts
     status: Status
     cost: float  # with windows, their sum: frames in two of them count twice
     iterations: int
