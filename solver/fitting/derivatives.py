@@ -9,7 +9,8 @@ kernels. g is exact; H, symmetric, and dg/dm are its central differences, in 2 (
 linearizations. The gradient of a loss L(x) needs no H, but one adjoint a, H a = dL/dx, of which
     dL/dm = -(dg/dm)ᵀ a
 It is found by conjugate gradients, each with H p as a difference of g, and preconditioned by the
-recursion's Gauss-Newton step: all in O(K + N).
+recursion's Gauss-Newton step: each step in O(K + N). dg/dm takes a linearization, O(K + N), for
+each number.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def solution_gradient(
     options: Options = Options(),  # noqa: B008 - frozen
 ) -> dict[str, Array]:
     """Return the gradient of a loss of a frame's solution with respect to its measurements and
-    weights: the vector-Jacobian product of `solution_derivatives`, whose matrices it does not form.
+    weights: the vector-Jacobian product of `solution_derivatives`, without its Hessian.
 
     :param loss: dL/dt (K+1, 3), by the joints' positions in the camera frame, per metre; or dL/dx
         (n,), by the unknowns of `NormalEquations`.
