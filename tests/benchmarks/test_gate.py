@@ -59,3 +59,17 @@ def test_a_ratio_of_times_fails_only_if_it_is_worse_in_all_runs(monkeypatch):
     assert least(11.0, 10.0, 10.0) == ({"time": 11.0}, [10.0, 10.0])
     assert least(30.0, 11.0, 10.0) == ({"time": 11.0}, [10.0])
     assert least(30.0, 14.0, 13.0) == ({"time": 13.0}, [])
+
+
+def test_an_update_without_the_clips_keeps_the_accuracy(monkeypatch, tmp_path):
+    record = tmp_path / "gate.json"
+    record.write_text(
+        '{"sample flipped": {"value": 0.1, "noise": 0.02}, "time of old": {"value": 9, "noise": 1}}'
+    )
+    monkeypatch.setattr(gate, "RECORD", record)
+    monkeypatch.setattr(gate, "clips", dict)
+    monkeypatch.setattr(gate, "ratios", lambda *_: {"time of a step": 2.0})
+    gate.update(None)
+    found = read(record)
+    assert list(found) == ["sample flipped", "time of a step"]
+    assert found["sample flipped"] == Figure(0.1, 0.02)
