@@ -37,15 +37,20 @@ CAPTURES = {
 
 
 def digests(name: str, arguments: list[str]) -> dict[str, str]:
-    """Capture, and return the digest of each array of each motion file."""
+    """Capture, and return the digest of the warnings and of each array of each motion file.
+
+    Exit where the capture fails: two that fail would be the same.
+    """
     with tempfile.TemporaryDirectory() as folder:
         given = [str(DATA / word) if "/" in word else word for word in arguments]
         output = Path(folder) / f"{name}.npz"
         command = [sys.executable, "-m", "scope.scope_addon", "capture", *given, "-o", str(output)]
         run = subprocess.run([*command, "--json"], capture_output=True, text=True, check=False)
-        found = {"status": str(run.returncode)}
-        if run.returncode == 0:
-            found["warnings"] = _digest(json.dumps(json.loads(run.stdout)["warnings"]).encode())
+        if run.returncode != 0:
+            sys.exit(
+                f"{run.stderr}{name}: the capture ended with status {run.returncode}, see above"
+            )
+        found = {"warnings": _digest(json.dumps(json.loads(run.stdout)["warnings"]).encode())}
         for path in sorted(Path(folder).glob("*.npz")):
             with np.load(path) as arrays:
                 for key in arrays.files:
@@ -67,11 +72,17 @@ def main() -> int:
     parser.add_argument("captures", nargs="*", help=f"of {', '.join(CAPTURES)}; default: all")
     options = parser.parse_args()
     names = options.captures or list(CAPTURES)
+    known = CAPTURES
+    before = {}
+    if options.what == "compare":
+        known = before = json.loads(options.file.read_text("utf-8"))
+    for name in names:
+        if name not in known or name not in CAPTURES:
+            parser.error(f"there is no capture {name!r}; choose of {', '.join(known)}")
     found = {name: digests(name, CAPTURES[name]) for name in names}
     if options.what == "record":
         options.file.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
         return 0
-    before = json.loads(options.file.read_text("utf-8"))
     changed = 0
     for name in names:
         keys = sorted({*found[name], *before[name]})
