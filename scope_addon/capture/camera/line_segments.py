@@ -40,6 +40,15 @@ class Lines:
         """Return the lines in other axes, those of ``R_new_camera`` (3, 3)."""
         return Lines(self.normals @ R_new_camera.T, self.lengths)
 
+    def with_focal_scale(self, scale: float) -> Lines:
+        """Return the lines of the same pixels with a focal length that is ``scale`` times as large.
+
+        A ray (x, y, 1) becomes (x / s, y / s, 1), so a plane's normal becomes (s n_x, s n_y, n_z).
+        """
+        normals = self.normals * [scale, scale, 1.0]
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        return Lines(normals / np.maximum(lengths, 1e-12), self.lengths)
+
 
 @dataclass(frozen=True)
 class Segments:

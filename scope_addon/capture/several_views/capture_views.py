@@ -102,8 +102,7 @@ def capture_views(
         _observe_view(
             Path(path),
             body,
-            # Who is captured is known from the first video; the others may show anybody nearer.
-            replace(options, calibration=file, people=ALL if number else options.people),
+            _options_of_view(options, number, file),
             clock,
             _progress_of_view(progress, number, len(paths)),
             watch,
@@ -122,8 +121,12 @@ def capture_views(
         doubts = _doubts_about_file(views, given, matches, options)
         places = [None if match is None else match.place for match in matches]
         first = views[0]
-        camera = with_focal_scale(first.camera, places[0] or CameraPlace.first())
-        footage = replace(first.footage, camera=camera)
+        first_place = places[0] or CameraPlace.first()
+        footage = replace(
+            first.footage,
+            camera=with_focal_scale(first.camera, first_place),
+            lines=first.footage.lines.with_focal_scale(np.exp(first_place.log_focal)),
+        )
         shot = shot_of(first.video, body, options, footage)
         everyone = same_people([view.people for view in views], matches)
         people, notices = _people_in_views(shot, views, places, everyone, options, progress)
@@ -187,6 +190,16 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
                 f"{speeds[0]:g} times; videos of several cameras need the same speed: export the "
                 "slow motion at its true speed"
             )
+
+
+def _options_of_view(options: CaptureOptions, number: int, file: Path | None) -> CaptureOptions:
+    """Return the options of one of the videos, with its calibration."""
+    of_view = replace(options, calibration=file)
+    if number == 0:
+        return of_view
+    # Who is captured is known from the first video, and the part of the picture is of that one; the
+    # others may show anybody nearer, anywhere.
+    return replace(of_view, people=ALL, part=None)
 
 
 def _progress_of_view(progress: Progress, number: int, count: int) -> Progress:

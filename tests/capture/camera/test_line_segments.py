@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.camera.line_segments import Segments, find_segments
+from scope.scope_addon.capture.camera.line_segments import Lines, Segments, find_segments
 from scope.solver.rotations import exp
 
 WIDTH = 800
@@ -74,3 +74,17 @@ def test_the_plane_of_a_segment_contains_the_line_that_it_shows() -> None:
         assert turned.normals[0] @ R @ point == pytest.approx(0.0, abs=1e-9)
     assert np.linalg.norm(lines.normals[0]) == pytest.approx(1.0)
     np.testing.assert_array_equal(turned.lengths, lines.lengths)
+
+
+def test_lines_of_the_same_pixels_with_another_focal_length() -> None:
+    """The plane through the camera's centre and two pixels, by the rays of either lens."""
+    rng = np.random.default_rng(0)
+    pixels = rng.uniform(-500, 500, (20, 2, 2))
+
+    def normals(focal_px: float) -> np.ndarray:
+        rays = np.concatenate([pixels / focal_px, np.ones((20, 2, 1))], axis=2)
+        across = np.cross(rays[:, 0], rays[:, 1])
+        return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+    found = Lines(normals(1600.0), np.ones(20)).with_focal_scale(1300.0 / 1600.0)
+    np.testing.assert_allclose(np.abs((found.normals * normals(1300.0)).sum(axis=1)), 1.0)

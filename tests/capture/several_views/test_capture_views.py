@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
+from scope.scope_addon.capture.perception.region import parse_crop
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.several_views import capture_views as several
 from scope.scope_addon.capture.several_views.capture_views import capture_views
@@ -79,19 +80,22 @@ def test_two_cameras_halve_the_error_of_one(shared):
 def test_everybody_in_the_further_videos_may_be_the_person_of_the_first(shared, monkeypatch):
     """Somebody else may be nearer there."""
     folder = shared / "data" / "pose2sim"
+    part = parse_crop("0,0,800,1900")
     asked = []
 
     def observed(path, body, options, *_):
-        asked.append((path.name, options.people))
+        asked.append((path.name, options.people, options.part))
         if len(asked) == 2:
             raise CancelledError
 
     monkeypatch.setattr(several, "_observe_view", observed)
     with pytest.raises(CancelledError):
         capture_views(
-            [folder / "cam1.mp4", folder / "cam4.mp4"], load_body("scope"), CaptureOptions()
+            [folder / "cam1.mp4", folder / "cam4.mp4"],
+            load_body("scope"),
+            CaptureOptions(part=part),
         )
-    assert asked == [("cam1.mp4", "largest"), ("cam4.mp4", "all")]
+    assert asked == [("cam1.mp4", "largest", part), ("cam4.mp4", "all", None)]
 
 
 def test_warnings_about_every_video_are_said_once():
