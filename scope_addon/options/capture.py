@@ -101,6 +101,12 @@ def _range_limit(settings: Any, name: str) -> str | None:
     return f"{getattr(settings, name):.6f}" if settings.use_range else None
 
 
+def _forget_person(settings: Any, _context: Any) -> None:
+    """Forget the chosen person, whose place is in the picture as it was turned before."""
+    settings.person = ""
+
+
+_TURNS_PICTURE = {"update": _forget_person}
 _TIME = {"step": 10, "precision": 2, "subtype": "TIME_ABSOLUTE", "unit": "TIME_ABSOLUTE"}
 
 
@@ -217,7 +223,7 @@ class CaptureDeclaration:
         "not say so",
         choices=ROTATIONS,
         argument=Argument(metavar="DEGREES"),
-        blender=Property(label="Turn", section=Section.FOOTAGE),
+        blender=Property(label="Turn", section=Section.FOOTAGE, keywords=_TURNS_PICTURE),
     )
     mirror: ClassVar[Option] = Option(
         "mirror",
@@ -225,7 +231,7 @@ class CaptureDeclaration:
         False,
         _EVERYWHERE,
         "exchange left and right in the footage, after turning it, as for a mirrored selfie video",
-        blender=Property(section=Section.FOOTAGE),
+        blender=Property(section=Section.FOOTAGE, keywords=_TURNS_PICTURE),
     )
     crop: ClassVar[Option] = Option(
         "crop",
@@ -492,7 +498,6 @@ class NetworkDeclaration:
         _NETWORKS | Place.LIVE | Place.LIVE_WORKER,
         "execution provider for the networks",
         choices=PROVIDERS,
-        decides_result=False,
         argument=Argument(default_text="auto, the fastest available"),
         blender=Property(
             label="Execution Provider",

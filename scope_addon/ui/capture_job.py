@@ -303,8 +303,6 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
             "Person is a place in one video, and there are several; clear it, or remove the other "
             "cameras' videos"
         )
-    if settings.lens == "FILE" and not settings.calibration_file:
-        raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
     values = chosen_values(scene)
     values["body"] = chosen_body(values)
     if any(view.use_offset for view in settings.views):
@@ -319,9 +317,11 @@ def capture_request(scene: bpy.types.Scene) -> JobRequest:
 def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
     """Return the values of a worker's options from the scene's settings and the preferences.
 
-    :raises UsageError: no body file is chosen.
+    :raises UsageError: no body or calibration file is chosen.
     """
     settings = scene.scope
+    if settings.lens == "FILE" and not settings.calibration_file:
+        raise UsageError("no calibration file is chosen; choose one, or another kind of lens")
     chosen = preferences()
     values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
     if values["body"] == "file":

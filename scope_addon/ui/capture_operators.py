@@ -102,6 +102,7 @@ class SCOPE_OT_choose_footage(SeveralFootageBrowser, bpy.types.Operator):
         _set_footage(self, context, paths[0])
         settings.queue.clear()
         if len(paths) > 1:
+            settings.person = ""  # a place in one of them
             for path in paths:
                 settings.queue.add().footage = stored_path(context, path)
         show_tab(context)
@@ -564,8 +565,9 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
         settings = context.scene.scope
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for name in ("quality", "people", "hands", "face", "height_cm", "take"):
-            layout.prop(settings, name)
+        for name in ("quality", "people", "people_count", "hands", "face", "height_cm", "take"):
+            if name != "people_count" or settings.people == "COUNT":
+                layout.prop(settings, name)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the footage to the file, and start the capture."""

@@ -308,7 +308,10 @@ class LiveJob:
         if self._kept and Path(self._kept).is_file():
             # Capture then captures the take once more
             self._footage = scene.scope.footage = str(self._kept)
-            scene.scope.views.clear()  # which are of other footage
+            # what is of other footage
+            scene.scope.person = ""
+            scene.scope.views.clear()
+            scene.scope.queue.clear()
         is_busy = Selection(scene).shows_work(since=self._selection)
         with selection_kept(scene) if is_busy else nullcontext():
             built = build_capture(

@@ -35,8 +35,8 @@ def scene_camera_path(scene: bpy.types.Scene) -> Path:
     """Write the path of the scene's chosen camera to a file of this session, and return it.
 
     The camera is read in all frames of the scene's range. *First Frame* shows the footage's first
-    one. The same camera has the same file, with the same time, so that a finished capture is found
-    again.
+    one, unless the camera follows a tracked clip, which says itself what each frame shows. The same
+    camera has the same file, with the same time, so that a finished capture is found again.
 
     :raises UsageError: no camera is chosen, it is not in the scene, or it is none that can have
         filmed the footage.
@@ -63,7 +63,6 @@ def scene_camera_path(scene: bpy.types.Scene) -> Path:
 def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]:
     """Return the content of the file: lens, times and poses."""
     render = scene.render
-    rate = render.fps / render.fps_base
     times_s = []
     poses = []
     lenses = []
@@ -75,7 +74,7 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
             evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
             lenses.append(_intrinsics(scene, evaluated))
             poses.append(_pose(scene, evaluated, frame))
-            times_s.append((frame - scene.scope.start_frame) / rate)
+            times_s.append(_time_s(scene, camera, frame))
     if lenses:
         focal = np.array(lenses)[:, 0, 0]
         if np.ptp(focal) > _SAME_LENS * focal.max():
@@ -92,12 +91,34 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
     }
 
 
+def _tracked_clips(
+    scene: bpy.types.Scene, camera: bpy.types.Object
+) -> list[bpy.types.MovieClip | None]:
+    """Return the clips in which Blender's tracker has solved the camera; None: a constraint has
+    none.
+    """
+    return [
+        scene.active_clip if constraint.use_active_clip else constraint.clip
+        for constraint in camera.constraints
+        if constraint.type == "CAMERA_SOLVER" and not constraint.mute
+    ]
+
+
+def _time_s(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> float:
+    """Return the time in the footage that a frame of the scene shows.
+
+    A tracked clip plays frame by frame, whatever the scene's rate is.
+    """
+    for clip in _tracked_clips(scene, camera):
+        if clip is not None and clip.fps > 0.0:
+            return float((frame - clip.frame_start) / clip.fps)
+    render = scene.render
+    return float((frame - scene.scope.start_frame) * render.fps_base / render.fps)
+
+
 def _is_solved(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> bool:
     """Return whether Blender's tracker has solved the camera in a frame, if it follows a track."""
-    for constraint in camera.constraints:
-        if constraint.type != "CAMERA_SOLVER" or constraint.mute:
-            continue
-        clip = scene.active_clip if constraint.use_active_clip else constraint.clip
+    for clip in _tracked_clips(scene, camera):
         if clip is None:
             return False
         solved = clip.tracking.reconstruction

@@ -210,6 +210,20 @@ def queued():
     return [(Path(clip.footage).name, clip.status) for clip in bpy.context.scene.scope.queue]
 
 
+def test_a_place_of_a_person_is_of_one_picture_alone(footage):
+    settings = bpy.context.scene.scope
+    settings.footage = str(footage)
+    shutil.copy(footage, footage.with_name("b.png"))
+    for change in (
+        lambda: setattr(settings, "rotate", "90"),
+        lambda: setattr(settings, "mirror", True),
+        lambda: choose_several([footage, footage.with_name("b.png")]),
+    ):
+        settings.person = "400,540"
+        change()
+        assert settings.person == ""
+
+
 def test_clips_of_a_queue_are_captured_one_after_the_other_and_a_bad_one_stops_none(
     fake_worker, footage
 ):

@@ -3,6 +3,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.capture.camera.given_path import read_camera_path
+from scope.scope_addon.ui import scene_camera
 from scope.scope_addon.ui.capture_job import capture_request
 
 POINTS = [(0.3, 5.0, 1.0), (-1.2, 7.0, 2.5), (0.0, 4.0, -0.5)]
@@ -124,3 +126,14 @@ def test_a_camera_that_cannot_have_filmed_it_is_refused(camera, change, says):
     change(camera)
     with pytest.raises(RuntimeError, match=says):
         bpy.ops.scope.capture()
+
+
+def test_a_tracked_clip_tells_the_times_whatever_the_scenes_rate_is(camera, monkeypatch):
+    clip = SimpleNamespace(frame_start=3, fps=30.0)
+    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [clip])
+    scene = bpy.context.scene
+    scene.render.fps = 24
+    assert scene_camera._time_s(scene, camera, 33) == pytest.approx(1.0)
+    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [])
+    first = scene.scope.start_frame
+    assert scene_camera._time_s(scene, camera, first + 48) == pytest.approx(2.0)

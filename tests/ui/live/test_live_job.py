@@ -179,10 +179,12 @@ def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch)
     job = live(f'pose(1); receive(); receive(); assert request["keep_footage"] == {str(kept)!r}; '
                f'shutil.copy({str(SAMPLE)!r}, request["keep_footage"]); finish()')  # fmt: skip
     until(job, lambda: job.has_body)
+    bpy.context.scene.scope.person = "400,540"  # of the footage before
     job.record()
     job.stop()
     to_end(job)
     assert bpy.context.scene.scope.footage == str(kept)
+    assert bpy.context.scene.scope.person == ""
     assert bpy.context.scene.scope.result.footage == str(kept)
 
 
@@ -526,6 +528,15 @@ def test_a_missing_video_is_an_error():
     settings.source = "FILE"
     settings.file = "/nowhere/walk.mp4"
     with pytest.raises(VideoError, match="does not exist"):
+        live_request(bpy.context.scene)
+
+
+def test_a_lens_by_calibration_needs_a_file(footage):
+    settings = bpy.context.scene.scope_live
+    settings.source = "FILE"
+    settings.file = str(footage)
+    bpy.context.scene.scope.lens = "FILE"
+    with pytest.raises(UsageError, match="no calibration file is chosen"):
         live_request(bpy.context.scene)
 
 
