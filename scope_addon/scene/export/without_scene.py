@@ -113,8 +113,9 @@ def _in_gap(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     after = np.clip(np.searchsorted(own_s, times_s), 1, len(own_s) - 1)
     before_s = times_s - own_s[after - 1]
     after_s = own_s[after] - times_s
-    between: NDArray[np.bool_] = np.minimum(before_s, after_s) > _ON_FRAME * usual_s
-    return between & (before_s + after_s > max(_GAP_S, 1.5 * usual_s))
+    between = np.minimum(before_s, after_s) > _ON_FRAME * usual_s
+    is_long: NDArray[np.bool_] = before_s + after_s > max(_GAP_S, 1.5 * usual_s)
+    return is_long & between
 
 
 def write_trc(path: Path, motion: Motion, body: Body) -> None:
