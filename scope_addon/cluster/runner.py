@@ -23,11 +23,13 @@ from typing import Any, NamedTuple
 from distributed import Client, Future
 
 from ...solver.errors import ScopeError
+from ..capture_report import warnings_as_json
 from ..errors import ClusterError, internal_error_message, system_error_message
 from ..footage import display_address, is_url
 from ..job.batch import how_to_continue
 from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
+from ..notices import OTHER, notice
 from ..output_paths import WITHOUT_SCENE
 from ..temporary import remove
 from . import worker as worker_side
@@ -297,7 +299,9 @@ class DaskRunner:
             entry = failure(task, text)
         if entry["status"] == "done":
             others = self._staging.left_over(task, entry["outputs"])
-            entry["report"]["warnings"] += [others] if others else []
+            notices = [notice(OTHER, text=others)] if others else []
+            for name, values in warnings_as_json(notices).items():
+                entry["report"].setdefault(name, []).extend(values)
         self._forget(key)
         return self._ended(task, attempt.worker, entry)
 

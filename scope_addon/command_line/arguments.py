@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
 
 BODY_SUFFIXES = (".npz", ".pkl", ".pickle")
+_NEGATIVE = re.compile(r"-\.?[0-9]")  # the beginning of a number below zero
 _LONGEST_SHOWN = 60  # characters of a value in a message
 
 
@@ -50,16 +52,30 @@ def add_options(parser: argparse.ArgumentParser, place: Place = Place.COMMAND_LI
 
 def with_bare_values(argv: Sequence[str]) -> list[str]:
     """Give the flags that may come without a value theirs: argparse would take what follows, such
-    as the footage.
+    as the footage. And join numbers below zero with their flags, since argparse takes a list of
+    them, such as -0.4,auto, for a flag.
+
+    :raises UsageError: a text is empty, as an unset variable of the shell is, which would mean that
+        its option is not given.
     """
+    flags = {option.flag for option in OPTIONS if option.value_type is not bool}
+    may_be_left_out = {option.flag for option in OPTIONS if option.default == ""}
     bare = {option.flag: option for option in OPTIONS if option.argument.bare}
     out = list(argv)
+    joined: list[int] = []
     for k, text in enumerate(argv):
         if text == "--":
             break
+        flag, has_value, value = text.partition("=")
+        value = value if has_value else argv[k + 1] if k + 1 < len(argv) else "missing"
+        if flag in may_be_left_out and not value.strip():
+            raise UsageError(f"{flag} is empty; give a value, or leave it out")
         if text in bare and (k + 1 == len(argv) or argv[k + 1] not in bare[text].values):
             out[k] = f"{text}={bare[text].argument.bare}"
-    return out
+        elif text in flags and k + 1 < len(argv) and _NEGATIVE.match(argv[k + 1]):
+            out[k] = f"{text}={argv[k + 1]}"
+            joined.append(k + 1)
+    return [text for k, text in enumerate(out) if k not in joined]
 
 
 def _add_valued(parser: argparse.ArgumentParser, option: Option) -> None:

@@ -72,6 +72,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     from ..live.open_source import is_stream
 
     to_finish = [Path(args.source)] if is_recording(args.source) else []
+    if to_finish:
+        _check_finishing(values)
     is_served = values["json_port"] is not None or values["preview"]
     connects = is_stream(args.source) or values["vmc"] is not None or is_served
     confine(args, to_finish, connects=connects)
@@ -254,6 +256,20 @@ def _paths(values: Mapping[str, Any]) -> list[Path]:
     )
 
 
+def _check_finishing(values: Mapping[str, Any]) -> None:
+    """Check that nothing is asked of a finished recording but to write it.
+
+    :raises UsageError: another output is given.
+    """
+    outputs = ("--json-port", "--vmc", "--preview", "--keep-footage")
+    for flag in outputs:
+        value = values[flag.removeprefix("--").replace("-", "_")]
+        if value is not None and value is not False:
+            raise UsageError(
+                f"{flag} is for a running capture, and this finishes a recording: leave it out"
+            )
+
+
 def _checked(values: Mapping[str, Any]) -> LiveOptions:
     """Check the options as far as possible without opening the source.
 
@@ -268,6 +284,10 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
         raise UsageError(
             "--keep-footage writes a video: give a name that ends in .mp4, not "
             f"{values['keep_footage'].name}"
+        )
+    if not values["listen"].strip():
+        raise UsageError(
+            "--listen is empty, which would mean all networks; give an address, or leave it out"
         )
     if len(values["heights_m"]) > values["live_people"]:
         raise UsageError(

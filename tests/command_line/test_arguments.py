@@ -8,7 +8,11 @@ import shutil
 
 import pytest
 from scope.scope_addon.cli import build_parser
-from scope.scope_addon.command_line.arguments import body_and_options, non_default_arguments
+from scope.scope_addon.command_line.arguments import (
+    body_and_options,
+    non_default_arguments,
+    with_bare_values,
+)
 from scope.scope_addon.errors import UsageError
 from scope.solver.body_file import BUILT_IN
 
@@ -50,6 +54,27 @@ def test_the_height_of_a_child_needs_the_body_of_all_ages(said, body):
     assert (
         body_and_options(build_parser().parse_args(["capture", "clip.mp4", *said]))[0].name == body
     )
+
+
+@pytest.mark.parametrize("flag", ["--person", "--crop", "--offset"])
+def test_an_empty_text_is_not_an_option_left_out(flag):
+    """As an unset variable of the shell gives it."""
+    for argv in ([flag, " ", "a.mp4"], [f"{flag}=", "a.mp4"]):
+        with pytest.raises(UsageError, match=f"{flag} is empty"):
+            with_bare_values(argv)
+
+
+def test_a_list_may_begin_with_a_number_below_zero():
+    argv = ["capture", "--offset", "-0.4,auto", "--offset", "-.5", "--hands", "a.mp4", "-o", "x"]
+    assert with_bare_values(argv) == [
+        "capture",
+        "--offset=-0.4,auto",
+        "--offset=-.5",
+        "--hands=on",
+        "a.mp4",
+        "-o",
+        "x",
+    ]
 
 
 def test_ones_own_body_is_not_exchanged(tmp_path):

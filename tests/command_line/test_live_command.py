@@ -104,6 +104,18 @@ def test_a_port_in_use_is_said(capsys):
     assert f"cannot listen on 127.0.0.1 port {port}" in capsys.readouterr().err
 
 
+def test_an_empty_address_does_not_mean_all_networks(capsys):
+    assert main(["live", str(SAMPLE), "--json-port", "0", "--listen", ""]) == 2
+    assert "--listen is empty" in capsys.readouterr().err
+
+
+def test_finishing_a_recording_serves_nothing(tmp_path, capsys):
+    left = tmp_path / "take.recording"
+    left.write_text("{}\n")
+    assert main(["live", str(left), "--json-port", "0"]) == 2
+    assert "--json-port is for a running capture" in capsys.readouterr().err
+
+
 def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
     def find_spec(name, *_):
         return None if name.endswith(".json_lines") else PathFinder.find_spec(name)

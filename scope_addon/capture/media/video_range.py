@@ -30,6 +30,7 @@ _SEPARATORS = (":::", "::;", ";;;")  # some editors write drop-frame timecode li
 _DROP_RATES = (30, 60)
 _NEAR_NOMINAL = Fraction(1, 100)  # relative tolerance: phones report a rate averaged over the file
 # Relative tolerance of 29.97 against 30000/1001; 30 differs ten times as much.
+_RATE = re.compile(r"\d{1,9}(\.\d{1,9})?(/\d{1,9})?", re.A)
 _SAME_RATE = Fraction(1, 10_000)
 
 
@@ -171,8 +172,8 @@ def parse_rate(text: str) -> Fraction:
 
     :raises UsageError: the text is not a positive number of at most 1000.
     """
-    try:
-        rate = Fraction(text.strip())
+    try:  # of an exponent, a fraction computes all digits
+        rate = Fraction(text.strip()) if _RATE.fullmatch(text.strip()) else Fraction(0)
     except (ValueError, ZeroDivisionError):
         rate = Fraction(0)
     if not 0 < rate <= 1000:

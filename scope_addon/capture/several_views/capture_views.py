@@ -311,7 +311,7 @@ def _doubts_about_file(
                     "calibration_contradicts",
                     calibration=name,
                     footage=views[v].name,
-                    person=0,
+                    person=0 if len(views[0].people) == 1 else 1,
                 )
             )
     return doubts

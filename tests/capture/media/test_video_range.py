@@ -99,6 +99,8 @@ def test_rates() -> None:
     assert parse_rate("29.97") == Fraction(30000, 1001)
     assert parse_rate("23.976") == Fraction(24000, 1001)
     assert parse_rate("30000/1001") == Fraction(30000, 1001)
+    with pytest.raises(UsageError, match="is not a frame rate"):
+        parse_rate("1e999999999")  # of which a fraction would compute all digits
     assert parse_rate("12.5") == Fraction(25, 2)
     for text in ("0", "-3", "fast", "1/0", "nan"):
         with pytest.raises(UsageError):
