@@ -43,6 +43,9 @@ class Camera:
     source: str  # as the report gives it
     # Relative error of the focal length, one standard deviation; 0: given.
     focal_deviation: float = 0.0
+    # Whether the focal length was given against the longer side of the picture, which is that of
+    # the frame as long as no bars are known.
+    is_by_side: bool = False
 
     def undistort(self, points_px: FloatArray) -> FloatArray:
         """Return pixels (..., 2) as an ideal pinhole camera with the same intrinsics would see
@@ -60,6 +63,13 @@ class Camera:
     def zoomed(self, zoom: float) -> Camera:
         """Return the camera with ``zoom`` times the focal length."""
         return replace(self, intrinsics=self.intrinsics @ np.diag([zoom, zoom, 1.0]))
+
+    def between_bars(self, longer_px: float, width: int, height: int) -> Camera:
+        """Return the camera whose picture has this longer side, between bars of a frame."""
+        share = longer_px / max(width, height)
+        if not self.is_by_side or share >= 1.0:
+            return self
+        return replace(self.zoomed(share), source=f"{self.source} between the bars")
 
     def at_zoom(self, points_px: FloatArray, zoom: FloatArray | float) -> FloatArray:
         """Return where pixels (..., 2) are with ``zoom`` times the focal length."""
@@ -155,7 +165,7 @@ def choose_camera(
         source = f"the file's metadata, {metadata_focal_mm:g} mm"
     else:
         return assumed_camera(width, height, longer)
-    return Camera(pinhole(width, height, focal_px), np.zeros(5), source)
+    return Camera(pinhole(width, height, focal_px), np.zeros(5), source, is_by_side=True)
 
 
 def _lens_of_file(

@@ -278,13 +278,15 @@ class BackgroundEstimators:
 
     def camera(self, record: BackgroundRecord, zoom: Zoom | None = None) -> Camera:
         """Return the camera of the first frame, once all were added; an assumed focal length is
-        replaced by the estimate from edges and fits.
+        replaced by the estimate from edges and fits, and a given one is that of the picture between
+        bars.
 
         :param zoom: what the lens does in the clip.
         """
         self.add(math.inf, None, record)
         if self._by_edges is None:
-            return self._given_camera
+            longer_px = longer_content_side(record.bars, *self._size)
+            return self._given_camera.between_bars(longer_px, *self._size)
         by_edges = self._by_edges.result()
         if zoom is not None:
             by_edges = by_edges.zoomed(1.0 / zoom.factors[record.edge_frames[0].row])

@@ -46,3 +46,16 @@ def test_a_distorting_lens_and_a_background_without_features():
     motion = record.motion(camera, camera, (320, 240))
     assert motion.is_static
     assert len(record.lines(motion, camera).lengths) == 0
+
+
+def test_a_given_focal_length_is_that_of_the_picture_between_bars(tmp_path):
+    """A portrait clip of 608 x 1080 in a wide video, filmed with a phone's 26 mm."""
+    camera = choose_camera(1920, 1080, focal_mm=26.0)
+    between = camera.between_bars(1080.0, 1920, 1080)
+    assert between.intrinsics[0, 0] == pytest.approx(26.0 / 36.0 * 1080.0)
+    assert between.source == "given, 26 mm between the bars"
+    assert camera.between_bars(1920.0, 1920, 1080) is camera
+    file = tmp_path / "calibration.json"
+    file.write_text('{"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]}')
+    calibrated = choose_camera(1920, 1080, calibration=file)
+    assert calibrated.between_bars(1080.0, 1920, 1080) is calibrated
