@@ -4,20 +4,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..errors import VideoError
-from ..footage import PICTURE_SUFFIXES
+from ..footage import PICTURE_SUFFIXES, numbered_from
+from ..motion import Motion
 from .datablocks import check_local
 
 _OURS = "scope_footage"  # custom property of the strips that are added here
 
 
+def pictures_of_frames(motion: Motion, start_frame: float, rate: float) -> tuple[float, list[int]]:
+    """Return the first scene frame of a motion, and which picture of its sequence each scene frame
+    from there on shows.
+
+    :param start_frame: scene frame of timestamp 0.
+    :param rate: of the scene, frames per second.
+    """
+    frames = start_frame + motion.timestamps * rate
+    scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
+    rows = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(int)
+    return float(scene_frames[0]), motion.frames[rows].tolist()
+
+
 def add_footage_strips(
-    scene: bpy.types.Scene, footage: str | Path, start_frame: float
+    scene: bpy.types.Scene,
+    footage: str | Path,
+    start_frame: float,
+    pictures: Sequence[int] = (),
+    with_sound: bool = True,
 ) -> list[bpy.types.Strip]:
     """Add the footage on free channels above existing strips, and return its strips, the picture
     last.
@@ -25,7 +45,10 @@ def add_footage_strips(
     Strips that were added before are moved instead. A scene without strips continues to render its
     camera; otherwise, the render would show the footage alone.
 
-    :param start_frame: scene frame of timestamp 0.
+    :param start_frame: scene frame of timestamp 0, or of the first of ``pictures``.
+    :param pictures: of numbered images, which of them each scene frame shows, from 0 on; empty: a
+        video or a still image.
+    :param with_sound: False: of slow motion, whose sound does not last as long as what happened.
     :raises VideoError: when the file is missing, or Blender cannot read it.
     :raises UsageError: when the scene is linked.
     """
@@ -50,9 +73,13 @@ def add_footage_strips(
     added = []
     try:
         if path.suffix.lower() in PICTURE_SUFFIXES:
-            added.append(strips.new_image(path.stem, str(path), channel, start))
+            found = (numbered_from(path) if pictures else []) or [path]
+            shown = [found[min(number, len(found) - 1)] for number in pictures] or [path]
+            added.append(strips.new_image(path.stem, str(shown[0]), channel, start))
+            for picture in shown[1:]:
+                added[-1].elements.append(picture.name)
         else:
-            sound = _sound(strips, path, channel, start)
+            sound = _sound(strips, path, channel, start) if with_sound else None
             added += [sound] if sound else []
             added.append(strips.new_movie(path.stem, str(path), channel + len(added), start))
         if not added[-1].elements[0].orig_width:  # Blender's only sign that it cannot open the file

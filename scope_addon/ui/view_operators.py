@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
 from ...solver.errors import ScopeError
+from ..footage import PICTURE_SUFFIXES
 from ..scene.datablocks import holds
 from ..scene.stored_values import start_frame
 from . import comparison
@@ -18,6 +20,9 @@ from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .reporting import ReportingOperator, refuse, rpt_, tip_
 from .sidebar import redraw_sidebars_twice, viewport_of
+
+if TYPE_CHECKING:
+    from ..motion import Motion
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -231,7 +236,12 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
 
     def work(self, context: bpy.types.Context) -> str:
         """Add the strips."""
-        from ..scene.footage_strip import add_footage_strips, strips_of, turn_strip
+        from ..scene.footage_strip import (
+            add_footage_strips,
+            pictures_of_frames,
+            strips_of,
+            turn_strip,
+        )
         from ..scene.timing import scene_rate
 
         scene = context.scene
@@ -239,12 +249,19 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         armatures = [o for o in result.collection.all_objects if "scope_start" in o]
         start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
-        strips = add_footage_strips(scene, bpy.path.abspath(result.footage), start)
+        footage = bpy.path.abspath(result.footage)
+        motion = _motion_of_any(armatures)
+        pictures: list[int] = []
+        is_picture = footage.lower().endswith(PICTURE_SUFFIXES)
+        if motion is not None and len(motion) > 1 and is_picture:
+            start, pictures = pictures_of_frames(motion, start, scene_rate(scene))
+        speed = 1.0 if motion is None else motion.footage_speed
+        strips = add_footage_strips(scene, footage, start, pictures, with_sound=speed == 1.0)
         camera = camera_of(scene)
         if camera is not None and camera.data.background_images:
             turn_strip(strips[-1], camera.data.background_images[0])
         # of what happened, which slow motion plays more slowly
-        rate = getattr(strips[-1], "fps", 0.0) * _speed_of_footage(armatures)
+        rate = getattr(strips[-1], "fps", 0.0) * speed
         if rate and abs(rate - scene_rate(scene)) > 0.01:
             self.report(
                 {"WARNING"},
@@ -260,14 +277,12 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         return rpt_("The footage is already in the sequencer") if strips[-1] in known else ""
 
 
-def _speed_of_footage(people: list[bpy.types.Object]) -> float:
-    """Return how many times as fast as the footage plays everything happened; 1 if the motions are
-    lost.
-    """
+def _motion_of_any(people: list[bpy.types.Object]) -> Motion | None:
+    """Return the captured motion of one of the people; None if the motions are lost."""
     for person in people:
         with suppress(ScopeError):
-            return motion_of(person).footage_speed
-    return 1.0
+            return motion_of(person)
+    return None
 
 
 CLASSES = (
