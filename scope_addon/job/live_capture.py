@@ -21,7 +21,7 @@ from ..live.source import Picture, Source
 from ..live.unfinished import SUFFIX, is_recording
 from ..notices import OTHER, Notice, notice
 from .cache import recordings_of
-from .request import Commands, LiveRequest
+from .request import MOTION, Commands, LiveRequest
 
 if TYPE_CHECKING:
     from ...solver import Body
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ..live.pose import LivePose
 
 Send = Callable[..., None]  # an event and its values
-MOTION = "person{}.npz"  # from 1 on
 
 
 def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: Commands) -> None:

@@ -32,6 +32,7 @@ _MOST_BYTES = 1 << 25
 RECORD = b"record\n"
 STOP = b"stop\n"
 _LONGEST = 4096  # bytes without an end of line, which is no command
+MOTION = "person{}.npz"  # file of a live recording, by the person's number from 1 on
 
 
 class LineRequest:

@@ -25,7 +25,7 @@ from ..footage import display_text
 from ..job.live_cameras import camera_source
 from ..job.live_process import PRESENCES, LiveProcess, ShownPose
 from ..job.process import START_SCRIPT
-from ..job.request import LiveRequest
+from ..job.request import MOTION, LiveRequest
 from ..live.journal import read_about
 from ..live.unfinished import remove_recording, unfinished_video
 from ..notices import OTHER, Notice, notice
@@ -320,16 +320,29 @@ class LiveJob:
         self._remove_bodies()
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()
-            try:
-                with window_shows(scene):
-                    self.warnings = retarget_to_chosen_rig(
-                        bpy.context, built.people[0].armature
-                    ).warnings
-            except ScopeError as error:  # the recording is there, and can be retargeted later
-                self.warnings = [notice(OTHER, text=str(error))]
+            self.warnings = self._retargeted(scene, built.people[0].armature, paths[0].name)
         self._worker.close()
         if self._unfinished is not None:
             remove_recording(self._unfinished)
+
+    def _retargeted(
+        self, scene: bpy.types.Scene, armature: bpy.types.Object, name: str
+    ) -> list[Notice]:
+        """Put the first person's recording on the rig that followed them; return what to say.
+
+        :param armature: of the first person who was recorded;  name: of that person's file.
+        """
+        if name != MOTION.format(1):
+            text = (
+                "the rig followed the first person, who is not in the recording; Retarget puts "
+                "another one on it"
+            )
+            return [notice(OTHER, text=text)]
+        try:
+            with window_shows(scene):
+                return retarget_to_chosen_rig(bpy.context, armature).warnings
+        except ScopeError as error:  # the recording is there, and can be retargeted later
+            return [notice(OTHER, text=str(error))]
 
 
 def finishing_request(unfinished: Path) -> LiveRequest:

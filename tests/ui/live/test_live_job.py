@@ -434,6 +434,22 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
     assert rig["scope_person"] == scene.scope.capture.objects[0]
 
 
+def test_the_rig_gets_nobody_elses_recording(live):
+    rig, _ = build_rig("mixamo")
+    scene = bpy.context.scene
+    scene.scope_live.with_rig = True
+    scene.scope_retarget.rig = rig
+    job = live('pose(1); assert receive() == "record"; assert receive() == "stop"; finish(2); ')
+    until(job, lambda: job.has_body)
+    job.record()
+    build = job._build
+    job._build = lambda scene, result: build(scene, result | {"motions": result["motions"][1:]})
+    job.stop()
+    to_end(job)
+    assert rig.animation_data is None or rig.animation_data.action is None
+    assert "first person, who is not in the recording" in str(job.warnings[0])
+
+
 @pytest.mark.parametrize(
     ("script", "says"),
     [
