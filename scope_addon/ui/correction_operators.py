@@ -113,7 +113,9 @@ def change_world(
     # each once, though it may be in several collections
     others = dict.fromkeys(obj for c in near for obj in c.all_objects if is_person(obj))
     others.pop(armature, None)
-    together = [armature, *(obj for obj in others if same_camera(motion_of(obj), motion))]
+    if not captures:  # a capture is of one clip, also where people were not in all of its frames
+        others = {o: None for o in others if same_camera(motion_of(o), motion)}
+    together = [armature, *others]
     cameras = list(dict.fromkeys(camera for c in near for camera in cameras_of_clip(c)))
     was = world_of(corrections_of(motion))
     now = world_of(change(corrections_of(motion)))

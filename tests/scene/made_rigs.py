@@ -130,13 +130,15 @@ def _appended(path, frames):
     return armature
 
 
-def captured_together():
+def captured_together(seconds=1.0):
     """Return the armatures of two people whom one camera has captured, each with its motion, at
     frame 10.
+
+    :param seconds: for which the second one was seen.
     """
     scene = bpy.context.scene
     scene.render.fps = 30
-    motions = [motion_of(walk(1.0)), motion_of(walk(1.0, speed=0.8))]
+    motions = [motion_of(walk(1.0)), motion_of(walk(seconds, speed=0.8))]
     people = [p.armature for p in build_scene(motions, BODY, None, BuildOptions()).people]
     for person, motion in zip(people, motions, strict=True):
         pack_motion(person, motion.to_bytes())

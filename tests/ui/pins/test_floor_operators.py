@@ -155,6 +155,12 @@ def test_the_floor_of_one_person_is_that_of_everybody_of_the_capture():
         assert_same(everything(person), expected)
 
 
+def test_the_floor_is_also_that_of_somebody_whom_a_live_recording_saw_longer():
+    people = captured_together(seconds=1.5)
+    bpy.ops.scope.floor_here()
+    assert [kinds(person) for person in people] == [["FLOOR"]] * 2
+
+
 def test_refused_changes_nothing(rig):
     before = everything(rig)
     bpy.context.scene.frame_set(500)
