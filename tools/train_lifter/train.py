@@ -317,9 +317,7 @@ def main() -> None:
         rolled_share=0.1,
         focal_spread=0.2,
     )
-    settings = Settings(
-        variety, a.steps, a.seed, a.rate, a.batch, a.bfloat16 or a.device == "cuda"
-    )
+    settings = Settings(variety, a.steps, a.seed, a.rate, a.batch, a.bfloat16 or a.device == "cuda")
     train(motions, a.output, settings, a.start, a.device)
 
 
