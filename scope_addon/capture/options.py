@@ -137,6 +137,15 @@ def check_options(body: Body, options: CaptureOptions, has_views: bool = False) 
         read_calibration(options.calibration)
     if options.offsets_s and not has_views:
         raise UsageError("--offset is for several cameras, but one video was given")
+    if has_views and options.camera_path is not None:
+        raise UsageError(
+            "the path of a camera cannot be given with several videos, whose cameras stand still"
+        )
+    if has_views and options.chosen is not None:
+        raise UsageError(
+            "--person is a place in one video, but several were given: leave it out; the most "
+            "prominent person of the first video is captured"
+        )
     if options.belt_speed_m_s and not options.treadmill:
         raise UsageError("--belt-speed is for people on a treadmill: add --treadmill")
     if options.belt_speed_m_s and (options.camera_path or has_views):

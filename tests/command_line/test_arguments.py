@@ -64,6 +64,12 @@ def test_an_empty_text_is_not_an_option_left_out(flag):
             with_bare_values(argv)
 
 
+def test_what_several_cameras_refuse_is_said_before_the_first_take(tmp_path):
+    argv = ["batch", str(tmp_path), "--out", str(tmp_path), "--views", "--person", "640,360"]
+    with pytest.raises(UsageError, match="--person is a place in one video"):
+        body_and_options(build_parser().parse_args(argv))
+
+
 def test_a_list_may_begin_with_a_number_below_zero():
     argv = ["capture", "--offset", "-0.4,auto", "--offset", "-.5", "--hands", "a.mp4", "-o", "x"]
     assert with_bare_values(argv) == [

@@ -156,15 +156,6 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
     :raises UsageError: there are too few or too many, or one was given twice.
     :raises VideoError: footage cannot be read.
     """
-    if options.camera_path is not None:
-        raise UsageError(
-            "the path of a camera cannot be given with several videos, whose cameras stand still"
-        )
-    if options.chosen is not None:
-        raise UsageError(
-            "--person is a place in one video, but several were given: leave it out; the most "
-            "prominent person of the first video is captured"
-        )
     if not 2 <= len(paths) <= MOST_VIEWS:
         raise UsageError(
             f"several cameras are 2 to {MOST_VIEWS} videos of the same moment, but {len(paths)} "
