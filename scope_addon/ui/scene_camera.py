@@ -85,6 +85,7 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
             )
     return {
         "intrinsics": lenses[0].tolist() if lenses else [],
+        "dist": _distortion(scene, camera),
         "size": [render.resolution_x, render.resolution_y],
         "times_s": times_s,
         "world_from_camera": [pose[:3].tolist() for pose in poses],
@@ -114,6 +115,37 @@ def _time_s(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> flo
             return float((frame - clip.frame_start) / clip.fps)
     render = scene.render
     return float((frame - scene.scope.start_frame) * render.fps_base / render.fps)
+
+
+def _distortion(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[float]:
+    """Return OpenCV's distortion k1, k2, p1, p2, k3 of the tracked clip's lens; zeros without one.
+
+    Blender's cameras are pinholes, but the footage is as the lens has distorted it. Blender's
+    models go from the ideal to the distorted picture, as OpenCV's does; see
+    `blender_brown_distortion` for the order and signs of Brown's.
+
+    :raises UsageError: the lens has another model of distortion.
+    """
+    clips = [clip for clip in _tracked_clips(scene, camera) if clip is not None]
+    if not clips:
+        return [0.0] * 5
+    lens = clips[0].tracking.camera
+    if lens.distortion_model == "POLYNOMIAL":
+        return [lens.k1, lens.k2, 0.0, 0.0, lens.k3]
+    if lens.distortion_model == "BROWN" and not lens.brown_k4:
+        return [lens.brown_k1, lens.brown_k2, -lens.brown_p2, lens.brown_p1, lens.brown_k3]
+    others = {
+        "DIVISION": ("division_k1", "division_k2"),
+        "NUKE": ("nuke_k1", "nuke_k2"),
+        "BROWN": ("brown_k4",),
+    }
+    used = others.get(lens.distortion_model, ())
+    if not any(getattr(lens, name, 0.0) for name in used):
+        return [0.0] * 5
+    raise UsageError(
+        f"the lens of the clip {clips[0].name!r} has {used[0]} of the model "
+        f"{lens.distortion_model.title()}, which cannot be used; solve it with the model Polynomial"
+    )
 
 
 def _is_solved(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> bool:

@@ -11,6 +11,9 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.capture.camera.given_path import read_camera_path
+from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.camera import blender_brown_distortion
 from scope.scope_addon.ui import scene_camera
 from scope.scope_addon.ui.capture_job import capture_request
 
@@ -137,3 +140,25 @@ def test_a_tracked_clip_tells_the_times_whatever_the_scenes_rate_is(camera, monk
     monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [])
     first = scene.scope.start_frame
     assert scene_camera._time_s(scene, camera, first + 48) == pytest.approx(2.0)
+
+
+def test_the_distortion_of_a_tracked_clip_is_that_of_the_footage(camera, monkeypatch):
+    clip = bpy.data.movieclips.load(str(SAMPLE))
+    lens = clip.tracking.camera
+    lens.units = "PIXELS"
+    lens.focal_length_pixels = 900.0
+    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [clip])
+    scene = bpy.context.scene
+    lens.distortion_model = "POLYNOMIAL"
+    lens.k1, lens.k2, lens.k3 = -0.08, 0.02, 0.003
+    assert scene_camera._distortion(scene, camera) == pytest.approx([-0.08, 0.02, 0, 0, 0.003])
+    lens.distortion_model = "BROWN"
+    lens.brown_k1, lens.brown_k2, lens.brown_k3 = -0.08, 0.02, 0.003
+    lens.brown_p1, lens.brown_p2 = 0.001, -0.002
+    dist = scene_camera._distortion(scene, camera)
+    back = blender_brown_distortion(np.array(dist))
+    assert back == pytest.approx((-0.08, 0.02, 0.003, 0.001, -0.002))
+    lens.distortion_model = "DIVISION"
+    lens.division_k1 = 0.1
+    with pytest.raises(UsageError, match="division_k1 of the model Division"):
+        scene_camera._distortion(scene, camera)
