@@ -332,13 +332,12 @@ class LiveJob:
 
         :param armature: of the first person who was recorded;  name: of that person's file.
         """
-        if name != MOTION.format(1):
-            text = (
-                "the rig followed the first person, who is not in the recording; Retarget puts "
-                "another one on it"
-            )
-            return [notice(OTHER, text=text)]
         try:
+            if name != MOTION.format(1):
+                raise UsageError(
+                    "the rig followed the first person, who is not in the recording; Retarget puts "
+                    "another one on it"
+                )
             with window_shows(scene):
                 return retarget_to_chosen_rig(bpy.context, armature).warnings
         except ScopeError as error:  # the recording is there, and can be retargeted later
