@@ -6,17 +6,13 @@ in a folder for each system and Python beside this file. It holds for the source
 that it was made from; where anything differs, a kernel is compiled and kept as numba does.
 """
 
-import glob
-import hashlib
 import sys
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import llvmlite.binding
-import numba
 import numba.core.caching
 import numba.core.config
 
@@ -38,34 +34,10 @@ LEVELS = {
 ANNOTATION = 6
 
 
-class OwnFiles(_caching.IndexDataCacheFile):  # type: ignore[misc]
-    """The index and the data files of one kernel, whose names say what they were compiled from.
-
-    Numba writes the index first, and uses the names of stale data again: read or ended in between,
-    an index of new sources would give the code of old ones.
-    """
-
-    def __init__(self, folder: str, name: str, stamp: Any) -> None:
-        super().__init__(folder, name, stamp)
-        made_from = repr((stamp, numba.__version__, llvmlite.__version__)).encode()
-        self._prefix = f"{name}.{hashlib.sha256(made_from).hexdigest()[:16]}."
-        self._data_name_pattern = self._prefix + "{number:d}.nbc"
-        self._any = f"{glob.escape(name)}.*.nbc"
-
-    def _save_data(self, name: str, data: Any) -> None:
-        super()._save_data(name, data)
-        for path in Path(self._cache_path).glob(self._any):
-            if not path.name.startswith(self._prefix):
-                with suppress(OSError):  # another process has removed it, or reads it
-                    path.unlink()
-
-
 class KernelCache(_caching.FunctionCache):  # type: ignore[misc]
     """Numba's cache of one kernel, which besides the kernel's own file heeds all of the solver's,
     and looks into shipped code as well.
     """
-
-    _cache_file: Any
 
     def __init__(self, function: Any, sources: str) -> None:
         """Find a folder to keep code in.
@@ -76,8 +48,7 @@ class KernelCache(_caching.FunctionCache):  # type: ignore[misc]
         """
         super().__init__(function)
         own = self._cache_file
-        stamp = own._source_stamp, sources
-        self._cache_file = OwnFiles(own._cache_path, self._impl.filename_base, stamp)
+        own._source_stamp = (own._source_stamp, sources)
         self._sources = sources
         module = function.__module__.rpartition("solver.")[2]
         self._shipped_name = f"{module.rpartition('.')[0]}.{self._impl.filename_base}"
