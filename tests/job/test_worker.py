@@ -167,7 +167,8 @@ def test_keys_differ_if_the_result_may_differ(tmp_path):
     clip = tmp_path / "clip.mp4"
     clip.write_bytes(b"x" * 100)
     request = JobRequest(str(clip))
-    assert request.key("1") == JobRequest(str(clip), threads=3, provider="cuda").key("1")
+    assert request.key("1") == JobRequest(str(clip), threads=3).key("1")
+    assert request.key("1") != JobRequest(str(clip), provider="cuda").key("1")
     assert request.key("1") != request.key("2")
     assert request.key("1") != JobRequest(str(clip), quality="fast").key("1")
     assert request.key("1") != JobRequest(str(clip), hands="on").key("1")
