@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.errors import VideoError
-from scope.scope_addon.job.live_capture import MOTION, _Recorder, capture_live
+from scope.scope_addon.job.live_capture import _Recorder, capture_live
 from scope.scope_addon.job.live_process import LiveProcess, parse_pose
 from scope.scope_addon.job.process import WorkerFailedError
-from scope.scope_addon.job.request import RECORD, Commands, LiveRequest
+from scope.scope_addon.job.request import MOTION, RECORD, Commands, LiveRequest
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
 
