@@ -226,8 +226,9 @@ class JobProgress:
         left = []
         if rate := self.frames_per_second:
             speed = [translate("{rate:.1f} frames/s").format(rate=rate)]
-        if self.seconds_left is not None:
-            left = [translate("{time} left").format(time=duration(self.seconds_left))]
+        seconds_left = self.seconds_left  # once: a moment later, the estimate may be gone
+        if seconds_left is not None:
+            left = [translate("{time} left").format(time=duration(seconds_left))]
         if speed or left:
             lines.append(", ".join(speed + left))
         return lines

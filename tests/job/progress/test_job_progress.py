@@ -121,3 +121,10 @@ def test_stages_of_a_second_person_have_no_remaining_time_without_an_earlier_cap
     second = [(26.0 + 0.2 * k, "solving", k, 100) for k in range(60)]
     found, _ = replayed([*messages, *second])
     assert all(left is None for t, _, left in found if t > 24.0)
+
+
+def test_an_estimate_that_is_gone_a_moment_later_is_shown(monkeypatch):
+    """The clock goes on between two looks at it."""
+    estimates = iter([75.0, None, None])
+    monkeypatch.setattr(JobProgress, "seconds_left", property(lambda _: next(estimates)))
+    assert "1 min 15 s left" in JobProgress().lines()[-1]
