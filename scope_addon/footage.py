@@ -99,19 +99,15 @@ def numbered_from(first: Path) -> list[Path]:
     return numbered(first.parent, before, after, number)
 
 
-def without_continued(pictures: Iterable[Path]) -> list[Path]:
-    """Return pictures without those that continue the sequence of another of them."""
-    first: dict[tuple[Path, str, str], tuple[int, Path]] = {}
-    kept = []
+def continued(pictures: Iterable[Path]) -> set[Path]:
+    """Return the pictures that continue the sequence of another of them."""
+    sequences: dict[tuple[Path, str, str], list[tuple[int, Path]]] = {}
     for picture in pictures:
         parts = _around_number(picture)
-        if parts is None:
-            kept.append(picture)
-        else:
+        if parts is not None:
             before, number, after = parts
-            sequence = picture.parent, before, after
-            first[sequence] = min(first.get(sequence, (number, picture)), (number, picture))
-    return [*kept, *(picture for _, picture in first.values())]
+            sequences.setdefault((picture.parent, before, after), []).append((number, picture))
+    return {picture for found in sequences.values() for _, picture in sorted(found)[1:]}
 
 
 def _around_number(picture: Path) -> tuple[str, int, str] | None:

@@ -24,7 +24,7 @@ from .media.video import Video
 from .observe import Footage
 from .options import CaptureOptions
 from .solve import Solved
-from .tracking.scene_cuts import SCENE_GAP_S
+from .tracking.scene_cuts import steps_in_scenes
 from .world.travel_scale import FEET, NOTHING
 from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
@@ -213,9 +213,7 @@ def face_frames(motion: Motion) -> dict[str, Any]:
     blinks = int((closed[1:] & ~closed[:-1]).sum() + closed[:1].sum())
     counts: dict[str, Any] = {"face_frames": int(seen.sum()), "blinks": blinks}
     if seen.any():
-        usual_s = 1.0 / motion.mocap_framerate
-        steps_s = np.diff(motion.timestamps, prepend=motion.timestamps[0] - usual_s)
-        steps_s[steps_s > SCENE_GAP_S] = usual_s
+        steps_s = steps_in_scenes(motion.timestamps, 1.0 / motion.mocap_framerate)
         minutes = float(steps_s[seen].sum()) / 60.0
         counts["blinks_per_minute"] = round(blinks / minutes, 1)
         counts["jaw_open"] = round(

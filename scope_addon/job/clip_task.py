@@ -24,12 +24,12 @@ from ..footage import (
     FOOTAGE_SUFFIXES,
     PICTURE_SUFFIXES,
     VIDEO_SUFFIXES,
+    continued,
     display_text,
     is_sequence,
     numbered_from,
     pictures_in,
     unicode_text,
-    without_continued,
 )
 from .finished_clip import (
     FINISHED_FILE,
@@ -372,9 +372,8 @@ def find_clips(
     """
     found = sorted(_footage_below(folder, out, recursive, views))
     if rate_given:
-        pictures = [path for path in found if _is_picture(path)]
-        continued = set(pictures).difference(without_continued(pictures))
-        found = [path for path in found if path not in continued]
+        others = continued(filter(_is_picture, found))
+        found = [path for path in found if path not in others]
     stems = Counter(_stem(folder, path) for path in found)
     names = {}
     for path in found:

@@ -82,7 +82,7 @@ class _FollowedPerson:
         start = newcomer.start
         if start.time <= self.end.time:
             return MAX_LINK_COST
-        # From then on anybody may have the session, so that clothes alone decide who goes first.
+        # After so long, the session may go to anybody: clothes alone decide who gets it first.
         if time_s - self.end.time > LONG_GAP_S:
             start = replace(start, time=time_s)
         return link_cost(self.end, start, distance(self.appearance, newcomer.appearance))

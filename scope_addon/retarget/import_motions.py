@@ -86,7 +86,7 @@ def import_motions(
         else "scope"
     )
     loaded = load_body(built_in if body == "scope" else body)
-    if up == "auto" and len(sources) > 1:  # somebody who lies has the same up axis as the others
+    if up == "auto" and len(sources) > 1:  # one for all, since some may be lying down
         axis, is_sure = _up_axis(
             np.concatenate([_for_body(source, loaded)[0] for source in sources]),
             loaded,

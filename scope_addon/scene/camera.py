@@ -36,6 +36,7 @@ from ..notices import Notice, notice
 from .actions import Channels, fcurves_of
 from .character.animation import on_one_hemisphere, quaternion_from_matrix
 from .stored_values import stored_numbers
+from .timing import rows_of_scene_frames
 
 # frames; footage that deviates less counts as synchronized, because 0.5 is rounding
 _MAX_OFFSET = 0.6
@@ -375,8 +376,7 @@ def _show_picture_sequence(
     if len(numbers) <= motion.frames.max() or numbers[-1] >= _MAX_DURATION:
         return [notice("image_numbers", first=first.name)]
     background.image.source = "SEQUENCE"
-    scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
-    poses = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(int)
+    scene_frames, poses = rows_of_scene_frames(frames)
     # Blender counts a video's frames from 0, but those of an image sequence from 1.
     _key_footage(camera, background, scene_frames, numbers[motion.frames[poses]] - 1)
     return []

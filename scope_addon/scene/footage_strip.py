@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import numpy as np
 
 from ..errors import VideoError
 from ..footage import PICTURE_SUFFIXES, numbered_from
 from ..motion import Motion
 from .datablocks import check_local
+from .timing import key_frames, rows_of_scene_frames
 
 _OURS = "scope_footage"  # custom property of the strips that are added here
 
@@ -26,9 +26,8 @@ def pictures_of_frames(motion: Motion, start_frame: float, rate: float) -> tuple
     :param start_frame: scene frame of timestamp 0.
     :param rate: of the scene, frames per second.
     """
-    frames = start_frame + motion.timestamps * rate
-    scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
-    rows = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(int)
+    frames = key_frames(motion.timestamps, rate, start_frame)
+    scene_frames, rows = rows_of_scene_frames(frames)
     return float(scene_frames[0]), motion.frames[rows].tolist()
 
 

@@ -74,6 +74,19 @@ def set_scene_rate(scene: bpy.types.Scene, frames_per_second: float) -> None:
     scene.render.fps, scene.render.fps_base = blender_rate(frames_per_second)
 
 
+def rows_of_scene_frames(
+    frames: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the whole frames (N,) of the scene during which a motion lasts, and the row of the
+    pose that is nearest to each.
+
+    :param frames: (T,) scene frame of each pose.
+    """
+    scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
+    rows = np.round(np.interp(scene_frames, frames, np.arange(len(frames)))).astype(np.intp)
+    return scene_frames, rows
+
+
 def key_frames(
     timestamps: NDArray[np.float64], rate: float, start_frame: float = 0.0
 ) -> NDArray[np.float64]:

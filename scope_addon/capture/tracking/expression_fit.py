@@ -53,7 +53,7 @@ from ..perception.face_record import (
     with_expression,
 )
 from ..perception.lifter import camera_towards
-from .scene_cuts import SCENE_GAP_S
+from .scene_cuts import steps_in_scenes
 
 FILE = Path(__file__).resolve().parents[3] / "assets" / "face" / "response.npz"
 # The time, and the number of frames, that tell a person's face at rest.
@@ -154,9 +154,7 @@ def is_known(rows: FloatArray, times: Float64Array) -> bool:
         it was seen, but not across a cut.
     """
     seen = rows[:, 0] > 0
-    steps_s = np.diff(times, prepend=times[:1])
-    steps_s[steps_s > SCENE_GAP_S] = 0.0
-    seconds = float(steps_s[seen].sum())
+    seconds = float(steps_in_scenes(times)[seen].sum())
     return int(seen.sum()) >= MIN_FRAMES and seconds >= MIN_S - _TIME_TOLERANCE_S
 
 

@@ -13,7 +13,7 @@ from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.smoothing import gaussian_smooth
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import Stance
-from ..tracking.scene_cuts import SCENE_GAP_S
+from ..tracking.scene_cuts import steps_in_scenes
 
 # Of the travel, see `camera_travel`.
 MIN_SPEED_M_S = 0.25  # slower sliding is explained by depth errors
@@ -178,7 +178,6 @@ def camera_travel(
     weight = carries.astype(float)
     total = gaussian_smooth(weight[:, None] * v + MEDIAN_WEIGHT * median, times, SMOOTH_HZ)
     camera_velocity = total / (gaussian_smooth(weight[:, None], times, SMOOTH_HZ) + MEDIAN_WEIGHT)
-    durations = np.diff(times)
-    durations[durations > SCENE_GAP_S] = 0.0  # after a cut, the camera counts as not having moved
+    durations = steps_in_scenes(times)[1:]  # after a cut, the camera counts as not having moved
     steps = 0.5 * (camera_velocity[1:] + camera_velocity[:-1]) * durations[:, None]
     return np.concatenate([np.zeros((1, 3)), -np.cumsum(steps, axis=0)])

@@ -31,7 +31,7 @@ from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
 from ..camera.odometry import Odometry
-from ..tracking.scene_cuts import SCENE_GAP_S
+from ..tracking.scene_cuts import steps_in_scenes
 from .placement import PlacedTrack
 
 # What the scale of a path follows from, the most certain one first.
@@ -327,11 +327,9 @@ def belt_travel(placed: PlacedTrack, up: FloatArray, belt_m_s: float) -> Float64
 
     :param up: (3,) unit vector.
     """
-    steps_s = np.diff(placed.times, prepend=placed.times[0])
-    steps_s[steps_s > SCENE_GAP_S] = 0.0
     ahead = _facing(placed, up)[placed.valid].mean(axis=0)
     ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
-    travel: Float64Array = belt_m_s * np.cumsum(steps_s)[:, None] * ahead
+    travel: Float64Array = belt_m_s * np.cumsum(steps_in_scenes(placed.times))[:, None] * ahead
     return travel
 
 
