@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hiding a captured person while a retargeted rig replaces them, and showing them again; and
-selection, mode and hidden objects from before a live capture, for when it is cancelled.
+selection, mode and hidden objects from before a live capture, for when it is cancelled; and where
+a hidden object is, which Blender does not evaluate.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
+from mathutils import Matrix
 
 from .datablocks import found, is_in_layer
 
@@ -55,6 +60,44 @@ def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list
     """Return armature and body, without objects outside the view layer, which cannot be hidden."""
     person = [armature, *(obj for obj in armature.children if obj.type == "MESH")]
     return [obj for obj in person if is_in_layer(view_layer, obj)]
+
+
+@contextmanager
+def evaluated(obj: bpy.types.Object) -> Iterator[None]:
+    """Let Blender evaluate an object inside the block, also one that is hidden or excluded.
+
+    Otherwise, such an object does not follow its animation and its parents, and is at the origin
+    after its file was opened.
+    """
+    scene = bpy.context.scene
+    shown = scene.collection.objects  # this collection cannot be hidden or excluded
+    is_hidden = obj.hide_viewport
+    is_added = obj not in shown.values() and scene.library is None
+    if obj.visible_get(view_layer=bpy.context.view_layer):
+        yield
+        return
+    try:
+        obj.hide_viewport = False
+        if is_added:
+            shown.link(obj)
+        above: bpy.types.Object | None = obj
+        while above is not None:
+            above.update_tag(refresh={"OBJECT", "TIME"})
+            above = above.parent
+        yield
+    finally:
+        if is_added:
+            shown.unlink(obj)
+        obj.hide_viewport = is_hidden
+
+
+def world_matrix(obj: bpy.types.Object) -> Matrix:
+    """Return an object's transform (4, 4) to the world at the current frame, also of a hidden
+    one.
+    """
+    with evaluated(obj):
+        bpy.context.view_layer.update()
+        return obj.matrix_world.copy()
 
 
 def select_only(layer: bpy.types.ViewLayer, chosen: bpy.types.Object) -> None:

@@ -26,6 +26,7 @@ from ..arrays import Float64Array
 from ..errors import UsageError
 from ..scene.camera import camera_pose
 from ..scene.timing import current_frame_kept
+from ..scene.visibility import evaluated
 
 _SAME_LENS = 1e-3  # of a focal length that does not change, relative
 _MAX_SCALE = 1e-3  # by which an object's axes may be longer or shorter than 1
@@ -66,14 +67,14 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
     times_s = []
     poses = []
     lenses = []
-    with current_frame_kept(scene):
+    with evaluated(camera), current_frame_kept(scene):
         for frame in range(scene.frame_start, scene.frame_end + 1):
             if not _is_solved(scene, camera, frame):
                 continue
             scene.frame_set(frame)
-            evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
-            lenses.append(_intrinsics(scene, evaluated))
-            poses.append(_pose(scene, evaluated, frame))
+            seen = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            lenses.append(_intrinsics(scene, seen))
+            poses.append(_pose(scene, seen, frame))
             times_s.append(_time_s(scene, camera, frame))
     if lenses:
         focal = np.array(lenses)[:, 0, 0]

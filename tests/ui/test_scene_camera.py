@@ -88,6 +88,38 @@ def test_positions_are_in_metres(camera):
     np.testing.assert_allclose(np.array(in_cm)[:, :, 3], 0.01 * np.array(in_metres)[:, :, 3])
 
 
+def hide(camera):
+    camera.hide_viewport = True
+
+
+def exclude(camera):
+    tracking = move_to_collection(camera)
+    bpy.context.view_layer.layer_collection.children[tracking.name].exclude = True
+
+
+def hide_collection(camera):
+    move_to_collection(camera).hide_viewport = True
+
+
+def move_to_collection(camera):
+    tracking = bpy.data.collections.new("Tracking")
+    bpy.context.scene.collection.children.link(tracking)
+    tracking.objects.link(camera)
+    bpy.context.scene.collection.objects.unlink(camera)
+    return tracking
+
+
+@pytest.mark.parametrize("hidden_by", [hide, exclude, hide_collection])
+def test_a_hidden_camera_moves_as_a_shown_one(camera, hidden_by):
+    shown = json.loads(path_of_request().read_text())
+    hidden_by(camera)
+    layer = bpy.context.view_layer
+    before = camera.visible_get(view_layer=layer), list(camera.users_collection)
+    assert json.loads(path_of_request().read_text()) == shown
+    assert (camera.visible_get(view_layer=layer), list(camera.users_collection)) == before
+    assert not before[0]
+
+
 def scale(camera):
     camera.scale = (2.0, 2.0, 2.0)
 
