@@ -17,12 +17,12 @@ import errno
 import json
 import os
 import queue
+import re
 import threading
 import time
 import zlib
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from fractions import Fraction
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -236,31 +236,92 @@ def read_about(path: Path) -> About:
     try:
         with path.open("rb") as file:
             line = file.readline(_LONGEST_LINE)
-        values = json.loads(line)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({reason(error)})") from error
+    values = _values(line)
+    if not values:
+        wrong = "its first line does not say of what"
+    elif unsound := _unsound_entries(values):
+        wrong = f"{', '.join(unsound)} in its first line"
+    else:
         about = About(**values)
-        width, height = (int(side) for side in values["size"])
-        texts = (about.body, about.source, about.fps, about.footage)
-        is_sound = (
-            line.endswith(b"\n")
-            and all(isinstance(text, str) for text in texts)
-            and isinstance(about.fingerprint, int)
-            and Fraction(about.fps) > 0
-            and isinstance(about.people, int)
-            and 0 < about.people <= MAX_PEOPLE
-            and 0 < width < 1 << 16
-            and 0 < height < 1 << 16
-        )
         origin = about.origin
-        if origin is not None:
-            origin = (int(origin[0]), float(origin[1]))
-            is_sound = is_sound and bool(np.isfinite(origin[1]))
-        if not is_sound:
-            raise ValueError("its first line")
-    except (OSError, ArithmeticError, ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(
-            f"{path} is not the recording of a live capture, or damaged ({in_one_line(error)})"
-        ) from error
-    return About(**{**asdict(about), "size": (width, height), "origin": origin})
+        return replace(
+            about,
+            size=(int(about.size[0]), int(about.size[1])),
+            origin=None if origin is None else (int(origin[0]), float(origin[1])),
+        )
+    raise InputError(
+        f"{path} is not the recording of a live capture, or damaged ({wrong}); choose another "
+        ".recording file, or capture its video if that was kept"
+    )
+
+
+def _values(line: bytes) -> dict[str, Any]:
+    """Return the entries of a recording's first line; none where it is not one of ours."""
+    if not line.endswith(b"\n"):
+        return {}
+    try:
+        values = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return values if isinstance(values, dict) else {}
+
+
+def _unsound_entries(values: dict[str, Any]) -> list[str]:
+    """Return what is missing, unknown or damaged in a recording's first line, in words."""
+    unsound = []
+    for name, is_sound in _IS_SOUND.items():
+        if name in values and not is_sound(values[name]):
+            unsound.append(f"a damaged {name}")
+        elif name not in values and name != "footage":  # which the first recordings had not
+            unsound.append(f"no {name}")
+    unknown = sorted(set(values) - set(_IS_SOUND))
+    unsound.extend(f"an unknown {in_one_line(name)}" for name in unknown)
+    return unsound
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _is_rate(value: object) -> bool:
+    """Return whether something is a frame rate, as `str` writes a `Fraction`."""
+    return isinstance(value, str) and re.fullmatch(_RATE, value) is not None
+
+
+def _is_size(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == 2
+        and all(isinstance(side, int) and 0 < side < 1 << 16 for side in value)
+    )
+
+
+def _is_origin(value: object) -> bool:
+    if value is None:
+        return True
+    return (
+        isinstance(value, list)
+        and len(value) == 2
+        and isinstance(value[0], int)
+        and isinstance(value[1], (int, float))
+        and abs(value[0]) < 1 << 63
+        and abs(value[1]) < 1 << 63  # no time that is not finite, either
+    )
+
+
+_RATE = "[1-9][0-9]{0,17}(/[1-9][0-9]{0,17})?"
+_IS_SOUND: dict[str, Callable[[Any], bool]] = {
+    "body": _is_text,
+    "fingerprint": lambda value: isinstance(value, int),
+    "source": _is_text,
+    "fps": _is_rate,
+    "size": _is_size,
+    "origin": _is_origin,
+    "people": lambda value: isinstance(value, int) and 0 < value <= MAX_PEOPLE,
+    "footage": _is_text,
+}
 
 
 def read_records(path: Path, about: About, body: Body) -> list[Record]:

@@ -2,6 +2,7 @@
 """Whatever ends a live capture, its recording is there, whole, and where the command says."""
 
 import errno
+import json
 import shutil
 import signal
 import subprocess
@@ -128,6 +129,40 @@ def test_a_cut_or_damaged_file_gives_what_is_whole(tmp_path, body):
         file.write_bytes(damaged)
         with pytest.raises(InputError, match="is not the recording of a live capture, or damaged"):
             read_about(file)
+
+
+@pytest.mark.parametrize(
+    ("entries", "said"),
+    [
+        ({"people": None}, "a damaged people in its first line"),
+        ({"fps": "30/0"}, "a damaged fps in its first line"),
+        ({"fps": "1e999999999"}, "a damaged fps in its first line"),
+        ({"size": [640]}, "a damaged size in its first line"),
+        ({"origin": []}, "a damaged origin in its first line"),
+        ({"origin": [0, float("nan")]}, "a damaged origin in its first line"),
+        ({"tempo": 1}, "an unknown tempo in its first line"),
+    ],
+)
+def test_a_damaged_first_line_says_what_is_wrong_in_it(tmp_path, body, entries, said):
+    recording, _ = recorded(tmp_path / "a", body)
+    recording._journal.close()
+    line = recording._journal.path.read_bytes().splitlines()[0]
+    file = tmp_path / "damaged.recording"
+    file.write_text(json.dumps(json.loads(line) | entries) + "\n")
+    with pytest.raises(InputError) as raised:
+        read_about(file)
+    assert f"({said}); choose another .recording file" in str(raised.value)
+
+
+def test_a_first_line_without_entries_names_them_in_our_words(tmp_path):
+    """Not as Python says it, with a name of the code."""
+    file = tmp_path / "damaged.recording"
+    file.write_text('{"body": "scope"}\n')
+    missing = ("fingerprint", "source", "fps", "size", "origin", "people")
+    with pytest.raises(InputError) as raised:
+        read_about(file)
+    assert f"({', '.join(f'no {name}' for name in missing)} in its" in str(raised.value)
+    assert "__init__" not in str(raised.value)
 
 
 def test_a_recording_with_another_body_is_not_finished(tmp_path, body):
