@@ -17,24 +17,17 @@ from ...solver.rotations import exp, log
 from ..errors import UsageError
 from .clip import Clip, keys_within
 
+FINGERS = ("index", "middle", "pinky", "ring", "thumb")
 LIMBS = {
-    "arms": (
-        "collar",
-        "shoulder",
-        "elbow",
-        "wrist",
-        "hand",
-        "index",
-        "middle",
-        "pinky",
-        "ring",
-        "thumb",
-    ),
+    "arms": ("collar", "shoulder", "elbow", "wrist", "hand", *FINGERS),
     "legs": ("hip", "knee", "ankle", "foot"),
 }
 # The arms point in opposite directions at rest. A half turn about z maps one arm's rotations to the
 # other's, and keeps elbows bending the right way.
 _HALF_ABOUT_Z = np.diag([-1.0, -1.0, 1.0])
+# A half turn would bend fingers backwards: both palms look down at rest, and it turns them up. The
+# mirror image of a finger's rotation bends it as far towards the other hand's palm.
+_SIDES_EXCHANGED = np.diag([-1.0, 1.0, 1.0])
 
 
 def interpolate(clip: Clip, start: float, end: float) -> Clip:
@@ -77,7 +70,8 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
 
     A detector swaps labels, not positions. Therefore the left thigh takes the direction in space of
     the right one, and so on down the limb. Legs keep their rotations; those of an arm are combined
-    with a half turn about z, because the arms point in opposite directions at rest.
+    with a half turn about z, because the arms point in opposite directions at rest. Fingers take
+    the mirrored rotations of the other hand's, S Ω S with S = diag(-1, 1, 1), and so its shape.
 
     :param start: start of the span, seconds.
     :param end: end of the span, seconds.
@@ -96,12 +90,16 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
             if bare == name or not bare.startswith(LIMBS[kind]) or f"right_{bare}" not in names:
                 continue
             right = names.index(f"right_{bare}")
-            # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk, which
-            # is not turned.
             for to, source in ((left, right), (right, left)):
+                rotation = clip.rotations[span, source]
+                if bare.startswith(FINGERS):
+                    out.rotations[span, to] = _SIDES_EXCHANGED @ rotation @ _SIDES_EXCHANGED
+                    continue
+                # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk,
+                # which is not turned.
                 first = not names[body.parents[to]].startswith(("left_", "right_"))
                 before = np.eye(3) if first else turn
-                out.rotations[span, to] = before.T @ clip.rotations[span, source] @ turn
+                out.rotations[span, to] = before.T @ rotation @ turn
     return out
 
 

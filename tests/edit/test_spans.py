@@ -6,6 +6,7 @@ import pytest
 from scope.scope_addon.edit import spans
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.errors import UsageError
+from scope.solver import load_body
 from scope.solver.rotations import exp
 
 from .walking import BETAS, BODY, NAMES, RATE, angle, walk
@@ -59,4 +60,25 @@ def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
                 assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 12.0, (a, b, side)
     np.testing.assert_array_equal(out.rotations[~span], clip.rotations[~span])
     again = spans.swap_sides(out, BODY, 0.2, 0.5, limbs)
+    np.testing.assert_allclose(again.rotations, clip.rotations, atol=1e-12)
+
+
+def test_fingers_of_exchanged_arms_are_bent_as_far_as_the_other_hands_were() -> None:
+    body = load_body("scope_h")
+    names = list(body.joint_names)
+    clip = Clip(np.arange(10) / RATE, np.tile(np.eye(3), (10, len(names), 1, 1)), np.zeros((10, 3)))
+    right, left = (names.index(f"{side}_middle1") for side in ("right", "left"))
+    # The right hand's fingers point along -x at rest, its palm along -y: this makes a fist.
+    clip.rotations[:, right] = exp(np.array([0.0, 0.0, 1.2]))
+    out = spans.swap_sides(clip, body, 0.0, 1.0, "arms")
+    betas = np.zeros(body.P)
+    tip, wrist = names.index("left_middle2"), names.index("left_wrist")
+    R, joints = out.parts(body, betas)
+    in_hand = np.swapaxes(R[:, wrist], 1, 2) @ (joints[:, tip] - joints[:, left])[..., None]
+    assert (in_hand[:, 1, 0] < -0.8 * np.linalg.norm(in_hand[:, :, 0], axis=1)).all()
+    np.testing.assert_allclose(
+        out.rotations[:, left], np.tile(exp(np.array([0, 0, -1.2])), (10, 1, 1))
+    )
+    np.testing.assert_array_equal(out.rotations[:, right], np.tile(np.eye(3), (10, 1, 1)))
+    again = spans.swap_sides(out, body, 0.0, 1.0, "arms")
     np.testing.assert_allclose(again.rotations, clip.rotations, atol=1e-12)
