@@ -59,7 +59,8 @@ def parent_to_root_object(
     """Parent the armature to a new empty that follows a trajectory, and replace a former root
     object.
 
-    The parent of the former root object becomes that of the new one.
+    The parent of the former root object becomes that of the new one, and so do its other children,
+    unless another armature has its root motion there: then it stays.
 
     :param frames: (T,) scene frames.
     :param positions: (T, 3) metres.
@@ -100,7 +101,11 @@ def parent_to_root_object(
     top.parent_type = "OBJECT"
     top.matrix_parent_inverse.identity()
     if former is not None:
-        _remove(former)
+        below = former.children_recursive
+        if not any(obj.type == "ARMATURE" for obj in below):
+            for child in former.children:
+                child.parent = empty
+        _remove_unless_parent(former)
         empty.name = f"{armature.name}_root"  # the take may have been renamed since
     return empty
 
@@ -108,6 +113,8 @@ def parent_to_root_object(
 def remove_root_object(armature: bpy.types.Object) -> None:
     """Remove the root object; the armature gets its former transform and parent and keeps the
     motion of its bones.
+
+    A root object stays if something else is parented to it.
     """
     top = topmost(armature)
     empty = root_object(armature)
@@ -116,7 +123,7 @@ def remove_root_object(armature: bpy.types.Object) -> None:
     if _PLACE in empty:
         armature.matrix_basis = _place(empty) @ Matrix.Scale(armature.matrix_basis.median_scale, 4)
     _copy_parenting(top, empty)
-    _remove(empty)
+    _remove_unless_parent(empty)
 
 
 def parent_transform(obj: bpy.types.Object) -> Matrix:
@@ -307,7 +314,9 @@ def _copy_parenting(obj: bpy.types.Object, other: bpy.types.Object) -> None:
         obj.matrix_parent_inverse = other.matrix_parent_inverse
 
 
-def _remove(empty: bpy.types.Object) -> None:
+def _remove_unless_parent(empty: bpy.types.Object) -> None:
+    if empty.children:
+        return
     action = empty.animation_data.action if empty.animation_data else None
     remove_blocks([empty])
     if action is not None and action.users == 0:

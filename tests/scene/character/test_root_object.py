@@ -91,3 +91,39 @@ def test_another_armature_is_not_moved_along():
     ):
         parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
     assert armature.parent == group
+
+
+def test_a_new_root_object_takes_over_what_is_parented_to_the_former():
+    armature = made("hero")
+    former = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
+    prop = made("prop", "EMPTY", parent=former)
+    prop.location = (0.0, 1.0, 0.0)
+    seen = place(prop, 11)
+    empty = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
+    assert prop.parent == empty
+    np.testing.assert_allclose(place(prop, 11), seen, atol=1e-6)
+    assert [obj.name for obj in bpy.data.objects if obj.type == "EMPTY"] == ["hero_root", "prop"]
+
+
+def test_a_removed_root_object_stays_for_what_is_parented_to_it():
+    armature = made("hero")
+    empty = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
+    prop = made("prop", "EMPTY", parent=empty)
+    seen = place(prop, 11)
+    remove_root_object(armature)
+    assert (armature.parent, prop.parent) == (None, empty)
+    np.testing.assert_allclose(place(prop, 11), seen, atol=1e-6)
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_duplicate_that_shares_the_root_object_does_not_lose_it(replaced):
+    armature = made("hero")
+    shared = parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
+    duplicate = made("hero.001", parent=shared)
+    if replaced:
+        assert parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES) == armature.parent
+    else:
+        remove_root_object(armature)
+    assert armature.parent != shared
+    assert duplicate.parent == shared
+    np.testing.assert_allclose(place(duplicate, 21), expected(2), atol=1e-5)
