@@ -70,8 +70,8 @@ def end_capture() -> None:
 
 
 def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path: str) -> None:
-    """Set the footage to a file. The place of the person to capture and videos of other cameras
-    belong to the footage before: they are removed, of which the operator reports the latter.
+    """Set the footage to a file. What is a place in the picture and videos of other cameras belong
+    to the footage before: they are removed, of which the operator reports the latter.
     """
     settings = context.scene.scope
     before = bpy.path.abspath(settings.footage)
@@ -79,7 +79,7 @@ def _set_footage(operator: bpy.types.Operator, context: bpy.types.Context, path:
     redraw_sidebars_twice()
     if bpy.path.abspath(settings.footage) == before:
         return
-    settings.person = ""
+    settings.forget_places()
     if settings.views:
         settings.views.clear()
         text = rpt_("Removed the other cameras' videos, which belong to the previous footage")

@@ -533,7 +533,7 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     footage: StringProperty(
         subtype="FILE_PATH", options=PATH_OPTIONS, update=_clear_message, **_FOOTAGE
     )
-    footage_text: path_text("footage", **_FOOTAGE)
+    footage_text: path_text("footage", typed=lambda settings: settings.forget_places(), **_FOOTAGE)
     views: CollectionProperty(
         type=SCOPE_PG_view, description="Further videos of the same moment, by other cameras"
     )
@@ -577,6 +577,13 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
         description="Raw, Normal and Strong act on everybody of the capture",
     )
     no_result: PointerProperty(type=SCOPE_PG_result)  # stays empty
+
+    def forget_places(self) -> None:
+        """Forget what is a place in the picture of other footage: the person to capture, and the
+        part in which people are looked for.
+        """
+        self.person = ""
+        self.crop = ""
 
     @property
     def result(self) -> SCOPE_PG_result:

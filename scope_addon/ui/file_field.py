@@ -10,6 +10,7 @@ switched off in its header.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -134,11 +135,14 @@ def stored_path(context: bpy.types.Context, path: str) -> str:
         return path
 
 
-def path_text(path: str, **keywords: Any) -> Any:
+def path_text(
+    path: str, typed: Callable[[Any], None] = lambda _settings: None, **keywords: Any
+) -> Any:
     """Return the text property of a path property, which stores nothing itself.
 
     :param path: name of the path property in the same group. That of the text is the same with
         ``_text`` after it.
+    :param typed: called with the group after another path was typed.
     :param keywords: of the property.
     """
 
@@ -151,6 +155,7 @@ def path_text(path: str, **keywords: Any) -> Any:
             return
         is_quoted = len(text) > 1 and text[0] == text[-1] == '"'  # as Windows copies a path
         setattr(settings, path, text[1:-1] if is_quoted else text)
+        typed(settings)
 
     return StringProperty(get=get, set=put, **keywords)
 

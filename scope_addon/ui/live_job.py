@@ -309,7 +309,7 @@ class LiveJob:
             # Capture then captures the take once more
             self._footage = scene.scope.footage = str(self._kept)
             # what is of other footage
-            scene.scope.person = ""
+            scene.scope.forget_places()
             scene.scope.views.clear()
             scene.scope.queue.clear()
         is_busy = Selection(scene).shows_work(since=self._selection)

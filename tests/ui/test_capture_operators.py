@@ -224,6 +224,24 @@ def test_a_place_of_a_person_is_of_one_picture_alone(footage):
         assert settings.person == ""
 
 
+def test_places_in_a_picture_are_forgotten_where_other_footage_is_chosen(footage):
+    settings = bpy.context.scene.scope
+    settings.footage = str(footage)
+    other = footage.with_name("b.png")
+    shutil.copy(footage, other)
+    for chosen, stays in (
+        (lambda: bpy.ops.scope.choose_footage(filepath=str(footage)), True),
+        (lambda: bpy.ops.scope.choose_footage(filepath=str(other)), False),
+        (lambda: setattr(settings, "footage_text", str(footage)), False),
+        (lambda: bpy.ops.scope.use_sample(), False),
+    ):
+        settings.person = "400,540"
+        settings.crop = "0,0,400,400"
+        chosen()
+        left = (settings.person, settings.crop)
+        assert left == (("400,540", "0,0,400,400") if stays else ("", ""))
+
+
 def test_clips_of_a_queue_are_captured_one_after_the_other_and_a_bad_one_stops_none(
     fake_worker, footage
 ):

@@ -180,11 +180,13 @@ def test_kept_footage_is_chosen_for_another_capture(live, tmp_path, monkeypatch)
                f'shutil.copy({str(SAMPLE)!r}, request["keep_footage"]); finish()')  # fmt: skip
     until(job, lambda: job.has_body)
     bpy.context.scene.scope.person = "400,540"  # of the footage before
+    bpy.context.scene.scope.crop = "0,0,400,400"
     job.record()
     job.stop()
     to_end(job)
     assert bpy.context.scene.scope.footage == str(kept)
     assert bpy.context.scene.scope.person == ""
+    assert bpy.context.scene.scope.crop == ""
     assert bpy.context.scene.scope.result.footage == str(kept)
 
 
