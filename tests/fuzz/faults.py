@@ -77,13 +77,6 @@ def failing(n: int, without: tuple[str, ...] = ()) -> Iterator[list[int]]:
         yield calls
 
 
-def later(n: int) -> int:
-    """Return the next call to fail where there may be thousands: all of the first 20, then ever
-    fewer.
-    """
-    return n + 1 if n < 20 else n * 8 // 5
-
-
 def all_faults(
     write: Callable[[], None], state: Callable[[], object], old: object, new: object
 ) -> int:
