@@ -10,7 +10,7 @@ of these asks for more.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -32,7 +32,6 @@ from .corrections import (
     DepthFlip,
     Exchange,
     Pin,
-    floor_height,
     from_arrays,
     to_arrays,
     world_of,
@@ -97,10 +96,7 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:
     """Return a pin in the world of the motion, which an upright line or a floor may have moved."""
     transform = world_of(corrections_of(motion))
-    if pin.position is None or transform is None:
-        return pin
-    x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
-    return replace(pin, position=(float(x), float(y), float(z)))
+    return pin if transform is None else _in_world(pin, transform)
 
 
 def uncorrected(motion: Motion) -> Motion:
@@ -179,7 +175,9 @@ def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
 
 
 def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
-    """Apply the flips in depth, the edits, then the contacts and pins, in the captured world."""
+    """Apply the flips in depth, the edits, then the contacts and pins, to a clip in the captured
+    world.
+    """
     corrections = corrections_of(motion)
     shot = shot_of(uncorrected(motion))
     flips = [c for c in corrections if isinstance(c, DepthFlip)]
@@ -188,16 +186,36 @@ def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
     if not wanted:
         return clip
-    # An upright line turns the world about a point on the floor, so the floor's height is nearly
-    # the same before it.
-    return resolve(clip, body, motion.betas, wanted, shot, floor=floor_of(motion, corrections))
+    world = world_of(corrections)
+    if world is None:
+        return resolve(clip, body, motion.betas, wanted, shot, floor=floor_of(motion))
+    # The floor is level, and at z = 0, only in the world that the corrections have moved.
+    before = moved_clip(clip, world)
+    moved = [_in_world(c, world) if isinstance(c, Pin) else c for c in wanted]
+    shot = replace(shot, world_from_camera=world @ shot.world_from_camera)
+    after = resolve(before, body, motion.betas, moved, shot, floor=floor_of(motion))
+    # Other keys stay the same to the bit.
+    new = (after.rotations != before.rotations).any((1, 2, 3)) | (after.root != before.root).any(1)
+    back = moved_clip(after.rows(new), np.linalg.inv(world))
+    out = clip.copy()
+    out.rotations[new] = back.rotations
+    out.root[new] = back.root
+    return out
 
 
-def floor_of(motion: Motion, corrections: Iterable[Correction] = ()) -> float:
-    """Return the floor's height z with these corrections, metres; −∞ on uneven ground, which has no
-    floor.
+def _in_world(pin: Pin, transform: NDArray[np.float64]) -> Pin:
+    """Return a pin in a world that ``transform`` (4, 4) has moved."""
+    if pin.position is None:
+        return pin
+    x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
+    return replace(pin, position=(float(x), float(y), float(z)))
+
+
+def floor_of(motion: Motion) -> float:
+    """Return the height z of the floor in the world that the motion's corrections have moved,
+    metres; −∞ on uneven ground, which has no floor.
     """
-    return -np.inf if motion.uneven_ground else floor_height(corrections)
+    return -np.inf if motion.uneven_ground else 0.0
 
 
 def before_smoothing(motion: Motion, body: Body) -> Motion:

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A line that is upright, in the image or in a view from the side, corrects a tilted world."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.corrected_motion import distance_from_pin, shot_of, with_corrections
-from scope.scope_addon.edit.corrections import Pin, Upright
+from scope.scope_addon.edit.corrections import Contact, Pin, Upright
 from scope.scope_addon.edit.edits import moved_clip, moved_motion
 from scope.scope_addon.edit.upright import upright_transform, upright_transform_in_view
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
-from .walking import BODY, angle, motion_of, walk
+from .walking import BODY, NAMES, angle, motion_of, walk
 
 TRUTH = motion_of(walk(2.0), noise=0.02)
+ANKLE = NAMES.index("left_ankle")
 POST = np.array([[0.4, 1.0, 0.2], [0.4, 1.0, 1.9]])  # two points of an upright post
 
 
@@ -49,7 +52,7 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
     before = motion
     motion = with_corrections(motion, BODY, (pin,))
     fixed = with_corrections(motion, BODY, (pin, Upright.of(transform)))
-    np.testing.assert_array_equal(fixed.joints_cam, motion.joints_cam)
+    np.testing.assert_allclose(fixed.joints_cam, motion.joints_cam, atol=1e-4)
     clips = [clip_from_motion(BODY, m, raw=False) for m in (motion, fixed)]
     for frame in (0, 30, 60):
         at = [
@@ -64,6 +67,33 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
         again = with_corrections(fixed, BODY, removed)
         for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam", "world_from_camera"):
             np.testing.assert_array_equal(getattr(again, name), getattr(expected, name))
+
+
+@pytest.mark.parametrize("degrees", [2.0, 4.0])
+def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned(degrees):
+    walker = walk(6.0)
+    walker.root[:, 2] -= 0.075  # Feet that are down are on the floor.
+    truth = motion_of(walker)
+    pivot = np.array([0.0, -3.6, 0.0])
+    upright = np.eye(4)
+    upright[:3, :3] = exp(np.radians([degrees, 0.0, 0.0]))
+    upright[:3, 3] = pivot - upright[:3, :3] @ pivot
+    tilted = moved_motion(truth, BODY, np.linalg.inv(upright))
+    ankle = clip_from_motion(BODY, truth, raw=False).joints(BODY, truth.betas)[100, ANKLE]
+    pinned = upright[:3, :3].T @ (ankle + [0.0, 0.0, 0.05] - upright[:3, 3])
+    in_truth = Pin(100, "left_ankle", position=tuple(ankle + [0.0, 0.0, 0.05]))
+    others = [Contact(10, 14, "left"), Contact(158, 162, "left"), Contact(58, 62, "left_knee")]
+    fixed = with_corrections(
+        tilted, BODY, (replace(in_truth, position=tuple(pinned)), *others, Upright.of(upright))
+    )
+    expected = with_corrections(truth, BODY, (in_truth, *others))
+    np.testing.assert_allclose(
+        *(
+            clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)
+            for motion in (fixed, expected)
+        ),
+        atol=1e-3,
+    )
 
 
 @pytest.mark.parametrize(
