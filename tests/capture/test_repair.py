@@ -28,7 +28,7 @@ def test_tentative_hands_are_believed_beside_sure_ones_and_dropped_elsewhere(
 ) -> None:
     for repaired_by in ("repair_left_right", "repair_limb_swaps", "repair_keypoint_jumps"):
         monkeypatch.setattr(repair_module, repaired_by, lambda track, *_: track)
-    hands = np.zeros((T, 2, 21, 6), np.float32)
+    hands = np.zeros((T, 2, 21, 7), np.float32)
     hands[..., :2] = np.random.default_rng(0).uniform(200, 240, (21, 2))
     hands[..., 2] = -0.4
     hands[3, 0, :, 2] = 0.9
@@ -79,7 +79,7 @@ def with_hand(track, row, side, away, confidence):
     frame.
     """
     length = HAND_LENGTH_M * pixels_per_metre(track.keypoints_px[row], track.world_landmarks[row])
-    hands = np.zeros((len(track), 2, 21, 6), np.float32)
+    hands = np.zeros((len(track), 2, 21, 7), np.float32)
     hands[row, side, :, :2] = track.keypoints_px[row, WRISTS[side]] + [away * length, 0]
     hands[row, side, 1:, 1] -= length / 2
     hands[row, side, :, 2] = confidence

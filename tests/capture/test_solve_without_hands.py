@@ -25,11 +25,11 @@ def body():
 
 def with_hands(track, frame=None):
     """The track with hands that were looked for, and seen in one frame at most."""
-    hands = np.zeros((len(track), 2, 21, 6), np.float32)
+    hands = np.zeros((len(track), 2, 21, 7), np.float32)
     if frame is not None:
         hands[frame, 0, :, :2] = track.keypoints_px[frame, 15]
         hands[frame, 0, :, 2] = 0.9
-        hands[frame, 0, :, 3:] = np.random.default_rng(0).standard_normal((21, 3)) * 0.04
+        hands[frame, 0, :, 3:6] = np.random.default_rng(0).standard_normal((21, 3)) * 0.04
     return replace(track, hands=hands)
 
 

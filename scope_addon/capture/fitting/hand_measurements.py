@@ -126,7 +126,7 @@ class HandMeasurer:
     def add(self, measured: Measurements, hands: FloatArray) -> Measurements:
         """Add the hands to the measurements of a frame.
 
-        :param hands: (2, 21, 6) undistorted pixels, confidence and world landmarks; confidence 0
+        :param hands: (2, 21, 7) as `Observation` has them, with undistorted pixels; confidence 0
             where not seen.
         """
         first = measured.keypoints2d
@@ -157,15 +157,16 @@ class HandMeasurer:
         )
 
     def _directions(self, hands: FloatArray) -> FloatArray:
-        """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 6), camera axes."""
+        """Return the (n, bones, 3) vectors along the bones of n hands (n, 21, 7), camera axes."""
         rays = hands[..., :2].mean(axis=1) @ self._unproject[:2, :2].T + self._unproject[:2, 2]
         R_virtual_camera = camera_towards(rays)
-        bones: FloatArray = (hands[:, self._to, 3:] - hands[:, self._from, 3:]) @ R_virtual_camera
+        world = hands[..., 3:6]
+        bones: FloatArray = (world[:, self._to] - world[:, self._from]) @ R_virtual_camera
         return bones
 
     def joint_confidence(self, hands: FloatArray) -> Float64Array:
         """Return (T, K+1), the confidence of the hand of each wrist and finger joint, of hands (T,
-        2, 21, 6).
+        2, 21, 7).
         """
         out = np.zeros((len(hands), self._body.K + 1))
         for side, joints in enumerate(self.fingers):
@@ -178,7 +179,7 @@ def reliability(hands: FloatArray) -> FloatArray:
     """Return how reliable the pose of each hand is at each keypoint (..., 21), 0..1: less where it
     is blurred or small.
 
-    :param hands: (..., 21, 6) as `HandMeasurer.add` takes them.
+    :param hands: (..., 21, 7) as `HandMeasurer.add` takes them.
     """
     confidence = hands[..., 2]
     size_px = np.linalg.norm(hands[..., _MIDDLE_KNUCKLE, :2] - hands[..., 0, :2], axis=-1)

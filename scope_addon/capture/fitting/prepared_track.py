@@ -114,7 +114,7 @@ class PreparedTrack:
     priors: Priors  # with unknown shape
     weights: Weights
     hand_measurer: HandMeasurer | None = None
-    # (T, 2, 21, 6) as in the track, undistorted; None: not fitted
+    # (T, 2, 21, 7) as in the track, undistorted; None: not fitted
     hands: FloatArray | None = None
     # (T, 4) direction across it, certainty; None: no face looked for
     head: FloatArray | None = None
@@ -306,7 +306,7 @@ def head_of(track: Track, camera: Camera, lifted: Lifted) -> Float64Array | None
 
 
 def undistorted_hands(hands: FloatArray, camera: Camera) -> FloatArray:
-    """Return hands (T, 2, 21, 6) with their pixels without lens distortion."""
+    """Return hands (T, 2, 21, 7) with their pixels without lens distortion."""
     return np.concatenate([camera.undistort(hands[..., :2]), hands[..., 2:]], axis=-1)
 
 

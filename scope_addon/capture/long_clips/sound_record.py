@@ -80,7 +80,7 @@ def _is_tracklet(tracklet: Tracklet, frames: int) -> bool:
         and len(tracklet.sides_px) == count
         and all(0 < side < math.inf for side in tracklet.sides_px)
         and _has_form(tracklet.appearance, "f", APPEARANCE_SIZE)
-        and (not tracklet.hands or _have_form(tracklet.hands, count, 2, 21, 6))
+        and (not tracklet.hands or _have_form(tracklet.hands, count, 2, 21, 7))
         and (not tracklet.faces or _have_form(tracklet.faces, count, RECORD))
         and _are_rows([row for row, _ in (*tracklet.references, *tracklet.masks)], 0, frames)
         and all(each is None or _has_form(each, "f", KEYPOINT_COUNT, 3) for each in found)

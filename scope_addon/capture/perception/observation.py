@@ -38,11 +38,12 @@ class Observation:
     a person; ``region``: the network's input region; ``acquired``: the person was not tracked from
     the previous frame; ``appearance``: see `appearance`, in some frames; ``reference_landmarks``:
     pending result of the heavy network, to replace ``world_landmarks``, in few frames. Order:
-    `KEYPOINT_NAMES`. ``hands`` (2, 21, 6), if requested: pixels, confidence and world landmarks of
-    the left and right hand, see `hand_tracker`; zeros where not seen, the confidence negative where
-    `confirmed` decides later. The tracker fills a hand in up to a third of a second later, if
-    it is found again, so the array has to be kept itself. ``face``, if requested: see
-    `face_record`. ``mask``: the person's outline, in few frames.
+    `KEYPOINT_NAMES`. ``hands`` (2, 21, 7), if requested: pixels, confidence and world landmarks of
+    the left and right hand, and the probability that the landmarks are a left hand's, see
+    `hand_tracker`; zeros where not seen, the confidence negative where `confirmed` decides later.
+    The tracker fills a hand in up to a third of a second later, if it is found again, so the array
+    has to be kept itself. ``face``, if requested: see `face_record`. ``mask``: the person's
+    outline, in few frames.
     """
 
     keypoints_px: Float64Array

@@ -54,9 +54,9 @@ def with_best_hands(tracks: Sequence[Track]) -> list[Track]:
 
 
 def _hands(track: Track) -> Float64Array:
-    """Return a copy of the hands (T, 2, 21, 6) of a track; zeros where none were looked for."""
+    """Return a copy of the hands (T, 2, 21, 7) of a track; zeros where none were looked for."""
     if track.hands is None:
-        return np.zeros((len(track), len(SIDES), HAND_POINTS, 6))
+        return np.zeros((len(track), len(SIDES), HAND_POINTS, 7))
     return np.array(track.hands, float)
 
 

@@ -50,6 +50,12 @@ FOLLOWED_WRIST = 0.5  # the first of them for a hand that was this one in the fr
 CROSSING = 2.0  # distance of the body's two wrists up to which this may be so, in hand lengths
 FOREARM = 2.0  # most of a hand's wrist from its elbow there, likewise
 
+# Columns of a hand, see `Observation`.
+_CONFIDENCE = 2
+_WORLD = slice(3, 6)
+_LEFT = 6
+_DEPTH_REVERSED = np.array([1.0, 1.0, -1.0])
+
 Key = tuple[int, int]  # tracklet number, and 0 for the left hand or 1 for the right one
 
 
@@ -131,8 +137,26 @@ def assigned(
         or (crossing and side_of(estimate) == 1 - side)
     ):
         return None
-    mirrored = estimate.world_landmarks * np.array([1.0, 1.0, -1.0])
+    mirrored = estimate.world_landmarks * _DEPTH_REVERSED
     return replace(estimate, world_landmarks=mirrored, left=1.0 - estimate.left)
+
+
+def with_sides_exchanged(hands: FloatArray) -> FloatArray:
+    """Return hands (T, 2, 21, 7) of which each is the other one, with the depth that `assigned`
+    would have given it as such: a right hand that was mirrored because it was at what was taken for
+    the left wrist has its own depth again.
+
+    :param hands: see `Observation`.
+    """
+    out = hands[:, ::-1].copy()
+    for side in range(len(WRISTS)):
+        own = out[:, side]
+        left = own[:, 0, _LEFT]
+        probability = left if side == 0 else 1.0 - left
+        is_wrong = (own[:, 0, _CONFIDENCE] != 0) & (probability < MIN_SIDE_PROBABILITY)
+        own[is_wrong, :, _WORLD] *= _DEPTH_REVERSED
+        own[is_wrong, :, _LEFT] = 1.0 - own[is_wrong, :, _LEFT]
+    return out
 
 
 def side_of(estimate: HandEstimate) -> int | None:
@@ -187,18 +211,17 @@ LONGEST_STEP_S = 0.12  # between two frames of which one supports the other
 MAX_CHANGE = 0.45  # of the keypoints about their wrist, mean over them, in sizes of the hand
 MAX_GROWTH = 1.6  # of its size from one frame to the other
 _TOLERANCE_S = 0.005
-_CONFIDENCE = 2  # column
 
 
 def confirmed(hands: FloatArray, times: Float64Array) -> FloatArray:
-    """Return hands (T, 2, 21, 6) in which tentative ones are either believed, with their low
+    """Return hands (T, 2, 21, 7) in which tentative ones are either believed, with their low
     confidence, or zeros.
 
     From every sure frame on, forwards and backwards, tentative hands are believed as long as each
     looks like the one before it, for at most `SUPPORT_S`.
 
-    :param hands: pixels, confidence, which is negative for tentative ones, and world landmarks;
-        zeros where not seen.
+    :param hands: see `Observation`, the confidence negative for tentative ones; zeros where not
+        seen.
     :param times: (T,) seconds.
     """
     out = hands.copy()
@@ -214,7 +237,7 @@ def confirmed(hands: FloatArray, times: Float64Array) -> FloatArray:
 
 
 def _reached(own: FloatArray, times: Float64Array, sure: BoolArray) -> BoolArray:
-    """Return (T,) which tentative hands (T, 21, 6) follow a sure one without interruption."""
+    """Return (T,) which tentative hands (T, 21, 7) follow a sure one without interruption."""
     out = np.zeros(len(own), bool)
     # The hand that was believed last, and when the network was sure of it last.
     last = -1
@@ -235,7 +258,7 @@ def _reached(own: FloatArray, times: Float64Array, sure: BoolArray) -> BoolArray
 
 
 def _continues(before: FloatArray, after: FloatArray) -> bool:
-    """Return whether two hands (21, 6) of successive frames may be one."""
+    """Return whether two hands (21, 7) of successive frames may be one."""
     a = before[:, :2] - before[0, :2]
     b = after[:, :2] - after[0, :2]
     sizes = [max(float(np.ptp(points, axis=0).max()), 1e-6) for points in (a, b)]

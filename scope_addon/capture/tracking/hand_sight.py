@@ -46,12 +46,13 @@ class Found(NamedTuple):
 
     @property
     def row(self) -> Float32Array:
-        """Pixels, confidence and world landmarks (21, 6), finite; the confidence of a tentative
-        hand is negative.
+        """Pixels, confidence, world landmarks and the probability that these are a left hand's
+        (21, 7), finite; the confidence of a tentative hand is negative.
         """
-        out = np.empty((HAND_POINTS, 6))
+        out = np.empty((HAND_POINTS, 7))
         out[:, :2] = self.estimate.keypoints_px
-        out[:, 3:] = self.estimate.world_landmarks
+        out[:, 3:6] = self.estimate.world_landmarks
+        out[:, 6] = self.estimate.left
         out[:, 2] = self.estimate.presence if self.is_sure else -self.estimate.presence
         return np.where(np.isfinite(out), out, 0.0).astype(np.float32)
 

@@ -156,7 +156,7 @@ class HandTracker:
             if hand is not None and hand.is_sure:
                 state.seen_s = now
                 state.color = hand.color
-        rows = {number: np.zeros((len(SIDES), HAND_POINTS, 6), np.float32) for number in people}
+        rows = {number: np.zeros((len(SIDES), HAND_POINTS, 7), np.float32) for number in people}
         for (number, side), hand in found.items():
             if hand is not None:
                 rows[number][side] = hand.row
@@ -194,7 +194,7 @@ class HandTracker:
         """Follow hands that are surely found back through the frames in which they were missed, and
         note those that are missed now.
 
-        :param rows: (2, 21, 6) of each person, which the observations of this frame have.
+        :param rows: (2, 21, 7) of each person, which the observations of this frame have.
         """
         now = self._time_s
         before = self._missed

@@ -26,6 +26,7 @@ from ...kinematics.sequences import least_cost_path
 from ..camera.intrinsics import Camera
 from ..perception.landmark_network import KEYPOINT_NAMES, PoseEstimate
 from ..perception.lifter import default_lifter
+from .hand_assignment import with_sides_exchanged
 from .track import Track
 
 _OPPOSITE = {"left": "right", "right": "left"}
@@ -102,7 +103,8 @@ def swap_keypoints(
         return track
     hands = track.hands
     if hands is not None and with_hands:
-        hands = np.where(where[:, None, None, None], hands[:, ::-1], hands)
+        hands = hands.copy()
+        hands[where] = with_sides_exchanged(hands[where])
     keypoints_px, confidence = (
         reorder_keypoints(v, where, order) for v in (track.keypoints_px, track.confidence)
     )

@@ -31,10 +31,10 @@ class Track:
 
     ``acquired`` marks frames in which the person was found (again) rather than followed from the
     frame before. ``reference_rows`` and ``reference_landmarks`` are the reference network's world
-    landmarks in a few frames, see `left_right`. ``hands`` holds pixels, confidence and world
-    landmarks of the left and the right hand; None: hands were not looked for. ``masks`` holds the
-    person's outline in a few frames, each with its row. ``face`` holds what was seen of the face,
-    see `face_record`; None: it was not looked for.
+    landmarks in a few frames, see `left_right`. ``hands`` holds what was seen of the left and the
+    right hand, see `Observation`; None: hands were not looked for. ``masks`` holds the person's
+    outline in a few frames, each with its row. ``face`` holds what was seen of the face, see
+    `face_record`; None: it was not looked for.
     """
 
     frames: NDArray[np.int64]  # (T,) source frame index
@@ -49,7 +49,7 @@ class Track:
     reference_landmarks: FloatArray = field(  # (A, 33, 3)
         default_factory=lambda: np.zeros((0, KEYPOINT_COUNT, 3))
     )
-    hands: FloatArray | None = None  # (T, 2, 21, 6)
+    hands: FloatArray | None = None  # (T, 2, 21, 7)
     masks: tuple[tuple[int, PersonMask], ...] = ()
     face: FloatArray | None = None  # (T, RECORD)
     # (T,) focal length over that by which keypoints and hands are given; None: it is constant.
@@ -121,7 +121,7 @@ class Tracklet:
     appearance: Float64Array = field(default_factory=lambda: np.zeros(APPEARANCE_SIZE))
     # Each with its row.
     references: list[tuple[int, PendingReference]] = field(default_factory=list)
-    # (2, 21, 6), see `Observation`; empty if not wanted
+    # (2, 21, 7), see `Observation`; empty if not wanted
     hands: list[Float32Array] = field(default_factory=list)
     masks: list[tuple[int, PersonMask]] = field(default_factory=list)  # each with its row
     # (RECORD,); empty if faces are not looked for

@@ -84,10 +84,10 @@ def line_of_sight(points):
 
 
 def hands_of(body, points):
-    """(2, 21, 6) the output of a perfect network for both hands: world landmarks in the axes of the
+    """(2, 21, 7) the output of a perfect network for both hands: world landmarks in the axes of the
     line of sight.
     """
-    hands = np.zeros((2, HAND_POINTS, 6))
+    hands = np.zeros((2, HAND_POINTS, 7))
     for side, name in enumerate(SIDES):
         at = [
             body.keypoint_names.index(n)
@@ -98,7 +98,7 @@ def hands_of(body, points):
         pixels = p @ K.T
         hands[side, :, :2] = pixels[:, :2] / pixels[:, 2:]
         hands[side, :, 2] = 1.0
-        hands[side, :, 3:] = (p - p.mean(axis=0)) @ line_of_sight(p).T
+        hands[side, :, 3:6] = (p - p.mean(axis=0)) @ line_of_sight(p).T
     return hands
 
 
@@ -242,7 +242,7 @@ def test_fingers_of_a_long_clip_take_no_more_memory_than_the_clip(body):
 
 
 def test_fingers_have_the_confidence_of_the_hand_and_other_joints_none(body):
-    hands = np.zeros((3, 2, HAND_POINTS, 6))
+    hands = np.zeros((3, 2, HAND_POINTS, 7))
     hands[1, 0, :, 2] = 0.8
     confidence = HandMeasurer(body, K).joint_confidence(hands)
     left = [body.joint_names.index(f"left_{finger}2") for finger in FINGERS]
@@ -260,7 +260,7 @@ def test_a_body_without_fingers_is_refused():
 def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():
     tracklet = Tracklet()
     for row in (1, 2):
-        hands = np.zeros((2, HAND_POINTS, 6))
+        hands = np.zeros((2, HAND_POINTS, 7))
         hands[0] = row
         where = Region((0.0, 0.0), 1.0, 0.0)
         tracklet.add(
@@ -282,11 +282,11 @@ def weights_of(body, presence: float, size_px: float) -> tuple[float, float]:
     """Sums of the weights of the keypoints and of the directions of a hand of a presence and a
     size.
     """
-    hands = np.zeros((2, HAND_POINTS, 6))
+    hands = np.zeros((2, HAND_POINTS, 7))
     hands[0, :, :2] = 300.0 + size_px * np.linspace(0.0, 1.0, HAND_POINTS)[:, None] * [0.6, 0.8]
     hands[0, HAND_NAMES.index("middle_finger_mcp"), :2] = 300.0 + size_px * np.array([0.6, 0.8])
     hands[0, :, 2] = presence
-    hands[0, :, 3:] = np.random.default_rng(0).normal(0, 0.05, (HAND_POINTS, 3))
+    hands[0, :, 3:6] = np.random.default_rng(0).normal(0, 0.05, (HAND_POINTS, 3))
     empty = Measurements(
         keypoints2d=Keypoints2D(np.zeros(0, int), np.zeros((0, 2)), np.zeros(0)),
         orientation_field=OrientationField(

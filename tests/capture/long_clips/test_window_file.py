@@ -66,7 +66,7 @@ def record(seed: int = 0) -> Observed:
             (1 + rng.random(n)).tolist(),
             rng.random(36),
             [(rows[1], known_reference(rng.random((33, 3)))), (rows[2], known_reference(None))],
-            list(rng.random((n, 2, 21, 6), np.float32)),
+            list(rng.random((n, 2, 21, 7), np.float32)),
             [(rows[0], PersonMask(region, rng.random((256, 256)).astype(np.float16), SIZE))],
             list(rng.random((n, RECORD), np.float32)),
         )

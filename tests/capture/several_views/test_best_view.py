@@ -67,7 +67,7 @@ def track_of(body, points, hand_confidence):
     """
     at = body.keypoint_set("blazepose")
     own = points[[at[name] for name in KEYPOINT_NAMES]]
-    hands = np.zeros((T, 2, HAND_POINTS, 6))
+    hands = np.zeros((T, 2, HAND_POINTS, 7))
     for side, name in enumerate(SIDES):
         names = [n for n in HAND_KEYPOINT_NAMES if n.startswith(f"hand/{name}")]
         of_hand = points[[body.keypoint_names.index(n) for n in names]]
@@ -75,7 +75,7 @@ def track_of(body, points, hand_confidence):
         R_virtual_camera = camera_towards((middle[:2] / middle[2])[None])[0]
         hands[:, side, :, :2] = pixels_of(of_hand)
         hands[:, side, :, 2] = hand_confidence[side]
-        hands[:, side, :, 3:] = (of_hand - middle) @ R_virtual_camera.T
+        hands[:, side, :, 3:6] = (of_hand - middle) @ R_virtual_camera.T
     return Track(
         frames=np.arange(T),
         times=TIMES,
@@ -99,7 +99,7 @@ def test_each_hand_comes_from_the_camera_that_sees_it(body):
     first = track_of(body, points, (0.0, 0.9))
     second = track_of(body, points @ place.R_camera_first.T + place.t_camera_first, (0.9, 0.3))
     # What the second camera guesses of the right hand is wrong.
-    second.hands[:, 1, :, 3:] = -second.hands[:, 1, :, 3:]
+    second.hands[:, 1, :, 3:6] = -second.hands[:, 1, :, 3:6]
     shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
     person = PersonInViews(shot, first, [(second, CAMERA, place)], None, lambda *_: None)
     (motion,) = solve_people(shot, [person], 0).motions

@@ -80,7 +80,8 @@ def test_walking_is_left_alone(heading: float, rate: float) -> None:
 
 
 def test_hands_go_with_the_arms() -> None:
-    true_hands = np.random.default_rng(0).normal(size=(90, 2, 21, 6))
+    true_hands = np.random.default_rng(0).normal(size=(90, 2, 21, 7))
+    true_hands[..., 6] = 0.5  # The network does not know which hand it is.
     right = replace(walker(HEADINGS["front"]), hands=true_hands)
     wrong = swapped(right, ARMS.all_points, slice(30, 50))
     hands = true_hands.copy()

@@ -24,6 +24,9 @@ from scope.scope_addon.capture.tracking.hand_assignment import (
     confirmed,
     is_same_hand,
 )
+from scope.scope_addon.capture.tracking.hand_sight import Found
+from scope.scope_addon.capture.tracking.left_right import swap_keypoints
+from scope.scope_addon.capture.tracking.track import Track
 
 SCALE = 500.0  # pixels per metre
 
@@ -132,6 +135,44 @@ def test_a_hand_of_the_wrong_side_at_this_wrist_alone_is_mirrored_in_depth() -> 
     assert assigned(found, person(sure=0.3), SCALE, 0) is None
 
 
+@pytest.mark.parametrize(
+    ("left", "is_sure"), [(0.02, True), (0.02, False), (0.3, True), (0.7, True)]
+)
+def test_a_hand_has_its_own_depth_again_where_left_and_right_are_exchanged_back(
+    left: float, *, is_sure: bool
+) -> None:
+    """A right hand, sure or not, at what the body's network took for the left wrist."""
+    found = hand(0, left=left)
+    at_left = assigned(found, person(), SCALE, 0)
+    assert at_left is not None
+    rows = np.zeros((2, 2, 21, 7), np.float32)
+    rows[0, 0] = Found(at_left, is_sure, None).row
+    rows[1, 0] = rows[0, 0]
+    track = Track(
+        frames=np.arange(2),
+        times=np.arange(2) / 30,
+        seen=np.ones(2, bool),
+        keypoints_px=np.zeros((2, 33, 2), np.float32),
+        confidence=np.ones((2, 33), np.float32),
+        world_landmarks=np.zeros((2, 33, 3), np.float32),
+        acquired=np.arange(2) == 0,
+        hands=rows,
+    )
+    where = np.array([True, False])
+    exchanged = swap_keypoints(track, where).hands
+    assert exchanged is not None
+    # As if the wrist had been the right one from the start: the same but for where it is.
+    at_right = assigned(hand(1, left=left), person(), SCALE, 1)
+    assert at_right is not None
+    np.testing.assert_allclose(exchanged[0, 1, :, 3:6], at_right.world_landmarks, atol=1e-7)
+    assert exchanged[0, 1, 0, 6] == pytest.approx(at_right.left)
+    assert not exchanged[0, 0].any()
+    np.testing.assert_array_equal(exchanged[1], rows[1])
+    again = swap_keypoints(replace(track, hands=exchanged), where).hands
+    assert again is not None
+    np.testing.assert_allclose(again, rows, atol=1e-7)
+
+
 def test_hands_that_touch_are_two_where_the_network_is_sure_of_their_sides() -> None:
     a = hand(0, left=0.95)
     for left, away, is_same in (
@@ -158,7 +199,7 @@ def tentative_hand(presence, turned_deg=0.0, size=40.0, wrist=(200.0, 300.0)):
     points = np.array(
         [[0.0, 0.0], *([x, y] for x in (-0.4, -0.2, 0, 0.2, 0.4) for y in (-0.5, -0.65, -0.8, -1))]
     )
-    out = np.zeros((21, 6))
+    out = np.zeros((21, 7))
     out[:, :2] = size * points @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) + wrist
     out[:, 2] = presence
     out[:, 3:5] = points
@@ -166,8 +207,8 @@ def tentative_hand(presence, turned_deg=0.0, size=40.0, wrist=(200.0, 300.0)):
 
 
 def track(presences):
-    """Hands (T, 2, 21, 6) of which the left one has these presences."""
-    hands = np.zeros((len(presences), 2, 21, 6))
+    """Hands (T, 2, 21, 7) of which the left one has these presences."""
+    hands = np.zeros((len(presences), 2, 21, 7))
     for k, presence in enumerate(presences):
         if presence:
             hands[k, LEFT] = tentative_hand(presence)
