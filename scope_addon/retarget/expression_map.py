@@ -30,6 +30,8 @@ _KIND = "expression map"
 # With so many keys of ARKit's names, others, such as visemes, are left alone.
 _MIN_ARKIT = 5
 _BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
+_LEFT_BLINK = {"eyeBlinkLeft": 1.0}
+_RIGHT_BLINK = {"eyeBlinkRight": 1.0}
 _SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
 _STRETCH = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}
 _PRESS = {
@@ -69,8 +71,8 @@ _VRM = {
     "oh": _OCULUS["o"],
     "o": _OCULUS["o"],
     "blink": _BOTH_BLINK,
-    "blinkleft": {"eyeBlinkLeft": 1.0},
-    "blinkright": {"eyeBlinkRight": 1.0},
+    "blinkleft": _LEFT_BLINK,
+    "blinkright": _RIGHT_BLINK,
     "happy": _SMILE,
     "joy": _SMILE,
     "angry": _BROWS_DOWN,
@@ -93,8 +95,8 @@ _VRM = {
 _VROID = {
     **{f"mth{vowel}": _VRM[vowel] for vowel in "aiueo"},
     "eyeclose": _BOTH_BLINK,
-    "eyecloseleft": {"eyeBlinkLeft": 1.0},
-    "eyecloseright": {"eyeBlinkRight": 1.0},
+    "eyecloseleft": _LEFT_BLINK,
+    "eyecloseright": _RIGHT_BLINK,
     "mthfun": _SMILE,
     "brwangry": _BROWS_DOWN,
     "brwsorrow": {"browInnerUp": 1.0},
@@ -161,6 +163,9 @@ class ExpressionMap:
 def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
     """Guess the map from the names of shape keys: ARKit's, else Oculus' visemes, else VRM's and
     VRoid's expressions.
+
+    A key that closes both eyes is left out beside keys that close one each: together they would
+    close the lids twice.
     """
     names = {key: _plain(key) for key in keys}
     arkit = {key: {_ARKIT[name]: 1.0} for key, name in names.items() if name in _ARKIT}
@@ -177,7 +182,10 @@ def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
             if looked_up in table:
                 found[key] = dict(table[looked_up])
                 break
-    return ExpressionMap(arkit | found)
+    found = arkit | found
+    if _LEFT_BLINK in found.values() and _RIGHT_BLINK in found.values():
+        found = {key: factors for key, factors in found.items() if factors != _BOTH_BLINK}
+    return ExpressionMap(found)
 
 
 def save_expression_map(expression_map: ExpressionMap, path: str | Path) -> None:

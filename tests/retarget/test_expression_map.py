@@ -85,10 +85,11 @@ def test_arkits_names_however_they_are_spelled(spelled):
 @pytest.mark.parametrize(
     ("names", "closed", "open_mouth", "round_mouth"),
     [
-        (OCULUS, None, "viseme_aa", "viseme_O"),
-        (VRM0, "Blink", "A", "O"),
-        (VRM1, "blink", "aa", "oh"),
-        (VROID, VROID[1], VROID[4], VROID[5]),
+        (OCULUS, (), "viseme_aa", "viseme_O"),
+        (VRM0, ("Blink_L", "Blink_R"), "A", "O"),
+        (VRM1, ("blinkLeft", "blinkRight"), "aa", "oh"),
+        (VROID, (VROID[2], VROID[3]), VROID[4], VROID[5]),
+        (["Blink", "Blink_L", "A", "O"], ("Blink",), "A", "O"),
     ],
 )
 def test_blinks_and_vowels_of_other_conventions(names, closed, open_mouth, round_mouth):
@@ -101,8 +102,18 @@ def test_blinks_and_vowels_of_other_conventions(names, closed, open_mouth, round
     assert ooh[round_mouth] > 0.9
     assert ooh[open_mouth] == 0
     assert not any(found.values(weights())[key] for key in found.keys)
-    if closed:
-        assert found.values(weights(eyeBlinkLeft=1, eyeBlinkRight=1))[closed] == 1
+    blink = found.values(weights(eyeBlinkLeft=1, eyeBlinkRight=1))
+    assert all(blink[key] == 1 for key in closed)
+
+
+@pytest.mark.parametrize("names", [VRM0, VRM1, VROID, ["eyeBlinkLeft", "eyeBlinkRight", "Blink"]])
+def test_no_key_closes_both_eyes_beside_keys_that_close_one_each(names: list[str]) -> None:
+    """Lids that follow two keys would close twice as far, into the face."""
+    found = guess_expression_map(names)
+    for eye in ("eyeBlinkLeft", "eyeBlinkRight"):
+        moved_by = [key for key, factors in found.keys.items() if eye in factors]
+        assert len(moved_by) == 1
+        assert found.keys[moved_by[0]] == {eye: 1.0}
 
 
 def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
