@@ -16,9 +16,10 @@ from .rest_pose import RestPose
 _WORDS = {
     "thumb": ("thumb",),
     "index": ("index", "pointer"),
-    "middle": ("middle", "mid"),
     "ring": ("ring",),
     "pinky": ("pinky", "pinkie", "little"),
+    # Last, because the second phalanx of any finger may be called so, as in ringMid.
+    "middle": ("middle", "mid"),
 }
 # Bones of a hand that are not phalanges. A thumb's metacarpal moves, and counts as its first
 # phalanx.
@@ -74,15 +75,18 @@ def _by_name(rest: RestPose, below: list[int]) -> dict[str, list[int]]:
     """Return the bones of each finger from the knuckle on; empty if no name is that of a finger."""
     own: dict[str, set[int]] = {}
     numbered: dict[int, set[int]] = {}
+    shared = [
+        word
+        for words in _WORDS.values()
+        for word in words
+        if all(word in rest.names[i].lower() for i in below)
+    ]
     for i in below:
         name = rest.names[i].rsplit(":", 1)[-1]
         words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)
         if any(_NO_PHALANX.fullmatch(word) for word in words):
             continue
-        bare = name.lower()
-        finger = next(
-            (f for f, known in _WORDS.items() if any(word in bare for word in known)), None
-        )
+        finger = _finger_of(name, shared)
         number = _NUMBERED.search(name)
         if finger == "thumb" or (finger and not _METACARPAL.search(name)):
             own.setdefault(finger, set()).add(i)
@@ -91,6 +95,22 @@ def _by_name(rest: RestPose, below: list[int]) -> dict[str, list[int]]:
     unnamed = [finger for finger in FINGERS if finger not in own]
     own |= {finger: numbered[n] for finger, n in zip(unnamed, sorted(numbered), strict=False)}
     return {finger: _longest(rest.parents, bones) for finger, bones in own.items()}
+
+
+def _finger_of(name: str, shared: list[str]) -> str | None:
+    """Return the finger of which a bone's name has a word; None if it has none.
+
+    :param shared: words that all bones of the hand have, as in the name of a rig; they count where
+        there is no other.
+    """
+    bare = name.lower()
+    found = [
+        (word in shared, finger)
+        for finger, words in _WORDS.items()
+        for word in words
+        if word in bare
+    ]
+    return min(found, key=lambda each: each[0])[1] if found else None
 
 
 def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list[int]]:

@@ -32,6 +32,8 @@ NAMES = {
         "123",
     ),
     "SMPL-X": ("left_{finger}{k}", FINGERS, "123"),
+    "phalanges with the name of a finger": ("{finger}{k}_L", FINGERS, ("Base", "Mid", "Top")),
+    "a rig with the name of a finger": ("Little_{finger}{k}_L", FINGERS, ("Base", "Mid", "Top")),
 }
 
 
