@@ -40,7 +40,7 @@ from .depth_flips import flipped
 from .edits import edited, moved_clip, moved_motion
 from .pose_refit import pixel_of
 from .solve_pins import Shot, lowest_skin, resolve, resting_joints
-from .spans import swap_sides
+from .spans import joints_of_limbs, swap_sides
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
 # Smoothing has mixed left and right within this time of a span's end.
@@ -233,7 +233,7 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
         return base
     raw = clip_from_motion(body, base, raw=True)
     finished = clip_from_motion(body, base, raw=False)
-    mixed = np.zeros(len(base), bool)
+    mixed = np.zeros(finished.rotations.shape[:2], bool)
     contact = base.foot_contact.copy()
     for exchange in exchanges:
         span = np.flatnonzero((base.frames >= exchange.first) & (base.frames <= exchange.last))
@@ -243,13 +243,13 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
             finished = swap_sides(finished, body, first, last, exchange.limbs)
             if exchange.limbs != "arms":
                 contact[span] = contact[span][:, _OTHER_FOOT]
+            joints = joints_of_limbs(body, exchange.limbs)
             for k, neighbour in ((span[0], span[0] - 1), (span[-1], span[-1] + 1)):
                 if 0 <= neighbour < len(base):
-                    mixed |= np.abs(base.timestamps - base.timestamps[k]) < _MIXED_S
+                    near = np.abs(base.timestamps - base.timestamps[k]) < _MIXED_S
+                    mixed[np.ix_(near, joints)] = True
     smooth = smooth_rotations(raw.rotations, raw.times)
-    sided = np.flatnonzero([name.startswith(("left_", "right_")) for name in body.joint_names])
-    again = np.ix_(np.flatnonzero(mixed), sided)
-    finished.rotations[again] = smooth[again]
+    finished.rotations[mixed] = smooth[mixed]
     new_raw, new = (
         _poses(clip, getattr(base, poses))
         for clip, poses in ((raw, "poses_raw"), (finished, "poses"))

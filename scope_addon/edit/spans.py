@@ -78,21 +78,16 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
     :param limbs: "arms", "legs" or "both".
     :raises UsageError: when ``limbs`` is none of these, or no key is in the span.
     """
-    if limbs not in (*LIMBS, "both"):
-        raise UsageError(f"limbs must be arms, legs or both, not {limbs!r}")
+    kinds = _kinds_of_limbs(limbs)
     span = keys_within(clip, start, end)
     names = list(body.joint_names)
     out = clip.copy()
-    for kind in LIMBS if limbs == "both" else (limbs,):
+    for kind in kinds:
         turn = _HALF_ABOUT_Z if kind == "arms" else np.eye(3)
-        for left, name in enumerate(names):
-            bare = name.removeprefix("left_")
-            if bare == name or not bare.startswith(LIMBS[kind]) or f"right_{bare}" not in names:
-                continue
-            right = names.index(f"right_{bare}")
+        for left, right in _pairs_of_joints(body, kind):
             for to, source in ((left, right), (right, left)):
                 rotation = clip.rotations[span, source]
-                if bare.startswith(FINGERS):
+                if names[to].partition("_")[2].startswith(FINGERS):
                     out.rotations[span, to] = _SIDES_EXCHANGED @ rotation @ _SIDES_EXCHANGED
                     continue
                 # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk,
@@ -101,6 +96,38 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
                 before = np.eye(3) if first else turn
                 out.rotations[span, to] = before.T @ rotation @ turn
     return out
+
+
+def joints_of_limbs(body: Body, limbs: str) -> list[int]:
+    """Return the joints of both sides that `swap_sides` exchanges.
+
+    :param limbs: "arms", "legs" or "both".
+    :raises UsageError: when ``limbs`` is none of these.
+    """
+    return [
+        joint
+        for kind in _kinds_of_limbs(limbs)
+        for pair in _pairs_of_joints(body, kind)
+        for joint in pair
+    ]
+
+
+def _kinds_of_limbs(limbs: str) -> tuple[str, ...]:
+    if limbs not in (*LIMBS, "both"):
+        raise UsageError(f"limbs must be arms, legs or both, not {limbs!r}")
+    return tuple(LIMBS) if limbs == "both" else (limbs,)
+
+
+def _pairs_of_joints(body: Body, kind: str) -> list[tuple[int, int]]:
+    """Return the left and the right one of each joint of the arms or the legs."""
+    names = list(body.joint_names)
+    pairs = []
+    for left, name in enumerate(names):
+        bare = name.removeprefix("left_")
+        is_of_kind = bare != name and bare.startswith(LIMBS[kind])
+        if is_of_kind and f"right_{bare}" in names:
+            pairs.append((left, names.index(f"right_{bare}")))
+    return pairs
 
 
 def _hermite(

@@ -28,10 +28,12 @@ from scope.scope_addon.motion import CORRECTION_KEYS, Motion
 from scope.solver.rotations import log
 
 from ..made_motion import made_motion
-from .walking import BODY, NAMES, RATE, motion_of, walk
+from .walking import BODY, NAMES, RATE, angle, motion_of, walk
 
 TRUTH = walk(3.0)
 MOTION = motion_of(TRUTH, noise=0.05)
+ARM = ("collar", "shoulder", "elbow", "wrist", "hand")
+LEG = ("hip", "knee", "ankle", "foot")
 
 
 def pin(name="right_wrist", frame=45, shift=(40.0, -25.0)):
@@ -103,6 +105,16 @@ def test_sides_are_exchanged_before_pins(pin_first):
         assert np.linalg.norm(joints - right, axis=-1).max() < 0.005
     wrong = clip_from_motion(BODY, captured, raw=False).joints(BODY, captured.betas)
     assert np.linalg.norm(wrong - right, axis=-1)[40].max() > 0.1
+
+
+@pytest.mark.parametrize(("limbs", "kept"), [("arms", LEG), ("legs", ARM)])
+def test_limbs_that_are_not_exchanged_stay_as_they_were(limbs, kept):
+    """Also around the span's ends, where the others are smoothed again."""
+    exchanged = with_corrections(MOTION, BODY, (Exchange(30, 50, limbs),))
+    others = [NAMES.index(f"{side}_{joint}") for side in ("left", "right") for joint in kept]
+    before, after = (clip_from_motion(BODY, m, raw=False) for m in (MOTION, exchanged))
+    assert angle(before.rotations, after.rotations)[:, others].max() < 1e-6
+    assert angle(before.rotations, after.rotations).max() > 0.1
 
 
 @pytest.mark.parametrize("limbs", ["legs", "both", "arms"])
