@@ -3,9 +3,10 @@
 load it quickly.
 """
 
+import math
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 VIDEO_SUFFIXES = (
@@ -75,6 +76,29 @@ def is_sequence(pictures: list[Path]) -> bool:
     number only.
     """
     return len(pictures) > 1 and len({sequence_pattern(p) for p in pictures}) == 1
+
+
+def numbered_places(numbers: Sequence[int]) -> list[int]:
+    """Return the places of numbered pictures, from 0 on; numbers in constant steps, such as tens,
+    count as consecutive.
+
+    :param numbers: in increasing order.
+    """
+    step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
+    return [(number - numbers[0]) // step for number in numbers]
+
+
+def picture_slots(numbers: Sequence[int]) -> list[int]:
+    """Return the slot of each numbered picture: it is shown at slot / rate seconds.
+
+    A missing picture leaves a gap in time. If more than half of the numbers are missing, they only
+    give the order.
+
+    :param numbers: in increasing order.
+    """
+    places = numbered_places(numbers)
+    missing = places[-1] + 1 - len(places)
+    return list(range(len(places))) if 2 * missing > places[-1] + 1 else places
 
 
 def numbered(folder: Path, before: str, after: str, first: int = 0) -> list[Path]:

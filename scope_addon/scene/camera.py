@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import VideoError
-from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from
+from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from, picture_slots
 from ..motion import Motion
 from ..notices import Notice, notice
 from .actions import Channels, fcurves_of
@@ -205,7 +205,7 @@ def show_footage(
     undistorted = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES else _show_video
     show = _show_clip if motion.dist.any() else undistorted
     try:
-        size, warnings = show(camera.data, background, path, motion, frames)
+        size, warnings = show(camera, background, path, motion, frames)
     except RuntimeError:  # also where a name has a backslash, which Blender takes for a slash
         size, warnings = (0, 0), []
     if not min(size):
@@ -241,7 +241,7 @@ def _turn(background: bpy.types.CameraBackgroundImage, motion: Motion) -> None:
 
 
 def _show_picture(
-    camera: bpy.types.Camera,
+    camera: bpy.types.Object,
     background: bpy.types.CameraBackgroundImage,
     path: Path,
     motion: Motion,
@@ -257,7 +257,7 @@ def _show_picture(
 
 
 def _show_clip(
-    camera: bpy.types.Camera,
+    camera: bpy.types.Object,
     background: bpy.types.CameraBackgroundImage,
     path: Path,
     motion: Motion,
@@ -329,7 +329,7 @@ def _drift(motion: Motion, frames: NDArray[np.float64]) -> float:
 
 
 def _show_video(
-    camera: bpy.types.Camera,
+    camera: bpy.types.Object,
     background: bpy.types.CameraBackgroundImage,
     path: Path,
     motion: Motion,
@@ -362,28 +362,36 @@ def _show_video(
 
 
 def _show_picture_sequence(
-    camera: bpy.types.Camera,
+    camera: bpy.types.Object,
     background: bpy.types.CameraBackgroundImage,
     first: Path,
     motion: Motion,
     frames: NDArray[np.float64],
 ) -> list[Notice]:
-    """Show numbered pictures in step with the poses, from the first one on; return warnings."""
+    """Show numbered pictures in step with the poses, from the first one on; return warnings.
+
+    A further camera has counted by its clock: it shows the picture before where one is missing, and
+    its first and last one where it did not film.
+    """
     found = [LAST_NUMBER.search(picture.stem) for picture in numbered_from(first)]
     numbers = np.array([int(match.group()) for match in found if match])
     if len(numbers) == 0:  # a single picture
         return []
-    if len(numbers) <= motion.frames.max() or numbers[-1] >= _MAX_DURATION:
+    pictures = motion.frames
+    if view_number(camera) is not None:
+        slots = picture_slots(numbers.tolist())
+        pictures = np.maximum(np.searchsorted(slots, motion.frames, side="right") - 1, 0)
+    if len(numbers) <= pictures.max() or numbers[-1] >= _MAX_DURATION:
         return [notice("image_numbers", first=first.name)]
     background.image.source = "SEQUENCE"
     scene_frames, poses = rows_of_scene_frames(frames)
     # Blender counts a video's frames from 0, but those of an image sequence from 1.
-    _key_footage(camera, background, scene_frames, numbers[motion.frames[poses]] - 1)
+    _key_footage(camera, background, scene_frames, numbers[pictures[poses]] - 1)
     return []
 
 
 def _key_footage(
-    camera: bpy.types.Camera,
+    camera: bpy.types.Object,
     background: bpy.types.CameraBackgroundImage,
     scene_frames: NDArray[np.float64],
     shown: NDArray[np.float64],
@@ -394,12 +402,13 @@ def _key_footage(
     _show_frames(background.image_user, int(scene_frames[0]))
     offsets = shown - (scene_frames - scene_frames[0])
     changes = np.flatnonzero(np.diff(offsets, prepend=np.inf))
-    path = _shown_frames_path(len(camera.background_images) - 1)
-    animation = camera.animation_data
+    data = camera.data
+    path = _shown_frames_path(len(data.background_images) - 1)
+    animation = data.animation_data
     if animation is not None and animation.action is not None:  # the keys of a lens that zooms
-        channels = Channels.of(camera)
+        channels = Channels.of(data)
     else:
-        channels = Channels(camera, bpy.data.actions.new(f"{camera.name}_footage"))
+        channels = Channels(data, bpy.data.actions.new(f"{data.name}_footage"))
     channels.write(path, scene_frames[changes], offsets[changes], "CONSTANT")
 
 

@@ -270,11 +270,7 @@ def test_footage_of_a_distorting_lens_at_another_rate_is_warned_about(body, make
 
 def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
     numbers = [7, 8, 10, 11]  # one is missing
-    for number in numbers:
-        image = bpy.data.images.new("picture", 64, 48)
-        image.filepath_raw = str(tmp_path / f"walk_{number:04d}.png")
-        image.file_format = "PNG"
-        image.save()
+    save_pictures(tmp_path, numbers)
     motion = make_motion(
         body, timestamps=np.array([0, 1, 3, 4]) / 24, rate=24.0, image_size=(64, 48)
     )
@@ -287,6 +283,39 @@ def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
     shown = [frame_shown(camera, f) + 1 for f in range(5)]
     assert shown[:2] + shown[3:] == numbers
     assert shown[2] in (8, 10)
+
+
+def save_pictures(folder, numbers):
+    for number in numbers:
+        image = bpy.data.images.new("picture", 64, 48)
+        image.filepath_raw = str(folder / f"walk_{number:04d}.png")
+        image.file_format = "PNG"
+        image.save()
+
+
+@pytest.mark.parametrize(
+    ("offset", "numbers", "expected"),
+    [
+        (-2, range(7, 13), [7, 7, 7, 8, 9]),  # it began two pictures later
+        (-2, range(7, 9), [7, 7, 7, 8, 8]),  # and ended earlier
+        (0, [7, 8, 10, 11, 12], [7, 8, 8, 10, 11]),  # one is missing
+        (0, [10, 20, 30, 40, 50], [10, 20, 30, 40, 50]),
+    ],
+)
+def test_numbered_pictures_of_a_further_camera_are_shown_by_its_clock(
+    body, make_motion, clip, tmp_path, offset, numbers, expected
+):
+    save_pictures(tmp_path, numbers)
+    views = made_views(offset / 30) | {
+        "view_image_sizes": np.array([[64, 48]]),
+        "view_frame_rates": np.array([30.0]),
+    }
+    motion = replace(make_motion(body, 5, rate=30.0, image_size=(64, 48)), views=views)
+    options = replace(NEW_SCENE, view_footage=[tmp_path / f"walk_{numbers[0]:04d}.png"])
+    built = build_scene([motion], body, clip, options)
+    _, second = (obj for obj in built.collection.objects if obj.type == "CAMERA")
+    assert built.warnings == []
+    assert [frame_shown(second, f) + 1 for f in range(5)] == expected
 
 
 def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_motion, tmp_path):

@@ -5,7 +5,6 @@ picture and a rate.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -18,6 +17,8 @@ from ...footage import (
     is_sequence,
     numbered,
     numbered_from,
+    numbered_places,
+    picture_slots,
     pictures_in,
     sequence_pattern,
 )
@@ -27,11 +28,8 @@ from .still_images import read_picture
 
 @dataclass(frozen=True)
 class PictureSequence:
-    """Numbered pictures in order: picture k is shown at ``slots[k]`` / fps seconds.
-
-    Slots follow from the numbers, so that a missing picture leaves a gap in time. Numbers in
-    constant steps, such as tens, count as consecutive. If more than half of the numbers are
-    missing, they only give the order.
+    """Numbered pictures in order: picture k is shown at ``slots[k]`` / fps seconds; see
+    `picture_slots`.
     """
 
     paths: list[Path]
@@ -46,20 +44,19 @@ class PictureSequence:
         :param numbers: of each.
         :param name: of the sequence, for warnings.
         """
-        step = math.gcd(*(number - numbers[0] for number in numbers)) or 1
-        slots = [(number - numbers[0]) // step for number in numbers]
-        missing = slots[-1] + 1 - len(paths)
+        slots = picture_slots(numbers)
+        places = numbered_places(numbers)
+        missing = places[-1] + 1 - len(paths)
         if missing <= 0:
             return cls(paths, slots, [])
-        is_order_alone = 2 * missing > slots[-1] + 1
         warning = notice(
-            "consecutive_images" if is_order_alone else "missing_images",
+            "missing_images" if slots == places else "consecutive_images",
             footage=name,
             missing=missing,
             first=numbers[0],
             last=numbers[-1],
         )
-        return cls(paths, list(range(len(paths))) if is_order_alone else slots, [warning])
+        return cls(paths, slots, [warning])
 
     def time(self, index: int, fps: Fraction) -> float:
         """Calculate at how many seconds a picture is shown."""
