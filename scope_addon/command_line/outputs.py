@@ -303,7 +303,7 @@ def write_outputs(
             NEW_SCENE,
             name=display_text(stem_of(video)),
             shape=args.shape_keys,
-            view_footage=views,
+            view_footage=[_shown_file(view, args) for view in views],
         )
         if not motions[0].image_size.any():  # imported, and never seen by a camera
             options = replace(options, resolution="keep", active_camera=False, with_camera=False)
@@ -337,12 +337,15 @@ def write_outputs(
 
 def _footage(video: Path, args: argparse.Namespace) -> Path | None:
     """Return the footage to show; None for an imported motion."""
-    if args.command == "import":
-        return None
+    return None if args.command == "import" else _shown_file(video, args)
+
+
+def _shown_file(footage: Path, args: argparse.Namespace) -> Path:
+    """Return the file that Blender shows: of numbered pictures, the first one."""
     from ..capture.media.image_sequence import find_sequence
 
-    sequence = find_sequence(video, args.fps is not None)
-    return sequence.paths[0] if sequence else video
+    sequence = find_sequence(footage, args.fps is not None)
+    return sequence.paths[0] if sequence else footage
 
 
 def summary(report: dict[str, Any]) -> str:

@@ -2,12 +2,16 @@
 """Where results lie that were given no place, and what lies beside them."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.cli import SAMPLE, main
-from scope.scope_addon.command_line.outputs import default_outputs
+from scope.scope_addon.command_line.outputs import default_outputs, write_outputs
 from scope.scope_addon.errors import UsageError
+
+from ..required import package
 
 
 def test_results_lie_next_to_the_footage(tmp_path):
@@ -94,3 +98,28 @@ def test_files_of_an_earlier_number_of_people_stay_and_are_named(
     assert "personal" not in said
     for name in left:
         assert (tmp_path / name).read_text("utf-8") == "earlier"
+
+
+def test_a_scene_shows_the_first_picture_of_folders_of_further_cameras(tmp_path, monkeypatch):
+    package("bpy")
+    from scope.scope_addon.scene.export import export
+
+    folder = tmp_path / "right"
+    folder.mkdir()
+    for number in (3, 4):
+        cv2.imwrite(str(folder / f"{number:02d}.png"), np.zeros((8, 8, 3), np.uint8))
+    shown = []
+
+    def exported(motions, body, outputs, footage, options, separate):
+        shown.extend([footage, *options.view_footage])
+        return outputs, []
+
+    monkeypatch.setattr(export, "export_motions", exported)
+    args = SimpleNamespace(
+        command="capture", fps=30, shape_keys="keyed", file_per_person=False, bvh_unit="m",
+        skeleton="scope",
+    )  # fmt: skip
+    motion = SimpleNamespace(image_size=np.array([8, 8]))
+    output = tmp_path / "out.blend"
+    write_outputs([output], [motion], None, SAMPLE, args, views=[folder, SAMPLE])
+    assert shown == [SAMPLE, folder / "03.png", SAMPLE]
