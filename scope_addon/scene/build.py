@@ -42,6 +42,7 @@ from .datablocks import (
 )
 from .packed_motion import motion_texts
 from .transaction import all_or_nothing
+from .visibility import world_matrix
 
 
 @dataclass(frozen=True)
@@ -332,7 +333,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     own = parts_of(collection)
     used = [*_data_of(own), *motion_texts(own)]
     for child in [child for obj in own for child in obj.children if child not in own]:
-        place = child.matrix_world.copy()
+        place = world_matrix(child)
         child.parent = None
         child.matrix_world = place
     kept = [obj for obj in collection.all_objects if obj not in own]

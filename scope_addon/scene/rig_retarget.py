@@ -48,6 +48,7 @@ from .rig_action import (
 from .rig_probe import at_rest, blocked_bones, probe, rest_pose
 from .rigify_ik import ik_keys
 from .transaction import all_or_nothing
+from .visibility import world_matrix
 
 # Whose motion is missed where a rig has no bones for them.
 _EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elbow")
@@ -314,9 +315,9 @@ def _with_source_transform(
     :param heads: (T, 3) metres.
     :return: the new rotations and heads, and the armature's rotation about the vertical, radians.
     """
-    bpy.context.view_layer.update()
     empty = root_object(source)
-    place, turn, _ = (source.matrix_world if empty is None else parent_transform(empty)).decompose()
+    world = world_matrix(source) if empty is None else parent_transform(empty)
+    place, turn, _ = world.decompose()
     R = np.array(turn.to_matrix())
     return R @ rotations, heads @ R.T + np.array(place), float(turn.to_euler("ZYX").z)
 

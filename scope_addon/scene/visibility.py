@@ -89,6 +89,7 @@ def evaluated(obj: bpy.types.Object) -> Iterator[None]:
         if is_added:
             shown.unlink(obj)
         obj.hide_viewport = is_hidden
+        bpy.context.view_layer.update()  # it would still list the object
 
 
 def world_matrix(obj: bpy.types.Object) -> Matrix:

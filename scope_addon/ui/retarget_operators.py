@@ -139,7 +139,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
     """
     from ..scene.rig_retarget import retarget, usable_guess
     from ..scene.timing import keyed_rate
-    from ..scene.visibility import hide, select_only, show
+    from ..scene.visibility import hide, select_only, show, world_matrix
 
     settings = context.scene.scope_retarget
     body = body_of(source)
@@ -152,7 +152,7 @@ def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object)
         settings.rig,
         guessed or listed_map(settings),
         keyed_rate(source, context.scene),
-        retarget_options(settings, face, source.matrix_world.median_scale),
+        retarget_options(settings, face, world_matrix(source).median_scale),
     )
     if guessed is not None:  # not before: what fails changes nothing
         fill_list(settings, guessed)

@@ -22,6 +22,7 @@ from ..actions import Channels, add_cycles, check_not_in_nla, fcurves, is_cyclic
 from ..datablocks import remove_blocks
 from ..stored_values import stored_numbers
 from ..timing import Retiming
+from ..visibility import world_matrix
 from .keys import read_clip, write_clip
 
 ROOT_TAG = "scope_root"  # custom property of the empty
@@ -132,8 +133,7 @@ def parent_transform(obj: bpy.types.Object) -> Matrix:
     """
     if obj.parent is None:
         return Matrix()
-    bpy.context.view_layer.update()
-    return obj.matrix_world @ obj.matrix_basis.inverted_safe()
+    return world_matrix(obj) @ obj.matrix_basis.inverted_safe()
 
 
 def move_root_motion_to_object(
@@ -155,8 +155,7 @@ def move_root_motion_to_object(
     clip = clip_with_root_motion(armature, clip, frames)
     former = root_object(armature)
     if former is None:  # the armature's own transform becomes part of the trajectory
-        bpy.context.view_layer.update()
-        seen = armature.matrix_world
+        seen = world_matrix(armature)
         if armature.parent is not None:  # stays the parent, so its transform is not included
             seen = armature.matrix_parent_inverse.inverted_safe() @ armature.matrix_local
         place = Matrix.LocRotScale(seen.translation, seen.to_quaternion(), None)

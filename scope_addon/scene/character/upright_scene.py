@@ -11,6 +11,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ..actions import fcurves, read_keys, rewrite_keys
+from ..visibility import world_matrix
 from .animation import on_one_hemisphere
 from .root_object import parent_transform
 
@@ -99,8 +100,7 @@ def move_camera(
 
     :param transform: (4, 4) rigid, of the captured world, in which the armature's keys are.
     """
-    bpy.context.view_layer.update()
-    world = armature.matrix_world
+    world = world_matrix(armature)
     above = parent_transform(camera)
     move = (
         above.inverted_safe() @ world @ Matrix(transform.tolist()) @ world.inverted_safe() @ above

@@ -17,6 +17,7 @@ from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
 from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
+from ..visibility import world_matrix
 
 
 @contextmanager
@@ -103,7 +104,7 @@ def unit_of_captures(rigs: Sequence[bpy.types.Object], unit: float) -> float:
 
     :param unit: of the scene, metres.
     """
-    size = abs(rigs[0].matrix_world.median_scale) if rigs else 1.0
+    size = abs(world_matrix(rigs[0]).median_scale) if rigs else 1.0
     return min((1.0, unit), key=lambda metres: abs(math.log(max(size * metres, 1e-9))))
 
 
