@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
 from .footage_view import FootageView
+from .scene_gaps import cut_times, with_scene_gaps
 from .untrusted.files import in_one_line, read_npz
 
 if TYPE_CHECKING:
@@ -77,6 +79,8 @@ class Motion:
     footage_speed: float = 1.0
     # (T,) focal length of each frame over that of `intrinsics`; None: it is constant
     zoom: NDArray[np.float64] | None = None
+    # (M,) rows, from 1 on, of the frames that begin another scene than the frame before
+    scene_starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named
     # CORRECTION_KEYS, or none.
     corrections: dict[str, NDArray[Any]] = field(default_factory=dict)
@@ -116,6 +120,22 @@ class Motion:
         motion.
         """
         return self.timestamps * self.footage_speed
+
+    @property
+    def cuts_s(self) -> NDArray[np.float64]:
+        """(M,) seconds: when the footage cuts to another scene."""
+        return cut_times(self.timestamps, self.scene_starts)
+
+    @property
+    def times_with_gaps(self) -> NDArray[np.float64]:
+        """(T,) seconds, with gaps at scene cuts: for what is filtered over time, and for speeds."""
+        return with_scene_gaps(self.timestamps, self.cuts_s)
+
+    @property
+    def scenes(self) -> list[slice]:
+        """The rows of each scene."""
+        starts = [0, *self.scene_starts.tolist(), len(self)]
+        return [slice(*pair) for pair in pairwise(starts)]
 
     @property
     def intrinsics_of_frames(self) -> NDArray[np.float64]:
@@ -202,6 +222,7 @@ class Motion:
             "K1": self.joints_cam.shape[1],
             "J": self.keypoints2d.shape[1],
             "P": self.betas.size,
+            "M": self.scene_starts.size,
         }
         sizes["3K1"] = 3 * sizes["K1"]
         for name, (shape, dtype) in _SCHEMA.items():
@@ -218,6 +239,14 @@ class Motion:
             raise MotionFileError(
                 f"motion: zoom must have a ratio of focal lengths from {1.0 / _LARGEST_ZOOM:g} "
                 f"to {_LARGEST_ZOOM:g} for each of {T} frames; capture again"
+            )
+        starts = self.scene_starts
+        if len(starts) and not (
+            0 < starts[0] and starts[-1] < T and (starts[1:] > starts[:-1]).all()
+        ):
+            raise MotionFileError(
+                f"motion: scene_starts must be rows from 1 to {T - 1} in increasing order; "
+                "capture again"
             )
         # An imported motion was seen by no camera.
         if self.image_size.any() and not _is_lens(self.intrinsics, self.image_size):
@@ -336,7 +365,9 @@ class Motion:
         arrays = {
             f.name: np.asarray(getattr(self, f.name))
             for f in fields(self)
-            if f.name not in _GROUPS and (f.name != "zoom" or self.zoom is not None)
+            if f.name not in _GROUPS
+            and (f.name != "zoom" or self.zoom is not None)
+            and (f.name != "scene_starts" or len(self.scene_starts))
         }
         return arrays | self.corrections | self.face | self.views
 
@@ -441,6 +472,7 @@ OPTIONAL_KEYS = {
     "footage_mirrored",
     "footage_speed",
     "zoom",
+    "scene_starts",
     *CORRECTION_KEYS,
     *FACE_KEYS,
     *VIEW_KEYS,
@@ -486,5 +518,6 @@ _SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
     "source": ((), str),
     "joint_sigma_m": (("T", "K1"), np.float32),
     "joint_sigma_depth_m": (("T", "K1"), np.float32),
+    "scene_starts": (("M",), np.int64),
 }
 REQUIRED_KEYS = set(_SCHEMA) - OPTIONAL_KEYS

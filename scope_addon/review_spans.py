@@ -27,8 +27,6 @@ from .motion import Motion
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
 FAR_SHARE = 0.03
 LOW_CONFIDENCE = 0.35  # mean over the joints that keypoints determine
-# A longer step between two frames is a scene cut: a capture adds as much to the times there.
-CUT_S = 10.0
 SWING_S = 0.2  # within which a limb swings
 # Along the line of sight, relative to the shoulder or hip. In 23 real clips where no limb swings,
 # hands and feet move by 0.43 m at most.
@@ -160,7 +158,7 @@ def has_bent_knees(motion: Motion) -> bool:
 
 
 def _swings(motion: Motion) -> NDArray[np.bool_]:
-    times = motion.timestamps
+    times = motion.times_with_gaps
     rows = np.arange(len(motion))
     later = np.minimum(np.searchsorted(times, times + SWING_S, side="right") - 1, len(motion) - 1)
     found = np.zeros(len(motion), bool)
@@ -216,10 +214,10 @@ def _distance(
 
 
 def _held(motion: Motion, mask: NDArray[np.bool_], least_s: float) -> NDArray[np.bool_]:
-    """Return the runs of a mask (T,) that last long enough, without the gap at a scene cut."""
-    steps_s = np.diff(motion.timestamps, prepend=motion.timestamps[0])
-    times = np.cumsum(np.where(steps_s < CUT_S, steps_s, 0.0))
+    """Return the runs of a mask (T,) that last long enough within a scene."""
     held = np.zeros(len(mask), bool)
-    for first, last in _spans(mask, times, 0.0):
-        held[first : last + 1] = times[last] - times[first] >= least_s
+    for scene in motion.scenes:
+        times = motion.timestamps[scene]
+        for first, last in _spans(mask[scene], times, 0.0):
+            held[scene][first : last + 1] = times[last] - times[first] >= least_s
     return held

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
 from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, VIEW_KEYS, Motion
+from scope.scope_addon.scene_gaps import SCENE_GAP_S
 
 from .made_motion import made_face, made_views
 
@@ -109,6 +110,27 @@ def test_a_missing_key_is_named(tmp_path):
     np.savez(tmp_path / "thin.npz", poses=np.zeros((1, 72)))
     with pytest.raises(MotionFileError, match="lacks .*trans"):
         Motion.load(tmp_path / "thin.npz")
+
+
+def test_starts_of_scenes_are_saved_and_loaded_and_absent_where_there_is_no_cut(tmp_path):
+    motion = make_motion()
+    motion.save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as file:
+        assert "scene_starts" not in file.files
+    assert Motion.load(tmp_path / "a.npz").scenes == [slice(0, 4)]
+    replace(motion, scene_starts=[1, 3]).save(tmp_path / "b.npz")
+    back = Motion.load(tmp_path / "b.npz")
+    assert back.scene_starts.tolist() == [1, 3]
+    assert back.scenes == [slice(0, 1), slice(1, 3), slice(3, 4)]
+    np.testing.assert_allclose(
+        back.times_with_gaps - back.timestamps, SCENE_GAP_S * np.array([0, 1, 1, 2])
+    )
+
+
+@pytest.mark.parametrize("rows", [[0], [4], [2, 2], [3, 1], [-1]])
+def test_starts_of_scenes_that_are_no_rows_in_order_are_refused(rows):
+    with pytest.raises(MotionFileError, match="scene_starts must be rows from 1 to 3"):
+        replace(make_motion(), scene_starts=rows)
 
 
 def test_a_zoom_is_saved_and_loaded_and_absent_where_the_lens_does_not_zoom(tmp_path):

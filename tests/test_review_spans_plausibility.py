@@ -82,10 +82,20 @@ def test_a_lean_that_is_held_is_found_and_a_short_one_is_a_step() -> None:
     assert not implausible(leaning(8.0, slice(30, 150)))["lean"].any()
 
 
-def test_the_gap_at_a_scene_cut_is_no_time() -> None:
-    short = leaning(35.0, slice(70, 100))
-    short.timestamps[85:] += 10.0
-    assert not implausible(short)["lean"].any()
+def test_two_people_who_lean_shortly_before_and_after_a_cut_do_not_hold_that() -> None:
+    held = leaning(35.0, slice(40, 120))
+    assert implausible(held)["lean"].any()
+    assert not implausible(replace(held, scene_starts=np.array([80])))["lean"].any()
+
+
+def test_a_limb_does_not_swing_over_a_cut() -> None:
+    joints = WALK.joints_cam.copy()
+    wrist = AT["left_wrist"]
+    joints[:, wrist] = joints[:, AT["left_shoulder"]] + np.array([0.05, 0.4, -0.35], np.float32)
+    joints[61:, wrist, 2] += 0.7
+    moved_in_depth = replace(WALK, joints_cam=joints)
+    assert implausible(moved_in_depth)["swing"].any()
+    assert not implausible(replace(moved_in_depth, scene_starts=np.array([61])))["swing"].any()
 
 
 def test_a_person_who_floats_is_found_but_not_one_who_jumps() -> None:

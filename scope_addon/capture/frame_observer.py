@@ -11,9 +11,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Uint8Array
 from ..notices import Notice
+from ..scene_gaps import SCENE_GAP_S, cut_times, with_scene_gaps
 from .camera.background_record import BackgroundRecord
 from .camera.camera_rotation import BackgroundTracker
 from .camera.intrinsics import Camera
@@ -26,7 +28,7 @@ from .tracking.chosen_person import ChosenPerson, find_chosen, place_of
 from .tracking.face_tracker import FaceTracker
 from .tracking.hand_tracker import HandTracker
 from .tracking.people import people_of
-from .tracking.scene_cuts import SCENE_GAP_S, SceneCuts
+from .tracking.scene_cuts import SceneCuts
 from .tracking.search_schedule import MaskSchedule
 from .tracking.track import Track, Tracklet, make_track
 from .tracking.tracker import PeopleTracker
@@ -96,6 +98,11 @@ class Observed:
     def __len__(self) -> int:
         return len(self.timestamps)
 
+    @property
+    def scene_starts(self) -> NDArray[np.int64]:
+        """(M,) rows of the frames that begin another scene than the frame before."""
+        return np.array([row for row in self.cut_rows if row > 0], np.int64)
+
     def tracks(
         self, most: int, chosen: ChosenPerson | None = None, speed: float = 1.0
     ) -> tuple[list[Track], list[ChosenPerson]]:
@@ -106,9 +113,9 @@ class Observed:
             at scene cuts are `SCENE_GAP_S` of what was filmed.
         :raises UsageError: the chosen person was not found.
         """
-        cuts = np.zeros(len(self))
-        cuts[self.cut_rows] = 1.0
-        times = np.array(self.timestamps) + SCENE_GAP_S * speed * np.cumsum(cuts)
+        times_s = np.array(self.timestamps)
+        cuts_s = cut_times(times_s, self.scene_starts)
+        times = with_scene_gaps(times_s, cuts_s, SCENE_GAP_S * speed)
         seen = [tracklet for tracklet in self.tracklets.values() if tracklet.rows]
         in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
         people = people_of(times.tolist(), in_order)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ..arrays import Float64Array
@@ -58,9 +59,15 @@ class Footage:
     # (T, 4, 4) metres, z up, where the user gives the camera's path; None: it is estimated
     world_from_camera: Float64Array | None
     lines: Lines  # of the background, in the first frame's camera axes
-    cuts_s: list[float]
+    scene_starts: NDArray[np.int64]  # (M,) rows of the frames that begin another scene
     execution: str  # what the networks ran on, for the report
     warnings: list[Notice]
+
+    @property
+    def cuts_s(self) -> list[float]:
+        """Times of the frames that begin another scene."""
+        times_s: list[float] = self.timestamps[self.scene_starts].tolist()
+        return times_s
 
 
 def given_camera(video: Video, options: CaptureOptions) -> Camera:
@@ -264,7 +271,7 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
         zoom=zoom,
         world_from_camera=given,
         lines=record.lines(motion, camera),
-        cuts_s=[observed.timestamps[row] for row in observed.cut_rows],
+        scene_starts=observed.scene_starts,
         execution=observed.execution,
         warnings=observed.warnings,
     )

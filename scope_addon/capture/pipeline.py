@@ -60,7 +60,11 @@ def capture(
         shot = shot_of(video, body, options, footage)
         solved = solve(shot, repaired(shot, tracks), progress, options.heights_m)
         times_s = footage.timestamps / shot.speed
-        motions = [replace(motion, timestamps=times_s) for motion in solved.motions]
+        motions = [
+            replace(motion, timestamps=times_s, scene_starts=footage.scene_starts)
+            for motion in solved.motions
+        ]
+        solved = replace(solved, motions=motions)
     rates = clock.rates(len(footage.timestamps))
     return Capture(motions, make_report(video, body, options, footage, solved, rates))
 

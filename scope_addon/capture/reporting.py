@@ -24,7 +24,6 @@ from .media.video import Video
 from .observe import Footage
 from .options import CaptureOptions
 from .solve import Solved
-from .tracking.scene_cuts import steps_in_scenes
 from .world.travel_scale import FEET, NOTHING
 from .world.world_frame import GIVEN, LINES, UP_DEVIATIONS_DEG
 
@@ -213,7 +212,8 @@ def face_frames(motion: Motion) -> dict[str, Any]:
     blinks = int((closed[1:] & ~closed[:-1]).sum() + closed[:1].sum())
     counts: dict[str, Any] = {"face_frames": int(seen.sum()), "blinks": blinks}
     if seen.any():
-        steps_s = steps_in_scenes(motion.timestamps, 1.0 / motion.mocap_framerate)
+        before_s = motion.timestamps[:1] - 1.0 / motion.mocap_framerate
+        steps_s = np.diff(motion.timestamps, prepend=before_s)
         minutes = float(steps_s[seen].sum()) / 60.0
         counts["blinks_per_minute"] = round(blinks / minutes, 1)
         counts["jaw_open"] = round(
@@ -283,7 +283,7 @@ def floor_warnings(
 
     There are none on uneven ground, which has no floor.
 
-    :param times_s: (n,) of the frames in the footage; the motions' own have gaps at scene cuts.
+    :param times_s: (T,) of the frames in the footage; the motions' own are when it was filmed.
     :param heights_given: of how many people the height was known.
     """
     warnings = []

@@ -62,10 +62,14 @@ def _smoothed(motion: Motion, body: Body, raw: Clip, finished: Clip, strength: f
     """Smooth a motion without corrections; see `smoothed`."""
     if strength > 1.0:
         center = motion.world_from_camera[:, :3, 3]
-        calm = _smoothed_further(
-            Clip(finished.times, finished.rotations, finished.root - center), strength
+        seen = replace(finished, root=finished.root - center)
+        scenes = [_smoothed_further(seen.rows(rows), strength) for rows in motion.scenes]
+        calm = Clip(
+            finished.times,
+            np.concatenate([scene.rotations for scene in scenes]),
+            np.concatenate([scene.root for scene in scenes]) + center,
         )
-        return _with_resting_feet(replace(calm, root=calm.root + center), finished, motion, body)
+        return _with_resting_feet(calm, finished, motion, body)
     plain = _filtered(raw, motion, 1.0)
     wanted = _filtered(raw, motion, strength)
     correction = np.swapaxes(plain.rotations, -1, -2) @ finished.rotations
@@ -82,18 +86,17 @@ def _filtered(clip: Clip, motion: Motion, strength: float) -> Clip:
     """Smooth without corrections; the position is taken relative to the camera, which may rotate
     but not travel.
     """
-    rotations = smooth_rotations(clip.rotations, clip.times, ROTATION_CUTOFF_HZ / strength)
+    times = motion.times_with_gaps
+    rotations = smooth_rotations(clip.rotations, times, ROTATION_CUTOFF_HZ / strength)
     center = motion.world_from_camera[:, :3, 3]
-    return Clip(
-        clip.times, rotations, center + smooth_root(clip.root - center, clip.times, strength)
-    )
+    return Clip(clip.times, rotations, center + smooth_root(clip.root - center, times, strength))
 
 
 def _smoothed_further(clip: Clip, strength: float) -> Clip:
-    """Return a clip whose root is relative to the camera through a filter that keeps its first and
-    its last frame.
+    """Return one scene of a clip, whose root is relative to the camera, through a filter that keeps
+    its first and its last frame.
 
-    The filter would move both ends of a path inwards, a walker by 12 cm, so the clip goes on at
+    The filter would move both ends of a path inwards, a walker by 12 cm, so the scene goes on at
     each of them as its reflection in that frame's pose, direction, and logarithm of the distance.
     """
     beyond = float(np.sqrt(strength * strength - 1.0))
@@ -139,7 +142,7 @@ def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -
     ankles = [body.joint_names.index(f"{side}_ankle") for side in ("left", "right")]
     pelvis_at_rest = body.rest_joints(motion.betas)[0]
     rests = motion.foot_contact.reshape(len(finished), 2, 2).max(axis=2).astype(float)
-    share = gaussian_smooth(rests, finished.times, ROTATION_CUTOFF_HZ)
+    share = gaussian_smooth(rests, motion.times_with_gaps, ROTATION_CUTOFF_HZ)
 
     def bend(
         R: NDArray[np.float64], root: NDArray[np.float64], R_held: NDArray[np.float64],

@@ -329,7 +329,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     """Return what a user may ask about a motion: name of the figure to its value with its unit."""
     seen = motion.valid
     pelvis = motion.trans.astype(float) + body.rest_joints(motion.betas.astype(float))[0]
-    path = np.linalg.norm(np.diff(pelvis[:, :2], axis=0), axis=1)
+    path = [np.linalg.norm(np.diff(pelvis[rows, :2], axis=0), axis=1) for rows in motion.scenes]
     error = motion.residual_px[seen]
     contact = motion.foot_contact > _CONTACT
     sigma = np.asarray(motion.joint_sigma_m, float)[seen]
@@ -339,8 +339,8 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     return {
         "Frames seen": f"{int(seen.sum())} of {len(motion)}",
         "Height": height_text(body.stature(motion.betas.astype(float)), motion.height_sigma_m),
-        "Path over the floor": f"{path.sum():.2f} m",
-        "Highest speed": f"{highest_speed(pelvis[:, :2], motion.timestamps):.2f} m/s",
+        "Path over the floor": f"{np.concatenate(path).sum():.2f} m",
+        "Highest speed": f"{highest_speed(pelvis[:, :2], motion.times_with_gaps):.2f} m/s",
         "Pelvis height": f"{pelvis[:, 2].min():.2f} to {pelvis[:, 2].max():.2f} m",
         "Reprojection error, mean": f"{error.mean():.1f} px" if len(error) else "–",
         "Reprojection error, 95th percentile": f"{np.percentile(error, 95):.1f} px"

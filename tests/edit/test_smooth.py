@@ -19,6 +19,11 @@ from scope.solver.rotations import exp, log
 from .walking import BETAS, BODY, NAMES, RATE, motion_of, walk
 
 ELBOW = NAMES.index("left_elbow")
+PER_FRAME = (
+    *("poses", "trans", "poses_raw", "trans_raw", "frames", "timestamps", "valid", "joints_cam"),
+    *("keypoints2d", "joint_confidence", "world_from_camera", "foot_contact", "residual_px"),
+    *("joint_sigma_m", "joint_sigma_depth_m"),
+)
 
 
 def shaking(hz: float, seconds: float = 6.0) -> Motion:
@@ -128,3 +133,32 @@ def motion_joints(motion: Motion) -> np.ndarray:
 def test_what_is_no_strength_is_refused(strength: float) -> None:
     with pytest.raises(UsageError, match="0 or more"):
         smoothed(BODY, motion_of(walk(0.5)), strength)
+
+
+@pytest.mark.parametrize("strength", [0.5, 2.0, 8.0])
+@pytest.mark.parametrize("lengths", [(1.0, 1.0), (1.0, 0.0)])
+def test_scenes_on_both_sides_of_a_cut_are_smoothed_apart(
+    strength: float, lengths: tuple[float, float]
+) -> None:
+    """As two motions are of which each has one of them; also a scene of one frame."""
+    first, second = (walk(seconds) for seconds in lengths)
+    second.root[:, 0] += 2.0
+    second.rotations[:, ELBOW] = exp(np.array([0.0, 0.0, 0.8]))
+    both = Clip(
+        np.arange(len(first) + len(second)) / RATE,
+        np.concatenate([first.rotations, second.rotations]),
+        np.concatenate([first.root, second.root]),
+    )
+    joined = replace(motion_of(both, noise=0.02), scene_starts=[len(first)])
+    found = smoothed(BODY, joined, strength)
+    for rows in (slice(0, len(first)), slice(len(first), None)):
+        alone = replace(
+            joined,
+            scene_starts=np.zeros(0),
+            **{name: getattr(joined, name)[rows] for name in PER_FRAME},
+        )
+        expected = smoothed(BODY, alone, strength)
+        if len(alone) > 2:  # a filter changes nothing else
+            np.testing.assert_allclose(found.root[rows], expected.root, atol=1e-6)
+            np.testing.assert_allclose(found.rotations[rows], expected.rotations, atol=1e-6)
+    np.testing.assert_array_equal(found.times, both.times)

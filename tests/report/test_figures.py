@@ -86,6 +86,19 @@ def test_a_walk_of_known_length_and_speed(body):
     assert figures["Height"] == f"{100 * np.ptp(body.v_template[:, 1]):.0f} cm"
 
 
+def test_two_people_who_stand_on_both_sides_of_a_cut_do_not_move(body):
+    T = 60
+    trans = np.zeros((T, 3))
+    trans[:, 2] = 0.9 - body.rest_joints()[0, 2]
+    trans[30:, 0] = 3.0
+    motion = made_motion(
+        body, np.zeros((T, 3 * (body.K + 1))), trans, scene_starts=[30], uneven_ground=True
+    )
+    figures = motion_figures(motion, body)
+    assert figures["Path over the floor"] == "0.00 m"
+    assert float(figures["Highest speed"].split()[0]) < 0.5
+
+
 def test_each_frame_to_review_counts_once_whatever_the_reasons(body):
     """A person floats for two seconds, at first away from where the footage shows them, then stands
     under the floor for one.

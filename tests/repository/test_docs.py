@@ -171,7 +171,12 @@ def test_every_key_of_the_motion_file_is_defined_once():
 
 
 def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
-    given = {"zoom": np.ones(7), "face": made_face(7), "views": made_views(0.5)}
+    given = {
+        "zoom": np.ones(7),
+        "scene_starts": [3],
+        "face": made_face(7),
+        "views": made_views(0.5),
+    }
     motion = made_motion(body, np.zeros((7, 3 * (body.K + 1))), np.zeros((7, 3)), **given)
     changes = (
         Pin(2, "head", (320.0, 200.0)),
@@ -200,7 +205,7 @@ def test_shapes_and_types_of_the_motion_file_are_as_documented(body, tmp_path):
         "V": 1,
         "B": 1,
     }
-    sizes |= {"I": 1, "S": 1}
+    sizes |= {"I": 1, "S": 1, "M": 1}
     sizes |= {"W": len(EXPRESSIONS), "F": motion.face["face_landmarks"].size}
     sizes["U"] = len(motion.corrections["uncorrected_rows"])
     rows = [

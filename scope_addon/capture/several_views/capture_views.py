@@ -133,6 +133,7 @@ def capture_views(
         solved = solve_people(shot, people, 0)
         times_s = footage.timestamps / shot.speed
         further = _further_cameras(views, places)
+        # No scene begins where the first camera's picture cuts: people move on meanwhile.
         motions = [replace(motion, timestamps=times_s, views=further) for motion in solved.motions]
     rates = clock.rates(len(footage.timestamps))
     report = make_report(

@@ -41,6 +41,7 @@ from numpy.typing import NDArray
 from ....solver.errors import ModelFileError
 from ....solver.rotations import exp, log
 from ...arrays import BoolArray, Float64Array, FloatArray
+from ...scene_gaps import steps_in_scenes
 from ...untrusted.files import read_npz
 from ..camera.intrinsics import Camera
 from ..perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
@@ -53,7 +54,6 @@ from ..perception.face_record import (
     with_expression,
 )
 from ..perception.lifter import camera_towards
-from .scene_cuts import steps_in_scenes
 
 FILE = Path(__file__).resolve().parents[3] / "assets" / "face" / "response.npz"
 # The time, and the number of frames, that tell a person's face at rest.

@@ -14,7 +14,7 @@ from collections import deque
 import cv2
 import numpy as np
 
-from ...arrays import Float32Array, Float64Array, Uint8Array
+from ...arrays import Float32Array, Uint8Array
 
 _SIZE = (32, 32)  # of the thumbnails that are compared
 _STRIDE = 8  # pixels between samples of a large picture
@@ -23,18 +23,6 @@ MIN_RATIO = 4.0  # to the usual difference
 PERSISTENCE = 0.7  # share of the difference that is left a frame later
 HISTORY_FRAMES = 15  # from which the usual difference is taken
 MIN_CONTRAST = 8.0  # standard deviation within a picture; a blank one has less
-SCENE_GAP_S = 10.0  # added to a track's times at a cut, so that nothing is interpolated across it
-
-
-def steps_in_scenes(times: Float64Array, unknown_s: float = 0.0) -> Float64Array:
-    """Return the (T,) seconds from the frame before to each frame, without the gaps at cuts.
-
-    :param times: (T,) of a track, seconds.
-    :param unknown_s: what counts for the first frame of the clip, and for the first after a cut.
-    """
-    steps_s: Float64Array = np.diff(times, prepend=times[:1] - unknown_s)
-    steps_s[steps_s > SCENE_GAP_S] = unknown_s
-    return steps_s
 
 
 class SceneCuts:

@@ -11,9 +11,9 @@ import numpy as np
 
 from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.smoothing import gaussian_smooth
+from ...scene_gaps import steps_in_scenes
 from ..fitting.frame_sequence import FittedTrack
 from ..fitting.prepared_track import Stance
-from ..tracking.scene_cuts import steps_in_scenes
 
 # Of the travel, see `camera_travel`.
 MIN_SPEED_M_S = 0.25  # slower sliding is explained by depth errors

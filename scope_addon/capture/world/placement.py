@@ -21,8 +21,8 @@ from ...kinematics.contact_points import (
 from ...kinematics.frame_blocks import by_blocks, to_single_precision
 from ...kinematics.smoothing import fill_gaps, fill_rotation_gaps, smooth_root, smooth_rotations
 from ...kinematics.standing import resting_probability
+from ...scene_gaps import SCENE_GAP_S
 from ..fitting.frame_sequence import FittedTrack
-from ..tracking.scene_cuts import SCENE_GAP_S
 from ..tracking.track import Track
 from .camera_path import CameraPath
 

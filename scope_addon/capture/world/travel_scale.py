@@ -30,8 +30,8 @@ import numpy as np
 from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
+from ...scene_gaps import steps_in_scenes
 from ..camera.odometry import Odometry
-from ..tracking.scene_cuts import steps_in_scenes
 from .placement import PlacedTrack
 
 # What the scale of a path follows from, the most certain one first.

@@ -76,6 +76,7 @@ def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path
         "two.mp4 cuts to another scene at 0.8 s" in text for text in map(str, found.report.warnings)
     )
     assert np.allclose(np.diff(motion.timestamps), 1 / 30, atol=1e-3)
+    assert motion.scene_starts.tolist() == [25]
     seen = motion.valid
     assert seen.mean() > 0.4  # one of the two, if not both
     assert motion.residual_px[seen].max() < 12

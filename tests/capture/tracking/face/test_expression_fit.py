@@ -31,8 +31,8 @@ from scope.scope_addon.capture.tracking.expression_fit import (
     view_terms,
     with_expressions,
 )
-from scope.scope_addon.capture.tracking.scene_cuts import SCENE_GAP_S
 from scope.scope_addon.kinematics.face import EXPRESSIONS
+from scope.scope_addon.scene_gaps import SCENE_GAP_S
 from scope.solver.body_file import load_body
 from scope.solver.errors import ModelFileError
 from scope.solver.rotations import exp

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gaps that are put into the times of frames at scene cuts, so that nothing is filtered, measured
+or interpolated across a cut.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Float64Array
+
+SCENE_GAP_S = 10.0  # longer than any filter reaches
+
+
+def cut_times(times: Float64Array, scene_starts: NDArray[np.int64]) -> Float64Array:
+    """Return when each cut is, (M,) seconds: midway between the frames on both sides of it.
+
+    :param times: (T,) seconds.
+    :param scene_starts: (M,) rows, from 1 on, of the frames that begin another scene.
+    """
+    middle: Float64Array = 0.5 * (times[scene_starts - 1] + times[scene_starts])
+    return middle
+
+
+def with_scene_gaps(
+    times: Float64Array, cuts_s: Float64Array, gap_s: float = SCENE_GAP_S
+) -> Float64Array:
+    """Return times (T,) in seconds, each later by a gap for every cut before it.
+
+    :param cuts_s: (M,) seconds, in order, from `cut_times`.
+    """
+    later: Float64Array = times + gap_s * np.searchsorted(cuts_s, times)
+    return later
+
+
+def steps_in_scenes(times: Float64Array, unknown_s: float = 0.0) -> Float64Array:
+    """Return the (T,) seconds from the frame before to each frame, without the gaps at cuts.
+
+    :param times: (T,) of a track, seconds.
+    :param unknown_s: what counts for the first frame of the clip, and for the first after a cut.
+    """
+    steps_s: Float64Array = np.diff(times, prepend=times[:1] - unknown_s)
+    steps_s[steps_s > SCENE_GAP_S] = unknown_s
+    return steps_s
