@@ -5,6 +5,7 @@ workers.
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import threading
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.cli import PROGRAM, SAMPLE, main
 from scope.scope_addon.cluster.runner import MAX_WINDOWS, Divisions, window_ranges
+from scope.scope_addon.job.batch import REPORT_NAME
 from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask
 
 from ..job.processes import runs, wait_for
@@ -62,7 +64,7 @@ print(json.dumps({"frames": 3 * count, "outputs": outputs, "warnings": []}))
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """Start two workers, which live as long as the tests that kill none of them."""
+    """Start two workers; one that the last test kills is started again."""
     with started(n_workers=2, processes=True) as cluster:
         yield cluster
 
@@ -132,35 +134,6 @@ def test_a_long_clip_is_captured_in_windows_and_counted_once(cluster: Any, folde
     assert report["counts"]["skipped"] == 2
 
 
-def test_the_windows_of_a_killed_worker_are_observed_by_another(folder: Path) -> None:
-    clip = folder / "a.mp4"
-    clip.write_text("6")
-    clip.with_suffix(".hangs").write_text("4")
-
-    def kill() -> None:
-        wait_for(lambda: calls(clip) and not clip.with_suffix(".hangs").exists())
-        (hung,) = [
-            c
-            for c in calls(clip)
-            if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))
-        ]
-        os.kill(hung["parent"], signal.SIGKILL)
-        wait_for(lambda: not runs(hung["pid"]))
-
-    with started(n_workers=2, processes=True) as cluster:
-        thread = threading.Thread(target=kill)
-        thread.start()
-        status, report = run(cluster, folder, program=CLIP)
-        thread.join()
-    assert status == 0
-    assert result(folder, "a") == "0 1 2 3 4 5 "
-    assert sum(row["attempts_lost"] for row in report["workers"]) == 1
-    assert sum(row["frames"] for row in report["workers"]) == 18
-    again = [call["windows"] for call in calls(clip) if ":" in call["windows"]]
-    assert len(again) == len(set(again)) + 1  # nothing else was repeated
-    assert any("a.mp4 (windows" in event["event"] for event in report["log"])
-
-
 def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(cluster: Any, folder: Path) -> None:
     clip = folder / "a.mp4"
     clip.write_text("4")
@@ -175,13 +148,43 @@ def test_real_windows_of_two_workers_give_the_result_in_one_piece(
     cluster: Any, folder: Path, networks: Path
 ) -> None:
     (folder / "clip.mp4").write_bytes(SAMPLE.read_bytes())
-    options = ["--quality", "fast", "--end", "1.1", "--window-seconds", "0.5", "--formats", "npz"]
+    options = ["--quality", "fast", "--end", "0.5", "--window-seconds", "0.3", "--formats", "npz"]
     whole = folder.parent / "whole.npz"
     capture = ["capture", str(SAMPLE), "-o", str(whole), *options[:-2], "--threads", "1"]
     assert main(capture) == 0
     argv = ["batch", str(folder), "--out", str(folder.parent / "out"), *options]
     assert main([*argv, "--scheduler", cluster.scheduler_address], program=PROGRAM) == 0
+    report = json.loads((folder.parent / "out" / REPORT_NAME).read_text("utf-8"))
+    assert report["files"][0]["windows"] == 2
     with np.load(whole) as one, np.load(folder.parent / "out" / "clip.npz") as other:
         assert set(one.files) == set(other.files)
         different = [name for name in one.files if not np.array_equal(one[name], other[name])]
     assert set(different) <= {"source", "report"}
+
+
+def test_the_windows_of_a_killed_worker_are_observed_by_another(cluster: Any, folder: Path) -> None:
+    clip = folder / "a.mp4"
+    clip.write_text("6")
+    clip.with_suffix(".hangs").write_text("4")
+
+    def kill() -> None:
+        wait_for(lambda: calls(clip) and not clip.with_suffix(".hangs").exists())
+        (hung,) = [
+            c
+            for c in calls(clip)
+            if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))
+        ]
+        os.kill(hung["parent"], signal.SIGKILL)
+        wait_for(lambda: not runs(hung["pid"]))
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    status, report = run(cluster, folder, program=CLIP)
+    thread.join()
+    assert status == 0
+    assert result(folder, "a") == "0 1 2 3 4 5 "
+    assert sum(row["attempts_lost"] for row in report["workers"]) == 1
+    assert sum(row["frames"] for row in report["workers"]) == 18
+    again = [call["windows"] for call in calls(clip) if ":" in call["windows"]]
+    assert len(again) == len(set(again)) + 1  # nothing else was repeated
+    assert any("a.mp4 (windows" in event["event"] for event in report["log"])

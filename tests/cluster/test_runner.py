@@ -392,10 +392,10 @@ def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(
     folder, tmp_path, monkeypatch, capsys
 ):
     class Impatient(package("distributed").Client):
-        """Gives up a scheduler that is lost after two seconds; connecting to it may take longer."""
+        """Gives up a scheduler that is lost soon; connecting to it may take longer."""
 
         async def _reconnect(self):
-            self._timeout = 2.0
+            self._timeout = 0.3
             await super()._reconnect()
 
     monkeypatch.setattr("scope.scope_addon.cluster.workers.Client", Impatient)
