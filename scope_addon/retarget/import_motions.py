@@ -193,6 +193,8 @@ def convert(
     poses, missing = _for_body(source, body)
     if missing:
         notes.append(notice("parts_left_out", body=body.name, parts=missing))
+    if source.left_out:
+        notes.append(notice("arrays_left_out", arrays=list(source.left_out)))
     frames_per_second = source.rate or rate or DEFAULT_RATE
     if source.rate is None and not rate:
         notes.append(notice("rate_not_stated", rate=DEFAULT_RATE))

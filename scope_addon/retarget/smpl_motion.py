@@ -102,6 +102,8 @@ class SmplMotion:
     models: tuple[str, ...]  # the published bodies of which the file may be, as ours are named
     # (T,) their numbers in the footage, increasing; from 0 on if the file does not say
     frames: NDArray[np.int64]
+    # Names of the file's arrays that are in no form which can be applied to a body.
+    left_out: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -216,6 +218,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         usual_up=usual_up,
         models=_models(arrays, len(names)),
         frames=_frames(arrays, count),
+        left_out=_left_out(arrays),
     )
 
 
@@ -292,8 +295,7 @@ def _poses(
     ):
         found = _first(arrays, hands)
         joints = [joint for side in sides for joint in HAND_JOINTS[side]]
-        # 6: MANO's components
-        if found is None or joints[0] in names or arrays[found].shape[-1:] == (6 * len(sides),):
+        if found is None or joints[0] in names or _has_components(arrays[found], len(sides)):
             continue
         parts.append(_axis_angles(arrays[found], found, path))
         if parts[-1].shape[1] != len(joints):
@@ -307,6 +309,30 @@ def _poses(
             f"{path}: the poses of {root}, {body} and hands must have as many frames, not {counts}"
         )
     return tuple(names), np.concatenate(parts, axis=1), "z" if root == "root_orient" else "camera"
+
+
+def _has_components(hands: NDArray[Any], sides: int) -> bool:
+    """Return whether an array holds the components of MANO's hands, six for each, and no
+    rotations.
+    """
+    return hands.ndim == 2 and hands.shape[1] == 6 * sides
+
+
+def _left_out(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, ...]:
+    """Return the names of arrays that say something about the person, but are not rotations."""
+    if _first(arrays, _ALL_JOINTS) is not None:
+        return ()
+    hands = [
+        name
+        for names, sides in ((_HANDS, 2), (_LEFT_HAND, 1), (_RIGHT_HAND, 1))
+        if (name := _first(arrays, names)) and _has_components(arrays[name], sides)
+    ]
+    return tuple(name for name in hands if _moves(arrays[name]))
+
+
+def _moves(array: NDArray[Any]) -> bool:
+    """Return whether an array holds numbers other than 0."""
+    return array.dtype.kind in "fiu" and bool(np.any(array))
 
 
 def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float32]:

@@ -154,6 +154,20 @@ def test_what_is_missing_is_assumed_and_said(tmp_path):
     np.testing.assert_allclose(np.ptp(found.motion.trans, axis=0), 0, atol=1e-6)
 
 
+def test_arrays_that_no_body_can_have_are_said(tmp_path: Path) -> None:
+    arrays = in_file("z")
+    poses = arrays.pop("poses")
+    parts = {"root_orient": poses[:, :3], "pose_body": poses[:, 3:66]}
+    np.savez(tmp_path / "still.npz", **arrays, **parts, pose_hand=np.zeros((len(poses), 12)))
+    np.savez(tmp_path / "moving.npz", **arrays, **parts, pose_hand=np.ones((len(poses), 12)))
+    said = {
+        name: " ".join(map(str, import_motion(tmp_path / f"{name}.npz").notes))
+        for name in ("still", "moving")
+    }
+    assert "were left out: 'pose_hand'" in said["moving"]
+    assert "left out: " not in said["still"]
+
+
 def test_an_unclear_up_axis_is_said(tmp_path):
     arrays = in_file("z")
     lying = arrays["poses"].copy()

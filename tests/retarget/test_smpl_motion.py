@@ -60,6 +60,15 @@ LAYOUTS = {
         {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "left_hand_pose": np.zeros((T, 6))},
         22,
     ),
+    "hands apart in six numbers": (
+        {
+            "global_orient": flat(0, 1),
+            "body_pose": flat(1, 22),
+            "left_hand_pose": exp(RANDOM[:, 22:37])[..., :2].reshape(T, 15, 6),
+            "right_hand_pose": exp(RANDOM[:, 37:52])[..., :2].reshape(T, 15, 6),
+        },
+        52,
+    ),
     "matrices": ({"global_orient": exp(RANDOM[:, :1]), "body_pose": exp(RANDOM[:, 1:24])}, 24),
     "one root matrix": (
         {"global_orient": exp(RANDOM[:, 0]), "body_pose": exp(RANDOM[:, 1:22])},
@@ -81,6 +90,19 @@ def test_every_layout_gives_the_same_rotations(tmp_path, layout):
     if joints == 52:
         assert motion.joint_names[22:] == HAND_JOINTS["left"] + HAND_JOINTS["right"]
     assert motion.has_fingers == (joints >= 52)
+
+
+def test_hands_as_components_are_named_as_left_out(tmp_path: Path) -> None:
+    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22)}
+    np.savez(
+        tmp_path / "walk.npz",
+        left_hand_pose=np.ones((T, 6)),
+        right_hand_pose=np.zeros((T, 6)),
+        **parts,
+    )
+    assert read_one(tmp_path / "walk.npz").left_out == ("left_hand_pose",)
+    assert smpl_motion(parts, FILE).left_out == ()
+    assert smpl_motion({"poses": flat(0, 52), "hand_pose": np.ones((T, 12))}, FILE).left_out == ()
 
 
 @pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
