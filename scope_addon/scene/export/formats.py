@@ -7,6 +7,9 @@ computes the rate as ``fps`` times ``fps_base`` instead of fps / fps_base: 29.97
 the motion drifts from the footage's sound. Therefore a scene is written at its integer ``fps``, and
 the times in the file are scaled afterwards. (Blender's importer has the same error as its
 exporter.)
+
+So are the fields of view of several cameras. Blender's exporter gives all of them the shape of the
+scene's picture. glTF's cameras cannot hold a shifted centre, a distortion or a lens that zooms.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import ctypes
 import errno
 import io
 import json
+import math
 import os
 import re
 import struct
@@ -39,6 +43,7 @@ from numpy.typing import NDArray
 
 from ...errors import OutputError
 from .. import timing
+from ..capture_parts import cameras_in
 from ..character.root_object import parent_transform, root_object
 from . import bvh
 from .fbx_file import correct_fbx
@@ -64,7 +69,7 @@ def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None
     enable_addon("io_scene_gltf2")
     scene = bpy.context.scene
     moving = [obj for obj in scene.objects if obj.animation_data]
-    with corrected_key_times(path, scene):
+    with corrected_key_times(path, scene), _corrected_fields_of_view(path, scene):
         call_operator(
             bpy.ops.export_scene.gltf,
             filepath=str(path),
@@ -393,13 +398,45 @@ def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
         _scale_times(path, base)
 
 
+@contextmanager
+def _corrected_fields_of_view(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
+    """Give every camera of a capture its own shape of the picture, and field of view, in the .glb
+    that the block writes to ``path``.
+    """
+    yield
+    aspects = {
+        camera.data.name: camera.data.sensor_width / camera.data.sensor_height
+        for collection in scene.collection.children
+        for camera in cameras_in(collection)
+        if camera.data.sensor_fit == "HORIZONTAL"
+    }
+    if aspects and path.is_file():
+        with _changed_glb(path) as (gltf, _):
+            for camera in gltf.get("cameras", ()):
+                _set_aspect(camera, aspects)
+
+
+def _set_aspect(camera: dict[str, Any], aspects: dict[str, float]) -> None:
+    """Set a camera's ratio of width to height, and keep its horizontal field of view.
+
+    :param aspects: by the names of cameras; others stay.
+    """
+    aspect = aspects.get(camera.get("name", ""))
+    lens = camera.get("perspective")
+    if aspect is None or lens is None:
+        return
+    half_width = math.tan(lens["yfov"] / 2) * lens["aspectRatio"]
+    lens["aspectRatio"] = aspect
+    lens["yfov"] = 2 * math.atan(half_width / aspect)
+
+
 def _scale_times(path: Path, factor: float) -> None:
     """Multiply the times of all keys in the file."""
-    data = path.read_bytes()
-    (length,) = struct.unpack_from("<I", data, _HEADER)
-    begin = _HEADER + _CHUNK_HEADER
-    gltf = json.loads(data[begin : begin + length])
-    binary = bytearray(data[begin + length :])
+    with _changed_glb(path) as (gltf, binary):
+        _scale_key_times(gltf, binary, factor)
+
+
+def _scale_key_times(gltf: dict[str, Any], binary: bytearray, factor: float) -> None:
     for index in {
         sampler["input"]
         for animation in gltf.get("animations", ())
@@ -413,6 +450,19 @@ def _scale_times(path: Path, factor: float) -> None:
         times *= np.float32(factor)
         accessor["min"] = [float(times.min())]
         accessor["max"] = [float(times.max())]
+
+
+@contextmanager
+def _changed_glb(path: Path) -> Iterator[tuple[dict[str, Any], bytearray]]:
+    """Read a .glb, give its description and what follows it to the block, which may change both,
+    and write them.
+    """
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, _HEADER)
+    begin = _HEADER + _CHUNK_HEADER
+    gltf = json.loads(data[begin : begin + length])
+    binary = bytearray(data[begin + length :])
+    yield gltf, binary
     text = json.dumps(gltf, separators=(",", ":"), ensure_ascii=False).encode()
     text += b" " * (-len(text) % 4)
     total = begin + len(text) + len(binary)

@@ -16,6 +16,7 @@ from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions, export, export_motions
 
+from ...made_motion import made_views
 from ...required import package
 from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, glb_json, read_back
 
@@ -122,6 +123,28 @@ def test_the_camera_keeps_its_field_of_view_in_a_scene_of_another_shape(
         lens = blender.only("CAMERA").data
         found = 2 * np.arctan(np.array([lens.sensor_width, lens.sensor_height]) / 2 / lens.lens)
     np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+def test_every_camera_of_a_glb_has_a_field_of_view_of_its_own(body, make_motion, tmp_path):
+    views = made_views(0.0) | {"view_image_sizes": np.array([[400, 600]])}
+    motion = replace(make_motion(body, 2, image_size=(640, 480)), views=views)
+    first_focal = motion.intrinsics[0, 0], motion.intrinsics[1, 1]
+    second_focal = 500.0, 510.0  # of `made_views`
+    build_scene([motion], body)
+    own = bpy.data.cameras.new("own")  # the user's, with the scene's picture
+    captures_of(bpy.context.scene)[0].objects.link(bpy.data.objects.new("own", own))
+    path = tmp_path / "walk.glb"
+    export(path, options=ExportOptions(camera=True))
+    lenses = {each["name"]: each["perspective"] for each in glb_json(path)["cameras"]}
+    assert lenses.pop("own")["aspectRatio"] == pytest.approx(640 / 480)
+    first, second = (lenses[name] for name in sorted(lenses))
+    for lens, width, height, focal in (
+        (first, 640, 480, first_focal),
+        (second, 400, 600, second_focal),
+    ):
+        assert lens["yfov"] == pytest.approx(2 * np.arctan(height / 2 / focal[1]), rel=1e-5)
+        half_width = np.tan(lens["yfov"] / 2) * lens["aspectRatio"]
+        assert half_width == pytest.approx(width / 2 / focal[0], rel=1e-5)
 
 
 def test_blend_opens_with_camera_rate_and_shape_keys(body, make_motion, tmp_path, blender):
