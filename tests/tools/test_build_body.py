@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The committed body files: rebuilt from the pinned wheel, and checked against anatomy and
-independent geometry.
+"""The committed files of body, teeth and tongue: rebuilt from the pinned wheel, and checked
+against anatomy, independent geometry, and the source's helpers and text of targets.
 """
 
 import zipfile
 
 import numpy as np
 import pytest
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.solver.body_file import BUILT_IN, CHILDREN, growth_of, load_body
-from scope.tools.build_body.build import rig_body
+from scope.tools.build_body.build import ShapedMesh, rig_body, shape_mesh
 from scope.tools.build_body.geometry.expressions import build_expressions
+from scope.tools.build_body.geometry.growth import with_growth
 from scope.tools.build_body.geometry.materials import mirror_faces
+from scope.tools.build_body.geometry.mouth import build_mouth
 from scope.tools.build_body.joints import make_skeleton, other_side
 from scope.tools.build_body.keypoints import SURFACE
 from scope.tools.build_body.source import fetch_wheel
+from scope.tools.build_body.survey_targets import read_survey_targets
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 NAMES = ("scope", "scope_h")
@@ -22,6 +26,12 @@ NAMES = ("scope", "scope_h")
 @pytest.fixture(scope="module", params=NAMES)
 def body(request):
     return load_body(request.param)
+
+
+@pytest.fixture(scope="module")
+def shaped() -> ShapedMesh:
+    """The body's source, which takes seconds to read and to shape."""
+    return shape_mesh()
 
 
 def committed(name):
@@ -339,3 +349,59 @@ def test_surface_keypoints_move_with_the_skin(body, shaped):
         for name, vertices in sources.items():
             worst = max(worst, np.linalg.norm(skinned[vertices].mean(axis=0) - rigid[found[name]]))
     assert worst < 5e-4
+
+
+# Teeth and tongue
+# --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def mouth(shaped):
+    """The built arrays of teeth and tongue, and those of the committed file."""
+    with np.load(BUILT_IN["scope"].with_name("mouth.npz")) as file:
+        kept = {key: file[key] for key in file.files}
+    wheel = fetch_wheel()
+    grown = with_growth(shaped, read_survey_targets(wheel, shaped.source))
+    return build_mouth(wheel, grown), kept
+
+
+def test_teeth_and_tongue_are_rebuilt(mouth):
+    built, kept = mouth
+    assert set(kept) == set(built)
+    for key, value in built.items():
+        if value.dtype.kind == "f":
+            np.testing.assert_allclose(kept[key], value, atol=5e-5, err_msg=key)
+        # displacements in whole steps: with another numpy, one lies on the other side of a half
+        elif key == "moves":
+            np.testing.assert_allclose(kept[key], value, atol=1, err_msg=key)
+        else:
+            np.testing.assert_array_equal(kept[key], value, err_msg=key)
+
+
+def mouth_move(arrays, name):
+    moves = np.zeros((len(arrays["v_template"]), 3))
+    k = EXPRESSIONS.index(name)
+    rows = slice(arrays["starts"][k], arrays["starts"][k + 1])
+    moves[arrays["vertices"][rows]] = arrays["step_m"] * arrays["moves"][rows]
+    return moves
+
+
+@pytest.mark.parametrize("jaw", ["upper", "lower"])
+def test_teeth_are_symmetric_and_face_outwards(mouth, jaw):
+    _, kept = mouth
+    V = kept["v_template"].astype(float)
+    faces = kept["faces"]
+    of_jaw = np.linalg.norm(mouth_move(kept, "jawOpen"), axis=1)[faces].min(axis=1) < 1e-9
+    chosen = (of_jaw if jaw == "upper" else ~of_jaw) & (kept["face_material"] < 2)
+    used = np.unique(faces[chosen])
+    mirrored = V[used] * MIRROR
+    assert max(np.linalg.norm(V[used] - point, axis=1).min() for point in mirrored) < 1e-4
+    crown = chosen & (kept["face_material"] == list(kept["material_names"]).index("teeth"))
+    a, b, c, d = (V[faces[crown, k]] for k in range(4))
+    normal = np.cross(c - a, d - b)
+    middle = (a + b + c + d) / 4
+    outer = middle[:, 2] > np.median(middle[:, 2])  # the front teeth
+    away = middle[outer] - [0.0, V[used, 1].mean(), V[used, 2].min()]
+    lip = normal[outer] * [1, 0, 1]
+    # the others are edges and inner sides
+    assert ((lip * away * [1, 0, 1]).sum(axis=1) > 0).mean() > 0.6

@@ -89,7 +89,7 @@ def build_mouth(wheel: Path, grown: ShapedMesh) -> dict[str, NDArray[Any]]:
     skeleton = make_skeleton(grown.source, with_hands=False)
     J, posed_J, _ = rest_joints(grown, skeleton)
     head = skeleton.index("head")  # which is not turned on the way to the T-pose
-    basis = np.einsum("vn,pnx->pvx", W, grown.basis) + (posed_J - J)[:, head, None]
+    basis = W @ grown.basis + (posed_J - J)[:, head, None]
     starts = [0]
     moved = []
     moves = []
