@@ -56,6 +56,11 @@ _BODY = ("pose_body", "body_pose")
 _HANDS = ("pose_hand", "hand_pose")
 _LEFT_HAND = ("left_hand_pose",)
 _RIGHT_HAND = ("right_hand_pose",)
+_JAW = ("jaw_pose", "pose_jaw")
+_EYES = ("pose_eye",)
+_LEFT_EYE = ("leye_pose",)
+_RIGHT_EYE = ("reye_pose",)
+_EXPRESSION = ("expression",)
 _TRANS = ("trans_world", "trans", "transl", "smpl_trans", "translation", "pred_trans")
 _BETAS = ("betas", "beta", "smpl_betas", "shape", "pred_shape")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "frame_rate", "framerate", "fps")
@@ -70,6 +75,11 @@ _READ = {
     *_HANDS,
     *_LEFT_HAND,
     *_RIGHT_HAND,
+    *_JAW,
+    *_EYES,
+    *_LEFT_EYE,
+    *_RIGHT_EYE,
+    *_EXPRESSION,
     *_TRANS,
     *_BETAS,
     *_RATES,
@@ -82,6 +92,16 @@ HAND_JOINTS = {
     side: tuple(f"{side}_{finger}{i}" for finger in HAND_ORDER for i in (1, 2, 3))
     for side in ("left", "right")
 }
+# Names of the arrays that may come with those of root and body, and the joints of each.
+_PARTS = (
+    (_HANDS, (*HAND_JOINTS["left"], *HAND_JOINTS["right"])),
+    (_LEFT_HAND, HAND_JOINTS["left"]),
+    (_RIGHT_HAND, HAND_JOINTS["right"]),
+    (_JAW, FACE_JOINTS[:1]),
+    (_EYES, FACE_JOINTS[1:]),
+    (_LEFT_EYE, FACE_JOINTS[1:2]),
+    (_RIGHT_EYE, FACE_JOINTS[2:]),
+)
 _JOINTS_OF_BODY = {len(BODY_JOINTS) - 1: BODY_JOINTS[1:], 23: SKELETONS[24].joint_names[1:]}
 
 
@@ -216,7 +236,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         gender=gender_of(arrays.get(_GENDER), Path("neutral")),
         body_model=_text(arrays.get(_MODEL)),
         usual_up=usual_up,
-        models=_models(arrays, len(names)),
+        models=_models(arrays, names),
         frames=_frames(arrays, count),
         left_out=_left_out(arrays),
     )
@@ -236,7 +256,7 @@ def _frames(arrays: Mapping[str, NDArray[Any]], count: int) -> NDArray[np.int64]
     return numbers.astype(np.int64)
 
 
-def _models(arrays: Mapping[str, NDArray[Any]], joint_count: int) -> tuple[str, ...]:
+def _models(arrays: Mapping[str, NDArray[Any]], joint_names: Sequence[str]) -> tuple[str, ...]:
     """Return the published bodies of which a file may be: the one that it states, or whose joints
     it has.
 
@@ -247,7 +267,9 @@ def _models(arrays: Mapping[str, NDArray[Any]], joint_count: int) -> tuple[str, 
     if stated:
         return (stated.replace("-", "").replace("+", ""),)
     all_models = {skeleton.name: count for count, skeleton in SKELETONS.items()}
-    is_whole = _first(arrays, _ALL_JOINTS) is not None or joint_count == all_models["smpl"]
+    in_one_array = _first(arrays, _ALL_JOINTS) is not None
+    joint_count = sum(in_one_array or name not in FACE_JOINTS for name in joint_names)
+    is_whole = in_one_array or joint_count == all_models["smpl"]
     fitting = tuple(name for name, count in all_models.items() if count == joint_count)
     return fitting if is_whole and fitting else tuple(all_models)
 
@@ -288,46 +310,49 @@ def _poses(
             f"{parts[1].shape[1]}"
         )
     names = [BODY_JOINTS[0], *_JOINTS_OF_BODY[parts[1].shape[1]]]
-    for hands, sides in (
-        (_HANDS, ("left", "right")),
-        (_LEFT_HAND, ("left",)),
-        (_RIGHT_HAND, ("right",)),
-    ):
-        found = _first(arrays, hands)
-        joints = [joint for side in sides for joint in HAND_JOINTS[side]]
-        if found is None or joints[0] in names or _has_components(arrays[found], len(sides)):
+    for of_part, joints in _PARTS:
+        found = _first(arrays, of_part)
+        if found is None or joints[0] in names or _has_components(arrays[found], joints):
             continue
-        parts.append(_axis_angles(arrays[found], found, path))
-        if parts[-1].shape[1] != len(joints):
+        part = _axis_angles(arrays[found], found, path)
+        if part.shape[1] != len(joints):
             raise MotionFileError(
-                f"{path}: {found} must have {len(joints)} joints, but has {parts[-1].shape[1]}"
+                f"{path}: {found} must have {len(joints)} "
+                f"joint{'s' if len(joints) > 1 else ''}, but has {part.shape[1]}"
             )
+        if len(part) == 1 and joints[0] in FACE_JOINTS:  # as it is where nobody has set it
+            part = np.repeat(part, len(parts[0]), axis=0)
+        parts.append(part)
         names += joints
     if len({len(part) for part in parts}) > 1:
         counts = ", ".join(str(len(part)) for part in parts)
         raise MotionFileError(
-            f"{path}: the poses of {root}, {body} and hands must have as many frames, not {counts}"
+            f"{path}: the poses of {root}, {body}, hands and face must have as many frames, not "
+            f"{counts}"
         )
     return tuple(names), np.concatenate(parts, axis=1), "z" if root == "root_orient" else "camera"
 
 
-def _has_components(hands: NDArray[Any], sides: int) -> bool:
-    """Return whether an array holds the components of MANO's hands, six for each, and no
-    rotations.
+def _has_components(array: NDArray[Any], joints: Sequence[str]) -> bool:
+    """Return whether an array for these joints holds the components of MANO's hands, six for each,
+    and no rotations.
     """
-    return hands.ndim == 2 and hands.shape[1] == 6 * sides
+    hands = len(joints) // len(HAND_JOINTS["left"])
+    return hands > 0 and array.ndim == 2 and array.shape[1] == 6 * hands
 
 
 def _left_out(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, ...]:
     """Return the names of arrays that say something about the person, but are not rotations."""
-    if _first(arrays, _ALL_JOINTS) is not None:
-        return ()
-    hands = [
-        name
-        for names, sides in ((_HANDS, 2), (_LEFT_HAND, 1), (_RIGHT_HAND, 1))
-        if (name := _first(arrays, names)) and _has_components(arrays[name], sides)
-    ]
-    return tuple(name for name in hands if _moves(arrays[name]))
+    found = []
+    if _first(arrays, _ALL_JOINTS) is None:
+        for names, joints in _PARTS:
+            hands = _first(arrays, names)
+            if hands is not None and _has_components(arrays[hands], joints):
+                found.append(hands)
+    expression = _first(arrays, _EXPRESSION)
+    if expression is not None:
+        found.append(expression)
+    return tuple(name for name in found if _moves(arrays[name]))
 
 
 def _moves(array: NDArray[Any]) -> bool:

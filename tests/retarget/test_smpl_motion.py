@@ -16,6 +16,7 @@ from scope.scope_addon.retarget.smpl_motion import (
 )
 from scope.solver.names import BODY_JOINTS
 from scope.solver.rotations import exp
+from scope.solver.smpl_family import FACE_JOINTS
 
 T = 5
 FILE = Path("walk.npz")
@@ -92,6 +93,40 @@ def test_every_layout_gives_the_same_rotations(tmp_path, layout):
     assert motion.has_fingers == (joints >= 52)
 
 
+FACE = {
+    "apart": ({"jaw_pose": flat(22, 23), "leye_pose": flat(23, 24), "reye_pose": flat(24, 25)}, 3),
+    "both eyes": ({"pose_jaw": RANDOM[:, 22:23], "pose_eye": flat(23, 25)}, 3),
+    "matrices": ({"jaw_pose": exp(RANDOM[:, 22])}, 1),
+    "two rows": ({"jaw_pose": exp(RANDOM[:, 22:23])[..., :2, :].reshape(T, 1, 6)}, 1),
+}
+
+
+@pytest.mark.parametrize("layout", FACE)
+def test_jaw_and_eyes_apart_are_read(tmp_path: Path, layout: str) -> None:
+    arrays, count = FACE[layout]
+    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22)}
+    np.savez(tmp_path / "walk.npz", **arrays, **parts)
+    motion = read_one(tmp_path / "walk.npz")
+    assert motion.joint_names == (*BODY_JOINTS, *FACE_JOINTS[:count])
+    np.testing.assert_allclose(exp(motion.poses), exp(RANDOM[:, : 22 + count]), atol=1e-5)
+    assert motion.has_face
+    assert not motion.has_fingers
+
+
+def test_a_jaw_that_nobody_has_set_is_at_rest_in_every_frame() -> None:
+    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "jaw_pose": np.zeros((1, 3))}
+    motion = smpl_motion(parts, FILE)
+    assert len(motion) == T
+    assert not motion.has_face
+
+
+def test_expressions_are_named_as_left_out(tmp_path: Path) -> None:
+    np.savez(tmp_path / "walk.npz", **GOOD, expression=np.ones((T, 10)))
+    assert read_one(tmp_path / "walk.npz").left_out == ("expression",)
+    for nothing in (np.zeros((T, 10)), np.array("smile")):
+        assert smpl_motion(GOOD | {"expression": nothing}, FILE).left_out == ()
+
+
 def test_hands_as_components_are_named_as_left_out(tmp_path: Path) -> None:
     parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22)}
     np.savez(
@@ -162,6 +197,8 @@ BROKEN = {
         PARTS | {"body_pose": flat(1, 22), "left_hand_pose": flat(22, 30)},
         "must have 15 joints",
     ),
+    "wrong jaw": (PARTS | {"jaw_pose": flat(22, 24)}, "jaw_pose must have 1 joint, but has 2"),
+    "short jaw": (PARTS | {"jaw_pose": flat(22, 23)[:2]}, "as many frames"),
     "short trans": (GOOD | {"trans": np.zeros((2, 3))}, "trans must have shape"),
     "scalar trans": (GOOD | {"trans": np.array(1.0)}, "trans must have shape"),
     "empty trans": (GOOD | {"trans": np.zeros((0, 3))}, "trans must have shape"),
