@@ -69,19 +69,20 @@ def _weights(**changed: Any) -> tuple[Replacement, ...]:
 
 
 def landmarks_as_lifted(
-    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]]
+    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], scale: float
 ) -> Lifted:
     """Return the landmark network's world landmarks in place of the lifting network's points."""
     sigma = np.full(track.confidence.shape, DEPTH_SIGMA_M)
-    return Lifted(track.world_landmarks, sigma, sigma)
+    return Lifted(track.world_landmarks, sigma, sigma).scaled(scale)
 
 
 def _lift_without_landmarks(
-    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]]
+    measurer: Measurer, track: Track, pixels: NDArray[np.floating[Any]], scale: float
 ) -> Lifted:
     """Return the points of the lifting network, which is given the keypoints in the image alone."""
     windows = windows_around(track.times, track.seen)
-    return default_lifter().lift(measurer.rays(pixels), track.confidence, None, windows)
+    rays = measurer.rays(pixels)
+    return default_lifter().lift(rays, track.confidence, None, windows).scaled(scale)
 
 
 def _upright(

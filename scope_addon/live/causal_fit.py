@@ -212,6 +212,7 @@ class CausalFit:
         lifted = default_lifter().lift(
             rays, confidence, world, windows, rows=np.array([len(seen) - 1])
         )
+        lifted = lifted.scaled(self._prepared.lift_scale)
         return self._measurer.measure(
             pixels[-1], confidence[-1], lifted.points[0], lifted.sigma_along[0], root_cam
         )

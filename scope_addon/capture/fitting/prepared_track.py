@@ -120,6 +120,9 @@ class PreparedTrack:
     head: FloatArray | None = None
     is_stature_given: bool = False  # by the user
     is_stature_known: bool = False  # from the user or from a floor that several people share
+    # Size of a child whose stature is given, relative to the adults whom the lifting network knows;
+    # otherwise 1
+    lift_scale: float = 1.0
     # In each frame's camera; the body's last keypoints are then its contact points.
     stance: Stance | None = None
     others: tuple[OtherView, ...] = ()  # the same person in other cameras
@@ -262,9 +265,10 @@ def prepare_track(
         body = without_fingers(body)
     measurer = Measurer(body, camera.intrinsics)
     pixels = camera.undistort(track.keypoints_px)
-    lifted = lift(measurer, track, pixels)
-    if height_m is not None and height_m < CHILD_BELOW_M:  # the lifting network knows adults alone
-        lifted = lifted.scaled(height_m / body.stature())
+    lift_scale = 1.0
+    if height_m is not None and height_m < CHILD_BELOW_M:
+        lift_scale = height_m / body.stature()
+    lifted = lift(measurer, track, pixels, lift_scale)
     priors = replace(default_priors(body), joint_weights=joint_weights(body))
     if height_m is not None:
         priors = with_stature(priors, body, height_m)
@@ -282,6 +286,7 @@ def prepare_track(
         WEIGHTS,
         is_stature_given=height_m is not None,
         is_stature_known=height_m is not None,
+        lift_scale=lift_scale,
     )
     prepared = replace(prepared, head=head_of(track, camera, lifted))
     if track.hands is None or not fingers:
@@ -310,13 +315,14 @@ def undistorted_hands(hands: FloatArray, camera: Camera) -> FloatArray:
     return np.concatenate([camera.undistort(hands[..., :2]), hands[..., 2:]], axis=-1)
 
 
-def lift(measurer: Measurer, track: Track, pixels: FloatArray) -> Lifted:
+def lift(measurer: Measurer, track: Track, pixels: FloatArray, scale: float) -> Lifted:
     """Lift the keypoints of a track by the lifting network, with the landmark network's estimate of
     depth where it has one.
 
     :param pixels: (T, J, 2) keypoints without lens distortion.
+    :param scale: see `PreparedTrack.lift_scale`.
     """
     rays = measurer.rays(pixels)
     windows = windows_around(track.times, track.seen)
     world = track.world_landmarks if track.has_depth else None
-    return default_lifter().lift(rays, track.confidence, world, windows)
+    return default_lifter().lift(rays, track.confidence, world, windows).scaled(scale)

@@ -90,7 +90,7 @@ def other_view(
     """
     measurer = Measurer(prepared.body, camera.intrinsics)
     pixels = camera.undistort(track.keypoints_px)
-    lifted = lift(measurer, track, pixels)
+    lifted = lift(measurer, track, pixels, prepared.lift_scale)
     view = OtherView(
         measurer,
         pixels,

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import track_fit
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
@@ -15,12 +16,16 @@ from scope.scope_addon.capture.perception.face_landmarks import FACE_POINTS, Fac
 from scope.scope_addon.capture.perception.face_record import record
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
+from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
+from scope.scope_addon.capture.several_views.bundle import CameraPlace
+from scope.scope_addon.capture.several_views.person_in_views import other_view
 from scope.scope_addon.capture.tracking.expression_fit import load_response
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.clip_fit import fit_clip
 from scope.scope_addon.capture.world.placement import place_track
+from scope.scope_addon.live.causal_fit import CausalFit
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
@@ -91,6 +96,36 @@ def test_a_child_is_lifted_in_its_size():
     ]
     true = 1.1 / 1.695 * np.linalg.norm(np.diff(rest, axis=0), axis=1).sum()
     np.testing.assert_allclose(leg, true, rtol=0.1)
+
+
+def test_another_camera_lifts_a_child_in_its_size_too():
+    body = load_body("scope_child")
+    camera = choose_camera(1080, 1920)
+    track = _standing_track(body, camera)
+    prepared = prepare_track(body, track, camera, height_m=1.1)
+    other = other_view(prepared, track, camera, CameraPlace.first())
+    np.testing.assert_array_equal(other.lifted.points, prepared.lifted.points)
+
+
+def test_a_live_capture_finds_a_child_who_sits_at_its_distance():
+    body = load_body("scope_child")
+    camera = choose_camera(1080, 1920)
+    track = _standing_track(body, camera, [("left_hip", -1.5), ("right_hip", -1.5)])
+    priors = prepare_track(body, track, camera, height_m=0.85).priors
+    observation = Observation(
+        track.keypoints_px[0],
+        track.confidence[0],
+        track.world_landmarks[0],
+        1.0,
+        Region((540.0, 960.0), 1000.0, 0.0),
+        acquired=True,
+    )
+    live = CausalFit(body, observation, camera, height_m=0.85)
+    live.set_shape(priors.shape_mean)
+    fitted = live.fit(0.0, observation)
+    assert fitted is not None
+    # The person whom the picture shows at 4 m has the mean body's stature.
+    assert fitted.root_cam[2] == pytest.approx(4.0 * 0.85 / body.stature(), rel=0.05)
 
 
 def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
