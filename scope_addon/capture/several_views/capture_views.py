@@ -461,12 +461,12 @@ def _without(track: Track, spans: Sequence[tuple[float, float]], place: CameraPl
 
 
 def _about_cameras(views: Sequence[_View], matches: Sequence[Match | None]) -> list[Notice]:
-    """Warn of cameras that could not be placed, or hardly."""
+    """Warn of cameras whose picture cuts, or that could not be placed, or hardly."""
     warnings = []
     for view, match in zip(views[1:], matches[1:], strict=True):
         name = view.name
-        if view.footage.cuts_s:
-            warnings.append(notice("cuts", footage=name, times=view.footage.cuts_s))
+        if cuts_s := _cuts_by_first_clock(views[0], view, match):
+            warnings.append(notice("cuts", footage=name, times=cuts_s))
         if match is None:
             warnings.append(notice("view_without_place", footage=name))
             continue
@@ -477,6 +477,21 @@ def _about_cameras(views: Sequence[_View], matches: Sequence[Match | None]) -> l
             degrees = float(np.degrees(match.place.rotation_sigma))
             warnings.append(notice("weak_place", footage=name, degrees=degrees))
     return warnings
+
+
+def _cuts_by_first_clock(first: _View, view: _View, match: Match | None) -> list[float]:
+    """Return when a further camera's picture cuts, in seconds of the first video, as all warnings
+    give times; without the cuts before and after it. Of a camera without a place, whose clock is
+    not known, they are those of its own video.
+    """
+    if match is None:
+        return view.footage.cuts_s
+    own_s = np.array(view.footage.cuts_s) / view.speed
+    times_s = match.place.first_times(own_s) * first.speed
+    played_s = first.footage.timestamps
+    within = (times_s >= played_s[0]) & (times_s <= played_s[-1])
+    cuts_s: list[float] = times_s[within].tolist()
+    return cuts_s
 
 
 def _about_footage(

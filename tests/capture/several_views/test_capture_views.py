@@ -2,6 +2,7 @@
 """Captures of two real cameras, and footage that several cameras cannot use."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,8 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.region import parse_crop
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.several_views import capture_views as several
+from scope.scope_addon.capture.several_views.bundle import CameraPlace
+from scope.scope_addon.capture.several_views.calibrate import Clock, Match
 from scope.scope_addon.capture.several_views.capture_views import capture_views
 from scope.scope_addon.capture.tracking.chosen_person import ChosenPerson
 from scope.scope_addon.errors import CancelledError, UsageError
@@ -154,6 +157,31 @@ def test_a_place_of_a_person_in_several_videos_is_refused(shared):
     options = CaptureOptions(chosen=ChosenPerson(540.0, 960.0, None))
     with pytest.raises(UsageError, match="--person is a place in one video"):
         capture_views(videos, load_body("scope"), options)
+
+
+def test_cuts_of_further_cameras_are_told_by_the_first_ones_clock():
+    def view(name, end_s, cuts_s):
+        footage = SimpleNamespace(timestamps=np.linspace(0.0, end_s, 9), cuts_s=cuts_s)
+        return SimpleNamespace(name=name, footage=footage, speed=2.0)
+
+    def match(offset_s):
+        place = replace(CameraPlace.first(), offset_s=offset_s, drift=0.01)
+        return Match(place, 0.0, 0, Clock.MOTION)
+
+    views = [
+        view("first.mp4", 6.0, [1.0]),
+        view("second.mp4", 9.0, [1.0, 6.0, 8.9]),  # before the first one, in it, after it
+        view("third.mp4", 9.0, [5.0]),  # whose place is not known
+        view("fourth.mp4", 9.0, [0.5]),
+    ]
+    matches = [match(0.0), match(1.0), None, match(2.0)]
+    said = [each for each in several._about_cameras(views, matches) if each.code == "cuts"]
+    # 6 s play in slow motion: after 3 s, by a clock that is 1 s early and 1 % faster.
+    times = [pytest.approx([2 * (3.0 - 1.0) / 1.01]), [5.0]]
+    assert [(each.values["footage"], each.values["times"]) for each in said] == [
+        ("second.mp4", times[0]),
+        ("third.mp4", times[1]),
+    ]
 
 
 def test_what_is_given_of_cameras_has_to_suit_the_videos(shared, tmp_path):
