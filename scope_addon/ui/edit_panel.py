@@ -141,12 +141,14 @@ class SCOPE_OT_smooth(EditOperator):
         from ..edit.corrected_motion import uncorrected
         from ..edit.smooth import smoothed
         from ..scene.actions import animated_together, remove_cycles
+        from ..scene.character.corrected_keys import check_times_of_keys
         from ..scene.character.keys import bake_whole_frames, write_clip
         from ..scene.character.other_curves import restore_whole_motion
         from ..scene.character.uncorrected_keys import write_both
         from ..scene.timing import is_cycle, key_frames, restore_scene_range, store_rate
 
         motion = motion_of(armature)
+        check_times_of_keys(armature, motion, rate)
         if motion.corrections:  # which are solved again
             keep_machine_code()
         frames = key_frames(motion.timestamps, rate, start_frame(armature))

@@ -31,13 +31,15 @@ from ...edit.smooth import smoothed
 from ...edit.solve_pins import Shot, missed, resolve
 from ...errors import UsageError
 from ...motion import Motion
+from ..actions import fcurves, read_keys
 from ..stored_values import smoothing_of, start_frame
-from .keys import channel_curves, read_clip, write_keys
+from .keys import ROTATION, channel_curves, read_clip, write_keys
 from .root_object import clip_with_root_motion, removed_root_motion, root_object
 from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
 
 _SAME_FRAME = 2e-3
 _WHOLE = 1e-3  # frames; timestamps are rounded
+_WHOLE_SHARE = 0.9  # of its keys that a motion has at least where it was captured
 _SAME_S = 1e-4  # keys' frames are single precision
 _MISSED_PX = 1.0
 _MISSED_M = 0.005
@@ -67,6 +69,7 @@ def rewrite_changed_keys(
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
+    check_times_of_keys(armature, before, rate)
     start = start_frame(armature)
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
@@ -197,8 +200,9 @@ def captured_points(
 def source_frame(armature: bpy.types.Object, motion: Motion, frame: float, rate: float) -> int:
     """Return the footage's frame that is shown at a scene frame.
 
-    :raises UsageError: the motion has none there.
+    :raises UsageError: the motion has none there, or its keys were moved.
     """
+    check_times_of_keys(armature, motion, rate)
     first, last = whole_span(armature, motion, rate)
     if not first <= frame <= last:
         raise UsageError(
@@ -253,6 +257,29 @@ def _longest_shown(motion: Motion, rate: float) -> float:
     """Return for how many seconds around its time a frame of the footage counts as shown."""
     spacing = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 1.0 / rate
     return max(spacing, 1.0 / rate)
+
+
+def check_times_of_keys(armature: bpy.types.Object, motion: Motion, rate: float) -> None:
+    """Check that the keys are at the times of the captured motion.
+
+    A loop has fewer keys, and further ones may have been added before and after the motion.
+
+    :param rate: scene frames per second.
+    :raises UsageError: they were moved or stretched.
+    """
+    curves = [curve for curve in fcurves(armature) if curve.data_path.endswith(ROTATION)]
+    if not curves:
+        return
+    first, last = whole_span(armature, motion, rate)
+    frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for curve in curves]))
+    inside = (frames >= first - 1) & (frames <= last + 1)
+    is_whole = inside.sum() >= _WHOLE_SHARE * min(len(motion), last - first + 1)
+    if not inside.all() and not is_whole:
+        raise UsageError(
+            f"the keys of '{armature.name}' are in frames {frames[0]:g} to {frames[-1]:g}, but its "
+            f"motion was captured in frames {first} to {last}: put them back there in the Dope "
+            "Sheet; after this change, they can be moved again"
+        )
 
 
 def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple[int, int]:

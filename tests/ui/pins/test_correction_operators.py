@@ -370,6 +370,39 @@ def test_an_exchange_swaps_the_sides_and_once_more_swaps_them_back(rig):
     assert listed_corrections(rig) == []
 
 
+def move_keys(rig, factor, shift):
+    """Move all keys in time as in the Dope Sheet."""
+    for curve in fcurves(rig):
+        for key in curve.keyframe_points:
+            for point in (key.co, key.handle_left, key.handle_right):
+                point.x = factor * point.x + shift
+        curve.update()
+
+
+@pytest.mark.parametrize(("factor", "shift"), [(1.0, 20.0), (1.0, -20.0), (2.0, 0.0)])
+def test_keys_that_were_moved_in_time_are_not_corrected_at_another_moment(rig, factor, shift):
+    move_keys(rig, factor, shift)
+    before = keys(rig)
+    for change in (
+        lambda: bpy.ops.scope.exchange_sides(start=40, end=52),
+        lambda: bpy.ops.scope.add_pin(joint="left_wrist", location=(0.0, 0.0, 1.0)),
+        lambda: bpy.ops.scope.smooth(),
+    ):
+        with pytest.raises(RuntimeError, match="was captured in frames 1 to 91: put them back"):
+            change()
+    for curve, now in keys(rig).items():
+        np.testing.assert_array_equal(now, before[curve])
+
+
+def test_keys_that_were_added_after_the_motion_do_not_prevent_corrections(rig):
+    for curve in fcurves(rig):
+        curve.keyframe_points.insert(150, curve.evaluate(91))
+    before = keys(rig)
+    bpy.ops.scope.exchange_sides(start=40, end=52)
+    for curve, now in keys(rig).items():
+        np.testing.assert_array_equal(now[-1], before[curve][-1])
+
+
 def outside(frame):
     return (
         f"Frame {frame} is outside of the captured motion of 'walk', which has frames 1 to 91; go "
