@@ -45,7 +45,7 @@ from .pose_refit import (
     pixel_of,
     within_reach,
 )
-from .spans import faded
+from .spans import are_far_apart, faded
 
 _CONTACT_REACH_S = 0.25
 _FLOOR_M = 0.12  # A foot that stands within this height of z = 0 is put on it.
@@ -393,7 +393,9 @@ def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> NDArray[np.in
 
 
 def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> list[_Track]:
-    """Return one track per limb with pins."""
+    """Return a track per limb with pins, or several where they are so far apart that the keys
+    between them stay.
+    """
     found: dict[str, dict[int, list[Pin]]] = {}
     for pin in sorted(pins, key=lambda p: (p.frame, refit.joint(p.joint))):
         key = _key_at(clip, shot.time(pin.frame))
@@ -401,20 +403,33 @@ def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> li
             found.setdefault(limb_of(pin.joint), {}).setdefault(key, []).append(pin)
     tracks = []
     for by_key in found.values():
-        joints = sorted({pin.joint for here in by_key.values() for pin in here}, key=refit.joint)
         keys = sorted(by_key)
-        gaps = np.diff(clip.times[keys], prepend=-np.inf, append=np.inf)
-        track = _Track(joints, keys, [], [], [])
-        for key, gap in zip(
-            keys, np.where(len(keys) > 1, np.minimum(gaps[:-1], gaps[1:]), np.inf), strict=True
-        ):
-            reach = max(pin.reach for pin in by_key[key])
-            track.reach.append(float(np.clip(gap, reach / 4, reach)))
-            track.points.append({pin.joint: _measured(refit, pin) for pin in by_key[key]})
-            in_image = [pin for pin in by_key[key] if pin.pixel is not None]
-            track.cameras.append(shot.camera(in_image[-1].frame) if in_image else None)
-        tracks.append(track)
+        times = clip.times[keys]
+        gaps = np.minimum(np.diff(times, prepend=-np.inf), np.diff(times, append=np.inf))
+        longest = np.array([max(pin.reach for pin in by_key[key]) for key in keys])
+        reach = np.clip(gaps, longest / 4, longest)
+        begins = 1 + np.flatnonzero(are_far_apart(times, reach))
+        for part in np.split(np.arange(len(keys)), begins):
+            own = {keys[k]: by_key[keys[k]] for k in part}
+            tracks.append(_pin_track(refit, own, [float(r) for r in reach[part]], shot))
     return tracks
+
+
+def _pin_track(
+    refit: PoseRefit, by_key: dict[int, list[Pin]], reach: list[float], shot: Shot
+) -> _Track:
+    """Return the track of a limb's pins.
+
+    :param by_key: the pins at each key, of which there are H, in their order.
+    :param reach: H of these, seconds.
+    """
+    joints = sorted({pin.joint for here in by_key.values() for pin in here}, key=refit.joint)
+    track = _Track(joints, list(by_key), [], [], reach)
+    for pins in by_key.values():
+        track.points.append({pin.joint: _measured(refit, pin) for pin in pins})
+        in_image = [pin for pin in pins if pin.pixel is not None]
+        track.cameras.append(shot.camera(in_image[-1].frame) if in_image else None)
+    return track
 
 
 def _measured(refit: PoseRefit, pin: Pin) -> Points:

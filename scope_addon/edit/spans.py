@@ -183,8 +183,7 @@ def faded(
 ) -> NDArray[np.float64]:
     """Interpolate values that fade to zero ``reach`` seconds beyond the known ones.
 
-    Between two known values it interpolates, unless they are farther apart than twice the sum of
-    their reaches.
+    Between two known values it interpolates, unless they are far apart, see `are_far_apart`.
 
     :param times: (T,) seconds at which the values are wanted.
     :param known: (H,) seconds, increasing.
@@ -196,18 +195,30 @@ def faded(
     zero = np.zeros((1, flat.shape[1]))
     at = [np.array([known[0] - reach[0]])]
     rows = [zero]
+    far = are_far_apart(known, reach)
     for k in range(len(known)):
         at.append(known[k : k + 1])
         rows.append(flat[k : k + 1])
-        apart = k + 1 < len(known) and known[k + 1] - known[k] > 2 * (reach[k] + reach[k + 1])
-        if apart or k + 1 == len(known):
+        is_far = k + 1 < len(known) and far[k]
+        if is_far or k + 1 == len(known):
             at.append(known[k : k + 1] + reach[k])
             rows.append(zero)
-        if apart:
+        if is_far:
             at.append(known[k + 1 : k + 2] - reach[k + 1])
             rows.append(zero)
     inside: NDArray[np.float64] = _monotone_cubic(times, np.concatenate(at), np.concatenate(rows))
     return inside.reshape(len(times), *values.shape[1:])
+
+
+def are_far_apart(known: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return (H-1,) between which of the known times a correction fades out and in again: those
+    farther apart than twice the sum of their reaches.
+
+    :param known: (H,) seconds, increasing.
+    :param reach: (H,) seconds.
+    """
+    far: NDArray[np.bool_] = np.diff(known) > 2 * (reach[:-1] + reach[1:])
+    return far
 
 
 def _monotone_cubic(

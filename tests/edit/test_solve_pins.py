@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Solving a motion again around corrected frames, against a truth that was corrupted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
@@ -102,6 +104,23 @@ def test_other_limbs_and_other_frames_stay():
     moved = np.linalg.norm(good.joints(BODY, BETAS) - bad.joints(BODY, BETAS), axis=-1)
     assert moved[:, ARM[1]].max() > 0.1
     assert moved[:, others].max() < 0.005
+
+
+def test_frames_between_two_pins_far_apart_keep_their_keys():
+    # An elbow bent backwards, which a fit would turn even if nothing is pinned.
+    bad = Clip(TRUTH.times, TRUTH.rotations.copy(), TRUTH.root.copy())
+    bad.rotations[30:60, ARM[0]] = exp(np.array([0.0, 0.35, 0.0]))
+    at = bad.joints(BODY, BETAS)[:, ARM[1]]
+    wanted = [
+        Pin(frame, "left_wrist", position=tuple(at[frame] + [0.05, 0.0, 0.05]))
+        for frame in (10, 80)
+    ]
+    good = resolve(bad, BODY, BETAS, wanted, SHOT)
+    assert max(missed(good, BODY, BETAS, pin, SHOT) for pin in wanted) < 0.005
+    between = slice(10 + 13, 80 - 12)
+    np.testing.assert_array_equal(good.rotations[between], bad.rotations[between])
+    near = resolve(bad, BODY, BETAS, [replace(pin, reach=0.7) for pin in wanted], SHOT)
+    assert (near.rotations[between] != bad.rotations[between]).any((1, 2, 3)).all()
 
 
 def test_the_correction_begins_and_ends_without_a_jump_of_velocity():
