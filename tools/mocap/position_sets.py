@@ -16,7 +16,7 @@ performer, such that both agree with the line from hips to neck in the median up
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,9 +91,10 @@ def load_sets(folder: str | Path, without: tuple[str, ...] = ()) -> list[Take]:
     return [take for name in found for take in load_set(folder / f"{name}.npz")]
 
 
-def load_set(path: Path) -> list[Take]:
+def load_set(path: Path, wanted: Collection[str] | None = None) -> list[Take]:
     """Return the takes of one file, which has the name of its set, as `load_sets`.
 
+    :param wanted: names of the only takes to return; all recordings of a performer level them.
     :raises MotionFileError: when the set is unknown, or the file lacks arrays or joints.
     """
     layout = LAYOUTS.get(path.stem)
@@ -110,7 +111,11 @@ def load_set(path: Path) -> list[Take]:
     for performer in sorted({recording.performer for recording in recordings}):
         own = sorted((r for r in recordings if r.performer == performer), key=lambda r: r.name)
         _level(own)
-        takes += [_take(recording, path.stem) for recording in own]
+        takes += [
+            _take(recording, path.stem)
+            for recording in own
+            if wanted is None or recording.name in wanted
+        ]
     return takes
 
 

@@ -18,9 +18,9 @@ from ...required import missing
 from .archives import beginning
 
 STANDING_AND_WALKING = {
-    "accad": ("Female1_A01_Stand", "Female1_A02_Sway", "Female1_B03_Walk1"),
+    "accad": ("Female1_A01_Stand", "Female1_B03_Walk1"),
     "cmu_more": ("07_01", "13_09"),
-    "rocketbox": ("f_idle_neutral_09", "f_walk_neutral", "m_idle_breathe_01", "m_walk_neutral"),
+    "rocketbox": ("f_idle_neutral_09", "m_walk_neutral"),
     "style100": ("Neutral_FW", "Neutral_ID"),
 }
 
@@ -58,7 +58,7 @@ def takes_of_people(shared):
     walks, _ = library.load_asf_amc({name: texts[name] for name in names})
     found = [straightened(walk.resampled(30)) for walk in walks]
     for name, wanted in STANDING_AND_WALKING.items():
-        found += [take for take in load_set(folder / f"{name}.npz") if take.name in wanted]
+        found += load_set(folder / f"{name}.npz", wanted)
     return [
         replace(t, positions=t.positions[:MOST_FRAMES], orientations=t.orientations[:MOST_FRAMES])
         for t in found
