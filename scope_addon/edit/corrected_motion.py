@@ -24,6 +24,7 @@ from ..errors import MotionFileError
 from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ..kinematics.smoothing import smooth_rotations
 from ..motion import Motion
+from ..scene_gaps import SCENE_GAP_S
 from ..untrusted.files import in_one_line
 from .clip import Clip, clip_from_motion
 from .corrections import (
@@ -176,10 +177,20 @@ def corrected(clip: Clip, motion: Motion, body: Body) -> Clip:
 
 def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     """Apply the flips in depth, the edits, then the contacts and pins, to a clip in the captured
-    world.
+    world. None of them reaches over a scene cut.
+    """
+    times = motion.times_with_gaps
+    shot = replace(shot_of(uncorrected(motion)), times=times)
+    apart = Clip(times, clip.rotations, clip.root)
+    return replace(_changed(apart, motion, body, shot), times=clip.times)
+
+
+def _changed(clip: Clip, motion: Motion, body: Body, shot: Shot) -> Clip:
+    """Apply to a clip in the captured world what `_pinned` does.
+
+    :param shot: with the clip's times.
     """
     corrections = corrections_of(motion)
-    shot = shot_of(uncorrected(motion))
     flips = [c for c in corrections if isinstance(c, DepthFlip)]
     clip = flipped(clip, body, motion.betas, flips, shot)
     clip = edited(clip, body, motion.betas, corrections, shot)
@@ -233,6 +244,7 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
         return base
     raw = clip_from_motion(body, base, raw=True)
     finished = clip_from_motion(body, base, raw=False)
+    times = base.times_with_gaps
     mixed = np.zeros(finished.rotations.shape[:2], bool)
     contact = base.foot_contact.copy()
     for exchange in exchanges:
@@ -245,10 +257,10 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
                 contact[span] = contact[span][:, _OTHER_FOOT]
             joints = joints_of_limbs(body, exchange.limbs)
             for k, neighbour in ((span[0], span[0] - 1), (span[-1], span[-1] + 1)):
-                if 0 <= neighbour < len(base):
-                    near = np.abs(base.timestamps - base.timestamps[k]) < _MIXED_S
+                if 0 <= neighbour < len(base) and abs(times[neighbour] - times[k]) < SCENE_GAP_S:
+                    near = np.abs(times - times[k]) < _MIXED_S
                     mixed[np.ix_(near, joints)] = True
-    smooth = smooth_rotations(raw.rotations, raw.times)
+    smooth = smooth_rotations(raw.rotations, times)
     finished.rotations[mixed] = smooth[mixed]
     new_raw, new = (
         _poses(clip, getattr(base, poses))

@@ -107,6 +107,23 @@ def test_sides_are_exchanged_before_pins(pin_first):
     assert np.linalg.norm(wrong - right, axis=-1)[40].max() > 0.1
 
 
+def test_a_scene_whose_sides_are_exchanged_is_mixed_with_no_other():
+    motion = replace(MOTION, scene_starts=[30, 51])
+    found = clip_from_motion(BODY, with_corrections(motion, BODY, (Exchange(30, 50),)), raw=False)
+    before = clip_from_motion(BODY, MOTION, raw=False)
+    expected = swap_sides(before, BODY, TRUTH.times[30], TRUTH.times[50])
+    np.testing.assert_allclose(found.rotations, expected.rotations, atol=1e-6)
+
+
+def test_a_pin_changes_nothing_beyond_a_cut():
+    motion = replace(MOTION, scene_starts=[48])
+    before = clip_from_motion(BODY, motion, raw=False)
+    found = clip_from_motion(BODY, with_corrections(motion, BODY, (pin(frame=45),)), raw=False)
+    assert angle(found.rotations, before.rotations)[45:48].max() > 0.01
+    np.testing.assert_array_equal(found.rotations[48:], before.rotations[48:])
+    np.testing.assert_array_equal(found.times, before.times)
+
+
 @pytest.mark.parametrize(("limbs", "kept"), [("arms", LEG), ("legs", ARM)])
 def test_limbs_that_are_not_exchanged_stay_as_they_were(limbs, kept):
     """Also around the span's ends, where the others are smoothed again."""
