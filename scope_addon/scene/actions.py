@@ -306,8 +306,13 @@ def add_cycles(datablock: bpy.types.ID, offset_curves: set[tuple[str, int]] | No
             if (curve.data_path, curve.array_index) in (offset_curves or set())
             else "REPEAT"
         )
-        cycles = {"type": "CYCLES", "mode_before": mode, "mode_after": mode}
-        write_modifiers(curve, [cycles, *read_modifiers(curve)])
+        repeat_curve(curve, mode)
+
+
+def repeat_curve(curve: bpy.types.FCurve, mode: str = "REPEAT") -> None:
+    """Make a curve without cycles cyclic."""
+    cycles = {"type": "CYCLES", "mode_before": mode, "mode_after": mode}
+    write_modifiers(curve, [cycles, *read_modifiers(curve)])
 
 
 def is_cyclic(datablock: bpy.types.ID) -> bool:
@@ -386,6 +391,25 @@ def check_not_in_nla(datablock: bpy.types.ID) -> None:
             "enter Tweak Mode on the strip (Tab), choose its action in the Action Editor again, or "
             "bake all strips "
             "into one action (Bake Action)"
+        )
+
+
+def check_not_moved_by_nla(datablock: bpy.types.ID) -> None:
+    """Check that the NLA plays the keys of a datablock at their own frames.
+
+    :raises UsageError: it is in Tweak Mode, on a strip that is elsewhere or plays at another speed.
+    """
+    animation = datablock.animation_data
+    if animation is None or not animation.use_tweak_mode or animation.action is None:
+        return
+    own = tuple(animation.action.frame_range)
+    played = tuple(animation.nla_tweak_strip_time_to_scene(frame) for frame in own)
+    if np.abs(np.subtract(played, own)).max() > _SAME_FRAME:
+        raise UsageError(
+            f"'{datablock.name}' is in the NLA's Tweak Mode on a strip that plays frames "
+            f"{own[0]:g} to {own[1]:g} of its action at {played[0]:g} to {played[1]:g}: set the "
+            f"strip's start to {own[0]:g} and its end to {own[1]:g}; after this change, it can be "
+            "moved again"
         )
 
 

@@ -29,7 +29,9 @@ from .actions import (
     bone_path,
     check_not_in_nla,
     fcurves,
+    is_cyclic,
     read_keys,
+    repeat_curve,
     shape_key_path,
     used_slot,
 )
@@ -45,11 +47,12 @@ _CHANNELS = ("location", "rotation_quaternion", "rotation_axis_angle", "rotation
 @dataclass(frozen=True)
 class CapturedExpressions:
     """The expressions of a captured person: weights (T, 52) in the order of `EXPRESSIONS`, at scene
-    frames (T,).
+    frames (T,), and whether they repeat.
     """
 
     frames: NDArray[np.float64]
     weights: NDArray[np.float64]
+    repeat: bool = False
 
 
 def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | None:
@@ -79,7 +82,7 @@ def captured_expressions(armature: bpy.types.Object) -> CapturedExpressions | No
                 (k, keys.key_blocks[name]) for k, name in zip(found, EXPRESSIONS, strict=True)
             )
         ]
-        return CapturedExpressions(longest, np.stack(columns, axis=1))
+        return CapturedExpressions(longest, np.stack(columns, axis=1), is_cyclic(keys))
     return None
 
 
@@ -134,7 +137,7 @@ def retarget_expressions(
     with all_or_nothing(bpy.context.scene, *faces, keys=[face.data.shape_keys for face in faces]):
         for face, values in plans:
             if values:
-                written.append((face, *_write(face.data.shape_keys, captured.frames, values, name)))
+                written.append((face, *_write(face.data.shape_keys, captured, values, name)))
         for face, action, former in written:
             retire(former, name)
             action.name = f"{face.name}_{name}"  # which an earlier retargeting had until now
@@ -143,7 +146,7 @@ def retarget_expressions(
 
 def _write(
     keys: bpy.types.Key,
-    frames: NDArray[np.float64],
+    captured: CapturedExpressions,
     values: dict[str, NDArray[np.float64]],
     source: str,
 ) -> tuple[bpy.types.Action, bpy.types.Action | None]:
@@ -156,7 +159,9 @@ def _write(
         block.mute = False
         block.value = float(column[0])
         if np.ptp(column) >= MOVES:
-            channels.write(shape_key_path(key), frames, column, group="Face")
+            curves = channels.write(shape_key_path(key), captured.frames, column, group="Face")
+            if captured.repeat:
+                repeat_curve(curves[0])
     override_nla(keys.animation_data)
     mark_written(channels.action, source)
     return channels.action, former
@@ -165,11 +170,12 @@ def _write(
 @dataclass(frozen=True)
 class FaceKeys:
     """The keys of a face: for each of its ``controls``, channels that are not at rest, with values
-    (1, n) or (T, n).
+    (1, n) or (T, n); and whether they repeat.
     """
 
     frames: NDArray[np.float64]  # (T,)
     controls: dict[str, dict[str, NDArray[np.float64]]]
+    repeat: bool = False
 
 
 def has_bone_face(rig: bpy.types.Object) -> bool:
@@ -249,7 +255,8 @@ def face_keys(
         for bone in bones
     }
     motions = control_motions(expression_map, captured.weights, rest)
-    return FaceKeys(captured.frames, {motion.bone: _channels(rig, motion) for motion in motions})
+    controls = {motion.bone: _channels(rig, motion) for motion in motions}
+    return FaceKeys(captured.frames, controls, captured.repeat)
 
 
 def key_face(rig: bpy.types.Object, keys: FaceKeys, source: str) -> bpy.types.Action:
@@ -262,9 +269,11 @@ def key_face(rig: bpy.types.Object, keys: FaceKeys, source: str) -> bpy.types.Ac
     for bone, moved in keys.controls.items():
         for path, values in moved.items():
             interpolation = "CONSTANT" if len(values) == 1 else "LINEAR"
-            channels.write(
+            curves = channels.write(
                 bone_path(bone, path), keys.frames[: len(values)], values, interpolation, group=bone
             )
+            for curve in curves if keys.repeat else ():
+                repeat_curve(curve)
     mark_written(channels.action, source)
     return channels.action
 

@@ -7,6 +7,8 @@ by an artist.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -165,3 +167,23 @@ def test_a_map_of_another_rig_is_refused(rigify_face):
         retarget_face_bones(
             shown(jawOpen=1.0), rigify_face, ExpressionMap({}, {"kiefer": {"up": {"jawOpen": 1.0}}})
         )
+
+
+def test_expressions_of_a_looped_person_repeat_on_bones_alone(
+    rigify_face: bpy.types.Object,
+) -> None:
+    """What else the rig's action holds keeps how it goes on."""
+    rigify_face.pose.bones["head"].keyframe_insert("location", frame=1)
+    looped = replace(shown(jawOpen=1.0), repeat=True)
+    retarget_face_bones(looped, rigify_face, guess_face_bones(rigify_face))
+    curves = actions.fcurves(rigify_face)
+    of_head = [
+        curve for curve in curves if curve.data_path == actions.bone_path("head", "location")
+    ]
+    repeating = [c for c in curves if [m.type for m in c.modifiers] == ["CYCLES"]]
+    assert of_head
+    assert repeating
+    assert len(repeating) + len(of_head) == len(curves)
+    np.testing.assert_allclose(
+        heads(rigify_face, 4, "DEF-lip.B.L"), heads(rigify_face, 2, "DEF-lip.B.L"), atol=1e-5
+    )

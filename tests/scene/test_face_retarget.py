@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import bpy
@@ -10,17 +11,20 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.kinematics.face import EXPRESSIONS
+from scope.scope_addon.motion import Motion
 from scope.scope_addon.retarget.expression_map import ExpressionMap
 from scope.scope_addon.retarget.rig_source import RigSource
 from scope.scope_addon.scene import actions, face_retarget
 from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.face_retarget import (
+    CapturedExpressions,
     captured_expressions,
     faces_of,
     retarget_expressions,
 )
 from scope.scope_addon.scene.rig_export import export_on_rig
+from scope.solver.body import Body
 
 from ..edit.walking import motion_of, walk
 from ..made_motion import made_face
@@ -87,6 +91,27 @@ def test_arkits_keys_move_as_captured(captured):
     values = {block.name: block.value for block in face.data.shape_keys.key_blocks}
     assert values["eyeBlink_L"] == pytest.approx(0.4)
     assert values["width"] == pytest.approx(0.7)
+
+
+def test_expressions_of_a_looped_person_repeat(
+    captured: CapturedExpressions, whole_body: Body, make_motion: Callable[..., Motion]
+) -> None:
+    assert not captured.repeat
+    motion = replace(make_motion(whole_body, 4), face=made_face(4, jawOpen=JAW))
+    person = build_scene([motion], whole_body, options=NEW_SCENE).people[0].armature
+    for block in actions.animated_together(person, None):
+        actions.add_cycles(block)
+    looped = captured_expressions(person)
+    assert looped is not None
+    face = face_mesh(["jawOpen", "eyeBlink_L", "eyeBlink_R", "mouthSmile_L", "mouthSmile_R"])
+    for _ in range(2):
+        (action,) = retarget_expressions(looped, [face])
+        (curve,) = actions.fcurves(face.data.shape_keys)
+        cycle = looped.frames[-1] - looped.frames[0]
+        for k in (1, 2):
+            later = looped.frames[k] + 2 * cycle
+            assert curve.evaluate(later) == pytest.approx(JAW[k], abs=1e-5)
+    assert action.name == "Head_Face"  # The first one was not edited, and so replaced.
 
 
 def test_a_map_adds_up_and_stays_within_0_and_1(captured):
