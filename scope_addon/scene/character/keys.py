@@ -26,7 +26,15 @@ from ....solver.rotations import quaternion_from_matrix as quaternions
 from ...edit.clip import Clip, band_limited, sample
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
-from ..actions import bone_path, change_keys, check_not_in_nla, fcurves, read_keys, rewrite_keys
+from ..actions import (
+    bone_path,
+    change_keys,
+    check_not_in_nla,
+    check_not_moved_by_nla,
+    fcurves,
+    read_keys,
+    rewrite_keys,
+)
 from ..timing import whole_frames_of
 from .animation import on_one_hemisphere
 from .armature import rest_orientations
@@ -223,6 +231,7 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
     of their index.
     """
     _check_bones(armature, body)
+    check_not_moved_by_nla(armature)
     wanted = {bone_path(name, ROTATION): 4 for name in body.joint_names} | {location_path(body): 3}
     found: dict[str, dict[int, bpy.types.FCurve]] = {path: {} for path in wanted}
     for curve in fcurves(armature):

@@ -18,7 +18,15 @@ from ...edit.clip import Clip
 from ...edit.edits import moved_clip
 from ...edit.root_motion import floor_trajectory, relative_to_trajectory, with_trajectory
 from ...errors import UsageError
-from ..actions import Channels, add_cycles, check_not_in_nla, fcurves, is_cyclic, read_keys
+from ..actions import (
+    Channels,
+    add_cycles,
+    check_not_in_nla,
+    check_not_moved_by_nla,
+    fcurves,
+    is_cyclic,
+    read_keys,
+)
 from ..datablocks import remove_blocks
 from ..stored_values import stored_numbers
 from ..timing import Retiming
@@ -274,6 +282,7 @@ def _keyed_path(
     :raises UsageError: the empty's keys are in its NLA.
     """
     columns = {}
+    check_not_moved_by_nla(empty)
     if not fcurves(empty):
         check_not_in_nla(empty)
     for curve in fcurves(empty):

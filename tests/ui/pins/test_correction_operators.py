@@ -394,6 +394,42 @@ def test_keys_that_were_moved_in_time_are_not_corrected_at_another_moment(rig, f
         np.testing.assert_array_equal(now, before[curve])
 
 
+def enter_tweak_mode(rig, start, scale):
+    """Push the motion to a strip that begins at a frame, and enter Tweak Mode on it."""
+    bpy.ops.scope.push_to_nla()
+    animation = rig.animation_data
+    track = animation.nla_tracks[0]
+    strip = track.strips[0]
+    strip.scale = scale
+    strip.frame_start_raw, strip.frame_end_raw = start, start + 90 * scale
+    strip.select = track.select = True
+    animation.nla_tracks.active = track
+    animation.use_tweak_mode = True
+
+
+@pytest.mark.parametrize(("start", "scale"), [(21, 1.0), (1, 2.0)])
+def test_a_strip_that_was_moved_is_not_edited_at_another_moment(rig, start, scale):
+    enter_tweak_mode(rig, start, scale)
+    before = keys(rig)
+    for change in (
+        lambda: bpy.ops.scope.exchange_sides(start=40, end=52),
+        lambda: bpy.ops.scope.loop(start=40, end=80),
+        lambda: bpy.ops.scope.root_motion(mode="OBJECT"),
+    ):
+        with pytest.raises(RuntimeError, match="set the strip's start to 1 and its end to 91"):
+            change()
+    for curve, now in keys(rig).items():
+        np.testing.assert_array_equal(now, before[curve])
+
+
+def test_a_strip_at_its_own_frames_is_edited(rig):
+    enter_tweak_mode(rig, 1, 1.0)
+    left = NAMES.index("left_knee")
+    before = seen(rig, [50])[0, left]
+    bpy.ops.scope.exchange_sides(start=40, end=52)
+    assert np.linalg.norm(seen(rig, [50])[0, left] - before) > 0.1
+
+
 def test_keys_that_were_added_after_the_motion_do_not_prevent_corrections(rig):
     for curve in fcurves(rig):
         curve.keyframe_points.insert(150, curve.evaluate(91))
