@@ -79,6 +79,11 @@ class FootageView:
         quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         return np.linalg.matrix_power(quarter, self.clockwise_deg // 90)
 
+    def then(self, later: FootageView) -> FootageView:
+        """Return the view that shows a picture as this one does, and that as ``later`` does."""
+        turn = -later.clockwise_deg if self.is_mirrored else later.clockwise_deg
+        return FootageView((self.clockwise_deg + turn) % 360, self.is_mirrored != later.is_mirrored)
+
     @property
     def inverse(self) -> FootageView:
         """The view that takes the shown picture to the file's; mirroring is its own inverse, and

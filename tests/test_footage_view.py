@@ -48,6 +48,13 @@ def test_the_inverse_gives_the_picture_and_the_lens_of_the_file_back(view: Foota
     np.testing.assert_allclose(view.inverse.distortion(view.distortion(DIST)), DIST)
 
 
+@pytest.mark.parametrize("later", VIEWS)
+@pytest.mark.parametrize("view", VIEWS)
+def test_two_views_are_one(view: FootageView, later: FootageView) -> None:
+    image = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    np.testing.assert_array_equal(view.then(later).show(image), later.show(view.show(image)))
+
+
 def test_footage_as_in_its_file_is_not_copied() -> None:
     image = np.zeros((4, 6, 3), np.uint8)
     assert AS_IN_FILE.show(image) is image

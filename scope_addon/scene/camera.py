@@ -23,6 +23,7 @@ a distorting lens is one.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -30,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import VideoError
+from ..exif import picture_view
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from, picture_slots
 from ..motion import Motion
 from ..notices import Notice, notice
@@ -200,9 +202,12 @@ def show_footage(
     background.alpha = 1.0
     background.display_depth = "BACK"
     background.frame_method = "FIT"
+    is_picture = path.suffix.lower() in PICTURE_SUFFIXES
+    if is_picture:
+        motion = _from_raw_picture(motion, path)
     _turn(background, motion)
     camera.data.show_background_images = True
-    undistorted = _show_picture if path.suffix.lower() in PICTURE_SUFFIXES else _show_video
+    undistorted = _show_picture if is_picture else _show_video
     show = _show_clip if motion.dist.any() else undistorted
     try:
         size, warnings = show(camera, background, path, motion, frames)
@@ -223,6 +228,16 @@ def show_footage(
             )
         )
     return warnings
+
+
+def _from_raw_picture(motion: Motion, picture: Path) -> Motion:
+    """Return the motion with a view of the picture as it is stored: Blender does not turn pictures
+    as their EXIF says, as the capture has done before it turned them by the user's choice.
+    """
+    view = picture_view(picture).then(motion.view)
+    if view == motion.view:
+        return motion
+    return replace(motion, footage_rotation=view.clockwise_deg, footage_mirrored=view.is_mirrored)
 
 
 def _turn(background: bpy.types.CameraBackgroundImage, motion: Motion) -> None:

@@ -52,7 +52,7 @@ def _read_layout(path: Path) -> None:
 
 
 def _read_exif(path: Path) -> None:
-    from scope.scope_addon.capture.media.exif import animation_length, read_exif
+    from scope.scope_addon.exif import animation_length, read_exif
 
     read_exif(path.read_bytes())
     animation_length(path.read_bytes())

@@ -9,8 +9,8 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from scope.scope_addon.capture.media.exif import Exif, animation_length, read_exif
 from scope.scope_addon.capture.media.heif import read_layout
+from scope.scope_addon.exif import Exif, animation_length, read_exif
 from scope.scope_addon.job.job_progress import load_stage_times
 from scope.solver.errors import ScopeError
 

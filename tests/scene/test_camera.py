@@ -374,6 +374,33 @@ def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(
     assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=1e-3)
 
 
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("chosen", [FootageView(), FootageView(90, True)])
+@pytest.mark.parametrize("k1", [0.0, -0.1])
+def test_a_picture_is_turned_as_its_exif_says(body, make_motion, tmp_path, orientation, chosen, k1):
+    """Blender shows it as it is stored."""
+    cv2 = package("cv2")
+    from ..capture.media.stills.test_exif import exif_block, jpeg_with_exif
+
+    stored = np.zeros((48, 64, 3), np.uint8)
+    stored[:8, :16] = 255  # in the corner
+    path = tmp_path / "photo.jpg"
+    path.write_bytes(jpeg_with_exif(stored, exif_block(orientation)))
+    upright = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
+    captured = chosen.show(upright)
+    size = captured.shape[1], captured.shape[0]
+    motion = make_motion(body, 1, image_size=size)
+    motion.footage_rotation, motion.footage_mirrored = chosen.clockwise_deg, chosen.is_mirrored
+    motion.dist[0] = k1  # a distorting lens is shown as a clip
+    result = build_scene([motion], body, footage=path, options=NEW_SCENE)
+    assert result.warnings == []
+    background = result.people[0].camera.data.background_images[0]
+    u, v = shown_by_blender(background, (64, 48), size) @ [2 * 8 / 64 - 1, 1 - 2 * 4 / 48]
+    row, column = np.argwhere(captured[..., 0] > 128).mean(axis=0)
+    assert (u + 1) / 2 * size[0] == pytest.approx(column + 0.5, abs=0.1)
+    assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=0.1)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a backslash separates folders there")
 def test_footage_whose_name_has_a_backslash_is_not_shown_and_said(body, make_motion, clip):
     """Blender takes it for a slash."""

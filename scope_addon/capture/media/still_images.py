@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from ...arrays import Float32Array, Uint8Array
 from ...errors import VideoError
+from ...exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
 from ...footage import MAX_PIXELS
 from ...untrusted.files import check_regular
-from .exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
 from .frame_readers import decode_items
 from .guards import check_depth, check_size, too_large, utf8_name
 from .heif import assemble, read_layout

@@ -10,6 +10,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+
+from .footage_view import AS_IN_FILE, FootageView
 
 PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
 TIFF = (b"II*\0", b"MM\0*")  # one of these does; a TIFF of more than 4 GB would begin otherwise
@@ -22,6 +25,16 @@ _DEEPEST = 64  # bits of one channel
 _ORIENTATION = 0x0112
 _EXIF_DIRECTORY = 0x8769
 _FOCAL_35MM = 0xA405
+_VIEWS = {  # by the orientation
+    1: AS_IN_FILE,
+    2: FootageView(0, True),
+    3: FootageView(180),
+    4: FootageView(180, True),
+    5: FootageView(90, True),
+    6: FootageView(90),
+    7: FootageView(270, True),
+    8: FootageView(270),
+}
 _INTEGER = {3: "H", 4: "I"}  # TIFF field types SHORT and LONG
 
 
@@ -42,6 +55,17 @@ def read_exif(data: bytes) -> Exif:
         return _parse(tiff) if tiff else Exif()
     except (struct.error, IndexError):
         return Exif()
+
+
+def picture_view(path: Path) -> FootageView:
+    """Return how the EXIF orientation of a picture file turns it; not at all where the file cannot
+    be read.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return AS_IN_FILE
+    return _VIEWS[read_exif(data).orientation]
 
 
 def animation_length(data: bytes) -> int:
