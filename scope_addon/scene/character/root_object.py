@@ -36,6 +36,8 @@ from .keys import read_clip, write_clip
 ROOT_TAG = "scope_root"  # custom property of the empty
 # of an empty whose armature stays in place: the trajectory it does not follow
 _UNUSED_TRAJECTORY = "scope_path"
+# properties with an object's transform
+_TRANSFORM = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 _RIGID = 1e-3  # by how much the determinant of a rigid transform may differ from 1
 # the armature's transform before it became part of the trajectory: a rigid matrix by rows
 _PLACE = "scope_place"
@@ -152,7 +154,8 @@ def move_root_motion_to_object(
     :param rate: scene frames per second.
     :param in_place: do not animate the object: the person stays where the motion begins.
     :param heading: include the rotation about the vertical.
-    :raises UsageError: when a bone or its keys are missing, or the armature's scale is 0.
+    :raises UsageError: when a bone or its keys are missing, the armature's scale is 0, or keys or
+        constraints move the armature itself.
     """
     clip, frames = read_clip(armature, body, rate)
     if not armature.matrix_basis.median_scale:
@@ -163,6 +166,7 @@ def move_root_motion_to_object(
     clip = clip_with_root_motion(armature, clip, frames)
     former = root_object(armature)
     if former is None:  # the armature's own transform becomes part of the trajectory
+        _check_own_transform(armature)
         seen = world_matrix(armature)
         if armature.parent is not None:  # stays the parent, so its transform is not included
             seen = armature.matrix_parent_inverse.inverted_safe() @ armature.matrix_local
@@ -182,6 +186,26 @@ def move_root_motion_to_object(
     empty[_PLACE] = [number for row in place for number in row]
     if is_cyclic(armature):
         repeat_root_object(empty)
+
+
+def _check_own_transform(armature: bpy.types.Object) -> None:
+    """Check that an armature's own transform does not move, as the trajectory would have it twice.
+
+    :raises UsageError: keys, drivers or constraints move it.
+    """
+    animation = armature.animation_data
+    curves = [*fcurves(armature), *(animation.drivers if animation else ())]
+    moving = [
+        curve.data_path
+        for curve in curves
+        if curve.data_path.removeprefix("delta_") in _TRANSFORM and not curve.mute
+    ]
+    moving += [each.name for each in armature.constraints if not each.mute]
+    if moving:
+        raise UsageError(
+            f"the armature '{armature.name}' is itself moved by '{moving[0]}': remove that first, "
+            "or move a parent of the armature instead"
+        )
 
 
 def repeat_root_object(empty: bpy.types.Object) -> None:

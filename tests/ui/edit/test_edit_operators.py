@@ -198,6 +198,33 @@ def test_root_motion_of_an_armature_parented_to_a_bone(rig, stage):
     assert (rig.parent, rig.parent_type, rig.parent_bone) == (crane, "BONE", "hook")
 
 
+def key_location(rig):
+    rig.location.x = 5.0
+    rig.keyframe_insert("location", frame=1)
+
+
+def drive_location(rig):
+    rig.driver_add("location", 0).driver.expression = "5.0"
+
+
+def constrain(rig):
+    rig.constraints.new("COPY_LOCATION")
+
+
+@pytest.mark.parametrize(
+    ("move", "by"),
+    [(key_location, "location"), (drive_location, "location"), (constrain, "Copy Location")],
+)
+def test_root_motion_is_not_added_to_what_moves_the_armature_itself(rig, move, by):
+    move(rig)
+    before = seen(rig)
+    for mode in ("OBJECT", "IN_PLACE"):
+        with pytest.raises(RuntimeError, match=f"'walk' is itself moved by '{by}': remove"):
+            bpy.ops.scope.root_motion(mode=mode)
+    np.testing.assert_array_equal(seen(rig), before)
+    assert root_object(rig) is None
+
+
 def test_a_failed_edit_restores_keys_and_root(rig, monkeypatch):
     bpy.ops.scope.root_motion(mode="OBJECT")
     before = seen(rig)
