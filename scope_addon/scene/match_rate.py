@@ -28,6 +28,7 @@ from .character.expression_keys import has_expression_keys
 from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
 from .datablocks import MARKERS, captures_of, holds, shape_keys_of
+from .face_retarget import faces_of
 from .rig_action import is_retargeted, retime_written_keys, source_of
 from .stored_values import FrameSpan, parse_spans, start_frame, stored_text
 from .timing import Retiming, action_strips, retime_keys, retime_strip
@@ -60,6 +61,8 @@ def change_rate(
         if (root := root_object(person)) is not None:
             retime_unused_trajectory(root, retiming)
     _retime_rigs(rigs, moves, done)
+    _retime_faces(scene, moves)
+    _retime_written_actions(moves, done)
     for collection in captures_of(scene):
         here = [person for person in people if holds(collection, person)]
         for camera in cameras_in(collection) if here else ():
@@ -136,10 +139,34 @@ def _retime_rigs(
     moves: dict[bpy.types.Object, Retiming],
     done: set[bpy.types.Action],
 ) -> None:
-    """Move what retargeting has written, also of captures other than the one that a rig has now."""
-    sources = {person.name: retiming for person, retiming in moves.items()}
+    """Move what retargeting has written to rigs, also of captures other than the one that a rig has
+    now.
+    """
+    sources = _retiming_by_name(moves)
     for rig, person in rigs:
         _retime_rig(rig, moves[person], sources, done)
+
+
+def _retime_faces(scene: bpy.types.Scene, moves: dict[bpy.types.Object, Retiming]) -> None:
+    """Move the strips by which shape keys of the user's meshes play what retargeting has written;
+    the actions are not moved.
+    """
+    sources = _retiming_by_name(moves)
+    moved = {keys for person in moves for keys in _datablocks(person)}
+    for face in faces_of(scene.objects):
+        keys = face.data.shape_keys
+        if keys in moved or keys.library is not None or keys.animation_data is None:
+            continue
+        for strip in action_strips(keys.animation_data):
+            if is_retargeted(strip.action) and source_of(strip.action) in sources:
+                retime_strip(strip, sources[source_of(strip.action)])
+
+
+def _retime_written_actions(
+    moves: dict[bpy.types.Object, Retiming], done: set[bpy.types.Action]
+) -> None:
+    """Move the keys of the other actions that retargeting has written, used or not."""
+    sources = _retiming_by_name(moves)
     for action in bpy.data.actions:
         if (
             action.library is None
@@ -149,6 +176,11 @@ def _retime_rigs(
         ):
             done.add(action)
             retime_written_keys(action, sources[source_of(action)])
+
+
+def _retiming_by_name(moves: dict[bpy.types.Object, Retiming]) -> dict[str, Retiming]:
+    """Return how every capture moves, by the name of its armature."""
+    return {person.name: retiming for person, retiming in moves.items()}
 
 
 def _retime_rig(

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture_report import Report
 from scope.scope_addon.edit.corrected_motion import corrections_of
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import Motion
-from scope.scope_addon.scene.actions import fcurves, read_keys
+from scope.scope_addon.retarget.expression_map import ExpressionMap
+from scope.scope_addon.scene.actions import fcurves, push_to_nla, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.face_retarget import CapturedExpressions, retarget_expressions
 from scope.scope_addon.scene.packed_motion import pack_motion, stored_motion
 from scope.scope_addon.ui.capture_job import show_result
 from scope.scope_addon.ui.frame_rate_operators import keyed_for, rate_warnings
@@ -220,6 +223,31 @@ def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
     if hasattr(rig.animation_data, "action_slot"):
         rig.animation_data.action_slot = kept.slots[0]
     np.testing.assert_allclose(at_times(rig, list(bones.values()), 101.0), take_2, atol=1e-3)
+
+
+@pytest.mark.parametrize("in_nla", [False, True])
+def test_a_retargeted_face_moves_along_in_the_nla_too(
+    scene: bpy.types.Scene, *, in_nla: bool
+) -> None:
+    person = built()
+    face = scene["cube"]
+    for name in ("Basis", "jawOpen", "A"):
+        face.shape_key_add(name=name)
+    frames = START + np.arange(41.0)
+    weights = np.zeros((41, len(EXPRESSIONS)))
+    weights[:, EXPRESSIONS.index("jawOpen")] = np.linspace(0.0, 1.0, 41)
+    chosen = ExpressionMap({"jawOpen": {"jawOpen": 1.0}})
+    retarget_expressions(CapturedExpressions(frames, weights), [face], chosen, person.name)
+    keys = face.data.shape_keys
+    strip = push_to_nla(keys) if in_nla else None
+    bpy.ops.scope.match_frame_rate()
+    if strip is not None:
+        assert (strip.frame_start, strip.frame_end) == pytest.approx((START, START + 60))
+    for time in (0.5, 1.0, 1.7):
+        frame = START + 30 * time
+        scene.frame_set(int(frame), subframe=frame % 1)
+        seen = keys.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert seen.key_blocks["jawOpen"].value == pytest.approx(time / 2, abs=1e-4)
 
 
 def test_review_frames_and_corrections_name_the_moved_frames(scene):
