@@ -6,7 +6,7 @@ the next frame.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -41,6 +41,9 @@ SMALLEST_REGION_PX = 24.0
 MIN_FACING = 0.1
 # Below this presence in the region by the body, the face is not looked for by its landmarks.
 FIRST_PRESENCE = 0.001
+# Two faces whose regions' centres are closer, in sides of the smaller region, are one. Those of
+# people cheek to cheek are half a side apart.
+SAME_FACE = 0.2
 
 
 @dataclass
@@ -88,17 +91,22 @@ class FaceTracker:
         """
         before = self._faces
         self._faces = {}
-        found = []
+        estimates: dict[int, FaceEstimate | None] = {}
         for number, person in observations:
             head = person.keypoints_px[list(HEAD)].mean(axis=0)
             face = before.get(number) or _Face(None, head, time_s, time_s - PATIENCE_S)
-            estimate = self._find(image_rgb, face, person, head, time_s)
-            face.region = estimate.next_region if estimate else None
+            estimates[number] = self._find(image_rgb, face, person, head, time_s)
             face.head_px = head
+            self._faces[number] = face
+        estimates = without_duplicates(estimates, dict(observations))
+        found = []
+        for number, person in observations:
+            estimate = estimates[number]
+            face = self._faces[number]
+            face.region = estimate.next_region if estimate else None
             if estimate:
                 face.seen_s = time_s
                 estimate = replace(estimate, eye_light=eye_light(image_rgb, estimate.landmarks))
-            self._faces[number] = face
             found.append((number, replace(person, face=record(estimate))))
         return found
 
@@ -143,8 +151,44 @@ def belongs(estimate: FaceEstimate, predicted: Region) -> bool:
     if estimate.presence < PRESENCE_THRESHOLD or not np.isfinite(estimate.landmarks).all():
         return False
     region = estimate.next_region
-    distance = float(np.hypot(*np.subtract(region.center_px, predicted.center_px)))
     return (
-        distance <= MAX_DISTANCE * predicted.side_px
+        distance_to(region, predicted) <= MAX_DISTANCE
         and MIN_SIZE * predicted.side_px <= region.side_px <= MAX_SIZE * predicted.side_px
     )
+
+
+def without_duplicates(
+    found: Mapping[int, FaceEstimate | None], people: Mapping[int, Observation]
+) -> dict[int, FaceEstimate | None]:
+    """Return the faces that were found, None for those that were found as that of another person
+    too whose body's head predicts it better.
+
+    :param found: by the person's tracklet number.
+    """
+    offsets = {
+        number: distance_to(estimate.next_region, region_from_body(people[number].keypoints_px))
+        for number, estimate in found.items()
+        if estimate is not None
+    }
+    unique: dict[int, FaceEstimate | None] = dict.fromkeys(found)
+    regions: list[Region] = []
+    for number in sorted(offsets, key=lambda each: offsets[each]):
+        estimate = found[number]
+        assert estimate is not None
+        region = estimate.next_region
+        if all(
+            _distance_px(region, r) > SAME_FACE * min(region.side_px, r.side_px) for r in regions
+        ):
+            unique[number] = estimate
+            regions.append(region)
+    return unique
+
+
+def distance_to(region: Region, predicted: Region) -> float:
+    """Return the distance of a face from where it is predicted, in sides of that region."""
+    return _distance_px(region, predicted) / predicted.side_px
+
+
+def _distance_px(a: Region, b: Region) -> float:
+    """Return the distance of two regions' centres."""
+    return float(np.hypot(*np.subtract(a.center_px, b.center_px)))

@@ -134,6 +134,22 @@ def test_a_face_is_looked_for_on_heads_that_the_body_does_not_see_from_the_side_
     assert (tracker._network.calls > 0) == is_looked_for
 
 
+def test_one_face_is_not_that_of_two_people(tracker: FaceTracker) -> None:
+    """Of two people whose heads are near each other, one looks away or is hidden."""
+    network = tracker._network
+    assert isinstance(network, FakeNetwork)
+    people = {1: person(300, 200), 2: person(336, 200)}
+    network.faces = [(*middle(334, 200), 92.0)]
+    for k in range(3):
+        seen = {n: values[0][0] > 0 for n, values in face_of(tracker, people, k / 30).items()}
+        assert seen == {1: False, 2: True}
+    # Cheek to cheek, each has their own.
+    people = {1: person(300, 200), 2: person(370, 200)}
+    network.faces = [(*middle(300, 200), 92.0), (*middle(370, 200), 92.0)]
+    seen = {n: values[0][0] > 0 for n, values in face_of(tracker, people, 1.0).items()}
+    assert seen == {1: True, 2: True}
+
+
 def test_a_head_too_small_is_not_looked_at(tracker):
     assert face_of(tracker, {1: person(300, 200, 70.0)})[1][0][0] == 0
     assert tracker._network.calls == 0
