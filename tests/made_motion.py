@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scope.scope_addon.kinematics.face import EXPRESSIONS
-from scope.scope_addon.motion import Motion
+from scope.scope_addon.motion import _SCHEMA, Motion
 from scope.solver.body import Body
 
 
@@ -47,6 +48,16 @@ def made_motion(
         "source": "walk.mp4",
     }
     return Motion(**(fields | given))
+
+
+def rows_of(motion: Motion, rows: slice) -> Motion:
+    """Some rows of a motion of one scene."""
+    names = [name for name, (shape, _) in _SCHEMA.items() if shape[:1] == ("T",)]
+    return replace(
+        motion,
+        scene_starts=np.zeros(0, np.int64),
+        **{name: getattr(motion, name)[rows] for name in names},
+    )
 
 
 def made_face(T: int, **weights: np.ndarray | float) -> dict[str, np.ndarray]:

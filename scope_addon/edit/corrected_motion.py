@@ -68,6 +68,8 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
         motion.timestamps + start,
         motion.world_from_camera,
         motion.intrinsics_of_frames,
+        motion.valid,
+        motion.cuts_s + start,
     )
 
 
@@ -179,10 +181,9 @@ def _pinned(clip: Clip, motion: Motion, body: Body) -> Clip:
     """Apply the flips in depth, the edits, then the contacts and pins, to a clip in the captured
     world. None of them reaches over a scene cut.
     """
-    times = motion.times_with_gaps
-    shot = replace(shot_of(uncorrected(motion)), times=times)
-    apart = Clip(times, clip.rotations, clip.root)
-    return replace(_changed(apart, motion, body, shot), times=clip.times)
+    shot = shot_of(uncorrected(motion))
+    changed = _changed(shot.apart(clip), motion, body, shot.with_gaps())
+    return replace(changed, times=clip.times)
 
 
 def _changed(clip: Clip, motion: Motion, body: Body, shot: Shot) -> Clip:

@@ -64,8 +64,8 @@ def edited(
         return out
     height = floor_above(corrections, feet)
     if world is None:
-        return refloor(out, body, betas, feet, height)
-    placed = refloor(moved_clip(out, world), body, betas, feet, height)
+        return refloor(out, body, betas, feet, height, shot)
+    placed = refloor(moved_clip(out, world), body, betas, feet, height, shot)
     return moved_clip(placed, np.linalg.inv(world))
 
 
@@ -144,6 +144,7 @@ def refloor(
     betas: NDArray[np.floating[Any]],
     feet: FeetOnFloor,
     height: float = 0.0,
+    shot: Shot | None = None,
 ) -> Clip:
     """Move the motion so that the feet in contact are on the floor.
 
@@ -153,9 +154,12 @@ def refloor(
 
     :param betas: (P,) shape coefficients.
     :param height: z of the floor in the clip's world, metres.
+    :param shot: the clip's; frames in which it does not show the person say nothing of the floor.
     """
     soles = clip.soles(body, betas)
-    weight = standing_probability(soles, UP, clip.times)
+    times = clip.times if shot is None else shot.apart(clip).times
+    seen = np.ones(len(clip), bool) if shot is None else shot.seen_at(clip.times)
+    weight = standing_probability(soles, UP, times) * seen[:, None]
     out = clip.copy()
     if feet.level:
         turn, middle = _levelling(soles, weight)
@@ -167,12 +171,12 @@ def refloor(
     floor = (
         float(np.median(heights[standing]))
         if standing.any()
-        else float(np.median(heights.min(axis=1)))
+        else float(np.median(heights[seen if seen.any() else slice(None)].min(axis=1)))
     )
     out.root[:, 2] -= floor - height
     if feet.lift:
         below = np.maximum(0.0, floor - heights.min(axis=1))
-        smooth = gaussian_smooth(below, clip.times, _LIFT_CUTOFF_HZ)
+        smooth = gaussian_smooth(below, times, _LIFT_CUTOFF_HZ)
         out.root[:, 2] += np.maximum(smooth, below)
     return out
 

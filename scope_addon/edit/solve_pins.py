@@ -19,7 +19,7 @@ With the pose as it was as the prior of step 3, only to 46 pixels and 11 cm.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from ...solver.rotations import exp, log
 from ..kinematics.axes import UP
 from ..kinematics.contact_points import FOOT_PARTS
 from ..kinematics.standing import standing_probability
+from ..scene_gaps import with_scene_gaps
 from .clip import Clip, sample
 from .corrections import FEET, Contact, Pin
 from .pose_refit import (
@@ -65,6 +66,27 @@ class Shot:
     times: NDArray[np.float64]  # (N,) seconds, on the clock of the clip that is corrected
     world_from_camera: NDArray[np.float64]  # (N, 4, 4)
     intrinsics: NDArray[np.float64]  # (N, 3, 3)
+    valid: NDArray[np.bool_] | None = None  # (N,) whether the person was seen; None: in all
+    # (M,) seconds, when the footage cuts to another scene, on the same clock
+    cuts_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def with_gaps(self) -> Shot:
+        """Return the shot on a clock that has gaps at scene cuts."""
+        times = with_scene_gaps(self.times, self.cuts_s)
+        return replace(self, times=times, cuts_s=np.zeros(0))
+
+    def apart(self, clip: Clip) -> Clip:
+        """Return a clip of this shot on the clock of `with_gaps`."""
+        return replace(clip, times=with_scene_gaps(clip.times, self.cuts_s))
+
+    def seen_at(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return whether the person was seen in the frames nearest to times, (T,)."""
+        if self.valid is None:
+            return np.ones(len(times), bool)
+        seen: NDArray[np.bool_] = self.valid[
+            np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
+        ]
+        return seen
 
     def time(self, frame: int) -> float:
         """Return the time of a source frame."""

@@ -91,8 +91,10 @@ def _transform(motion: Motion, body: Body, normal: NDArray[np.float64]) -> NDArr
     turn = shortest_turn(u / np.linalg.norm(u), UP)
     clip = clip_from_motion(body, motion, raw=False)
     soles = clip.soles(body, motion.betas)
-    standing = standing_probability(soles, UP, clip.times) > 0.5
-    points = soles[standing] if standing.any() else soles.reshape(-1, 3)
+    seen = motion.valid if motion.valid.any() else np.ones(len(motion), bool)
+    standing = standing_probability(soles, UP, motion.times_with_gaps) > 0.5
+    standing &= seen[:, None]
+    points = soles[standing] if standing.any() else soles[seen].reshape(-1, 3)
     pivot = points.mean(axis=0) * [1.0, 1.0, 0.0]
     moved = (points - pivot) @ turn.T + pivot
     out = np.eye(4)

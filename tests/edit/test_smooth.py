@@ -16,14 +16,10 @@ from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.motion import Motion
 from scope.solver.rotations import exp, log
 
+from ..made_motion import rows_of
 from .walking import BETAS, BODY, NAMES, RATE, motion_of, walk
 
 ELBOW = NAMES.index("left_elbow")
-PER_FRAME = (
-    *("poses", "trans", "poses_raw", "trans_raw", "frames", "timestamps", "valid", "joints_cam"),
-    *("keypoints2d", "joint_confidence", "world_from_camera", "foot_contact", "residual_px"),
-    *("joint_sigma_m", "joint_sigma_depth_m"),
-)
 
 
 def shaking(hz: float, seconds: float = 6.0) -> Motion:
@@ -152,11 +148,7 @@ def test_scenes_on_both_sides_of_a_cut_are_smoothed_apart(
     joined = replace(motion_of(both, noise=0.02), scene_starts=[len(first)])
     found = smoothed(BODY, joined, strength)
     for rows in (slice(0, len(first)), slice(len(first), None)):
-        alone = replace(
-            joined,
-            scene_starts=np.zeros(0),
-            **{name: getattr(joined, name)[rows] for name in PER_FRAME},
-        )
+        alone = rows_of(joined, rows)
         expected = smoothed(BODY, alone, strength)
         if len(alone) > 2:  # a filter changes nothing else
             np.testing.assert_allclose(found.root[rows], expected.root, atol=1e-6)

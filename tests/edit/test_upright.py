@@ -13,6 +13,7 @@ from scope.scope_addon.edit.upright import upright_transform, upright_transform_
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
+from ..made_motion import rows_of
 from .walking import BODY, NAMES, angle, motion_of, walk
 
 TRUTH = motion_of(walk(2.0), noise=0.02)
@@ -94,6 +95,20 @@ def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned(degr
         ),
         atol=1e-3,
     )
+
+
+def test_the_world_turns_about_where_the_person_was_seen_to_stand():
+    seen = np.arange(len(TRUTH)) < 40
+    poses = TRUTH.poses.copy()
+    trans = TRUTH.trans.copy()
+    poses[40:] = poses[40]
+    trans[40:] = trans[40] + np.array([3.0, 0.0, 1.0], np.float32)
+    motion = replace(TRUTH, poses=poses, trans=trans, valid=seen)
+    post = POST + np.array([[0.3, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    line = tuple(tuple(shot_of(TRUTH).project(20, point)) for point in post)
+    found = upright_transform(motion, BODY, 20, line)
+    expected = upright_transform(rows_of(TRUTH, slice(0, 40)), BODY, 20, line)
+    np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
 @pytest.mark.parametrize(

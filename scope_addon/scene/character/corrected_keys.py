@@ -161,7 +161,10 @@ def _meet_pin(
     if missed(whole, body, motion.betas, pin, shot) > (
         _MISSED_M if pin.pixel is None else _MISSED_PX
     ):
-        met = resolve(whole, body, motion.betas, [pin], shot, slack=0.0, floor=floor_of(motion))
+        apart = shot.apart(whole), shot.with_gaps()
+        met = resolve(
+            apart[0], body, motion.betas, [pin], apart[1], slack=0.0, floor=floor_of(motion)
+        )
         _write_change(armature, body, clip, frames, (whole, met))
 
 
@@ -431,7 +434,9 @@ def begin_with_edits(
         return keys, old
     height = floor_above(edits.corrections, feet)
     rows = edits.rows
-    placed = floored(armature, body, edits.betas, keys.rows(rows), frames[rows], feet, height)
+    placed = floored(
+        armature, body, edits.betas, keys.rows(rows), frames[rows], feet, height, edits.shot
+    )
     others = tuple(c for c in edits.corrections if not isinstance(c, Interpolation))
     compared = edited(old.rows(edits.rows), body, edits.betas, others, edits.shot)
     return _replaced(keys, edits.rows, placed), _replaced(old, edits.rows, compared)
@@ -450,7 +455,7 @@ def meet_floor(
         return
     clip, frames = read_clip(armature, body, rate)
     height = floor_above(edits.corrections, feet)
-    placed = floored(armature, body, edits.betas, clip, frames, feet, height)
+    placed = floored(armature, body, edits.betas, clip, frames, feet, height, edits.shot)
     if np.abs(placed.root - clip.root).max() > _SAME_M:
         write_keys(armature, body, placed, frames, np.ones(len(frames), bool))
 
@@ -463,16 +468,18 @@ def floored(
     frames: NDArray[np.float64],
     feet: FeetOnFloor,
     height: float = 0.0,
+    shot: Shot | None = None,
 ) -> Clip:
     """Put the feet of keys on the floor: those in contact are at rest only with their root motion.
 
     :param betas: (P,) shape coefficients.
     :param frames: (T,) scene frames of the keys.
     :param height: z of the floor, metres, in the armature's space.
+    :param shot: on the clock of the keys; None: the motion is lost.
     """
     positions, angles = removed_root_motion(armature, frames)
     path = positions * [1.0, 1.0, 0.0], angles
-    placed = refloor(with_trajectory(clip, *path), body, betas, feet, height)
+    placed = refloor(with_trajectory(clip, *path), body, betas, feet, height, shot)
     return relative_to_trajectory(placed, *path)
 
 

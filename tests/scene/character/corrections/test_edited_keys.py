@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edits of keys that differ from the motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
@@ -43,6 +45,19 @@ def test_feet_of_displayed_keys_are_put_on_the_floor_wherever_the_motion_has_the
         floored(rig, BODY, BETAS, WALK, FRAMES, FeetOnFloor(), 0.2).root[:, 2] - 0.2,
         same.root[:, 2],
     )
+
+
+def test_keys_of_frames_without_the_person_say_nothing_of_the_floor(rig):
+    still = Clip(
+        WALK.times,
+        np.tile(WALK.rotations[:1], (len(WALK), 1, 1, 1)),
+        np.tile(WALK.root[:1], (len(WALK), 1)),
+    )
+    seen = np.arange(len(WALK)) < 20
+    still.root[~seen, 2] -= 0.5
+    shot = shot_of(replace(motion_of(still), valid=seen))
+    put = floored(rig, BODY, BETAS, still, FRAMES, FeetOnFloor(), 0.0, shot)
+    assert abs(np.median(put.soles(BODY, BETAS)[:18, :, 2].min(axis=1))) < 0.01
 
 
 def test_an_edit_from_before_changes_only_keys_that_begin_without_it(rig):
