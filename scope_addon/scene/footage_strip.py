@@ -118,11 +118,16 @@ def strips_of(editor: bpy.types.SequenceEditor) -> Any:
     return editor.strips if hasattr(editor, "strips") else editor.sequences
 
 
+def is_footage(strip: bpy.types.Strip) -> bool:
+    """Return whether ``add_footage_strips`` has made a strip."""
+    return _OURS in strip
+
+
 def _added_before(strips: Any, path: Path) -> list[bpy.types.Strip]:
     """Return the strips that ``add_footage_strips`` has made of a file: its sound first, then its
     picture.
     """
-    found = [strip for strip in strips if _OURS in strip and _file_of(strip) == path.resolve()]
+    found = [strip for strip in strips if is_footage(strip) and _file_of(strip) == path.resolve()]
     return sorted(found, key=lambda strip: strip.type != "SOUND")
 
 

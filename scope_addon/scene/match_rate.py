@@ -19,9 +19,9 @@ import bpy
 from ..motion import Motion
 from ..notices import Notice
 from . import timing
-from .actions import fcurves, frame_range
+from .actions import frame_range
 from .camera import same_camera, show_footage_again, view_number
-from .capture_parts import cameras_in, parts_of
+from .capture_parts import cameras_in
 from .character.body_mesh import shape_key_name
 from .character.correction_list import store_corrections
 from .character.expression_keys import has_expression_keys
@@ -276,24 +276,3 @@ def _show_footage(
                         warnings += show_footage_again(view, motion.from_view(number), frames)
             seen.append(motion)
     return warnings
-
-
-def other_animation(
-    scene: bpy.types.Scene,
-    people: Iterable[bpy.types.Object],
-    rigs: Iterable[tuple[bpy.types.Object, object]],
-) -> bool:
-    """Return whether anything else in the scene has keys, which keep their frames at another
-    rate.
-    """
-    moved = {obj for collection in captures_of(scene) for obj in parts_of(collection)}
-    moved |= {obj for person in people for obj in (person, root_object(person))}
-    moved |= {rig for rig, _ in rigs}
-    others = [obj for obj in scene.objects if obj not in moved]
-    blocks = (
-        block
-        for obj in others
-        for block in (obj, obj.data)
-        if getattr(block, "animation_data", None)
-    )
-    return any(map(fcurves, blocks))

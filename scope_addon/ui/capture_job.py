@@ -30,6 +30,7 @@ from ..options import Place
 from ..options.body_choice import chosen_body
 from ..options.capture import AUTO
 from ..review_spans import Span, find_review_spans
+from ..scene.animated import is_animated
 from ..scene.build import BuildOptions, BuildResult, build_scene
 from ..scene.datablocks import captures_of, check_local, found, holds
 from ..scene.packed_motion import pack_motion
@@ -360,14 +361,8 @@ def store_motions(result: BuildResult, contents: Sequence[bytes], body: str) -> 
 
 
 def _automatic_frame_rate(scene: bpy.types.Scene) -> str:
-    return "keep" if _is_animated(scene) else "set"
-
-
-def _is_animated(scene: bpy.types.Scene) -> bool:
-    """Return whether another frame rate would change the speed of an animation in the scene."""
-    owners = [scene, *scene.objects, *(obj.data for obj in scene.objects if obj.data)]
-    data = [owner.animation_data for owner in owners if owner.animation_data]
-    return any(animation.action or animation.nla_tracks for animation in data)
+    """Return the policy of the rate, with which another animation keeps its speed."""
+    return "keep" if is_animated(scene) else "set"
 
 
 @contextmanager

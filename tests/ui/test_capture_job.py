@@ -397,15 +397,18 @@ def test_a_removed_scene_is_an_error(fake_worker, footage):
         run_to_end(job)
 
 
-@pytest.mark.parametrize(("animated", "rate"), [(False, 25), (True, 24)])
+@pytest.mark.parametrize(("animated", "rate"), [(None, 25), ("object", 24), ("shape", 24)])
 def test_the_automatic_frame_rate_respects_other_animation(fake_worker, footage, animated, rate):
     fake_worker(FINISH)
     scene = bpy.context.scene
     scene.render.fps = 24
     if animated:
-        cube = bpy.data.objects.new("cube", None)
+        cube = bpy.data.objects.new("cube", bpy.data.meshes.new("cube"))
         scene.collection.objects.link(cube)
-        cube.keyframe_insert("location", frame=1)
+        if animated == "object":
+            cube.keyframe_insert("location", frame=1)
+        else:
+            cube.shape_key_add(name="Basis").keyframe_insert("mute", frame=1)
     scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     assert scene.render.fps == rate
