@@ -50,6 +50,7 @@ cv2.setLogLevel(0)  # silent: failures are reported as exceptions
 # whatever the name.
 _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _VARYING = Fraction(2, 100)  # of the rate, by which the average differs where it varies
+_ONE_MISSING = 0.5  # frames, from which at least one is missing, or too many
 _SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
 # Of a frame; a fifth of what videos of calls and surveillance have at their lowest quality.
 _LEAST_BYTES = 100
@@ -82,6 +83,7 @@ class Video:
     _average_fps: Fraction | None = field(default=None, repr=False)
     _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: Uint8Array | None = field(default=None, repr=False)
+    _is_even: bool = field(default=True, repr=False)  # a frame's time tells its number
     _is_part: bool = field(default=False, repr=False)  # see `frames_from`
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
@@ -288,12 +290,15 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
                 "convert it to H.264 .mp4"
             )
         fps = exact_fps(reader.rate) or estimate_fps(reader)
-        average_fps = exact_fps(reader.average_rate) or fps
+        measured_fps = average_fps = exact_fps(reader.average_rate) or fps
         varies = abs(average_fps - fps) > _VARYING * fps
         if varies:
             fps = usual_fps(path) or fps
         else:
             average_fps = fps
+        # Frames that an even rate would have and the file has not, or the reverse: a phone leaves
+        # some out, also where its rate counts as constant.
+        missing_frames = float(abs(measured_fps - fps)) * (reader.shown_s or 0.0)
         recorded_speed = reader.recorded_rate / float(fps)
         count = reader.frame_count
         flip = ("Y" if reader.clockwise_deg % 180 == 0 else "X") if reader.is_mirrored else ""
@@ -303,6 +308,7 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     video._average_fps = average_fps
+    video._is_even = missing_frames < _ONE_MISSING
     if recorded_speed > _SLOW_MOTION:
         video.recorded_speed = recorded_speed
     if abs(average_fps - fps) > _VARYING * fps:
@@ -396,8 +402,7 @@ class _Decoder:
         resized = False
         if video.wanted.start_s > 0:
             # Indices have to be those of the whole footage, whichever part is chosen.
-            is_constant = video.average_fps == video.source_fps
-            may_seek = is_constant or video._is_part
+            may_seek = video._is_even or video._is_part
             index, time = reader.skip_to(video.wanted.start_s, video.source_fps, may_seek)
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
             time = next_time(time, decoded[0], float(1 / video.source_fps))

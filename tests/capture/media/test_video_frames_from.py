@@ -99,6 +99,18 @@ def test_frames_have_their_indices_where_the_range_begins_late_in_a_varying_rate
     assert found == [each for each in whole if each[1] >= 30.0]
 
 
+def test_frames_have_their_indices_where_few_are_missing(tmp_path: Path) -> None:
+    """The rate counts as constant: a phone has left out two frames of 180."""
+    times = [k / FPS for k in range(SECONDS * FPS) if k not in (50, 51)]
+    path = write(tmp_path / "missing.mp4", "mpeg4", "yuv420p", times, {"g": "20"})
+    with open_video(path) as video:
+        assert video.average_fps == video.fps == FPS
+        whole = [(frame.index, frame.timestamp_s) for frame in video]
+    with open_video(path, VideoRange(start_s=30.0)) as video:
+        found = [(frame.index, frame.timestamp_s) for frame in video]
+    assert found == [each for each in whole if each[1] >= 30.0]
+
+
 def test_the_end_of_the_range_is_kept(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", "mpeg4", "yuv420p", EVEN, {"g": "30"})
     with open_video(path, VideoRange(5.0, 40.0)) as video:
