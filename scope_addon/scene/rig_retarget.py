@@ -17,7 +17,7 @@ from ..edit.clip import Clip
 from ..edit.root_motion import about_z, floor_trajectory
 from ..errors import UsageError
 from ..notices import PHRASES, Notice, notice
-from ..retarget.bone_map import SPINE, BoneMap
+from ..retarget.bone_map import PHALANGES, SPINE, BoneMap
 from ..retarget.expression_map import ExpressionMap
 from ..retarget.guess import SHAPED, guess
 from ..retarget.rest_pose import rest_faults
@@ -52,6 +52,9 @@ from .visibility import world_matrix
 
 # Whose motion is missed where a rig has no bones for them.
 _EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elbow")
+# Largest difference from the identity of the rotations of fingers that were not captured, which
+# single precision leaves.
+_AT_REST = 1e-5
 
 
 @dataclass(frozen=True)
@@ -177,6 +180,7 @@ def retarget(
     bone_map = usable_map(source, body, rig, bone_map)
     clip, frames = read_clip(source, body, rate)
     clip = clip_as_displayed(source, clip, frames)
+    bone_map = _without_unseen_hands(bone_map, body, clip)
     captured = captured_expressions(source) if options.face is not None else None
     face = (
         face_keys(captured, rig, options.face)
@@ -268,7 +272,26 @@ def usable_map(
         raise UsageError(
             f"'{rig.name}' has no bone '{missing[0]}'; guess the bones again or correct the list"
         )
-    parts = {bone: part for bone, part in bone_map.parts.items() if part in body.joint_names}
+    return _with_parts(bone_map, set(body.joint_names))
+
+
+def _without_unseen_hands(bone_map: BoneMap, body: Body, clip: Clip) -> BoneMap:
+    """Return the bone map without the fingers of hands that were not captured: theirs are at rest
+    in every frame.
+    """
+    names = list(body.joint_names)
+    kept = set(names)
+    for side in ("left", "right"):
+        fingers = {f"{side}_{phalanx}" for phalanx in PHALANGES}.intersection(names)
+        rotations = clip.rotations[:, [names.index(finger) for finger in fingers]]
+        if np.abs(rotations - np.eye(3)).max(initial=0.0) < _AT_REST:
+            kept -= fingers
+    return _with_parts(bone_map, kept)
+
+
+def _with_parts(bone_map: BoneMap, kept: set[str]) -> BoneMap:
+    """Return a bone map with these parts alone."""
+    parts = {bone: part for bone, part in bone_map.parts.items() if part in kept}
     confidence = {bone: sure for bone, sure in bone_map.confidence.items() if bone in parts}
     return BoneMap(parts, confidence)
 

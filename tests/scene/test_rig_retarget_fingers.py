@@ -204,6 +204,31 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
     assert rig.animation_data.action == done.action
 
 
+@pytest.mark.parametrize("unseen", [("left",), ("left", "right")])
+def test_fingers_of_a_hand_that_was_not_seen_stay_as_they_are(unseen: tuple[str, ...]) -> None:
+    """The body has fingers, but those of such a hand are at rest in every frame."""
+    clip = gesture()
+    for i, name in enumerate(HANDS.joint_names):
+        side, _, part = name.partition("_")
+        if side in unseen and part[:-1] in FINGERS:
+            clip.rotations[:, i] = np.eye(3)
+    source = captured(motion_of(clip, body=HANDS), HANDS)
+    rig, bone_of = build_hands("unreal")
+    curled = Matrix.Rotation(0.7, 4, "X")
+    for side in ("left", "right"):
+        rig.pose.bones[bone_of[f"{side}_ring2"]].matrix_basis = curled
+    run(source, rig)
+    keyed = {curve.data_path for curve in fcurves(rig)}
+    bpy.context.scene.frame_set(30)
+    for side in ("left", "right"):
+        for finger in FINGERS:
+            for k in (1, 2, 3):
+                path = bone_path(bone_of[f"{side}_{finger}{k}"], "rotation_quaternion")
+                assert (path in keyed) == (side not in unseen)
+        is_curled = np.allclose(rig.pose.bones[bone_of[f"{side}_ring2"]].matrix_basis, curled)
+        assert is_curled == (side in unseen)
+
+
 def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):
     """The captured body's skeleton with other names: its mesh must coincide with the captured
     one.
