@@ -24,7 +24,7 @@ from ..notices import Notice, notice
 from . import camera, timing
 from .actions import Channels
 from .budget import check_content, check_last_frame
-from .capture_parts import parts_of, tag_part
+from .capture_parts import is_part, parts_of, tag_part
 from .character import animation, armature, body_mesh, expression_keys, other_curves
 from .character.armature import remove_unused_ring
 from .character.correction_list import store_corrections
@@ -222,6 +222,7 @@ def _build_person(
     action = bpy.data.actions.new(label)
     # kept in the file when the armature gets another action or NLA strips
     action.use_fake_user = True
+    tag_part(action)
     channels = animation.animate_armature(rig, action, body, motion, rest, frames)
     other_curves.key_measurements(rig, channels, body, motion, frames)
     if options.frame_rate == "resample":
@@ -327,7 +328,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     """Remove a capture's people, camera, footage, actions and markers, and its collection.
 
     Objects of the user's in the collection stay where they are, in the scene's own collection, and
-    so does data that something else uses.
+    so does data that something else uses, assets, and what the user keeps by a fake user.
     """
     enter_object_mode(bpy.context.view_layer)
     own = parts_of(collection)
@@ -346,10 +347,16 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     bpy.data.batch_remove(collections)
     # What the objects used is free now, unless something else uses it too; actions are freed by the
     # data that they animate.
+    used = [block for block in used if not _is_kept(block)]
     while unused := [block for block in used if block.users == int(block.use_fake_user)]:
         used = [block for block in used if block not in unused]
         bpy.data.batch_remove(unused)
     remove_unused_ring()
+
+
+def _is_kept(block: bpy.types.ID) -> bool:
+    """Return whether the user keeps a datablock, also without a use."""
+    return block.asset_data is not None or (block.use_fake_user and not is_part(block))
 
 
 def _data_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.ID]:

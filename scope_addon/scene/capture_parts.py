@@ -15,15 +15,20 @@ from .camera import view_number
 from .character.root_object import ROOT_TAG
 from .datablocks import is_person
 
-_PART_TAG = "scope_part"  # custom property of a body and of a camera
+_PART_TAG = "scope_part"  # custom property of a body, of a camera and of a person's action
 # names that bodies and cameras were built with
 _BODY_NAME = re.compile(r"_body(\.\d{3,})?$")
 _CAMERA_NAME = re.compile(r"_camera\d*(\.\d{3,})?$")
 
 
-def tag_part(obj: bpy.types.Object) -> None:
-    """Mark a body or camera as made for the capture whose collection it is in."""
-    obj[_PART_TAG] = True
+def tag_part(block: bpy.types.ID) -> None:
+    """Mark a body, camera or action as made for the capture whose collection it is in."""
+    block[_PART_TAG] = True
+
+
+def is_part(block: bpy.types.ID) -> bool:
+    """Return whether a datablock was marked as made for a capture."""
+    return _PART_TAG in block
 
 
 def cameras_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:

@@ -393,6 +393,25 @@ def test_what_the_user_has_put_into_a_capture_is_not_deleted_with_it(
     assert rig.parent == path
 
 
+def test_the_users_own_actions_are_not_deleted_with_a_capture(fake_worker, footage):
+    capture(fake_worker, footage)
+    person = bpy.data.objects["person"]
+    bpy.ops.scope.push_to_nla()
+    own = bpy.data.actions.new("my edit")
+    own.use_fake_user = True
+    person.animation_data.action = own
+    person.keyframe_insert("location", frame=1)
+    bpy.ops.scope.delete_capture()
+    assert bpy.data.actions.keys() == ["my edit"]
+
+
+def test_a_motion_that_is_an_asset_is_not_deleted_with_its_capture(fake_worker, footage):
+    capture(fake_worker, footage)
+    bpy.ops.scope.mark_asset()
+    bpy.ops.scope.delete_capture()
+    assert bpy.data.actions["person"].asset_data is not None
+
+
 def test_a_capture_whose_armature_was_deleted_can_be_deleted(fake_worker, footage, contents):
     capture(fake_worker, footage)
     bpy.data.objects.remove(bpy.data.objects["person"])
