@@ -122,6 +122,18 @@ class Motion:
         return self.timestamps * self.footage_speed
 
     @property
+    def has_residual(self) -> NDArray[np.bool_]:
+        """(T,) whether this camera saw the person, so that ``residual_px`` is no mere 0."""
+        known: NDArray[np.bool_] = self.valid & (self.residual_px > 0.0)
+        return known
+
+    @property
+    def mean_residual_px(self) -> float:
+        """Mean of the reprojection errors that are known, pixels; 0 if none is."""
+        known = self.residual_px[self.has_residual]
+        return float(known.mean()) if len(known) else 0.0
+
+    @property
     def cuts_s(self) -> NDArray[np.float64]:
         """(M,) seconds: when the footage cuts to another scene."""
         return cut_times(self.timestamps, self.scene_starts)

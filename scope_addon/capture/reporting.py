@@ -73,7 +73,7 @@ def make_report(
         focal_deviation=round(camera.focal_deviation, 3),
         frame_rate=[video.fps.numerator, video.fps.denominator],
         fps=rates,
-        reprojection_px=_reprojection_px(motions[0]),
+        reprojection_px=motions[0].mean_residual_px,
         iterations=solved.iterations,
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
@@ -247,21 +247,13 @@ def _about_person(body: Body, motion: Motion) -> dict[str, Any]:
             "valid_frames": len(seen),
             "first_frame": int(seen[0]),
             "last_frame": int(seen[-1]),
-            "reprojection_px": _reprojection_px(motion),
+            "reprojection_px": motion.mean_residual_px,
             "height_m": round(body.stature(motion.betas), 3),
             "height_sigma_m": round(motion.height_sigma_m, 3)
             if np.isfinite(motion.height_sigma_m)
             else None,
         }
     )
-
-
-def _reprojection_px(motion: Motion) -> float:
-    """Return the mean residual in pixels, over the frames in which the first camera saw the
-    person; 0 if there are none.
-    """
-    seen = motion.valid & (motion.residual_px > 0.0)
-    return float(motion.residual_px[seen].mean()) if seen.any() else 0.0
 
 
 def _legs_confidence(motion: Motion) -> float:

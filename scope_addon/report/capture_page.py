@@ -168,7 +168,10 @@ def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> l
     ]
     error = [
         Curve(
-            times, np.where(m.valid, m.residual_px, np.nan).astype(float), color, _name(n, motions)
+            times,
+            np.where(m.has_residual, m.residual_px, np.nan).astype(float),
+            color,
+            _name(n, motions),
         )
         for n, (m, color) in enumerate(zip(motions, colors, strict=True))
     ]
@@ -330,7 +333,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     seen = motion.valid
     pelvis = motion.trans.astype(float) + body.rest_joints(motion.betas.astype(float))[0]
     path = [np.linalg.norm(np.diff(pelvis[rows, :2], axis=0), axis=1) for rows in motion.scenes]
-    error = motion.residual_px[seen]
+    error = motion.residual_px[motion.has_residual]
     contact = motion.foot_contact > _CONTACT
     sigma = np.asarray(motion.joint_sigma_m, float)[seen]
     review = np.zeros(len(motion), bool)

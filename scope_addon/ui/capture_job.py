@@ -391,7 +391,8 @@ def show_result(
     shown.footage = footage
     shown.people = len(result.people)
     shown.frames = max(len(p.motion) for p in result.people)
-    residuals = np.concatenate([p.motion.residual_px[p.motion.valid] for p in result.people])
+    motions = [person.motion for person in result.people]
+    residuals = np.concatenate([motion.residual_px[motion.has_residual] for motion in motions])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
     sigmas = np.concatenate(
         [np.ravel(np.asarray(p.motion.joint_sigma_m, float)) for p in result.people]

@@ -62,7 +62,8 @@ def test_a_walk_of_known_length_and_speed(body):
     trans[:, 2] = 0.9 - body.rest_joints()[0, 2]
     contact = np.zeros((T, 4))
     contact[31:, 1] = 1.0
-    residual = np.r_[np.full(T - 1, 4.0), 100.0]
+    # In some frames, this camera does not see the person, nor anybody in the last one.
+    residual = np.r_[np.full(20, 0.0), np.full(T - 21, 4.0), 100.0]
     valid = np.arange(T) < T - 1
     motion = made_motion(
         body,
@@ -78,7 +79,7 @@ def test_a_walk_of_known_length_and_speed(body):
     assert figures["Path over the floor"] == "1.50 m"
     assert figures["Highest speed"] == "1.50 m/s"
     assert figures["Pelvis height"] == "0.90 to 0.90 m"
-    # of the frames in which the person was seen
+    # of the frames in which this camera saw the person
     assert figures["Reprojection error, mean"] == "4.0 px"
     assert figures["Left foot in contact"] == "49 % of frames"
     assert figures["Right foot in contact"] == "0 % of frames"

@@ -43,6 +43,15 @@ def test_heights_and_joints_with_their_deviations(body):
     assert shown.heights == ""
 
 
+def test_the_reprojection_error_is_that_of_frames_the_first_camera_sees(body):
+    motion = made_motion(body, np.zeros((6, body.K + 1, 3)), np.zeros((6, 3)))
+    motion.residual_px[3:] = 4.0
+    result = build_scene([motion], body)
+    shown = result.collection.scope_result
+    show_result(shown, "", Report(), result)
+    assert shown.reprojection_px == 4.0
+
+
 def test_a_warning_keeps_the_name_of_the_footage(body):
     motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
     motion.source = "my walk.mp4"

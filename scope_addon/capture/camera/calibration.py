@@ -287,7 +287,7 @@ def calibration_text(motion: Motion) -> str:
     lines += [
         f"[{METADATA}]",
         "adjusted = false",
-        f"error = {float(np.mean(motion.residual_px))}",
+        f"error = {motion.mean_residual_px}",
         "",
     ]
     return "\n".join(lines)

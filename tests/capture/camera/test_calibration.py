@@ -275,6 +275,13 @@ def test_saved_cameras_are_read_again_as_they_were(tmp_path, rotation):
     np.testing.assert_allclose(places[1] @ np.linalg.inv(places[0]), T, atol=1e-9)
 
 
+def test_the_error_is_that_of_frames_in_which_the_camera_saw_the_person():
+    body = load_body("scope")
+    poses = np.zeros((4, 3 * (body.K + 1)))
+    motion = made_motion(body, poses, np.zeros((4, 3)), residual_px=np.array([0.0, 3.0, 0.0, 5.0]))
+    assert "error = 4.0\n" in calibration_text(motion)
+
+
 def test_axes_turn_as_the_picture_does():
     """A point's pixel in the turned picture is its projection in the turned axes."""
     point = np.array([0.3, -0.2, 2.0])
