@@ -152,7 +152,7 @@ def has_bent_knees(motion: Motion) -> bool:
         is_upright = hip[:, 2] - ankle[:, 2] > STANDING * (thigh + shank)
         stands |= is_upright & motion.valid
     period = float(np.median(np.diff(motion.timestamps))) if len(motion) > 1 else 0.0
-    if stands.sum() * period < BENT_S or stands.mean() < 0.5:
+    if stands.sum() * period < BENT_S or stands.sum() < 0.5 * motion.valid.sum():
         return False
     return bool(np.percentile(straightest[stands], 98) < BENT_KNEE_DEG)
 

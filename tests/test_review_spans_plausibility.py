@@ -125,6 +125,13 @@ def test_knees_that_are_never_straight_are_said_of_who_stands() -> None:
     assert not has_bent_knees(motion_of(walk(1.0, bent=0.5)))
 
 
+def test_bent_knees_are_said_of_who_stands_in_most_of_the_frames_that_show_them() -> None:
+    bent = motion_of(walk(14.0, bent=0.5))
+    seen = np.arange(len(bent)) < 150
+    half = replace(bent, image_size=np.array([1280, 720]), valid=seen)
+    assert has_bent_knees(half)
+
+
 def test_an_imported_motion_which_no_camera_has_seen_is_not_judged() -> None:
     imported = replace(WALK, image_size=np.zeros(2, int))
     assert not any(frames.any() for frames in implausible(imported).values())
