@@ -214,10 +214,14 @@ def _distance(
 
 
 def _held(motion: Motion, mask: NDArray[np.bool_], least_s: float) -> NDArray[np.bool_]:
-    """Return the runs of a mask (T,) that last long enough within a scene."""
+    """Return the runs of a mask (T,) that last long enough within a scene; frames in which the
+    person was not seen do not count.
+    """
     held = np.zeros(len(mask), bool)
     for scene in motion.scenes:
         times = motion.timestamps[scene]
+        steps_s = np.diff(times, prepend=times[:1])
+        seen_s = times - np.cumsum(np.where(motion.valid[scene], 0.0, steps_s))
         for first, last in _spans(mask[scene], times, 0.0):
-            held[scene][first : last + 1] = times[last] - times[first] >= least_s
+            held[scene][first : last + 1] = seen_s[last] - seen_s[first] >= least_s
     return held

@@ -118,6 +118,17 @@ def test_a_person_who_floats_is_found_but_not_one_who_jumps() -> None:
     assert not implausible(uneven)["floating"].any()
 
 
+def test_the_pose_that_is_kept_while_a_jumper_is_not_seen_does_not_float() -> None:
+    height = np.zeros((len(WALK), 3))
+    height[40:120, 2] = 0.8
+    floats = moved(dict.fromkeys(AT, height))
+    lost = np.arange(len(WALK)) >= 60
+    assert not implausible(replace(floats, valid=~lost))["floating"].any()
+    now_and_then = np.arange(len(WALK)) % 10 == 5
+    found = implausible(replace(floats, valid=~now_and_then))["floating"]
+    assert found.sum() == 72
+
+
 def test_knees_that_are_never_straight_are_said_of_who_stands() -> None:
     bent = motion_of(walk(6.0, bent=0.5))
     bent = replace(bent, image_size=np.array([1280, 720]))
