@@ -179,10 +179,17 @@ def fcurves(datablock: bpy.types.ID) -> list[bpy.types.FCurve]:
     animation = datablock.animation_data
     if animation is None or animation.action is None:
         return []
-    action = animation.action
+    return fcurves_in_slot(animation.action, getattr(animation, "action_slot", None))
+
+
+def fcurves_in_slot(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot | None
+) -> list[bpy.types.FCurve]:
+    """Return the F-curves in a slot of an action, none without a slot; in a Blender without slots,
+    every F-curve.
+    """
     if not has_slots():
         return list(action.fcurves)
-    slot = animation.action_slot
     found: list[bpy.types.FCurve] = []
     for layer in action.layers:
         for strip in layer.strips:

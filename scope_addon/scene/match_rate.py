@@ -19,7 +19,7 @@ import bpy
 from ..motion import Motion
 from ..notices import Notice
 from . import timing
-from .actions import frame_range
+from .actions import fcurves_in_slot, frame_range
 from .camera import same_camera, show_footage_again, view_number
 from .capture_parts import cameras_in
 from .character.body_mesh import shape_key_name
@@ -34,6 +34,10 @@ from .stored_values import FrameSpan, parse_spans, start_frame, stored_text
 from .timing import Retiming, action_strips, retime_keys, retime_strip
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")
+
+# The actions whose keys were moved, each with the handle of the slot.
+_Done = set[tuple[bpy.types.Action, int]]
+_ALL_SLOTS = -1
 
 
 def change_rate(
@@ -54,7 +58,7 @@ def change_rate(
     moves = {p: Retiming(start_frame(p), rate / timing.keyed_rate(p, scene)) for p in people}
     own = {p: frame_range([p]) for p in people}
     played = _played(scene, people)
-    done: set[bpy.types.Action] = set()
+    done: _Done = set()
     for person, retiming in moves.items():
         for datablock in _datablocks(person):
             _retime(datablock, retiming, done)
@@ -121,23 +125,25 @@ def _datablocks(person: bpy.types.Object) -> list[bpy.types.ID]:
     return [person, *filter(None, [root_object(person)]), *shapes]
 
 
-def _retime(datablock: bpy.types.ID, retiming: Retiming, done: set[bpy.types.Action]) -> None:
+def _retime(datablock: bpy.types.ID, retiming: Retiming, done: _Done) -> None:
     animation = datablock.animation_data
     if animation is None:
         return
     strips = action_strips(animation)
     for strip in strips:
         retime_strip(strip, retiming)
-    for action in [animation.action, *(strip.action for strip in strips)]:
-        if action is not None and action not in done:
-            done.add(action)
-            retime_keys(action, retiming)
+    for user in [animation, *strips]:
+        slot = getattr(user, "action_slot", None)
+        used = user.action, slot.handle if slot else 0
+        if user.action is not None and used not in done:
+            done.add(used)
+            retime_keys(fcurves_in_slot(user.action, slot), retiming)
 
 
 def _retime_rigs(
     rigs: Iterable[tuple[bpy.types.Object, bpy.types.Object]],
     moves: dict[bpy.types.Object, Retiming],
-    done: set[bpy.types.Action],
+    done: _Done,
 ) -> None:
     """Move what retargeting has written to rigs, also of captures other than the one that a rig has
     now.
@@ -162,19 +168,17 @@ def _retime_faces(scene: bpy.types.Scene, moves: dict[bpy.types.Object, Retiming
                 retime_strip(strip, sources[source_of(strip.action)])
 
 
-def _retime_written_actions(
-    moves: dict[bpy.types.Object, Retiming], done: set[bpy.types.Action]
-) -> None:
+def _retime_written_actions(moves: dict[bpy.types.Object, Retiming], done: _Done) -> None:
     """Move the keys of the other actions that retargeting has written, used or not."""
     sources = _retiming_by_name(moves)
     for action in bpy.data.actions:
         if (
             action.library is None
-            and action not in done
+            and (action, _ALL_SLOTS) not in done
             and is_retargeted(action)
             and source_of(action) in sources
         ):
-            done.add(action)
+            done.add((action, _ALL_SLOTS))
             retime_written_keys(action, sources[source_of(action)])
 
 
@@ -187,7 +191,7 @@ def _retime_rig(
     rig: bpy.types.Object,
     retiming: Retiming,
     sources: dict[str, Retiming],
-    done: set[bpy.types.Action],
+    done: _Done,
 ) -> None:
     """Move the keys that retargeting has written, and the strips that play them; the rig's other
     actions stay.
@@ -206,9 +210,10 @@ def _retime_rig(
         if animation.action is not None and is_retargeted(animation.action)
         else []
     )
-    moved = {action for action in [*own, *(strip.action for strip in strips)] if action not in done}
+    written = {*own, *(strip.action for strip in strips)}
+    moved = {action for action in written if (action, _ALL_SLOTS) not in done}
     for action in moved:
-        done.add(action)
+        done.add((action, _ALL_SLOTS))
         retime_written_keys(action, sources.get(source_of(action), retiming))
     if not moved:
         return

@@ -147,7 +147,7 @@ def retire(former: bpy.types.Action | None, source: str) -> None:
 def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
     """Move the keys of a retargeted action; it counts as edited only if it was."""
     unedited = action.get(_CHECKSUM) == _checksum(action)
-    retime_keys(action, retiming)
+    retime_keys(fcurves_of(action), retiming)
     if unedited:
         mark_written(action)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MotionFileError, UsageError
-from .actions import fcurves_of
 from .stored_values import LAST_FRAME, RATE, RATES, stored_rate, stored_text
 
 # Rates within this tolerance (frames per second) of a standard one are taken to be it: 23.98 is 24
@@ -239,9 +238,9 @@ class Retiming:
         return math.floor(self.frame(first) + _WHOLE), math.ceil(self.frame(last) - _WHOLE)
 
 
-def retime_keys(action: bpy.types.Action, retiming: Retiming) -> None:
-    """Move every key of an action, with its handles."""
-    for curve in fcurves_of(action):
+def retime_keys(curves: Iterable[bpy.types.FCurve], retiming: Retiming) -> None:
+    """Move every key of curves, with its handles."""
+    for curve in curves:
         keys = curve.keyframe_points
         for name in ("co", "handle_left", "handle_right"):
             values = np.empty(2 * len(keys), np.float32)

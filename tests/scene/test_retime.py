@@ -29,7 +29,7 @@ def test_keys_move_away_from_the_origin_with_their_handles(moved: bpy.types.Obje
     for key in curve.keyframe_points:
         key.handle_left_type = key.handle_right_type = "FREE"  # Blender places others itself
     before = [[*key.handle_left, *key.co, *key.handle_right] for key in curve.keyframe_points]
-    retime_keys(moved.animation_data.action, DOUBLED)
+    retime_keys(fcurves(moved), DOUBLED)
     after = [[*key.handle_left, *key.co, *key.handle_right] for key in curve.keyframe_points]
     expected = np.array(before)
     expected[:, ::2] = 1 + 2 * (expected[:, ::2] - 1)

@@ -11,7 +11,7 @@ from scope.scope_addon.edit.corrected_motion import corrections_of
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.retarget.expression_map import ExpressionMap
-from scope.scope_addon.scene.actions import fcurves, push_to_nla, read_keys
+from scope.scope_addon.scene.actions import fcurves, has_slots, push_to_nla, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.face_retarget import CapturedExpressions, retarget_expressions
@@ -92,6 +92,26 @@ def test_keys_return_to_whole_frames_and_other_animation_stays(scene):
     again = at_times(person, NAMES)
     bpy.ops.scope.smooth(strength=1.0)  # which writes keys at the scene's rate
     np.testing.assert_allclose(at_times(person, NAMES), again, atol=1e-3)
+
+
+@pytest.mark.skipif(not has_slots(), reason="this Blender has no slots")
+@pytest.mark.parametrize("in_nla", [False, True])
+def test_another_slot_of_the_captures_action_keeps_its_frames(scene, in_nla):
+    person = built()
+    action = person.animation_data.action
+    prop = bpy.data.objects.new("prop", None)
+    scene.collection.objects.link(prop)
+    prop.animation_data_create().action = action
+    prop.animation_data.action_slot = action.slots.new(id_type="OBJECT", name="prop")
+    for frame in (10, 40):
+        prop.keyframe_insert("location", index=0, frame=frame)
+    curves = fcurves(person)
+    if in_nla:
+        push_to_nla(person)
+    bpy.ops.scope.match_frame_rate()
+    assert key_times(prop) == [[10, 40]]
+    for curve in curves:
+        np.testing.assert_array_equal(read_keys(curve)[:, 0], START + np.arange(61))
 
 
 def test_a_rate_that_an_importer_has_changed_is_noticed_and_restored(scene):
