@@ -281,13 +281,15 @@ def _show_clip(
     """Show footage of a distorting lens; return the size in pixels, and warnings."""
     # Always a new clip, because another capture may have another start or lens.
     clip = bpy.data.movieclips.load(str(path))
-    clip.frame_start = _start(motion, frames)
+    is_video = clip.source == "MOVIE"
+    shown = _frames_by_time(motion, clip) if is_video else motion.frames.astype(float)
+    clip.frame_start = _start(shown, frames)
     size = tuple(clip.size)
     background.source = "MOVIE_CLIP"
     background.clip = clip
     clip.display_aspect = _footage_aspect(motion)
     _set_lens_distortion(clip, background, motion)
-    if (drift := _drift(motion, frames)) <= 1.0:
+    if (drift := _drift(shown, frames)) <= 1.0:
         return size, []
     return size, [notice("footage_drifts", frames=drift)]
 
@@ -329,18 +331,29 @@ def show_footage_again(
     return warnings
 
 
-def _start(motion: Motion, frames: NDArray[np.float64]) -> int:
+def _frames_by_time(motion: Motion, clip: bpy.types.MovieClip) -> NDArray[np.float64]:
+    """Return the frame (T,) of a video that each pose was seen in, as Blender counts: by the time
+    and the video's rate, so that frames which the file lacks count, too.
+    """
+    counted: NDArray[np.float64] = motion.footage_times_s * clip.fps
+    return counted
+
+
+def _start(shown: NDArray[np.float64], frames: NDArray[np.float64]) -> int:
     """Return the scene frame of the footage's first frame, which need not be captured, if the rates
     are the same.
+
+    :param shown: (T,) frame of the footage of each pose, from 0 on.
+    :param frames: (T,) scene frame of each pose.
     """
-    return round(float(frames[0] - motion.frames[0]))
+    return round(float(frames[0] - shown[0]))
 
 
-def _drift(motion: Motion, frames: NDArray[np.float64]) -> float:
+def _drift(shown: NDArray[np.float64], frames: NDArray[np.float64]) -> float:
     """Return how many frames the poses deviate from footage of which each scene frame shows the
-    next frame.
+    next frame; the parameters are those of `_start`.
     """
-    return float(np.abs(frames - (_start(motion, frames) + motion.frames)).max())
+    return float(np.abs(frames - (_start(shown, frames) + shown)).max())
 
 
 def _show_video(
@@ -356,22 +369,21 @@ def _show_video(
     :return: the size in pixels, and no warnings.
     """
     clip = bpy.data.movieclips.load(str(path))
-    # at which Blender counts the video's frames
     size = tuple(clip.size)
-    rate = clip.fps
+    shown = _frames_by_time(motion, clip)
     bpy.data.movieclips.remove(clip)  # which was never shown
     background.source = "IMAGE"
     background.image = image = bpy.data.images.load(str(path), check_existing=True)
     image.display_aspect = _footage_aspect(motion)
-    if _drift(motion, frames) <= _MAX_OFFSET:
-        _show_frames(background.image_user, _start(motion, frames))
+    if _drift(shown, frames) <= _MAX_OFFSET:
+        _show_frames(background.image_user, _start(shown, frames))
         return size, []
     scene_frames = np.arange(np.floor(frames[0]), np.ceil(frames[-1]) + 1)
     _key_footage(
         camera,
         background,
         scene_frames,
-        np.round(np.interp(scene_frames, frames, motion.footage_times_s) * rate),
+        np.round(np.interp(scene_frames, frames, shown)),
     )
     return size, []
 

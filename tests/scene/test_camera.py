@@ -401,6 +401,26 @@ def test_a_picture_is_turned_as_its_exif_says(body, make_motion, tmp_path, orien
     assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=0.1)
 
 
+@pytest.mark.parametrize("k1", [0.0, -0.1])
+def test_footage_that_lacks_frames_before_the_captured_ones_is_shown_by_time(
+    body, make_motion, clip, k1
+):
+    """Blender counts frames by time: its third one is shown a tenth of a second after the first,
+    also where the file has only one before it.
+    """
+    times = np.array([3, 4, 5]) / 30
+    motion = make_motion(body, timestamps=times, rate=30.0, image_size=(64, 48))
+    motion.frames[:] = [1, 2, 3]
+    motion.dist[0] = k1  # a distorting lens is shown as a clip
+    result = build_scene([motion], body, footage=clip, options=NEW_SCENE)
+    assert result.warnings == []
+    camera = result.people[0].camera
+    if k1:
+        assert camera.data.background_images[0].clip.frame_start == 0
+    else:
+        assert [frame_shown(camera, f) for f in (3, 4, 5)] == [3, 4, 5]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="a backslash separates folders there")
 def test_footage_whose_name_has_a_backslash_is_not_shown_and_said(body, make_motion, clip):
     """Blender takes it for a slash."""
