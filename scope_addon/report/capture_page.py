@@ -334,7 +334,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     pelvis = motion.trans.astype(float) + body.rest_joints(motion.betas.astype(float))[0]
     path = [np.linalg.norm(np.diff(pelvis[rows, :2], axis=0), axis=1) for rows in motion.scenes]
     error = motion.residual_px[motion.has_residual]
-    contact = motion.foot_contact > _CONTACT
+    contact = motion.foot_contact[seen] > _CONTACT
     sigma = np.asarray(motion.joint_sigma_m, float)[seen]
     review = np.zeros(len(motion), bool)
     for span in find_review_spans(motion, under_floor=under_floor(motion, body)):
@@ -349,7 +349,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
         "Reprojection error, 95th percentile": f"{np.percentile(error, 95):.1f} px"
         if len(error)
         else "–",
-        "Confidence, mean": f"{body_confidence(motion).mean():.2f}",
+        "Confidence, mean": f"{body_confidence(motion)[seen].mean():.2f}",
         "Standard deviation of joints, mean": f"{100 * np.nanmean(sigma):.1f} cm"
         if np.isfinite(sigma).any()
         else "–",

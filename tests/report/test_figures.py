@@ -61,14 +61,17 @@ def test_a_walk_of_known_length_and_speed(body):
     trans[:, 0] = np.minimum(np.arange(T), 30) / 30 * 1.5
     trans[:, 2] = 0.9 - body.rest_joints()[0, 2]
     contact = np.zeros((T, 4))
-    contact[31:, 1] = 1.0
+    contact[30:, 1] = 1.0
     # In some frames, this camera does not see the person, nor anybody in the last one.
     residual = np.r_[np.full(20, 0.0), np.full(T - 21, 4.0), 100.0]
     valid = np.arange(T) < T - 1
+    confidence = np.full((T, body.K + 1), 0.8)
+    confidence[-1] = 0.0
     motion = made_motion(
         body,
         np.zeros((T, 3 * (body.K + 1))),
         trans,
+        joint_confidence=confidence,
         foot_contact=contact,
         residual_px=residual,
         valid=valid,
@@ -81,7 +84,9 @@ def test_a_walk_of_known_length_and_speed(body):
     assert figures["Pelvis height"] == "0.90 to 0.90 m"
     # of the frames in which this camera saw the person
     assert figures["Reprojection error, mean"] == "4.0 px"
-    assert figures["Left foot in contact"] == "49 % of frames"
+    # in 30 of 60 frames in which the person was seen
+    assert figures["Left foot in contact"] == "50 % of frames"
+    assert figures["Confidence, mean"] == "0.80"
     assert figures["Right foot in contact"] == "0 % of frames"
     assert figures["Frames to review"] == "1"
     assert figures["Height"] == f"{100 * np.ptp(body.v_template[:, 1]):.0f} cm"
