@@ -135,15 +135,19 @@ def resolve(
     corrections = tuple(corrections)
     out = clip.copy()
     refit = PoseRefit(body, betas)
+    stands = np.zeros((len(out), len(refit.sole_names)), bool)
     for contact in (c for c in corrections if isinstance(c, Contact)):
         # What rests turns while it is moved, and another part of its skin is the lowest then.
         for _ in range(1 if contact.part in FEET else _RESTING_ROUNDS):
             track = _contact_track(refit, out, contact, shot, floor)
             if track is not None:
                 _Correction(refit, out, [track], slack, floor).run()
+        if contact.part in FEET:
+            span = keys_of_span(out, contact.first, contact.last, shot)
+            stands[np.ix_(span, _soles_of_foot(refit, contact.part))] = True
     tracks = _pin_tracks(refit, out, [c for c in corrections if isinstance(c, Pin)], shot)
     for together in _clusters(out, tracks):
-        _Correction(refit, out, together, slack, floor).run()
+        _Correction(refit, out, together, slack, floor, stands).run()
     return out
 
 
@@ -164,8 +168,18 @@ class _Correction:
     """The limbs of one cluster, treated in turns. Changes the clip that it is given."""
 
     def __init__(
-        self, refit: PoseRefit, clip: Clip, tracks: list[_Track], slack: float, floor: float
+        self,
+        refit: PoseRefit,
+        clip: Clip,
+        tracks: list[_Track],
+        slack: float,
+        floor: float,
+        stands: NDArray[np.bool_] | None = None,
     ) -> None:
+        """Take what is corrected.
+
+        :param stands: (T, 4) where the user says that soles stand.
+        """
         self._refit = refit
         self._clip = clip
         self._tracks = tracks
@@ -186,6 +200,7 @@ class _Correction:
         self._limited: set[int] = set()
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(soles, UP, times[around])
+        self._stands = np.zeros(self._standing.shape, bool) if stands is None else stands
 
     def run(self) -> None:
         """Treat every joint from the trunk outwards, then each limb as a whole until all are where
@@ -298,8 +313,12 @@ class _Correction:
             points.floor = float(self._floor[key])
         # A pinned hip moves over its standing foot; other joints release the limb's own soles.
         free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)
+        is_foot_pinned = any(joint.endswith(("ankle", "foot")) for joint in own)
         for k, name in enumerate(refit.sole_names):
-            if name not in free and self._standing[key, k] > _STANDS:
+            if name in free:
+                if self._stands[key, k] and not is_foot_pinned:
+                    points.add(refit.number(name), soles[k], PINNED)
+            elif self._standing[key, k] > _STANDS:
                 points.add(refit.number(name), soles[k], STANDING * self._standing[key, k])
         moves_trunk = limb == "trunk" or any(joint.endswith(("hip", "collar")) for joint in own)
         for name in () if moves_trunk else refit.ends:
@@ -492,9 +511,7 @@ def _contact_track(
         return None
     if contact.part not in FEET:
         return _resting_track(refit, clip, contact.part, span, floor)
-    which = [
-        k for k, name in enumerate(refit.sole_names) if name.startswith(f"sole/{contact.part}")
-    ]
+    which = _soles_of_foot(refit, contact.part)
     soles = refit.place(clip.rotations[span], clip.root[span])[2][:, which]
     where = np.median(soles, axis=0)
     lowest = float(where[:, 2].min()) - floor
@@ -508,6 +525,10 @@ def _contact_track(
     return _Track(
         [joint], [int(k) for k in span], [{joint: points}] * n, [None] * n, [_CONTACT_REACH_S] * n
     )
+
+
+def _soles_of_foot(refit: PoseRefit, side: str) -> NDArray[np.intp]:
+    return np.flatnonzero([name.startswith(f"sole/{side}") for name in refit.sole_names])
 
 
 def _resting_track(

@@ -196,6 +196,24 @@ def test_a_foot_that_stands_stays_on_the_floor():
     assert changed[-1] < 62 + 0.25 * RATE
 
 
+def test_a_pinned_knee_leaves_a_foot_where_it_stands():
+    clip = Clip(TRUTH.times, TRUTH.rotations, TRUTH.root - [0.0, 0.0, 0.075])
+    contact = Contact(40, 48, "left")
+    stands = resolve(clip, BODY, BETAS, [contact], SHOT)
+    knee = stands.joints(BODY, BETAS)[44, NAMES.index("left_knee")]
+    pin = Pin(44, "left_knee", position=tuple(knee + [0.05, 0.0, 0.0]))
+    both = resolve(clip, BODY, BETAS, [contact, pin], SHOT)
+    assert missed(both, BODY, BETAS, pin, SHOT) < 0.6 * missed(stands, BODY, BETAS, pin, SHOT)
+    moved = both.soles(BODY, BETAS)[40:49, :2] - stands.soles(BODY, BETAS)[40:49, :2]
+    assert np.linalg.norm(moved, axis=-1).max() < 0.005
+    alone = resolve(clip, BODY, BETAS, [pin], SHOT).soles(BODY, BETAS)[44, :2]
+    assert np.linalg.norm(alone - stands.soles(BODY, BETAS)[44, :2], axis=-1).max() > 0.05
+    ankle = stands.joints(BODY, BETAS)[44, NAMES.index("left_ankle")]
+    moves = Pin(44, "left_ankle", position=tuple(ankle + [0.0, 0.0, 0.05]))
+    pinned = resolve(clip, BODY, BETAS, [contact, moves], SHOT)
+    assert missed(pinned, BODY, BETAS, moves, SHOT) < 0.002
+
+
 # Poses, by the rotation vectors of joints and of the whole body, the height of their lowest vertex,
 # metres, and the parts whose skin rests.
 RESTS = {
