@@ -16,6 +16,7 @@ It may be true: of a punch, of somebody who is held or hangs, of a crouch.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,6 +99,16 @@ def body_confidence(motion: Motion) -> NDArray[np.float32] | NDArray[np.float64]
     confidence = motion.joint_confidence[:, : len(BODY_JOINTS)]
     shown = confidence.max(axis=0) > 0
     return confidence[:, shown].mean(axis=1) if shown.any() else np.zeros(len(motion))
+
+
+def body_sigma_m(motions: Sequence[Motion]) -> float:
+    """Return the median standard deviation of the body's joints, without fingers, over the frames
+    of motions in which it is known, metres; NaN if there are none.
+    """
+    sigmas = [np.ravel(np.asarray(m.joint_sigma_m)[:, : len(BODY_JOINTS)]) for m in motions]
+    known = np.concatenate(sigmas)
+    known = known[np.isfinite(known)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _spans(

@@ -21,7 +21,7 @@ from ..installed import machine, versions
 from ..kinematics.foot_skin import under_floor
 from ..motion import Motion
 from ..notices import REASONS, Notice, TimeText, counted
-from ..review_spans import FAR_SHARE, Span, body_confidence, find_review_spans
+from ..review_spans import FAR_SHARE, Span, body_confidence, body_sigma_m, find_review_spans
 from . import page
 from .page import Markup, Picture, Progress, overlay_pictures
 from .plots import Axis, Curve, band_plot, line_plot
@@ -335,7 +335,7 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     path = [np.linalg.norm(np.diff(pelvis[rows, :2], axis=0), axis=1) for rows in motion.scenes]
     error = motion.residual_px[motion.has_residual]
     contact = motion.foot_contact[seen] > _CONTACT
-    sigma = np.asarray(motion.joint_sigma_m, float)[seen]
+    sigma_m = body_sigma_m([motion])
     review = np.zeros(len(motion), bool)
     for span in find_review_spans(motion, under_floor=under_floor(motion, body)):
         review[span.first : span.last + 1] = True
@@ -350,8 +350,8 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
         if len(error)
         else "–",
         "Confidence, mean": f"{body_confidence(motion)[seen].mean():.2f}",
-        "Standard deviation of joints, mean": f"{100 * np.nanmean(sigma):.1f} cm"
-        if np.isfinite(sigma).any()
+        "Standard deviation of joints, median": f"{100 * sigma_m:.1f} cm"
+        if np.isfinite(sigma_m)
         else "–",
         "Left foot in contact": f"{100 * contact[:, :2].any(axis=1).mean():.0f} % of frames",
         "Right foot in contact": f"{100 * contact[:, 2:].any(axis=1).mean():.0f} % of frames",

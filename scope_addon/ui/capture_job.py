@@ -29,7 +29,7 @@ from ..notices import notice
 from ..options import Place
 from ..options.body_choice import chosen_body
 from ..options.capture import AUTO
-from ..review_spans import Span, find_review_spans
+from ..review_spans import Span, body_sigma_m, find_review_spans
 from ..scene.animated import is_animated
 from ..scene.build import BuildOptions, BuildResult, build_scene
 from ..scene.datablocks import captures_of, check_local, found, holds
@@ -394,11 +394,8 @@ def show_result(
     motions = [person.motion for person in result.people]
     residuals = np.concatenate([motion.residual_px[motion.has_residual] for motion in motions])
     shown.reprojection_px = float(residuals.mean()) if residuals.size else 0.0
-    sigmas = np.concatenate(
-        [np.ravel(np.asarray(p.motion.joint_sigma_m, float)) for p in result.people]
-    )
-    sigmas = sigmas[np.isfinite(sigmas)]
-    shown.sigma_cm = 100.0 * float(np.median(sigmas)) if sigmas.size else 0.0
+    sigma_m = body_sigma_m(motions)
+    shown.sigma_cm = 100.0 * sigma_m if np.isfinite(sigma_m) else 0.0
     shown.heights = ", ".join(
         _height(person) for person in report.per_person if "height_m" in person
     )

@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 from scope.scope_addon.capture_report import Report
 from scope.scope_addon.notices import OTHER, notice
+from scope.scope_addon.report.capture_page import motion_figures
 from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.stored_values import FrameSpan
 from scope.scope_addon.ui import capture_panel
 from scope.scope_addon.ui.capture_job import review_spans, show_result
 from scope.scope_addon.ui.reporting import add_warning, sentence, stored_warning
+from scope.solver import load_body
+from scope.solver.names import BODY_JOINTS
 
 from ..made_motion import made_motion
 
@@ -50,6 +53,19 @@ def test_the_reprojection_error_is_that_of_frames_the_first_camera_sees(body):
     shown = result.collection.scope_result
     show_result(shown, "", Report(), result)
     assert shown.reprojection_px == 4.0
+
+
+def test_panel_and_page_say_the_same_of_joints_and_nothing_of_fingers():
+    body = load_body("scope_h")
+    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion.joint_sigma_m[:, : len(BODY_JOINTS)] = 0.03
+    motion.joint_sigma_m[1, : len(BODY_JOINTS)] = 0.08
+    motion.joint_sigma_m[:, len(BODY_JOINTS) :] = 0.2
+    result = build_scene([motion], body)
+    shown = result.collection.scope_result
+    show_result(shown, "", Report(), result)
+    assert np.isclose(shown.sigma_cm, 3.0, atol=1e-5)
+    assert motion_figures(motion, body)["Standard deviation of joints, median"] == "3.0 cm"
 
 
 def test_a_warning_keeps_the_name_of_the_footage(body):
