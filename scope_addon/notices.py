@@ -84,6 +84,13 @@ SENTENCES = {
     "left_out": "{footage} shows more people than were captured: at least {others} more, one of "
     "them at {place} (x, y in pixels, @ seconds). Capture everyone, or choose the one to be "
     "captured with Person, --person {place} on the command line",
+    # of several cameras, whose captures have no Person, and turn all videos alike
+    "left_out_of_views": "{footage} shows more people than were captured: at least {others} more, "
+    "one of them at {place} (x, y in pixels, @ seconds). Capture everyone, --people all on the "
+    "command line",
+    "turned_view": "{footage}: the person lies or stands on the head in the picture from beginning "
+    "to end. If this camera was turned, turn its video with another program first, because Turn "
+    "turns those of all cameras",
     "turned_footage": "{footage}: the person lies or stands on the head in the picture from "
     "beginning to end. If the camera was turned, capture with Turn, --rotate {degrees} on the "
     "command line",

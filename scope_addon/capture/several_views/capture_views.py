@@ -349,6 +349,7 @@ def _observe_view(
     """Observe one video, as a capture of it alone does."""
     with open_video(path, options.wanted) as video:
         footage, tracks = observe(video, body, options, clock, progress, watch)
+    footage.warnings[:] = map(_with_possible_advice, footage.warnings)
     name = display_text(path.name)
     if len(footage.timestamps) < 2:
         raise UsageError(f"{name} is a still image; several cameras need videos")
@@ -372,6 +373,17 @@ def _observe_view(
             for track in tracks
         ]
     return _View(video, footage, tracks, people, shot.speed)
+
+
+def _with_possible_advice(warning: Notice) -> Notice:
+    """Return a warning about one video without the advice that is impossible with several: there
+    is no Person, and Turn turns all videos.
+    """
+    if warning.code == "left_out":
+        return notice("left_out_of_views", **warning.values)
+    if warning.code == "turned_footage":
+        return notice("turned_view", footage=warning.values["footage"])
+    return warning
 
 
 def _rest_keypoints(body: Body, options: CaptureOptions) -> Float64Array:

@@ -116,6 +116,34 @@ def test_warnings_about_every_video_are_said_once():
     assert several._about_footage(views, CaptureOptions(speed=1.0), [slower]) == [damaged]
 
 
+def test_warnings_advise_only_what_several_cameras_can_have(shared, monkeypatch):
+    folder = shared / "data" / "pose2sim"
+
+    def observed(video, *args):
+        footage, tracks = real(video, *args)
+        footage.warnings[:] = [
+            notice("left_out", footage="a.mp4", others=2, place="4,5@0.1"),
+            notice("turned_footage", footage="a.mp4", degrees=90),
+            notice("frame_size_changes", footage="a.mp4"),
+        ]
+        return footage, tracks
+
+    real = several.observe
+    monkeypatch.setattr(several, "observe", observed)
+    view = several._observe_view(
+        folder / "cam1.mp4",
+        load_body("scope"),
+        CaptureOptions(wanted=VideoRange(end_s=0.1)),
+        several.StageClock(),
+        lambda *_: None,
+        lambda *_: None,
+    )
+    found = [str(each) for each in view.footage.warnings]
+    assert "at 4,5@0.1" in found[0]
+    assert not [text for text in found if "--person" in text or "--rotate" in text]
+    assert len(found) == 3
+
+
 def test_offsets_are_given_in_the_times_of_the_videos_as_they_play():
     first, second = (
         SimpleNamespace(camera=SimpleNamespace(focal_deviation=0.1), speed=8.0) for _ in range(2)
