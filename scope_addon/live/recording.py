@@ -238,25 +238,42 @@ def in_last_shape(poses: Sequence[LivePose], body: Body) -> list[LivePose]:
     out = []
     for pose in poses:
         if np.abs(pose.betas - final).max(initial=0.0) > _SAME_SHAPE:
-            rise = _lowest_sole(body, pose, pose.betas) - _lowest_sole(body, pose, final)
             pose = replace(
-                pose, betas=final, root_cam=pose.root_cam + rise * pose.T_world_camera[2, :3]
+                pose,
+                betas=final,
+                root_cam=_raised(body, pose, pose.rotations, pose.root_cam, final),
+                raw_root_cam=_raised(body, pose, pose.raw_rotations, pose.raw_root_cam, final),
             )
         out.append(pose)
     return out
 
 
-def _lowest_sole(body: Body, pose: LivePose, betas: NDArray[np.floating[Any]]) -> float:
-    """Return the height of the lowest sole of a pose in a shape, relative to the camera, metres."""
-    with_points = with_contact_points(body, betas)
-    R, t = with_points.forward_kinematics(
-        pose.rotations, pose.root_cam - with_points.rest_joints(betas)[0], betas
+def _raised(
+    body: Body,
+    pose: LivePose,
+    rotations: NDArray[np.floating[Any]],
+    root_cam: NDArray[np.floating[Any]],
+    betas: NDArray[np.floating[Any]],
+) -> NDArray[np.floating[Any]]:
+    """Return the pelvis (3,) with which the lowest sole is as high in a shape as in the pose's own.
+
+    :param rotations: (K+1, 3, 3) of the pose, or those before smoothing.
+    :param root_cam: (3,) the pelvis that belongs to them.
+    :param betas: (P,) the other shape.
+    """
+    up = pose.T_world_camera[2, :3]
+
+    def lowest_sole(betas: NDArray[np.floating[Any]]) -> float:
+        with_points = with_contact_points(body, betas)
+        R, t = with_points.forward_kinematics(
+            rotations, root_cam - with_points.rest_joints(betas)[0], betas
+        )
+        return float((contact_point_positions(with_points, R, t)[: len(SOLES)] @ up).min())
+
+    raised: NDArray[np.floating[Any]] = (
+        root_cam + (lowest_sole(pose.betas) - lowest_sole(betas)) * up
     )
-    return float(
-        (
-            contact_point_positions(with_points, R, t)[: len(SOLES)] @ pose.T_world_camera[2, :3]
-        ).min()
-    )
+    return raised
 
 
 @dataclass(frozen=True)

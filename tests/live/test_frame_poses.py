@@ -56,12 +56,14 @@ def test_soles_stay_at_their_height_in_the_last_shape(body):
     )
     assert all(np.array_equal(pose.betas, tall) for pose in poses)
 
-    def height(pose, betas):
+    def height(pose, betas, root_cam):
         model = with_contact_points(body, betas)
         R, t = model.forward_kinematics(
-            pose.rotations, pose.root_cam - model.rest_joints(betas)[0], betas
+            pose.rotations, root_cam - model.rest_joints(betas)[0], betas
         )
         return (contact_point_positions(model, R, t)[:4] @ pose.T_world_camera[2, :3]).min()
 
-    before = height(pose_given(body, 0, 0.0, 0.0), np.zeros(body.P))
-    assert height(poses[0], tall) == pytest.approx(before, abs=1e-6)
+    given = pose_given(body, 0, 0.0, 0.0)
+    for name in ("root_cam", "raw_root_cam"):
+        before = height(given, np.zeros(body.P), getattr(given, name))
+        assert height(poses[0], tall, getattr(poses[0], name)) == pytest.approx(before, abs=1e-6)
