@@ -199,7 +199,9 @@ class _Correction:
         # Tracks whose pins have been moved to where the limb can reach them.
         self._limited: set[int] = set()
         self._standing = np.zeros((len(clip), soles.shape[1]))
-        self._standing[around] = standing_probability(soles, UP, times[around])
+        self._standing[around] = standing_probability(
+            soles, UP, times[around], uneven_ground=not np.isfinite(floor)
+        )
         self._stands = np.zeros(self._standing.shape, bool) if stands is None else stands
 
     def run(self) -> None:

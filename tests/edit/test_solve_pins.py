@@ -214,6 +214,20 @@ def test_a_pinned_knee_leaves_a_foot_where_it_stands():
     assert missed(pinned, BODY, BETAS, moves, SHOT) < 0.002
 
 
+@pytest.mark.parametrize("shift", [(0.0, 0.0, -0.06), (0.08, 0.0, 0.0)], ids=["down", "aside"])
+def test_both_feet_on_a_step_stay_when_the_pelvis_is_pinned(shift):
+    clip = standing()
+    for name, angle in {"hip": -1.0, "knee": 1.2, "ankle": -0.2}.items():
+        clip.rotations[:, NAMES.index(f"left_{name}")] = exp(np.array([angle, 0.0, 0.0]))
+    soles = clip.soles(BODY, BETAS)
+    assert np.ptp(soles[0, [0, 2], 2]) > 0.1
+    place = clip.joints(BODY, BETAS)[45, 0] + shift
+    pin = Pin(45, "pelvis", position=tuple(place))
+    moved = resolve(clip, BODY, BETAS, [pin], SHOT, floor=-np.inf)
+    assert missed(moved, BODY, BETAS, pin, SHOT) < 0.005
+    assert np.linalg.norm(moved.soles(BODY, BETAS) - soles, axis=-1).max() < 0.015
+
+
 # Poses, by the rotation vectors of joints and of the whole body, the height of their lowest vertex,
 # metres, and the parts whose skin rests.
 RESTS = {
