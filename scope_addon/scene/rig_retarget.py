@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...solver.body import Body
@@ -28,6 +30,7 @@ from .actions import add_cycles, bone_path, is_cyclic
 from .character.keys import read_clip
 from .character.root_object import (
     clip_as_displayed,
+    moved_by,
     parent_to_root_object,
     parent_transform,
     remove_root_object,
@@ -47,8 +50,9 @@ from .rig_action import (
 )
 from .rig_probe import at_rest, blocked_bones, probe, rest_pose
 from .rigify_ik import ik_keys
+from .timing import current_frame_kept
 from .transaction import all_or_nothing
-from .visibility import world_matrix
+from .visibility import evaluated, world_matrix
 
 # Whose motion is missed where a rig has no bones for them.
 _EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elbow")
@@ -187,6 +191,7 @@ def retarget(
         if captured is not None and options.face is not None
         else None
     )
+    places = _places(source, frames)
     leave_tweak_mode(rig)
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
         with at_rest(rig):
@@ -204,7 +209,7 @@ def retarget(
                 one_floor=one_floor,
                 travel=travel,
             ).pose(clip)
-            motion = _placed(source, clip, skeleton, place, pose, root, options)
+            motion = _placed(places, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = map_notices(rig, bone_map)
             warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)
@@ -297,7 +302,7 @@ def _with_parts(bone_map: BoneMap, kept: set[str]) -> BoneMap:
 
 
 def _placed(
-    source: bpy.types.Object,
+    places: NDArray[np.float64],
     clip: Clip,
     skeleton: Skeleton,
     place: NDArray[np.float64],
@@ -308,10 +313,11 @@ def _placed(
     """Apply the transform of the captured armature, the user's offset and the choice of root
     motion.
 
+    :param places: of the captured armature, from `_places`.
     :param place: (4, 4) the rig's object to world at rest.
     :param root: index of the root bone.
     """
-    rotations, heads, yaw = _with_source_transform(source, pose.rotations, pose.heads[:, root])
+    rotations, heads, yaw = _with_source_transform(places, pose.rotations, pose.heads[:, root])
     heads = heads + options.offset
     if options.root == "in-place":
         heads[:, :2] = skeleton.heads[root, :2]
@@ -327,22 +333,60 @@ def _placed(
 
 
 def _with_source_transform(
-    source: bpy.types.Object, rotations: NDArray[np.float64], heads: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    places: NDArray[np.float64], rotations: NDArray[np.float64], heads: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Apply the position and rotation of the captured armature in the scene.
+
+    :param places: (T, 4, 4) or (1, 4, 4) from `_places`.
+    :param rotations: (T, B, 3, 3) bone to world.
+    :param heads: (T, 3) metres.
+    :return: the new rotations and heads, and the armature's rotation about the vertical, (T,) or
+        (1,) radians.
+    """
+    parts = [Matrix(place.tolist()).decompose() for place in places]
+    position = np.array([tuple(part[0]) for part in parts])
+    R = np.array([part[1].to_matrix() for part in parts])
+    angles = np.unwrap([part[1].to_euler("ZYX").z for part in parts])
+    return R[:, None] @ rotations, (R @ heads[..., None])[..., 0] + position, angles
+
+
+def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the transform of the captured armature to the world at scene frames (T,), (T, 4, 4);
+    (1, 4, 4) if it does not move.
 
     The trajectory of a root object is included in the motion already, but not the transform of its
     parent. The scale of the armature does not affect the rig.
-
-    :param rotations: (T, B, 3, 3) bone to world.
-    :param heads: (T, 3) metres.
-    :return: the new rotations and heads, and the armature's rotation about the vertical, radians.
     """
     empty = root_object(source)
-    world = world_matrix(source) if empty is None else parent_transform(empty)
-    place, turn, _ = world.decompose()
-    R = np.array(turn.to_matrix())
-    return R @ rotations, heads @ R.T + np.array(place), float(turn.to_euler("ZYX").z)
+    scene = bpy.context.scene
+    if not _is_carried(source):
+        return np.array([_place_of(source, empty)], float)
+    places = []
+    with evaluated(empty or source), current_frame_kept(scene):
+        for frame in frames:
+            whole = math.floor(frame)
+            scene.frame_set(whole, subframe=frame - whole)
+            places.append(_place_of(source, empty))
+    return np.array(places, float)
+
+
+def _place_of(source: bpy.types.Object, empty: bpy.types.Object | None) -> Matrix:
+    return world_matrix(source) if empty is None else parent_transform(empty)
+
+
+def _is_carried(source: bpy.types.Object) -> bool:
+    """Return whether the captured armature, or what it is parented to above its root object, may
+    move.
+    """
+    empty = root_object(source)
+    if empty is None and moved_by(source):
+        return True
+    above = source.parent if empty is None else empty.parent
+    while above is not None:
+        if above.animation_data is not None or moved_by(above):
+            return True
+        above = above.parent
+    return False
 
 
 def _repeat(rig: bpy.types.Object, action: bpy.types.Action, keys: Sequence[BoneMotion]) -> None:

@@ -17,7 +17,7 @@ from scope.scope_addon.scene.character.root_object import (
 from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
 from ..edit.walking import BODY, RATE, motion_of, walk
-from .made_rigs import FBX, build_rig, captured, seen
+from .made_rigs import FBX, FRAMES, build_rig, captured, seen
 
 TURNED = Matrix.LocRotScale(
     (2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3
@@ -120,6 +120,38 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root)
     run(source, rig, root=root, offset=(0.0, 0.0, 0.25))
     wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation) + [0, 0, 0.25]
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
+
+
+def drive_around(obj):
+    """Key an object's place and heading."""
+    for frame, angle in ((1, 0.5), (60, 4.0)):
+        obj.location.y = 5.0 * angle
+        obj.rotation_euler.z = angle
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_euler", frame=frame)
+
+
+@pytest.mark.parametrize("root", ["bone", "object"])
+@pytest.mark.parametrize("carried", ["itself", "by a parent", "root object by a parent"])
+def test_the_rig_follows_a_capture_that_is_carried(source, root, carried):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig, root=root)
+    before = seen(rig, bones)
+    car = source
+    if carried != "itself":
+        car = bpy.data.objects.new("car", None)
+        bpy.context.scene.collection.objects.link(car)
+        source.parent = car
+    drive_around(car)
+    places = rigs_matrices(car, FRAMES)
+    if carried.startswith("root"):
+        move_root_motion_to_object(source, BODY, RATE, in_place=False, heading=True)
+    bpy.context.scene.frame_set(30)
+    run(source, rig, root=root)
+    assert bpy.context.scene.frame_current == 30
+    wanted = before @ np.swapaxes(places[:, :3, :3], 1, 2) + places[:, None, :3, 3]
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=5e-3)
 
 
 def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):

@@ -193,19 +193,25 @@ def _check_own_transform(armature: bpy.types.Object) -> None:
 
     :raises UsageError: keys, drivers or constraints move it.
     """
-    animation = armature.animation_data
-    curves = [*fcurves(armature), *(animation.drivers if animation else ())]
+    if moving := moved_by(armature):
+        raise UsageError(
+            f"the armature '{armature.name}' is itself moved by '{moving[0]}': remove that first, "
+            "or move a parent of the armature instead"
+        )
+
+
+def moved_by(obj: bpy.types.Object) -> list[str]:
+    """Return the properties by whose keys or drivers an object itself moves, and its
+    constraints.
+    """
+    animation = obj.animation_data
+    curves = [*fcurves(obj), *(animation.drivers if animation else ())]
     moving = [
         curve.data_path
         for curve in curves
         if curve.data_path.removeprefix("delta_") in _TRANSFORM and not curve.mute
     ]
-    moving += [each.name for each in armature.constraints if not each.mute]
-    if moving:
-        raise UsageError(
-            f"the armature '{armature.name}' is itself moved by '{moving[0]}': remove that first, "
-            "or move a parent of the armature instead"
-        )
+    return moving + [each.name for each in obj.constraints if not each.mute]
 
 
 def repeat_root_object(empty: bpy.types.Object) -> None:
