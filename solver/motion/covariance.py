@@ -61,8 +61,7 @@ def joint_covariances(
     G = tree.globals
     parts = len(tree.parents)
     W = len(factor.c)
-    C = np.triu(factor.C[:G, :G])
-    shared = np.linalg.pinv(C + np.triu(C, 1).T, hermitian=True)
+    shared = _shared_covariance(factor.C[:G, :G])
     middle = middle_of(T)
     out = ClipCovariance(np.empty((T, parts, 3, 3)), np.empty((T, parts, 3, 3)), shared)
     front = _make_memory(n, W, parts)
@@ -91,6 +90,20 @@ def joint_covariances(
         half,
     )
     return out
+
+
+def _shared_covariance(information: Array) -> Array:
+    """Return the covariance (G, G) of the global columns.
+
+    What nothing fixes, as a column of the shape without measurements and prior, varies as an
+    unknown of the poses does: as if by the least damping alone.
+
+    :param information: (G, G), of which the upper triangle is read.
+    """
+    upper = np.triu(information)
+    values, vectors = np.linalg.eigh(upper + np.triu(upper, 1).T)
+    covariance: Array = vectors / np.maximum(values, MIN_DAMPING) @ vectors.T
+    return covariance
 
 
 def _make_memory(n: int, W: int, parts: int) -> _Memory:

@@ -67,7 +67,7 @@ class MotionFit:
     iterations: int
     rejected: int
     # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only. Millions and more
-    # where nothing fixes a joint's pose; NaN where the cost is not finite
+    # where nothing fixes a joint's pose or the shape; NaN where the cost is not finite
     joint_covariance: Array | None = None
     # (T, K+1, 3, 3) of their positions relative to the root; likewise
     covariance_from_root: Array | None = None

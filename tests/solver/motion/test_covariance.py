@@ -4,9 +4,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scope.solver.gauss_newton.optimizer import MIN_DAMPING
 from scope.solver.motion.band import make_factor
 from scope.solver.motion.covariance import joint_covariances
+from scope.solver.motion.system import GLOBALS
 
 from ..dense import H as TINY
 from ..dense import moved
@@ -91,3 +93,26 @@ def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
         expected = S[f * n + 3 : f * n + 6, f * n + 3 : f * n + 6]
         np.testing.assert_allclose(found[f, 0], expected, rtol=1e-6)
         assert (np.linalg.eigvalsh(found[f]) > 0.0).all()
+
+
+def test_a_column_of_the_shape_that_nothing_fixes_is_unknown():
+    clip = noisy_clip(4, frames=7)
+    problem, poses, system = clip.problem()
+    problem.linearize(0, poses, system)
+    column = P - 1
+    system.N[:, :, GLOBALS + column] = 0.0
+    system.C[column, :] = 0.0
+    system.C[:, column] = 0.0
+    found, from_root, shared = joint_covariances(
+        problem.tree, system, poses, 1.0, make_factor(system)
+    )
+    assert shared[column, column] == pytest.approx(1.0 / MIN_DAMPING)
+    known = np.delete(np.arange(P + 1), column)
+    T, n = len(clip.times), 6 + 3 * K
+    H = dense_matrix(system, T) + MIN_DAMPING * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)])
+    rows = np.r_[: T * n, T * n + known]
+    S = np.linalg.inv(H[np.ix_(rows, rows)])
+    np.testing.assert_allclose(shared[np.ix_(known, known)], S[T * n :, T * n :], rtol=1e-6)
+    # metres^2: the column moves every joint but the root
+    assert (np.trace(found[:, 1:], axis1=2, axis2=3) > 1e4).all()
+    assert (np.trace(from_root[:, 1:], axis1=2, axis2=3) > 1e4).all()
