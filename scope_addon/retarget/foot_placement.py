@@ -20,20 +20,25 @@ So a point that is at rest on the body is at rest on the rig. On a flat foot bot
 same: t times the body's ankle, at the height of the rig's ankle; so a longer foot extends at both
 ends, and nothing jumps. The two goals are blended by a logistic function of the difference in
 height of the points, in favour of the lower one. Neither point penetrates the floor, even where the
-captured foot does.
+captured foot does, unless the person is on a lower floor.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
+from ..edit.clip import Clip
 from ..edit.root_motion import about_z
+from ..kinematics.axes import UP
+from ..kinematics.foot_skin import FootSkin, lower_floors
 from ..kinematics.leg_reach import cross, knee_turn
+from ..kinematics.standing import standing_probability
 from .skeleton import Skeleton, head_positions, rotated
 
 # Thickness of the sole, and length of the heel region.
@@ -183,26 +188,32 @@ def place_feet(
     motion: RigMotion,
     joints: NDArray[np.float64],
     times: NDArray[np.float64],
-    one_floor: bool = True,
+    one_floor: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Move the rig's ankles, and with them heels and balls, to where the body's are.
 
     :param joints: (T, K+1, 3) of the body, metres, world frame.
     :param times: (T,) seconds.
-    :param one_floor: keep feet and toes above the floor; False on uneven ground.
+    :param one_floor: (T,) where feet and toes are kept above the floor; see `frames_on_one_floor`.
     :return: the changed rotations (T, B, 3, 3) and heads (T, B, 3).
     """
     world = motion.rotations.copy()
     heads = motion.heads.copy()
     turns = motion.turns[:, legs.ankles]
     goals = ankle_goal(
-        legs.body, legs.rig, legs.scales, turns, joints[:, legs.joints], one_floor=one_floor
+        legs.body,
+        legs.rig,
+        legs.scales,
+        turns,
+        joints[:, legs.joints],
+        one_floor=one_floor[:, None],
     )
-    if legs.toed and one_floor:
-        balls = (goals + rotated(turns, legs.rig.ball))[:, legs.toed]
+    if legs.toed and one_floor.any():
+        balls = (goals + rotated(turns, legs.rig.ball))[one_floor][:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
-        flat = flat_toes(motion.turns[:, legs.toes], legs.tips, balls, rested)
-        world[:, legs.toes] = flat @ (motion.alignment[legs.toes] @ rig.rotations[legs.toes])
+        flat = flat_toes(motion.turns[one_floor][:, legs.toes], legs.tips, balls, rested)
+        at_rest = motion.alignment[legs.toes] @ rig.rotations[legs.toes]
+        world[np.ix_(np.flatnonzero(one_floor), np.array(legs.toes))] = flat @ at_rest
     heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
     at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
     left = _rows(motion.turns[:, legs.hips, :, 0])  # The axis about which the body's knees bend.
@@ -214,6 +225,20 @@ def place_feet(
     first = legs.hips[0]
     placed += (heads[:, first] - placed[:, first])[:, None]
     return world, placed
+
+
+def frames_on_one_floor(
+    clip: Clip, body: Body, betas: NDArray[np.floating[Any]]
+) -> NDArray[np.bool_]:
+    """Return the (T,) frames in which the feet do not walk or stand on another, lower floor, as at
+    the foot of a stage.
+    """
+    heights = FootSkin(body, betas).heights(*clip.parts(body, betas), UP)
+    contact = standing_probability(clip.soles(body, betas), UP, clip.times)
+    found = np.ones(len(clip), bool)
+    for first, end in lower_floors(heights, contact, clip.times):
+        found[first:end] = False
+    return found
 
 
 def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -279,7 +304,7 @@ def ankle_goal(
     scales: NDArray[np.float64],
     turn: NDArray[np.float64],
     ankle: NDArray[np.float64],
-    one_floor: bool = True,
+    one_floor: NDArray[np.bool_] | bool = True,
 ) -> NDArray[np.float64]:
     """Compute the goals of the rig's ankles, for any number of frames and feet at once.
 
@@ -288,7 +313,7 @@ def ankle_goal(
     :param scales: (3,), t, t and s.
     :param turn: (..., 3, 3) D, the rotation of both feet from rest.
     :param ankle: (..., 3) the body's, metres.
-    :param one_floor: keep the feet above the floor; False on uneven ground.
+    :param one_floor: (...) where feet are kept above the floor.
     :return: (..., 3) metres.
     """
     yaw = _heading(turn)
@@ -308,8 +333,8 @@ def ankle_goal(
     # A weight of 1 means that the ball is in contact.
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))
     goal: NDArray[np.float64] = goals[0] + share[..., None] * (goals[1] - goals[0])
-    if one_floor:
-        goal[..., 2] = np.maximum(goal[..., 2], -np.minimum(rolled[0], rolled[1]))
+    lowest = np.where(one_floor, -np.minimum(rolled[0], rolled[1]), -np.inf)
+    goal[..., 2] = np.maximum(goal[..., 2], lowest)
     return goal
 
 

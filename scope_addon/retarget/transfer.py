@@ -59,14 +59,12 @@ class Transfer:
         bone_map: BoneMap,
         *,
         feet: bool = True,
-        one_floor: bool = True,
         travel: float | None = None,
     ) -> None:
         """Compare both at rest.
 
         :param betas: (P,) shape coefficients of the body.
         :param feet: place the feet where the body's are, scaled; bends the legs a little.
-        :param one_floor: with ``feet``, keep the feet above the floor; False on uneven ground.
         :param travel: scale of positions on the floor; None: the ratio of leg lengths, by which
             heights are scaled in any case. Rigs that share it keep the distances between the people
             in proportion.
@@ -74,7 +72,6 @@ class Transfer:
         self._body = body
         self._betas = betas
         self._rig = rig
-        self._one_floor = one_floor
         index = {part: k for k, part in enumerate(body.joint_names)}
         rest = body.rest_joints(betas) @ R_WORLD_MODEL.T
         row = {
@@ -103,8 +100,12 @@ class Transfer:
             else None
         )
 
-    def pose(self, clip: Clip) -> Pose:
-        """Compute the rig's motion."""
+    def pose(self, clip: Clip, one_floor: NDArray[np.bool_] | bool = True) -> Pose:
+        """Compute the rig's motion.
+
+        :param one_floor: where feet that are placed are kept above the floor, (T,) or in all of the
+            frames; see `frames_on_one_floor`.
+        """
         rig = self._rig
         R, joints = clip.parts(self._body, self._betas)
         turns = self._turns(R @ R_WORLD_MODEL.T)
@@ -116,7 +117,8 @@ class Transfer:
         ]
         if self._legs is not None:
             motion = RigMotion(turns, self._alignment, world, heads)
-            world, heads = place_feet(rig, self._legs, motion, joints, clip.times, self._one_floor)
+            held = np.broadcast_to(one_floor, len(clip))
+            world, heads = place_feet(rig, self._legs, motion, joints, clip.times, held)
         return Pose(world, heads, self._facing)
 
     def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,6 +21,7 @@ from ..errors import UsageError
 from ..notices import PHRASES, Notice, notice
 from ..retarget.bone_map import PHALANGES, SPINE, BoneMap
 from ..retarget.expression_map import ExpressionMap
+from ..retarget.foot_placement import frames_on_one_floor
 from ..retarget.guess import SHAPED, guess
 from ..retarget.rest_pose import rest_faults
 from ..retarget.rig_source import ROOTS
@@ -198,7 +199,9 @@ def retarget(
             skeleton = probe(rig, bone_map.parts)
             place = np.array(rig.matrix_world, float)
             root = skeleton.names.index(bone_map.bone("pelvis") or "")
-            one_floor = not source.get("scope_uneven_ground", False)
+            one_floor = np.zeros(len(clip), bool)
+            if not source.get("scope_uneven_ground", False):
+                one_floor = frames_on_one_floor(clip, body, betas)
             travel = options.travel or leg_ratio(body, betas, skeleton, bone_map)
             pose = Transfer(
                 body,
@@ -206,9 +209,8 @@ def retarget(
                 skeleton,
                 bone_map,
                 feet=options.feet,
-                one_floor=one_floor,
                 travel=travel,
-            ).pose(clip)
+            ).pose(clip, one_floor)
             motion = _placed(places, clip, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = map_notices(rig, bone_map)

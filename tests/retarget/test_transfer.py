@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.scope_addon.retarget.foot_placement import frames_on_one_floor
 from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver.rotations import exp
 
@@ -76,7 +77,7 @@ def test_travel_scales_positions_on_the_floor_and_legs_scale_heights(feet: bool)
         )
 
 
-def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
+def test_feet_go_below_the_floor_only_on_uneven_ground_and_a_lower_floor() -> None:
     """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its
     own metre.
     """
@@ -84,10 +85,27 @@ def test_feet_go_below_the_floor_only_on_uneven_ground() -> None:
     rig = body_rig(scale=1.7)
     ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
     above = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP).heads
-    below = Transfer(BODY, BETAS, rig, same_names(), one_floor=False).pose(lower).heads
+    below = Transfer(BODY, BETAS, rig, same_names()).pose(lower, one_floor=False).heads
     np.testing.assert_allclose(below, above - 1.7 * VERTICAL, atol=0.05)
     held = Transfer(BODY, BETAS, rig, same_names()).pose(lower).heads
     assert held[:, ankles, 2].min() > 0.0
+    stage = Transfer(BODY, BETAS, rig, same_names())
+    on_it = stage.pose(lower, frames_on_one_floor(lower, BODY, BETAS)).heads
+    np.testing.assert_allclose(on_it, below, atol=1e-9)
+
+
+def test_feet_are_kept_above_the_floor_before_they_go_down_to_a_lower_one() -> None:
+    """Somebody walks 20 cm too low, and one metre lower for half a second."""
+    rig = body_rig()
+    ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
+    is_lower = CLIP.times < 0.5
+    root = CLIP.root - np.where(is_lower, 1.0, 0.2)[:, None] * VERTICAL
+    clip = Clip(CLIP.times, CLIP.rotations, root)
+    one_floor = frames_on_one_floor(clip, BODY, BETAS)
+    pose = Transfer(BODY, BETAS, rig, same_names()).pose(clip, one_floor)
+    lowest = pose.heads[:, ankles, 2].min(axis=1)
+    assert lowest[is_lower].max() < -0.5
+    assert lowest[CLIP.times > 0.8].min() > 0.0
 
 
 @pytest.mark.parametrize("feet", [False, True])

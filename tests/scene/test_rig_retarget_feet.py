@@ -123,6 +123,21 @@ def test_feet_of_a_capture_below_the_floor_stay_on_it():
         assert np.abs(moved[STANDS[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
 
 
+def test_feet_of_somebody_on_a_lower_floor_go_down_to_it():
+    clip, _ = rolling_walk()
+    clip.root[:, 2] -= 0.5
+    rig, bone_of = build_rig("mixamo")
+    run(captured(motion_of(clip)), rig)
+    feet = points(rig, [(bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"]) for side in STANDS])
+    scale = leg_length(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"]) / sum(
+        np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}"))
+        for a, b in (("hip", "knee"), ("knee", "ankle"))
+    )
+    for side, (moved, rest) in zip(STANDS, feet, strict=True):
+        on_floor = moved[STANDS[side][:, 1], 1, 2] - rest[1, 2]
+        np.testing.assert_allclose(on_floor, -0.5 * scale, atol=0.02)
+
+
 def test_toes_without_captured_bending_stay_flat():
     rig, bone_of = build_rig("mixamo")
     run(captured(motion_of(rolling_walk(stiff_toes=True)[0])), rig)
