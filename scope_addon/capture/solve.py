@@ -98,6 +98,11 @@ class Person:
         lifted = to_single_precision(prepared.lifted)
         self.prepared = to_single_precision(replace(prepared, track=self.track, lifted=lifted))
 
+    @property
+    def is_size_known(self) -> bool:
+        """Whether the size is given, or seen from several sides, so that no floor corrects it."""
+        return self.prepared.is_stature_given or bool(self.prepared.others)
+
     def fit_alone(self) -> None:
         """Fit one shape, and every frame with it, in the frame's camera."""
         self.fit = to_single_precision(fit_track(self.prepared, self._progress))
@@ -195,17 +200,14 @@ def solve(
     :param tracks: the most prominent person's first.
     :param heights_m: known statures of the first people, metres.
     """
-    return solve_people(shot, prepare(shot, tracks, progress, heights_m), len(heights_m))
+    return solve_people(shot, prepare(shot, tracks, progress, heights_m))
 
 
-def solve_people(shot: Shot, people: Sequence[Person], known: int) -> Solved:
-    """Fit prepared people, the most prominent one first; see `solve`.
-
-    :param known: of how many people, the first ones, the stature is known.
-    """
+def solve_people(shot: Shot, people: Sequence[Person]) -> Solved:
+    """Fit prepared people, the most prominent one first; see `solve`."""
     for person in people:
         person.fit_alone()
-    resize_people(shot, people, known)
+    resize_people(shot, people)
     shot = with_camera_path(shot, people[0])
     iterations = people[0].fit.iterations
     if not shot.is_still:
@@ -262,19 +264,19 @@ def progress_of_person(progress: Progress, number: int, count: int) -> Progress:
     return report
 
 
-def resize_people(shot: Shot, people: Sequence[Person], known: int) -> None:
+def resize_people(shot: Shot, people: Sequence[Person]) -> None:
     """Fit those again whose size contradicts that of somebody of known stature on the same floor.
 
     The camera's travel is not known yet, so with a camera that travels, sizes follow from the
     clip's first places.
-
-    :param known: of how many people, the first ones, the stature is known.
     """
-    if not 0 < known < len(people) or shot.uneven_ground:
+    known = [person.is_size_known for person in people]
+    is_given = any(person.prepared.is_stature_given for person in people)
+    if not is_given or all(known) or shot.uneven_ground:
         return
     placed = [person.fitted_places(shot) for person in people]
     up = world_of(shot, placed).up
-    standers = [stander(each, up, k < known) for k, each in enumerate(placed)]
+    standers = [stander(each, up, sure) for each, sure in zip(placed, known, strict=True)]
     del placed
     return_freed_memory()
     for person, alone, factor in zip(people, standers, relative_sizes(standers), strict=True):

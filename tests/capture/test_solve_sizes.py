@@ -8,10 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.stature import with_stature
-from scope.scope_addon.capture.solve import solve
+from scope.scope_addon.capture.several_views.bundle import CameraPlace
+from scope.scope_addon.capture.several_views.person_in_views import PersonInViews
+from scope.scope_addon.capture.solve import solve, solve_people
 from scope.solver import default_priors
+from scope.solver.rotations import exp
 
-from .standing_people import BODY, seen, steps
+from .standing_people import BODY, T_CAMERA_WORLD, seen, steps
 
 pytestmark = pytest.mark.usefixtures("exact_lifting")
 TALL_M = 1.95
@@ -37,6 +40,40 @@ def test_the_size_of_others_follows_from_a_given_height():
     (_, unknown), (tall, short) = statures
     assert tall == pytest.approx(TALL_M, abs=0.01)
     assert abs(short - SHORT_M) < min(0.6 * abs(unknown - SHORT_M), 0.03)
+
+
+@pytest.mark.parametrize("is_seen_by_both", [False, True])
+def test_a_given_height_corrects_only_whom_no_second_camera_sees(is_seen_by_both):
+    """A second camera at 90° to the first one."""
+    R = exp(np.array([0.0, np.radians(90.0), 0.0]))
+    place = CameraPlace(R, np.array([0.0, 0.0, 3.5]) - R @ np.array([0.0, 0.0, 3.5]))
+    T_other_world = np.eye(4)
+    T_other_world[:3, :3] = R @ T_CAMERA_WORLD[:3, :3]
+    T_other_world[:3, 3] = R @ T_CAMERA_WORLD[:3, 3] + place.t_camera_first
+    shapes = [(shape(TALL_M), -0.6), (shape(SHORT_M), 0.6)]
+    tracks, theirs = (
+        [steps(0.0, betas, right_m, T) for betas, right_m in shapes]
+        for T in (T_CAMERA_WORLD, T_other_world)
+    )
+    shot = seen(tracks[0])
+    resized = []
+
+    class Counted(PersonInViews):
+        def fit_with_height(self, height_m: float) -> None:
+            resized.append(height_m)
+            super().fit_with_height(height_m)
+
+    people = [
+        Counted(shot, own, others, height_m, lambda *_: None)
+        for own, others, height_m in (
+            (tracks[0], [(theirs[0], shot.camera, place)], TALL_M),
+            (tracks[1], [(theirs[1], shot.camera, place)] if is_seen_by_both else [], None),
+        )
+    ]
+    tall, short = (BODY.stature(motion.betas) for motion in solve_people(shot, people).motions)
+    assert tall == pytest.approx(TALL_M, abs=0.01)
+    assert short == pytest.approx(SHORT_M, abs=0.03)
+    assert bool(resized) is not is_seen_by_both
 
 
 def test_the_deviation_of_such_a_size_is_not_that_of_a_given_one():

@@ -130,7 +130,7 @@ def capture_views(
         shot = shot_of(first.video, body, options, footage)
         everyone = same_people([view.people for view in views], matches)
         people, notices = _people_in_views(shot, views, places, everyone, options, progress)
-        solved = solve_people(shot, people, 0)
+        solved = solve_people(shot, people)
         times_s = footage.timestamps / shot.speed
         further = _further_cameras(views, places)
         # No scene begins where the first camera's picture cuts: people move on meanwhile.

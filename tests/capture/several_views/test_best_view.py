@@ -102,7 +102,7 @@ def test_each_hand_comes_from_the_camera_that_sees_it(body):
     second.hands[:, 1, :, 3:6] = -second.hands[:, 1, :, 3:6]
     shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
     person = PersonInViews(shot, first, [(second, CAMERA, place)], None, lambda *_: None)
-    (motion,) = solve_people(shot, [person], 0).motions
+    (motion,) = solve_people(shot, [person]).motions
     assert hand_frames(body, motion) == {"left_hand_frames": T, "right_hand_frames": T}
     # The file has the hands of the first camera's picture.
     at = motion.keypoints2d_names.tolist().index("hand/left_wrist")
