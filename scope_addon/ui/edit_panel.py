@@ -144,11 +144,14 @@ class SCOPE_OT_smooth(EditOperator):
         from ..scene.character.corrected_keys import check_times_of_keys
         from ..scene.character.keys import bake_whole_frames, write_clip
         from ..scene.character.other_curves import restore_whole_motion
+        from ..scene.character.root_object import check_own_action, root_object
         from ..scene.character.uncorrected_keys import write_both
         from ..scene.timing import is_cycle, key_frames, restore_scene_range, store_rate
 
         motion = motion_of(armature)
         check_times_of_keys(armature, motion, rate)
+        if root_object(armature) is not None:  # which goes
+            check_own_action(armature)
         if motion.corrections:  # which are solved again
             keep_machine_code()
         frames = key_frames(motion.timestamps, rate, start_frame(armature))
@@ -260,9 +263,16 @@ class SCOPE_OT_loop(SpanOperator):
         from ..scene.actions import add_cycles, animated_together
         from ..scene.character.keys import location_path, read_clip, write_clip
         from ..scene.character.other_curves import cut_to_cycle
-        from ..scene.character.root_object import clip_with_root_motion, remove_root_object
+        from ..scene.character.root_object import (
+            check_own_action,
+            clip_with_root_motion,
+            remove_root_object,
+            root_object,
+        )
         from ..scene.timing import play_cycle
 
+        if root_object(armature) is not None:  # which goes
+            check_own_action(armature)
         clip, frames = read_clip(armature, body, rate)
         clip = clip_with_root_motion(armature, clip, frames)
         betas = betas_of(armature, body)

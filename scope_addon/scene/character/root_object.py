@@ -26,6 +26,7 @@ from ..actions import (
     fcurves,
     is_cyclic,
     read_keys,
+    used_slot,
 )
 from ..datablocks import remove_blocks
 from ..stored_values import stored_numbers
@@ -154,9 +155,10 @@ def move_root_motion_to_object(
     :param rate: scene frames per second.
     :param in_place: do not animate the object: the person stays where the motion begins.
     :param heading: include the rotation about the vertical.
-    :raises UsageError: when a bone or its keys are missing, the armature's scale is 0, or keys or
-        constraints move the armature itself.
+    :raises UsageError: when a bone or its keys are missing, another object has the same keys, the
+        armature's scale is 0, or keys or constraints move the armature itself.
     """
+    check_own_action(armature)
     clip, frames = read_clip(armature, body, rate)
     if not armature.matrix_basis.median_scale:
         raise UsageError(
@@ -186,6 +188,27 @@ def move_root_motion_to_object(
     empty[_PLACE] = [number for row in place for number in row]
     if is_cyclic(armature):
         repeat_root_object(empty)
+
+
+def check_own_action(armature: bpy.types.Object) -> None:
+    """Check that no other object, such as a linked duplicate, has the same keys: it would lose or
+    double the root motion that they lose or get.
+
+    :raises UsageError: another object has them.
+    """
+    animation = armature.animation_data
+    if animation is None or animation.action is None:
+        return
+    for other in bpy.data.objects:
+        its = other.animation_data
+        if its is None or its.action != animation.action or used_slot(its) != used_slot(animation):
+            continue
+        if other != armature and other.library is None and other.users_scene:
+            raise UsageError(
+                f"'{armature.name}' and '{other.name}' have the same action "
+                f"'{its.action.name}': make it a single user first (Object > Relations > Make "
+                "Single User > Object Animation)"
+            )
 
 
 def _check_own_transform(armature: bpy.types.Object) -> None:
@@ -226,10 +249,11 @@ def move_root_motion_to_bones(armature: bpy.types.Object, body: Body, rate: floa
     restored too.
 
     :param rate: scene frames per second.
-    :raises UsageError: when a bone or its keys are missing.
+    :raises UsageError: when a bone or its keys are missing, or another object has the same keys.
     """
     if root_object(armature) is None:
         return
+    check_own_action(armature)
     clip, frames = read_clip(armature, body, rate)
     write_clip(armature, body, clip_with_root_motion(armature, clip, frames), frames)
     remove_root_object(armature)

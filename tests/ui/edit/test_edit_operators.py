@@ -225,6 +225,43 @@ def test_root_motion_is_not_added_to_what_moves_the_armature_itself(rig, move, b
     assert root_object(rig) is None
 
 
+def linked_duplicate(rig):
+    """Duplicate an armature with Alt+D."""
+    bpy.ops.object.select_all(action="DESELECT")
+    rig.select_set(True)
+    bpy.ops.object.duplicate(linked=True)
+    copy = bpy.context.object
+    bpy.context.view_layer.objects.active = rig
+    return copy
+
+
+def test_a_linked_duplicate_keeps_its_root_motion(rig):
+    copy = linked_duplicate(rig)
+    before = seen(copy)
+    with pytest.raises(RuntimeError, match="'walk' and 'walk.001' have the same action"):
+        bpy.ops.scope.root_motion(mode="OBJECT")
+    bpy.ops.object.make_single_user(
+        type="SELECTED_OBJECTS", object=False, obdata=False, material=False, animation=True
+    )
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    assert root_object(rig) is not None
+    np.testing.assert_allclose(seen(copy), before, atol=1e-6)
+
+
+def test_a_linked_duplicate_on_the_same_root_object_does_not_move_twice(rig):
+    bpy.ops.scope.root_motion(mode="OBJECT")
+    copy = linked_duplicate(rig)
+    before = seen(copy)
+    for change in (
+        lambda: bpy.ops.scope.root_motion(mode="BONES"),
+        lambda: bpy.ops.scope.smooth(),
+        lambda: bpy.ops.scope.loop(start=5, end=85),
+    ):
+        with pytest.raises(RuntimeError, match="have the same action"):
+            change()
+    np.testing.assert_array_equal(seen(copy), before)
+
+
 def test_a_failed_edit_restores_keys_and_root(rig, monkeypatch):
     bpy.ops.scope.root_motion(mode="OBJECT")
     before = seen(rig)
