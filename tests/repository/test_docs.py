@@ -312,7 +312,7 @@ def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
     page = (DOCS / "command_line.md").read_text("utf-8")
     words = shlex.split(re.search(r"## capture\n\n```sh\n\./scripts/(.+)", page)[1], comments=True)
     (folder / "walk.mp4").symlink_to(SAMPLE)
-    assert main([*words, "--quality", "fast", "--end", "0.3", "--json"]) == 0
+    assert main([*words, "--quality", "fast", "--end", "0.1", "--json"]) == 0
     report = json.loads(capfd.readouterr().out)
     written = [
         word
@@ -346,7 +346,7 @@ def test_the_captures_of_the_readme_are_run(words, folder):
     (folder / "walk.mp4").symlink_to(SAMPLE)
     for name in ("left.mp4", "right.mp4"):
         shutil.copy(SAMPLE, folder / name)
-    assert main([*words, "--quality", "fast", "--end", "0.2", "--quiet"]) == 0
+    assert main([*words, "--quality", "fast", "--end", "0.1", "--quiet"]) == 0
     written = [
         word for before, word in zip(words, words[1:], strict=False) if before in ("-o", "--report")
     ]

@@ -53,7 +53,7 @@ def test_the_notebook_captures_shows_fits_and_plots(
     monkeypatch.chdir(tmp_path)
     content = json.loads(NOTEBOOK.read_text("utf-8"))
     assert all(not cell.get("outputs") for cell in content["cells"])
-    cells = json.loads(json.dumps(content["cells"]).replace("END_S = 1.0", "END_S = 0.2"))
+    cells = json.loads(json.dumps(content["cells"]).replace("END_S = 1.0", "END_S = 0.1"))
     names: dict[str, Any] = {}
     video, page, plot = run(cells, names)
     for shown in (video, page):
