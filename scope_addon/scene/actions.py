@@ -213,6 +213,22 @@ def read_keys(curve: bpy.types.FCurve) -> NDArray[np.float32]:
     return coordinates.reshape(-1, 2)
 
 
+def values_between_keys(
+    curve: bpy.types.FCurve, frames: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Evaluate a curve at frames (T,) as its keys and their repetition have it, without its other
+    modifiers: these are added to whatever keys are written from the values.
+    """
+    added = [m for m in curve.modifiers if m.type != "CYCLES" and not m.mute]
+    try:
+        for modifier in added:
+            modifier.mute = True
+        return np.array([curve.evaluate(frame) for frame in frames])
+    finally:
+        for modifier in added:
+            modifier.mute = False
+
+
 def rewrite_keys(
     curve: bpy.types.FCurve,
     frames: NDArray[np.float64],

@@ -34,6 +34,7 @@ from ..actions import (
     fcurves,
     read_keys,
     rewrite_keys,
+    values_between_keys,
 )
 from ..timing import whole_frames_of
 from .animation import on_one_hemisphere
@@ -248,11 +249,13 @@ def _curves(armature: bpy.types.Object, body: Body) -> dict[str, list[bpy.types.
 
 
 def _values(curve: bpy.types.FCurve, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Evaluate the curve at frames (T,); if these are its keys, read them, which is much faster."""
+    """Evaluate the curve's keys at frames (T,); if these are theirs, read them, which is much
+    faster.
+    """
     keys = read_keys(curve)
     if len(keys) == len(frames) and (keys[:, 0] == frames).all():
         return keys[:, 1].astype(float)
-    return np.array([curve.evaluate(frame) for frame in frames])
+    return values_between_keys(curve, frames)
 
 
 def _check_bones(armature: bpy.types.Object, body: Body) -> None:

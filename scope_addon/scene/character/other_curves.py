@@ -22,7 +22,15 @@ from ....solver.body import Body
 from ...motion import Motion
 from ...notices import REASONS
 from ...review_spans import find_review_spans
-from ..actions import Channels, bone_property_path, fcurves, read_keys, rewrite_keys, shape_key_path
+from ..actions import (
+    Channels,
+    bone_property_path,
+    fcurves,
+    read_keys,
+    rewrite_keys,
+    shape_key_path,
+    values_between_keys,
+)
 from ..datablocks import shape_keys_of
 from ..stored_values import in_scene
 from .body_mesh import shape_key_name
@@ -65,7 +73,7 @@ def cut_to_cycle(armature: bpy.types.Object, body: Body, first: float, last: flo
         is_constant = len(frames) == 1 or interpolation == _CONSTANT
         inside = (frames > first) & (frames < last)
         at = np.array([first]) if len(frames) == 1 else np.r_[first, frames[inside], last]
-        kept = np.array([curve.evaluate(frame) for frame in at])
+        kept = values_between_keys(curve, at)
         rewrite_keys(curve, at, kept, _CONSTANT if is_constant else "LINEAR")
 
 

@@ -442,6 +442,18 @@ def test_baking_to_rates(rig):
     np.testing.assert_allclose(keys(rig)[1], 1 + np.arange(91))
 
 
+def test_a_modifier_of_a_curve_is_not_baked_into_its_keys_beside_it(rig):
+    bpy.ops.scope.reduce_keys(degrees=5.0)
+    curve = next(curve for curve in fcurves(rig) if curve.data_path.endswith("location"))
+    noise = curve.modifiers.new("NOISE")
+    noise.strength = 0.5
+    noise.scale = 8.0
+    before = seen(rig)
+    bpy.ops.scope.bake_rate()
+    assert [(each.type, each.mute) for each in curve.modifiers] == [("NOISE", False)]
+    np.testing.assert_allclose(seen(rig), before, atol=0.01)
+
+
 def test_edits_need_a_captured_armature_and_find_the_only_one():
     assert not bpy.ops.scope.smooth.poll()
     bpy.ops.object.empty_add()
