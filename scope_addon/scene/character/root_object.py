@@ -29,6 +29,7 @@ from ..actions import (
     used_slot,
 )
 from ..datablocks import remove_blocks
+from ..packed_motion import apart_at_cuts
 from ..stored_values import stored_numbers
 from ..timing import Retiming
 from ..visibility import world_matrix
@@ -133,7 +134,8 @@ def remove_root_object(armature: bpy.types.Object) -> None:
     if empty is None:
         return
     if _PLACE in empty:
-        armature.matrix_basis = _place(empty) @ Matrix.Scale(armature.matrix_basis.median_scale, 4)
+        size = armature.matrix_basis.median_scale
+        armature.matrix_basis = _place_now(empty) @ Matrix.Scale(size, 4)
     _copy_parenting(top, empty)
     _remove_unless_parent(empty)
 
@@ -175,11 +177,12 @@ def move_root_motion_to_object(
         place = Matrix.LocRotScale(seen.translation, seen.to_quaternion(), None)
         armature.matrix_basis = Matrix.Scale(seen.median_scale, 4)
     else:
-        place = _place(former)
+        place = _place_now(former)
     size = armature.matrix_basis.median_scale
     height = place.translation.z
     clip = _moved(clip, Matrix.Translation((0, 0, -height)) @ place, size)
-    positions, angles = floor_trajectory(clip, heading=heading)
+    apart = apart_at_cuts(armature, clip, rate)
+    positions, angles = floor_trajectory(apart, heading=heading)
     write_clip(armature, body, relative_to_trajectory(clip, positions, angles), frames)
     positions = size * positions + [0.0, 0.0, height]
     empty = parent_to_root_object(
@@ -356,6 +359,20 @@ def _place(empty: bpy.types.Object) -> Matrix:
     numbers = stored_numbers(empty, _PLACE)
     place = Matrix([numbers[k : k + 4] for k in (0, 4, 8, 12)]) if len(numbers) == 16 else Matrix()
     return place if abs(place.determinant() - 1.0) < _RIGID else Matrix()
+
+
+def _place_now(empty: bpy.types.Object) -> Matrix:
+    """Return the transform that the armature gets back: that of `_place`, moved over the floor like
+    an empty at rest since its trajectory was stored.
+    """
+    place = _place(empty)
+    rows = _unused_trajectory(empty)
+    if rows is None:
+        return place
+    _, x, y, angle = rows[0]
+    turn = Matrix.Rotation(empty.rotation_euler.z - angle, 4, "Z")
+    there = Matrix.Translation((empty.location.x, empty.location.y, 0.0))
+    return there @ turn @ Matrix.Translation((-x, -y, 0.0)) @ place
 
 
 def _moved(clip: Clip, place: Matrix, size: float) -> Clip:

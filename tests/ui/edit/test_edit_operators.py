@@ -167,6 +167,27 @@ def test_root_motion_looks_the_same_and_comes_back(rig, heading):
     assert not [o for o in bpy.data.objects if "scope_root" in o]
 
 
+@pytest.mark.parametrize("mode", ["OBJECT", "BONES", "smooth"])
+def test_an_empty_that_was_moved_in_place_takes_the_whole_motion_along(rig, mode):
+    rig.location.y = 0.4
+    before = seen(rig)
+    clip = keys(rig)[0]
+    bpy.ops.scope.root_motion(mode="IN_PLACE")
+    empty = root_object(rig)
+    start = np.array(empty.location)
+    empty.location.x += 3.0
+    empty.rotation_euler.z += 0.7
+    if mode == "smooth":
+        bpy.ops.scope.smooth()
+    else:
+        bpy.ops.scope.root_motion(mode=mode)
+    turn = exp([0.0, 0.0, 0.7])
+    wanted = (before - start) @ turn.T + start + [3.0, 0.0, 0.0]
+    np.testing.assert_allclose(seen(rig), wanted, atol=1e-2 if mode == "smooth" else 5e-4)
+    if mode == "BONES":
+        np.testing.assert_allclose(keys(rig)[0].root, clip.root, atol=1e-4)
+
+
 @pytest.fixture
 def stage():
     """An animated object that is also moved, rotated, tilted and scaled."""
