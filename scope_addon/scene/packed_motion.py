@@ -11,11 +11,16 @@ copies a text, and undo stores it again only if it changes.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import bpy
 
+from ...solver.errors import ScopeError
+from ..edit.clip import Clip
 from ..errors import MotionFileError, UsageError
 from ..motion import Motion
+from ..scene_gaps import with_scene_gaps
+from .stored_values import start_frame
 
 # property of the armature: the text, or the path of a motion file in older .blend files
 MOTION = "scope_motion"
@@ -76,6 +81,19 @@ def stored_motion(armature: bpy.types.Object) -> Motion:
         "the cache; capture the "
         "footage again, or import its .npz file"
     )
+
+
+def apart_at_cuts(armature: bpy.types.Object, clip: Clip, rate: float) -> Clip:
+    """Return the keys of an armature with gaps in their times at the cuts of the footage, so that
+    they can be filtered; as they are where the motion is lost.
+
+    :param rate: scene frames per second.
+    """
+    try:
+        cuts_s = stored_motion(armature).cuts_s
+    except ScopeError:
+        return clip
+    return replace(clip, times=with_scene_gaps(clip.times, cuts_s + start_frame(armature) / rate))
 
 
 def stored_keys(armature: bpy.types.Object) -> object:

@@ -40,6 +40,7 @@ from .character.root_object import (
     topmost,
 )
 from .face_retarget import captured_expressions, face_keys, key_face, rest_face
+from .packed_motion import apart_at_cuts
 from .rig_action import (
     clear_offsets,
     leave_tweak_mode,
@@ -211,7 +212,8 @@ def retarget(
                 feet=options.feet,
                 travel=travel,
             ).pose(clip, one_floor)
-            motion = _placed(places, clip, skeleton, place, pose, root, options)
+            apart = apart_at_cuts(source, clip, rate)
+            motion = _placed(places, apart, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
             warnings = map_notices(rig, bone_map)
             warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)

@@ -5,18 +5,28 @@ goes without trace.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.scene.character.keys import read_clip
 from scope.scope_addon.scene.character.root_object import (
+    move_root_motion_to_object,
     parent_to_root_object,
     parent_transform,
     remove_root_object,
     removed_root_motion,
     root_object,
 )
+from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.scene.timing import scene_rate
+from scope.solver.rotations import exp
+
+from ...edit.walking import BODY, motion_of, walk
+from ..made_rigs import captured
 
 FRAMES = np.array([1.0, 11.0, 21.0])
 POSITIONS = np.array([[1.0, 2.0, 0.5], [2.0, 2.0, 0.5], [2.0, 4.0, 0.5]])
@@ -67,6 +77,20 @@ def test_the_armature_follows_the_trajectory_and_its_parent():
     assert (root_object(armature), armature.parent) == (None, group)
     assert "hero_root" not in bpy.data.objects
     assert len(bpy.data.actions) == actions - 1
+
+
+def test_the_heading_of_one_scene_has_nothing_of_the_next():
+    """In place, somebody who stands looks ahead until the cut, after which another one stands."""
+    still = walk(2.0, speed=0.0)
+    still.rotations[30:, 0] = exp(np.array([0.0, 0.0, 1.5])) @ still.rotations[0, 0]
+    motion = replace(motion_of(still), scene_starts=[30])
+    armature = captured(motion)
+    pack_motion(armature, motion.to_bytes())
+    rate = scene_rate(bpy.context.scene)
+    move_root_motion_to_object(armature, BODY, rate, in_place=True, heading=True)
+    clip = read_clip(armature, BODY, rate)[0]
+    expected = np.tile(still.rotations[0, 0], (len(clip), 1, 1))
+    np.testing.assert_allclose(clip.rotations[:, 0], expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("in_place", [False, True])
