@@ -347,7 +347,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .report.capture_page import CapturedClip, write_capture_page
 
     confine(args, outputs)
-    rigs = checked_rigs(args, outputs, args.hands != OFF)
+    rigs = checked_rigs(args, outputs, args.hands != OFF, args.face)
     with ExitStack() as stack:
         progress = stack.enter_context(ProgressBar(sys.stderr, show=not args.quiet))
         if not args.views and (found := window_report(args, video, options, progress)):
@@ -431,7 +431,7 @@ def run_batch(args: argparse.Namespace) -> dict[str, Any]:
         raise UsageError(f"--jobs must be at least 1, not {args.jobs}")
     clips = [Path(args.out) / f"clip{suffix}" for suffix in formats]
     check_blender(clips)
-    rigs = checked_rigs(args, clips, args.hands != OFF)
+    rigs = checked_rigs(args, clips, args.hands != OFF, args.face)
     _, options = body_and_options(args)
     check_networks(options)  # an unusable network is reported once, before the first clip
     extras = Extras(args.overlays, args.reports)

@@ -99,6 +99,30 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (
+            [
+                *("capture", "--retarget", "{tmp}/rig.glb", "--expression-map", "{tmp}/face.json"),
+                *("-o", "{tmp}/a.glb"),
+            ],
+            2,
+            "only --face captures",
+        ),
+        (["capture", "--bvh-unit", "m", "-o", "{tmp}/a.glb"], 2, "-o OUT.bvh"),
+        (["capture", "--shape-keys", "baked", "-o", "{tmp}/a.npz"], 2, "-o OUT.glb"),
+        (["capture", "--shape-keys", "baked", "-o", "{tmp}/a.bvh"], 2, "-o OUT.glb"),
+        (
+            [
+                *("capture", "--shape-keys", "baked", "--retarget", "{tmp}/rig.glb"),
+                *("-o", "{tmp}/a.glb"),
+            ],
+            2,
+            "either --shape-keys or --retarget",
+        ),
+        (
+            ["batch", "{tmp}", "--out", "{tmp}", "--formats", "npz", "--bvh-unit", "m"],
+            2,
+            "-o OUT.bvh",
+        ),
+        (
             ["capture", str(SAMPLE), "second.mp4", "-o", "{tmp}/a.npz"],
             1,
             "second.mp4",

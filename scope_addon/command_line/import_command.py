@@ -64,7 +64,9 @@ def run_import(args: argparse.Namespace) -> dict[str, Any]:
     people = import_motions(args.motion, values["body"], values["up_axis"], values["motion_rate"])
     motions = [person.motion for person in people]
     body = people[0].body
-    rigs = checked_rigs(args, outputs, motions[0].joint_count > len(SKELETONS[24].joint_names))
+    has_fingers = motions[0].joint_count > len(SKELETONS[24].joint_names)
+    has_expressions = any(motion.face for motion in motions)
+    rigs = checked_rigs(args, outputs, has_fingers, has_expressions)
     written, warnings = write_outputs(outputs, motions, body, args.motion, args, rigs)
     notes = dict.fromkeys(note for person in people for note in person.notes)
     warnings = [*notes, *warnings]

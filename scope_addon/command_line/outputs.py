@@ -200,24 +200,50 @@ def distinct_paths(outputs: list[Path]) -> list[Path]:
     return list(by_real_path.values())
 
 
-def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -> list[RigSource]:
-    """Check the user's rigs before the capture starts and return them; none without --retarget.
+def _check_output_options(args: argparse.Namespace, outputs: list[Path]) -> None:
+    """Check that each option which says how an output is written has such an output.
 
-    :param fingers: whether the motion has fingers.
-    :raises ScopeError: a rig cannot be used, or the arguments contradict each other.
+    :raises UsageError: it has none.
     """
+    suffixes = {path.suffix.lower() for path in outputs}.difference(WITHOUT_SCENE)
     if args.skeleton != option("skeleton").default:
-        named = [path for path in outputs if path.suffix.lower() not in (*WITHOUT_SCENE, ".blend")]
         if args.retarget:
             raise UsageError(
                 "--skeleton names the bones of Scope's own body, and a rig keeps its own: give "
                 "either --skeleton or --retarget"
             )
-        if not named:
+        if not suffixes - {".blend"}:
             raise UsageError(
                 "--skeleton needs an output whose bones it can name, such as -o OUT.fbx; motion "
                 "files and .blend files keep Scope's names"
             )
+    if args.shape_keys != option("shape").default:
+        if args.retarget:
+            raise UsageError(
+                "--shape-keys says how the shape of Scope's own body is stored, and a rig keeps "
+                "its own: give either --shape-keys or --retarget"
+            )
+        if not suffixes - {".bvh"}:
+            raise UsageError(
+                "--shape-keys needs an output with the body's mesh, such as -o OUT.glb, or "
+                "--formats glb in a batch"
+            )
+    if args.bvh_unit != option("bvh_unit").default and ".bvh" not in suffixes:
+        raise UsageError(
+            "--bvh-unit needs an output in .bvh: give -o OUT.bvh, or --formats bvh in a batch"
+        )
+
+
+def checked_rigs(
+    args: argparse.Namespace, outputs: list[Path], fingers: bool, face: bool
+) -> list[RigSource]:
+    """Check the user's rigs before the capture starts and return them; none without --retarget.
+
+    :param fingers: whether the motion has fingers.
+    :param face: whether it has expressions.
+    :raises ScopeError: a rig cannot be used, or the arguments contradict each other.
+    """
+    _check_output_options(args, outputs)
     of_rigs = {
         "--rig-object": args.rig_object,
         "--bone-map": args.bone_map,
@@ -230,6 +256,12 @@ def checked_rigs(args: argparse.Namespace, outputs: list[Path], fingers: bool) -
             if value:
                 raise UsageError(f"{flag} applies to a rig: give the rig's file with --retarget")
         return []
+    if args.expression_map and not face:
+        raise UsageError(
+            f"--expression-map maps expressions, which {args.motion} does not have: leave it out"
+            if args.command == "import"
+            else "--expression-map maps expressions, which only --face captures: give it too"
+        )
     scene_files = [p for p in outputs if p.suffix.lower() not in WITHOUT_SCENE]
     if not scene_files:
         raise UsageError(

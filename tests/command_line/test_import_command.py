@@ -67,6 +67,13 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
         (["walk.npz", "--bone-map", "bones.json"], 2, "--retarget"),
         (["walk.npz", "--expression-map", "face.json"], 2, "--retarget"),
         (["walk.npz", "--retarget", "rig.glb"], 1, "rig.glb"),
+        (
+            ["walk.npz", "--retarget", "rig.glb", "--expression-map", "face.json"],
+            2,
+            "expressions, which walk.npz does not have",
+        ),
+        (["walk.npz", "--bvh-unit", "m"], 2, "-o OUT.bvh"),
+        (["walk.npz", "--shape-keys", "baked", "-o", "out.bvh"], 2, "-o OUT.glb"),
         (["walk.npz", *TWO_RIGS], 2, "2 rigs need 2 outputs"),
         (["walk.npz", *TWO_RIGS, "-o", "a.glb", "-o", "a.npz"], 2, "but there is 1"),
         (
