@@ -24,7 +24,7 @@ from ..notices import Notice, notice
 from . import camera, timing
 from .actions import Channels
 from .budget import check_content, check_last_frame
-from .capture_parts import is_part, parts_of, tag_part
+from .capture_parts import parts_of, tag_part
 from .character import animation, armature, body_mesh, expression_keys, other_curves
 from .character.armature import remove_unused_ring
 from .character.correction_list import store_corrections
@@ -37,6 +37,7 @@ from .datablocks import (
     captures_of,
     check_local,
     enter_object_mode,
+    is_part,
     remove_blocks,
     short_name,
 )

@@ -13,9 +13,8 @@ import bpy
 
 from .camera import view_number
 from .character.root_object import ROOT_TAG
-from .datablocks import is_person
+from .datablocks import PART_TAG, is_part, is_person
 
-_PART_TAG = "scope_part"  # custom property of a body, of a camera and of a person's action
 # names that bodies and cameras were built with
 _BODY_NAME = re.compile(r"_body(\.\d{3,})?$")
 _CAMERA_NAME = re.compile(r"_camera\d*(\.\d{3,})?$")
@@ -23,12 +22,7 @@ _CAMERA_NAME = re.compile(r"_camera\d*(\.\d{3,})?$")
 
 def tag_part(block: bpy.types.ID) -> None:
     """Mark a body, camera or action as made for the capture whose collection it is in."""
-    block[_PART_TAG] = True
-
-
-def is_part(block: bpy.types.ID) -> bool:
-    """Return whether a datablock was marked as made for a capture."""
-    return _PART_TAG in block
+    block[PART_TAG] = True
 
 
 def cameras_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -37,7 +31,7 @@ def cameras_in(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """
     cameras = [obj for obj in collection.all_objects if obj.type == "CAMERA"]
     if _is_tagged(collection):
-        cameras = [camera for camera in cameras if _PART_TAG in camera]
+        cameras = [camera for camera in cameras if is_part(camera)]
     return sorted(cameras, key=_place_of)
 
 
@@ -62,7 +56,7 @@ def _place_of(camera: bpy.types.Object) -> int:
 
 
 def _is_tagged(collection: bpy.types.Collection) -> bool:
-    return any(_PART_TAG in obj for obj in collection.all_objects)
+    return any(is_part(obj) for obj in collection.all_objects)
 
 
 def _is_part(obj: bpy.types.Object, tagged: bool) -> bool:
@@ -71,7 +65,7 @@ def _is_part(obj: bpy.types.Object, tagged: bool) -> bool:
     if ROOT_TAG in obj:  # which a rig that the motion was retargeted to may have, too
         return not obj.children or any(map(is_person, obj.children_recursive))
     if tagged:
-        return _PART_TAG in obj
+        return is_part(obj)
     if obj.type == "CAMERA":
         return view_number(obj) is not None or bool(_CAMERA_NAME.search(obj.name))
     # A body knows its bones, also after its armature was deleted; so does what was given its

@@ -22,6 +22,8 @@ NAME_TAG = "scope_name"
 # custom property of a capture's collection: the names of its markers on the timeline, by lines
 MARKERS = "scope_markers"
 SOURCE_TAG = "scope_source"  # custom property of a captured armature: what it was captured from
+# custom property of what was made for a capture: a body, a camera, the action of a person
+PART_TAG = "scope_part"
 # Kinds of datablock that a file or a capture may contain, users before the datablocks that they
 # use. Shape keys go with their mesh, and ``temporary_scene`` removes scenes.
 _KINDS = (
@@ -69,6 +71,13 @@ def captures_of(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
 def is_person(obj: bpy.types.Object) -> bool:
     """Return whether an object is the armature of a captured person."""
     return SOURCE_TAG in obj
+
+
+def is_part(block: bpy.types.ID) -> bool:
+    """Return whether a body, camera or action was made for a capture; those from before it was
+    stored do not say so.
+    """
+    return PART_TAG in block
 
 
 def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:

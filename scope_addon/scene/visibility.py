@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import bpy
 from mathutils import Matrix
 
-from .datablocks import found, is_in_layer
+from .datablocks import found, is_in_layer, is_part
 
 # Custom property of objects hidden here, so that those hidden by the user stay hidden. Its value
 # says whether the object stays hidden or is only shown temporarily.
@@ -37,8 +37,8 @@ def show(
 
     :param temporarily: until ``hide_again``.
     """
-    for obj in _person(armature, view_layer):
-        if _HIDDEN not in obj:
+    for obj in (armature, *armature.children):
+        if _HIDDEN not in obj or not is_in_layer(view_layer, obj):
             continue
         if not temporarily:
             del obj[_HIDDEN]
@@ -57,9 +57,12 @@ def hide_again(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> N
 
 
 def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """Return armature and body, without objects outside the view layer, which cannot be hidden."""
-    person = [armature, *(obj for obj in armature.children if obj.type == "MESH")]
-    return [obj for obj in person if is_in_layer(view_layer, obj)]
+    """Return armature and body, without objects outside the view layer, which cannot be hidden, and
+    without what the user has parented to the armature.
+    """
+    meshes = [obj for obj in armature.children if obj.type == "MESH"]
+    bodies = [mesh for mesh in meshes if is_part(mesh)] or meshes  # older ones are not marked
+    return [obj for obj in (armature, *bodies) if is_in_layer(view_layer, obj)]
 
 
 @contextmanager

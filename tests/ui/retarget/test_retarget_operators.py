@@ -170,6 +170,19 @@ def test_the_captured_persons_collection_may_be_excluded_from_the_view_layer(rig
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
 
+def test_what_the_user_has_parented_to_the_captured_armature_is_not_hidden_with_it(rig):
+    source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
+    sword = bpy.data.objects.new("sword", bpy.data.meshes.new("sword"))
+    bpy.context.scene.collection.objects.link(sword)
+    sword.parent = source
+    bpy.ops.scope.retarget()
+    body = next(obj for obj in source.children if obj != sword)
+    assert body.hide_render
+    assert body.hide_get()
+    assert not sword.hide_render
+    assert not sword.hide_get()
+
+
 def test_a_hidden_body_is_shown_temporarily_for_comparison(rig):
     layer = bpy.context.view_layer
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
