@@ -22,7 +22,7 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
-    """Return `value` as contiguous float64.
+    """Return `value` as contiguous float64 that can be written to.
 
     :param value: an array, or lists of numbers, of `shape`; what numpy's masked arrays mask becomes
         NaN.
@@ -30,7 +30,7 @@ def as_array(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Arra
     :param name: what the array is, as a message begins.
     :raises ShapeError: it has another shape, or is not an array of numbers.
     """
-    array = np.ascontiguousarray(_numbers(value, shape, name))
+    array = _writable(np.ascontiguousarray(_numbers(value, shape, name)))
     if array.shape == shape and array.ndim:
         return array
     if len(shape) != np.ndim(value) or any(
@@ -65,7 +65,7 @@ def as_numbers(value: ArrayLike, name: str) -> Array:
 
 
 def as_integers(value: ArrayLike, name: str) -> Array:
-    """Return `value` as contiguous int64 (n,).
+    """Return `value` as contiguous int64 (n,) that can be written to.
 
     :raises ShapeError: it is not a list of whole numbers, or is a masked array that masks one.
     """
@@ -78,7 +78,7 @@ def as_integers(value: ArrayLike, name: str) -> Array:
         raise ShapeError(
             f"{name} must be integers of shape (n,), but got {array.dtype} of shape {array.shape}."
         )
-    return np.ascontiguousarray(array, dtype=np.int64)
+    return _writable(np.ascontiguousarray(array, dtype=np.int64))
 
 
 def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Array]:
@@ -114,6 +114,13 @@ def described(value: Any) -> str:
         return f"an array of {value.dtype} of shape {value.shape}"
     kind = type(value).__name__
     return f"{'an' if kind[0] in 'aeioAEIO' else 'a'} {kind}"
+
+
+def _writable(array: Array) -> Array:
+    """Return the array, or a copy of one that is read-only: numba would compile every kernel anew
+    that it is given to.
+    """
+    return array if array.flags.writeable else array.copy()
 
 
 def _masked(value: np.ma.MaskedArray[Any, Any]) -> Array:

@@ -17,7 +17,9 @@ from scope.solver import (
     fit,
     fit_clip,
     make_tree,
+    measurements,
     rotations,
+    validation,
 )
 from scope.solver.gauss_newton.optimizer import optimize
 from scope.solver.gauss_newton.terms import pack_priors
@@ -106,6 +108,34 @@ def test_three_hundred_coefficients_over_a_clip():
         for f, m in zip(found.frames, clip, strict=True)
     ]
     assert np.sqrt(np.mean(np.square(residual))) < 0.01
+
+
+def test_measurements_that_cannot_be_written_to_need_no_other_machine_code():
+    body = random_body(np.random.default_rng(3), 4, 2, 6)
+    points = forward(body, *random_state(np.random.default_rng(4), 4, 2))[2]
+    confidence = np.full(6, 0.5)
+    arrays = [np.arange(6), INTRINSICS.copy(), project(points), confidence, points]
+    indices, K, pixels, confidence, points = arrays
+
+    def fitted():
+        seen2d = Keypoints2D(indices, pixels, confidence)
+        seen3d = Keypoints3D(indices, points, confidence)
+        return fit(body, Measurements(K, keypoints2d=seen2d, keypoints3d=seen3d))
+
+    kernels = [
+        each
+        for module in (measurements, validation)
+        for each in vars(module).values()
+        if hasattr(each, "signatures")
+    ]
+    expected = fitted()
+    compiled = [len(each.signatures) for each in kernels]
+    assert len(kernels) > 5
+    for array in arrays:
+        array.flags.writeable = False
+    found = fitted()
+    assert [len(each.signatures) for each in kernels] == compiled
+    np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
 
 
 def test_arrays_that_cannot_be_written_to_need_no_other_machine_code():
