@@ -96,3 +96,26 @@ def test_no_other_python_is_taken_for_one_that_cannot_be_used(
     assert not list(program.glob("**/bin/activate"))
     assert not (program / ".venv" / "bin").exists()
     assert not (program / "build").exists()
+
+
+@pytest.mark.parametrize(("version", "status"), [("3.13", 0), ("", 127)])
+def test_an_environment_of_another_python_than_the_named_one_is_said_and_kept(
+    program: Path, version: str, status: int
+) -> None:
+    (program / "solver").mkdir()
+    (program / "assets" / "networks").mkdir(parents=True)
+    (program / "assets" / "networks" / "built.json").touch()
+    first = program / "first"
+    make_python(first, "3.11")
+    assert run(program, "setup", str(first)).returncode == 0
+    named = program / "named"
+    make_python(named, version, status)
+    done = run(program, "setup", str(named))
+    assert done.returncode == 1
+    assert f".venv has Python 3.11, and PYTHON={named} is another one" in done.stderr
+    assert (program / ".venv" / "bin" / "python").read_text() == first.read_text()
+    # Another path of the same version, and none at all, go on as before.
+    make_python(named, "3.11")
+    for python in (str(named), ""):
+        done = run(program, "setup", python)
+        assert (done.returncode, done.stderr) == (0, "")
