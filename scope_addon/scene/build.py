@@ -328,8 +328,9 @@ def _check(motion: Motion, body: Body) -> None:
 def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
     """Remove a capture's people, camera, footage, actions and markers, and its collection.
 
-    Objects of the user's in the collection stay where they are, in the scene's own collection, and
-    so does data that something else uses, assets, and what the user keeps by a fake user.
+    Objects of the user's in the collection stay where they are, in each scene's own collection if
+    they are in no other. So does data that something else uses, assets, and what the user keeps by
+    a fake user.
     """
     enter_object_mode(bpy.context.view_layer)
     own = parts_of(collection)
@@ -338,12 +339,10 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
         place = world_matrix(child)
         child.parent = None
         child.matrix_world = place
-    kept = [obj for obj in collection.all_objects if obj not in own]
-    for obj in kept:
-        if obj.name not in scene.collection.objects:
-            scene.collection.objects.link(obj)
-    _remove_markers(scene, collection)
     collections = [collection, *collection.children_recursive]
+    for obj in [obj for obj in collection.all_objects if obj not in own]:
+        _keep_in_scenes(obj, collections)
+    _remove_markers(scene, collection)
     remove_blocks(own)
     bpy.data.batch_remove(collections)
     # What the objects used is free now, unless something else uses it too; actions are freed by the
@@ -353,6 +352,16 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
         used = [block for block in used if block not in unused]
         bpy.data.batch_remove(unused)
     remove_unused_ring()
+
+
+def _keep_in_scenes(obj: bpy.types.Object, collections: Sequence[bpy.types.Collection]) -> None:
+    """Keep an object in its scenes when some collections are removed."""
+    others = set(obj.users_collection) - set(collections)
+    for scene in obj.users_scene:
+        if scene.library is None and others.isdisjoint(
+            (scene.collection, *scene.collection.children_recursive)
+        ):
+            scene.collection.objects.link(obj)
 
 
 def _is_kept(block: bpy.types.ID) -> bool:

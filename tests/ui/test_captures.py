@@ -393,6 +393,21 @@ def test_what_the_user_has_put_into_a_capture_is_not_deleted_with_it(
     assert rig.parent == path
 
 
+def test_the_users_objects_stay_in_every_scene_that_had_the_capture(fake_worker, footage):
+    collection = capture(fake_worker, footage)
+    scene = bpy.context.scene
+    shot = bpy.data.scenes.new("Shot")
+    shot.collection.children.link(collection)
+    props = bpy.data.collections.new("Props")
+    shot.collection.children.link(props)
+    for name in ("chair", "table"):
+        collection.objects.link(bpy.data.objects.new(name, None))
+    props.objects.link(bpy.data.objects["table"])
+    bpy.ops.scope.delete_capture()
+    assert sorted(scene.objects.keys()) == sorted(shot.objects.keys()) == ["chair", "table"]
+    assert shot.collection.objects.keys() == ["chair"]
+
+
 def test_the_users_own_actions_are_not_deleted_with_a_capture(fake_worker, footage):
     capture(fake_worker, footage)
     person = bpy.data.objects["person"]
