@@ -47,11 +47,18 @@ def shown_capture(scene: bpy.types.Scene) -> bpy.types.Collection | None:
 def hide_others(scene: bpy.types.Scene, shown: Collection[bpy.types.Collection]) -> None:
     """Hide all captures but the new ones, in whose place they are, in viewports and renders.
 
-    Whoever selects one in the list shows it again.
+    Whoever selects one in the list shows it again. One that another scene has too stays shown, as
+    it would be hidden there as well.
     """
+    elsewhere = {
+        each
+        for other in bpy.data.scenes
+        if other != scene
+        for each in other.collection.children_recursive
+    }
     for capture in captures_of(scene):
         is_local = capture.library is None and not capture.hide_viewport
-        if capture not in shown and is_local:
+        if capture not in shown and capture not in elsewhere and is_local:
             capture.hide_viewport = capture.hide_render = True
             capture[_HIDDEN] = True
 

@@ -320,6 +320,17 @@ def test_a_new_capture_hides_the_earlier_ones_and_the_list_shows_them_again(two,
     assert bpy.data.collections["other"].hide_viewport
 
 
+def test_a_new_capture_hides_none_that_another_scene_has_too(two):
+    select("person")
+    person = bpy.data.collections["person"]
+    shot = bpy.data.scenes.new("Shot")
+    shot.collection.children.link(person)
+    hide_others(bpy.context.scene, [])
+    assert not person.hide_render
+    assert not person.hide_viewport
+    assert bpy.data.collections["other"].hide_render
+
+
 def test_several_motions_that_are_imported_together_do_not_hide_each_other(two, standing, tmp_path):
     for number in (1, 2):
         standing.save(tmp_path / f"take{number}.npz")
