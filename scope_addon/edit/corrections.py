@@ -263,9 +263,12 @@ def _check_span(first: int, last: int) -> None:
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:
     """Return the corrections with a new one; a pin replaces the same joint's pin in the same frame.
 
-    The same exchange or flip a second time undoes the first, so that neither remains. An upright
-    line and a floor move the world that those before have made, so that one of each remains. An
-    interpolation replaces those within its span. Feet are put on the floor that was corrected last.
+    The same exchange or flip a second time undoes the first, so that neither remains. Where sides
+    are exchanged, what was flipped or rests has the other side's name. An upright line and a floor
+    move the world that those before have made, so that one of each remains. An interpolation
+    replaces those within its span. Feet are put on the floor that was corrected last.
+
+    :raises UsageError: sides are exchanged in some frames only of a flip or of what rests.
     """
     if isinstance(new, Upright | Floor):
         return _moved_on(corrections, new)
@@ -273,7 +276,9 @@ def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correct
         others = tuple(c for c in corrections if not isinstance(c, FeetOnFloor))
         return (*others, replace(new, height=floor_height(corrections)))
     if isinstance(new, Exchange | DepthFlip) and new in corrections:
-        return tuple(c for c in corrections if c != new)
+        return without(corrections, corrections.index(new))
+    if isinstance(new, Exchange):
+        return (*_renamed(corrections, new), new)
     if isinstance(new, Interpolation):
         corrections = tuple(
             c for c in corrections if not (isinstance(c, Interpolation) and _is_within(c, new))
@@ -285,6 +290,53 @@ def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correct
             if not (isinstance(c, Pin) and (c.frame, c.joint) == (new.frame, new.joint))
         )
     return corrections if new in corrections else (*corrections, new)
+
+
+def without(corrections: tuple[Correction, ...], index: int) -> tuple[Correction, ...]:
+    """Return the corrections without one. Where sides are no longer exchanged, what was flipped or
+    rests has the other side's name.
+
+    :raises UsageError: sides were exchanged in some frames only of a flip or of what rests.
+    """
+    kept = (*corrections[:index], *corrections[index + 1 :])
+    gone = corrections[index]
+    return _renamed(kept, gone) if isinstance(gone, Exchange) else kept
+
+
+def _renamed(corrections: tuple[Correction, ...], exchange: Exchange) -> tuple[Correction, ...]:
+    """Return the corrections with the other side's name for the limbs of flips and contacts in the
+    span of an exchange that is added or removed: they are meant for a limb where it is.
+
+    :raises UsageError: one of them is only partly in that span.
+    """
+    out: list[Correction] = []
+    for each in corrections:
+        if not isinstance(each, DepthFlip | Contact) or not _is_exchanged(each.part, exchange):
+            out.append(each)
+            continue
+        if each.last < exchange.first or exchange.last < each.first:
+            out.append(each)
+            continue
+        if each.first < exchange.first or exchange.last < each.last:
+            part = f"{each.part}_foot" if each.part in FEET else each.part
+            raise UsageError(
+                f"the correction of the {part.replace('_', ' ')} in frames {each.first} to "
+                f"{each.last} is only partly in frames {exchange.first} to {exchange.last}, in "
+                "which left and right would change; remove it first, and add it again afterwards"
+            )
+        side, joined, kind = each.part.partition("_")
+        other = "right" if side == "left" else "left"
+        out.append(replace(each, part=f"{other}{joined}{kind}"))
+    return tuple(out)
+
+
+def _is_exchanged(part: str, exchange: Exchange) -> bool:
+    """Return whether a flipped or resting part belongs to the limbs of an exchange."""
+    side, _, kind = part.partition("_")
+    if side not in FEET:
+        return False
+    limbs = "arms" if kind in ("arm", "forearm", "hand", "elbow") else "legs"
+    return exchange.limbs in ("both", limbs)
 
 
 def removed(

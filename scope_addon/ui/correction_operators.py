@@ -528,8 +528,11 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
     ) -> str:
         """Remove it and change the keys back.
 
-        :raises UsageError: there is no correction of this number.
+        :raises UsageError: there is no correction of this number, or sides were exchanged by it in
+            some frames only of another one.
         """
+        from ..edit.corrections import without
+
         count = len(listed_corrections(armature))
         if self.index >= count:
             raise UsageError(
@@ -545,9 +548,7 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
                 armature,
                 body,
                 rate,
-                lambda present: tuple(
-                    c for k, c in enumerate(present) if self.index >= 0 and k != self.index
-                ),
+                lambda present: without(present, self.index) if self.index >= 0 else (),
             )
         return ""
 

@@ -14,10 +14,12 @@ from scope.scope_addon.edit.corrected_motion import (
 )
 from scope.scope_addon.edit.corrections import (
     Contact,
+    DepthFlip,
     Exchange,
     FeetOnFloor,
     Interpolation,
     Pin,
+    added,
 )
 from scope.scope_addon.edit.smooth import smoothed
 from scope.scope_addon.edit.solve_pins import missed
@@ -25,7 +27,7 @@ from scope.scope_addon.edit.spans import swap_sides
 from scope.scope_addon.errors import MotionFileError
 from scope.scope_addon.kinematics.smoothing import smooth_rotations
 from scope.scope_addon.motion import CORRECTION_KEYS, Motion
-from scope.solver.rotations import log
+from scope.solver.rotations import exp, log
 
 from ..made_motion import made_motion
 from .walking import BODY, NAMES, RATE, angle, motion_of, walk
@@ -132,6 +134,21 @@ def test_limbs_that_are_not_exchanged_stay_as_they_were(limbs, kept):
     before, after = (clip_from_motion(BODY, m, raw=False) for m in (MOTION, exchanged))
     assert angle(before.rotations, after.rotations)[:, others].max() < 1e-6
     assert angle(before.rotations, after.rotations).max() > 0.1
+
+
+def test_a_flipped_arm_stays_flipped_when_arms_are_exchanged_afterwards():
+    clip = walk(3.0)
+    clip.rotations[:, NAMES.index("left_elbow")] = exp(np.array([0.0, -0.9, 0.0]))
+    clip.rotations[:, NAMES.index("left_shoulder")] = exp(np.array([0.0, -0.5, -0.9]))
+    captured = motion_of(clip)
+    flips = (DepthFlip(30, 60, "left_arm"),)
+    flipped = clip_from_motion(BODY, with_corrections(captured, BODY, flips), raw=False)
+    expected = swap_sides(flipped, BODY, flipped.times[30], flipped.times[60], "arms")
+    both = with_corrections(captured, BODY, added(flips, Exchange(30, 60, "arms")))
+    found = clip_from_motion(BODY, both, raw=False)
+    wrists = [NAMES.index(f"{side}_wrist") for side in ("left", "right")]
+    off = (found.joints(BODY, captured.betas) - expected.joints(BODY, captured.betas))[36:55]
+    assert np.linalg.norm(off[:, wrists], axis=-1).max() < 0.02
 
 
 @pytest.mark.parametrize("limbs", ["legs", "both", "arms"])

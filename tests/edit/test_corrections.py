@@ -23,6 +23,7 @@ from scope.scope_addon.edit.corrections import (
     from_arrays,
     removed,
     to_arrays,
+    without,
 )
 from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.errors import MotionFileError, UsageError
@@ -55,6 +56,41 @@ def test_arrays_give_the_corrections_back(tmp_path, corrections):
     with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
         assert from_arrays(file) == corrections
     assert from_arrays({}) == ()
+
+
+def test_exchanged_limbs_keep_their_flips_and_contacts_under_the_other_name():
+    arms = (DepthFlip(40, 80, "left_arm"), DepthFlip(50, 60, "right_forearm"))
+    legs = (Contact(42, 46, "left"), DepthFlip(40, 44, "right_shin"), Contact(50, 55, "left_knee"))
+    others = (DepthFlip(40, 80, "body"), Contact(41, 45, "back"), Contact(90, 95, "left"))
+    new_arms = (DepthFlip(40, 80, "right_arm"), DepthFlip(50, 60, "left_forearm"))
+    new_legs = (
+        Contact(42, 46, "right"),
+        DepthFlip(40, 44, "left_shin"),
+        Contact(50, 55, "right_knee"),
+    )
+    present = (*arms, *legs, *others)
+    for limbs, expected in (
+        ("arms", (*new_arms, *legs, *others)),
+        ("legs", (*arms, *new_legs, *others)),
+        ("both", (*new_arms, *new_legs, *others)),
+    ):
+        exchange = Exchange(40, 80, limbs)
+        exchanged = added(present, exchange)
+        assert exchanged == (*expected, exchange)
+        assert added(exchanged, exchange) == present
+        assert without(exchanged, len(present)) == present
+    assert without(present, 1) == (*present[:1], *present[2:])
+
+
+@pytest.mark.parametrize("span", [(50, 90), (30, 70), (45, 55)])
+def test_sides_are_not_exchanged_in_a_part_of_a_flip(span):
+    flips = (DepthFlip(40, 80, "left_arm"),)
+    with pytest.raises(UsageError, match="left arm in frames 40 to 80 is only partly"):
+        added(flips, Exchange(*span, "arms"))
+    assert added(flips, Exchange(*span, "legs"))[0] == flips[0]
+    later = (Exchange(*span, "both"), *flips)  # The flip was added to what is shown.
+    with pytest.raises(UsageError, match="remove it first"):
+        without(later, 0)
 
 
 def test_damaged_arrays_are_an_error():
