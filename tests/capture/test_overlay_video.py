@@ -284,6 +284,19 @@ def test_cancelling_leaves_no_file_and_keeps_an_existing_one(tmp_path, footage, 
     assert (tmp_path / "overlay.mp4").read_bytes() == b"the last one"
 
 
+def test_the_progress_of_a_part_is_that_of_its_frames(tmp_path, footage, body):
+    seen = []
+    write_overlay(
+        tmp_path / "overlay.mp4",
+        footage,
+        [standing(body, [5, 6, 7])],
+        body,
+        progress=lambda done, total: seen.append((done, total)),
+        wanted=VideoRange(start_s=0.2),
+    )
+    assert seen == [(done, 5) for done in range(1, 6)]
+
+
 @pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])
 def test_a_range_without_frames_is_an_error_and_leaves_no_file(tmp_path, footage, body, name):
     with pytest.raises(

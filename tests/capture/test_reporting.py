@@ -4,6 +4,8 @@
 What a report says of feet that are not on the floor, for motions whose heights are known.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture import reporting
@@ -43,6 +45,17 @@ def test_blinks_are_counted_and_related_to_the_time_in_which_the_face_was_seen(m
         "blinks_per_minute": 20.0,
         "jaw_open": 0.8,
     }
+
+
+def test_blinks_are_related_to_the_times_of_frames_whose_rate_varies(motion):
+    lids = np.zeros(T)
+    lids[10:14] = lids[100:103] = 0.9
+    times_s = np.cumsum(np.where(np.arange(T) < 90, 1.0, 2.0)) / RATE
+    varying = replace(motion, timestamps=times_s)
+    varying.face = made_face(T, eyeBlinkLeft=lids, eyeBlinkRight=lids)
+    varying.face["expression_confidence"][180:] = 0.0
+    # Seen for 3 s and 6 s, in as many frames.
+    assert face_frames(varying)["blinks_per_minute"] == pytest.approx(2 / 9 * 60, abs=0.05)
 
 
 def test_one_eye_alone_is_a_wink(motion):

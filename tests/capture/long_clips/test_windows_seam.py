@@ -16,6 +16,7 @@ from scope.scope_addon.capture.long_clips.windows import (
     same_people,
 )
 from scope.scope_addon.capture.tracking.track import Tracklet
+from scope.scope_addon.scene_gaps import SCENE_GAP_S
 
 # pixels; frames
 SIDE = 200.0
@@ -44,6 +45,16 @@ def windows(before: dict[int, Tracklet], after: dict[int, Tracklet]) -> tuple[Ob
     first.
     """
     return record(BEFORE, 0, BEFORE - OVERLAP, before), record(40, OVERLAP, 40, after)
+
+
+@pytest.mark.parametrize("speed", [1.0, 8.0])
+def test_the_gap_at_a_cut_is_as_long_in_what_slow_motion_shows(speed: float) -> None:
+    observed = record(40, 0, 40, {0: tracklet(range(40), 100.0)})
+    observed.cut_rows = [15]
+    ((track,), _) = observed.tracks(1, speed=speed)
+    steps_s = np.diff(track.times) / speed
+    assert steps_s[14] == pytest.approx(SCENE_GAP_S + 1 / 30 / speed)
+    np.testing.assert_allclose(np.delete(steps_s, 14), 1 / 30 / speed)
 
 
 def test_people_in_the_same_places_are_the_same_whatever_their_numbers() -> None:

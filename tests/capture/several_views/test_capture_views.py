@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Captures of two real cameras, and footage that several cameras cannot use."""
 
+import re
 from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
@@ -55,6 +56,9 @@ def test_two_cameras_halve_the_error_of_one(shared):
     first, second = (np.load(folder / f"truth_cam{k}.npz") for k in (1, 4))
     (motion,) = captured.motions
     place = captured.report.views[1]
+    lens = captured.report.camera
+    assert re.fullmatch(r"estimated, \d+ degrees ± \d+ %, adjusted to the other cameras", lens)
+    assert captured.report.focal_deviation == captured.report.views[0]["focal_deviation"] > 0
     np.testing.assert_allclose(
         motion.views["view_from_camera"][0, :3, :3], place["R_camera_first"], atol=1e-5
     )
