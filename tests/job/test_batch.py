@@ -26,7 +26,7 @@ from scope.solver.errors import InputError
 from .processes import runs, wait_for
 
 RECORD = r"\.[ab]\.finished-[0-9a-f]{16}\.json"  # of a clip's results
-FRAMES = 31  # of the sample clip up to --end 1, both ends included
+FRAMES = 10  # of the sample clip up to --end 0.3, both ends included
 
 # Replaces the capture: the clip's text decides the outcome, and every call is logged in the folder
 # of the clips. What "hangs" runs until its standard input ends, what "lingers" also does after it
@@ -322,7 +322,7 @@ def test_a_clip_that_was_finished_when_the_batch_was_killed_is_not_captured_agai
         "--quality",
         "fast",
         "--end",
-        "1",
+        "0.3",
     ]
     program = [sys.executable, str(tmp_path / "clip.py")]
     code = f"import sys\nfrom scope.scope_addon.cli import main\nmain({argv}, program={program})\n"
@@ -380,7 +380,7 @@ def test_the_clips_of_a_killed_batch_end_and_leave_no_partial_file(tmp_path, at)
         "cli.run()\n"
     )
     argv = ["batch", str(clips), "--out", str(out), "--jobs", "2", "--formats", "npz", "--overlays"]
-    argv += ["--quality", "fast", "--end", "1", "--threads", "1"]
+    argv += ["--quality", "fast", "--end", "0.3", "--threads", "1"]
     code = (
         "import sys\n"
         "from scope.scope_addon.cli import main\n"
@@ -544,7 +544,7 @@ def test_the_real_capture_of_a_folder(tmp_path, capfd):
     shutil.copy(SAMPLE, clips / "walk.mp4")
     (clips / "text.mp4").write_text("this is not a video")
     argv = ["batch", str(clips), "--out", str(tmp_path / "out"), "--jobs", "2", "--formats", "npz"]
-    argv += ["--quality", "fast", "--end", "0.3", "--threads", "1", "--json"]
+    argv += ["--quality", "fast", "--end", "0.1", "--threads", "1", "--json"]
     assert main(argv) == 1
     report = json.loads(capfd.readouterr().out)
     entries = {e["file"]: e for e in report["files"]}
@@ -552,7 +552,7 @@ def test_the_real_capture_of_a_folder(tmp_path, capfd):
     assert entries["walk.mp4"]["outputs"] == ["walk.npz"]
     assert entries["walk.mp4"]["report"]["people"] == 1
     assert "text.mp4" in entries["text.mp4"]["message"]
-    assert report["options"] == {"--quality": "fast", "--end": "0.3", "--threads": "1"}
+    assert report["options"] == {"--quality": "fast", "--end": "0.1", "--threads": "1"}
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [REPORT_NAME, "walk.npz"]
 
 
