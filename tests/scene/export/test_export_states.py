@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.root_object import move_root_motion_to_object
@@ -222,7 +223,8 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
 
 def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path):
     jaw = np.array([0.0, 0.3, 0.9, 0.2, 0.5])
-    motion = replace(make_motion(whole_body, 5), face=made_face(5, jawOpen=jaw))
+    face = made_face(5, jawOpen=jaw, eyeBlinkLeft=0.4)
+    motion = replace(make_motion(whole_body, 5), face=face)
     person = build_scene([motion], whole_body, options=BuildOptions(frame_rate="set")).people[0]
     kept = [_to_nla(block, 40) for block in (person.armature, person.mesh.data.shape_keys)]
     actions_before = set(bpy.data.actions)
@@ -230,7 +232,10 @@ def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path):
     assert [(animation.action, animation.use_nla) for animation in kept] == [(None, True)] * 2
     assert set(bpy.data.actions) == actions_before
     weights = morph_animation(tmp_path / "talk.glb")
+    assert list(weights)[-52:] == list(EXPRESSIONS)
     np.testing.assert_allclose(weights["jawOpen"], jaw, atol=1e-5)
+    np.testing.assert_allclose(weights["eyeBlinkLeft"], 0.4, atol=1e-5)
+    assert not weights["mouthSmileLeft"].any()
     np.testing.assert_allclose(weights["Shape000"], motion.betas[0], atol=1e-5)
 
 
