@@ -41,7 +41,11 @@ def lowest(armature, frame=FRAME):
     graph = bpy.context.evaluated_depsgraph_get()
     mesh = next(o for o in bpy.context.scene.objects if o.type == "MESH" and o.parent == armature)
     posed = mesh.evaluated_get(graph)
-    return min((posed.matrix_world @ v.co).z for v in posed.to_mesh().vertices)
+    vertices = posed.to_mesh().vertices
+    places = np.empty(3 * len(vertices), np.float32)
+    vertices.foreach_get("co", places)
+    up = np.array(posed.matrix_world)[2]
+    return float((places.reshape(-1, 3) @ up[:3]).min() + up[3])
 
 
 def from_camera(armature):

@@ -290,8 +290,9 @@ def test_a_floor_after_feet_on_the_floor_moves_them_and_snapping_again_puts_them
     bpy.ops.scope.refloor()
     scene = bpy.context.scene
     camera = next(o for o in scene.objects if o.type == "CAMERA")
-    high = max(range(10, 80), key=lambda frame: lowest(rig)[frame - 1])
-    height = lowest(rig)[high - 1]
+    heights = lowest(rig)
+    high = max(range(10, 80), key=lambda frame: heights[frame - 1])
+    height = heights[high - 1]
     z = camera.matrix_world.translation.z
     assert height > 0.005
     scene.frame_set(high)
