@@ -29,8 +29,8 @@ from .character.other_curves import MARKER_NAMES
 from .character.root_object import retime_unused_trajectory, root_object
 from .datablocks import MARKERS, captures_of, holds, shape_keys_of
 from .face_retarget import faces_of
-from .rig_action import is_retargeted, retime_written_keys, source_of
-from .stored_values import FrameSpan, parse_spans, start_frame, stored_text
+from .rig_action import is_retargeted, retime_written_keys
+from .stored_values import FrameSpan, parse_spans, source_of, start_frame, stored_text
 from .timing import Retiming, action_strips, retime_keys, retime_strip
 
 _MARKER = re.compile(rf"((?:person \d+ )?(?:{'|'.join(MARKER_NAMES.values())})) (\S+)")

@@ -15,13 +15,11 @@ from ...solver.rotations import quaternion_from_matrix
 from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import Channels, bone_path, fcurves_of, nla_strips, read_keys
 from .character.animation import on_one_hemisphere
-from .stored_values import stored_text
+from .stored_values import KEYS_OF, source_of
 from .timing import Retiming, retime_keys
 
-# Custom properties of an action: the checksum of its keys when they were written, and the captured
-# armature's name.
+# custom property of an action: the checksum of its keys when they were written
 _CHECKSUM = "scope_keys"
-_SOURCE = "scope_keys_of"
 # channels of a bone beside its rotation, and their values at rest
 _OFFSETS = {"location": 0.0, "scale": 1.0}
 
@@ -89,7 +87,7 @@ def mark_written(action: bpy.types.Action, source: str = "") -> None:
     """
     action[_CHECKSUM] = _checksum(action)
     if source:
-        action[_SOURCE] = source
+        action[KEYS_OF] = source
 
 
 def follow_renaming(names: dict[str, str]) -> None:
@@ -98,7 +96,7 @@ def follow_renaming(names: dict[str, str]) -> None:
     """
     for action in bpy.data.actions:
         if action.library is None and (name := names.get(source_of(action))):
-            action[_SOURCE] = name
+            action[KEYS_OF] = name
 
 
 def clear_offsets(rig: bpy.types.Object, bones: Iterable[str]) -> None:
@@ -137,7 +135,7 @@ def retire(former: bpy.types.Action | None, source: str) -> None:
     """
     if former is None:
         return
-    is_same = former.get(_SOURCE, source) == source
+    is_same = former.get(KEYS_OF, source) == source
     if is_same and former.get(_CHECKSUM) == _checksum(former) and former.users == 0:
         bpy.data.actions.remove(former)
     else:
@@ -155,13 +153,6 @@ def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
 def is_retargeted(action: bpy.types.Action) -> bool:
     """Return whether retargeting has written the action."""
     return _CHECKSUM in action
-
-
-def source_of(action: bpy.types.Action) -> str:
-    """Return the name of the captured armature whose motion retargeting has written to the action;
-    empty if unknown.
-    """
-    return stored_text(action, _SOURCE)
 
 
 def _checksum(action: bpy.types.Action) -> str:

@@ -24,6 +24,8 @@ LAST_FRAME = 1_048_574  # of Blender's timeline; the first one is its negative
 RATES = 0.01, 32767.0
 # custom property of an armature: the scene's frame rate for which its keys were written
 RATE = "scope_rate"
+# custom property of an action: the name of the captured armature whose motion retargeting wrote
+KEYS_OF = "scope_keys_of"
 _LARGEST = 1e9  # of numbers in a list
 _SPAN = re.compile(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", re.ASCII)
 
@@ -56,6 +58,13 @@ def stored_text(block: bpy.types.ID, name: str) -> str:
     """Return a text; empty if the property is missing or something else."""
     value = block.get(name)
     return value if isinstance(value, str) else ""
+
+
+def source_of(action: bpy.types.Action) -> str:
+    """Return the name of the captured armature whose motion retargeting has written to an action;
+    empty if unknown.
+    """
+    return stored_text(action, KEYS_OF)
 
 
 def start_frame(armature: bpy.types.Object) -> float:

@@ -15,7 +15,7 @@ from ..errors import UsageError
 from ..scene.datablocks import NAME_TAG, SOURCE_TAG, short_name
 from ..scene.stored_values import start_frame, stored_text
 from . import comparison
-from .captured_person import PERSON, captured_armature, motion_of
+from .captured_person import captured_armature, motion_of, stored_person
 from .captures import show_again, shown_capture
 from .reporting import ReportingOperator, refuse, rpt_, tip_
 
@@ -25,7 +25,8 @@ def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     without one.
     """
     active = context.view_layer.objects.active if context.view_layer else None
-    return active if active is not None and active.get(PERSON) else captured_armature(context)
+    is_rig = active is not None and bool(stored_person(active))
+    return active if is_rig else captured_armature(context)
 
 
 class ActionOperator(ReportingOperator):
@@ -291,7 +292,9 @@ def _captured(armature: bpy.types.Object) -> bpy.types.Object:
     """Return the captured armature whose motion an armature has; the armature itself if that is
     unknown.
     """
-    person = armature.get(PERSON)
+    person = stored_person(armature)
+    if isinstance(person, str):
+        person = bpy.data.objects.get(person)
     return person if isinstance(person, bpy.types.Object) else armature
 
 

@@ -12,7 +12,7 @@ from bpy.props import IntProperty
 
 from ..errors import UsageError
 from ..scene.datablocks import holds, is_person
-from ..scene.stored_values import stored_numbers, stored_text
+from ..scene.stored_values import source_of, stored_numbers, stored_text
 from .reporting import ReportingOperator, refuse, tip_
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     while obj is not None:
         if is_person(obj):
             return obj
-        person = _retargeted_from(context.scene, obj)
+        person = retargeted_from(context.scene, obj)
         if person is not None:
             return person
         found = [child for child in obj.children if is_person(child)]
@@ -51,9 +51,21 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
 
 
-def _retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:
+def stored_person(rig: bpy.types.Object) -> bpy.types.Object | str | None:
+    """Return the captured armature that a rig was retargeted from, or its name.
+
+    Blender does not save what a library override of a rig stores, but its action.
+    """
+    person: bpy.types.Object | str | None = rig.get(PERSON)
+    animation = rig.animation_data
+    if person is not None or rig.override_library is None or animation is None:
+        return person
+    return source_of(animation.action) if animation.action is not None else None
+
+
+def retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:
     """Return the captured armature in the scene that a rig was retargeted from."""
-    person = rig.get(PERSON)
+    person = stored_person(rig)
     if isinstance(person, str):
         person = scene.objects.get(person)
     if not isinstance(person, bpy.types.Object) or not is_person(person):

@@ -17,7 +17,7 @@ from ..errors import UsageError
 from ..options import Place
 from ..output_paths import person_paths
 from ..scene.datablocks import captures_of, holds
-from .captured_person import PERSON, body_of, motion_of
+from .captured_person import body_of, motion_of, stored_person
 from .captures import people_of, shown_capture
 from .comparison import cameras_of
 from .declared_properties import with_options
@@ -369,7 +369,7 @@ def _check_available(kind: str) -> None:
 
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
-    person = rig.get(PERSON)  # an object, or its name in older .blend files; None if it was deleted
+    person = stored_person(rig)  # None if it was deleted
     if isinstance(person, bpy.types.Object):
         return next((c.name for c in collections if holds(c, person)), "")
     return next(

@@ -11,7 +11,13 @@ from ...solver.errors import ScopeError
 from ..notices import Notice, notice
 from ..scene.datablocks import holds
 from ..scene.stored_values import parse_spans, spans_text, start_frame, stored_rate
-from .captured_person import PERSON, body_of, captured_people, library_of, motion_of
+from .captured_person import (
+    body_of,
+    captured_people,
+    library_of,
+    motion_of,
+    retargeted_from,
+)
 from .captures import people_of, shown_capture
 from .reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning, tip_
 
@@ -114,7 +120,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
             read_clip(person, body, former)
         keyed = {person: keyed_rate(person, scene) for person in people}
         motions = {person: _motion(person) for person in people}
-        rigs = [(obj, obj[PERSON]) for obj in scene.objects if obj.get(PERSON) in people]
+        sources = {obj: retargeted_from(scene, obj) for obj in scene.objects}
+        rigs = [(obj, person) for obj, person in sources.items() if person in people]
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
         with all_or_nothing(scene, *people, *(rig for rig, _ in rigs), *cameras):
             warnings = change_rate(scene, rate, motions, rigs)

@@ -8,7 +8,7 @@ from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import PARTS
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
-from scope.scope_addon.ui.captured_person import captured_armature
+from scope.scope_addon.ui.captured_person import captured_armature, retargeted_from
 from scope.scope_addon.ui.retarget_panel import offered_parts
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
@@ -431,9 +431,9 @@ def test_a_library_override_is_animated_and_saved(tmp_path, root):
     assert np.ptp(moving[:, 0, 1]) > 1.0
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
-    np.testing.assert_allclose(
-        seen(bpy.context.scene.scope_retarget.rig, ["pelvis", "hand_l"]), moving, atol=1e-4
-    )
+    rig = bpy.context.scene.scope_retarget.rig
+    np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
+    assert retargeted_from(bpy.context.scene, rig) == bpy.data.objects["walk"]
 
 
 def test_a_rig_outside_the_view_layer_is_an_error(rig):
