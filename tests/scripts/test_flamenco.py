@@ -124,9 +124,9 @@ def test_the_commands_capture(folder, tmp_path):
     blender = tmp_path / "blender"
     blender.write_text(BLENDER.format(python=sys.executable))
     blender.chmod(0o755)
-    (task,) = compiled(given(folder, formats="npz", quality="fast", options="--end 0.3"))["tasks"]
+    (task,) = compiled(given(folder, formats="npz", quality="fast", options="--end 0.1"))["tasks"]
     (command,) = (each["parameters"] for each in task["commands"])
     subprocess.run(
         [command["exe"].replace("{blender}", str(blender)), *command["args"]], check=True
     )
-    assert Motion.load(folder.parent / "out" / "walk.npz").frames.size == 10
+    assert Motion.load(folder.parent / "out" / "walk.npz").frames.size == 4
