@@ -59,10 +59,13 @@ def change_rate(
     own = {p: frame_range([p]) for p in people}
     played = _played(scene, people)
     done: _Done = set()
-    for person, retiming in moves.items():
-        for datablock in _datablocks(person):
-            _retime(datablock, retiming, done)
-        if (root := root_object(person)) is not None:
+    # each once, as duplicates of a person share the root object
+    blocks = {block: moves[person] for person in people for block in _datablocks(person)}
+    roots = {root_object(person): moves[person] for person in people}
+    for datablock, retiming in blocks.items():
+        _retime(datablock, retiming, done)
+    for root, retiming in roots.items():
+        if root is not None:
             retime_unused_trajectory(root, retiming)
     _retime_rigs(rigs, moves, done)
     _retime_faces(scene, moves)

@@ -181,6 +181,26 @@ def test_root_motion_on_an_object_moves_along(scene, mode):
     assert np.ptp(at_times(person, ["pelvis"])[:, 0, 1]) > 1.5
 
 
+@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
+def test_a_root_object_that_a_duplicate_has_too_moves_once(scene, mode):
+    person = built()
+    bpy.ops.scope.root_motion(mode=mode)
+    if mode == "OBJECT":
+        push_to_nla(person.parent)
+    bpy.ops.object.select_all(action="DESELECT")
+    person.select_set(True)
+    bpy.ops.object.duplicate()
+    assert bpy.context.object.parent == person.parent
+    bpy.context.view_layer.objects.active = person
+    before = at_times(person, NAMES)
+    bpy.ops.scope.match_frame_rate()
+    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
+    if mode == "IN_PLACE":
+        bpy.ops.scope.root_motion(mode="BONES")
+        path = at_times(person, ["pelvis"])[:, 0, 1]
+        np.testing.assert_allclose(np.diff(path) / np.diff(TIMES), -1.2, atol=0.1)
+
+
 def test_nla_strips_and_their_actions_move(scene):
     person = built()
     bpy.ops.scope.push_to_nla()
