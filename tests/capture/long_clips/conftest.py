@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,6 +21,7 @@ from scope.scope_addon.capture.frame_observer import FrameObserver
 from scope.scope_addon.capture.long_clips.windowed_clip import lasting
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video import Video, open_video
+from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.observe import observe
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
@@ -33,14 +35,14 @@ from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
 BODY = load_body("scope")
 RED = (220, 30, 30)
 BLUE = (30, 30, 220)
-# three windows: frames 0 to 59, 60 to 119, and the rest
-FPS = 30
-FRAMES = 210
+# three windows: frames 0 to 29, 30 to 59, and the rest
+FPS = 15
+FRAMES = 105
 WINDOW_S = 2.0
-SMALL = Person(lambda t: (150 + 0.5 * t, 130), RED, size_px=45)
+SMALL = Person(lambda t: (150 + t, 130), RED, size_px=45)
 # Present when the second window's trackers begin, and so large that they would not care about the
 # other one.
-LARGE = Person(lambda t: (430, 130) if 20 <= t < 75 else None, BLUE, size_px=115)
+LARGE = Person(lambda t: (430, 130) if 10 <= t < 38 else None, BLUE, size_px=115)
 
 
 @contextmanager
@@ -98,7 +100,7 @@ def windows_of(
                 raise CancelledError("cancelled")
 
         fitted.clear()
-        with open_video(folder) as video:
+        with open_video(folder, options.wanted) as video:
             return observe(
                 video,
                 BODY,
@@ -164,7 +166,10 @@ def observed_times(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def options(people: int | str = "largest") -> CaptureOptions:
-    return CaptureOptions(quality="fast", threads=1, people=people, window_s=WINDOW_S)
+    wanted = VideoRange(fps=Fraction(FPS))
+    return CaptureOptions(
+        quality="fast", threads=1, people=people, window_s=WINDOW_S, wanted=wanted
+    )
 
 
 def assert_same(a: list[Track], b: list[Track]) -> None:

@@ -53,9 +53,9 @@ def all_kept(
 @pytest.mark.parametrize(
     ("people", "frame", "goes_on_at_s"),
     [
-        ("largest", 40, 0.0),
-        (2, 75, 1.0),
-        ("largest", 210, 3.0),
+        ("largest", 20, 0.0),
+        (2, 38, 1.0),
+        ("largest", FRAMES, 3.0),
     ],
 )
 def test_a_clip_that_was_stopped_goes_on_after_its_last_finished_window(
@@ -117,14 +117,14 @@ def test_windows_found_with_other_options_or_networks_are_not_taken(
         '{"image_size": [600, 260], "K": [[500, 0, 300], [0, 500, 130], [0, 0, 1]]}'
     )
     given = replace(options(2), calibration=calibration)
-    stop(windows_of, given, tmp_path, 130)
+    stop(windows_of, given, tmp_path, 65)
     for other, begins_at_s in (
         (replace(given, threads=2), 3.0),
         (options(2), 0.0),
         (replace(given, people=1), 0.0),
     ):
         observed_times.clear()
-        stop(windows_of, other, tmp_path, 125 if begins_at_s else 5)
+        stop(windows_of, other, tmp_path, 63 if begins_at_s else 5)
         assert observed_times[0] == pytest.approx(begins_at_s)
     calibration.write_text(calibration.read_text("utf-8").replace("500, 130", "400, 130"))
     observed_times.clear()
@@ -143,11 +143,11 @@ def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its
     def damaged(k: int, frame: Frame) -> Frame:
         return (
             Frame(frame.index + 5, frame.timestamp_s, np.full_like(frame.image_rgb, 90))
-            if k < 40
+            if k < 20
             else frame
         )
 
-    stop(windows_of, options(), tmp_path, 75)
+    stop(windows_of, options(), tmp_path, 38)
     whole = undisturbed()
     with frames_from(damaged):
         observed_times.clear()
