@@ -40,6 +40,7 @@ def best_cycle(
     end: float,
     shortest: float = 0.4,
     least_movement_m: float = 0.05,
+    most_turn: float = np.pi,
 ) -> Cycle:
     """Find the two keys within a span whose poses and velocities differ least, with movement
     between them.
@@ -53,7 +54,10 @@ def best_cycle(
     :param shortest: minimum duration of the cycle, seconds.
     :param least_movement_m: root mean square distance of the joints, metres, by which a pose
         between the two must differ from the first; 0 also accepts a person who does not move.
-    :raises UsageError: when the span is too short, or no movement in it is repeated.
+    :param most_turn: radians by which the body may be turned about the vertical from the first pose
+        to the second; `MIN_TURN` for a cycle that is to be repeated.
+    :raises UsageError: when the span is too short, no movement in it is repeated, or only with a
+        turn.
     """
     span = keys_within(clip, start, end)
     if clip.times[span[-1]] - clip.times[span[0]] < shortest or len(span) < 4:
@@ -76,6 +80,17 @@ def best_cycle(
             "no cycle was found: no movement is repeated within the chosen frames; choose frames "
             "in which the person "
             "does the same thing twice, such as two steps of a walk"
+        )
+    turns = np.abs(_vertical_turns(part.rotations[:, 0]))
+    is_straight = turns <= most_turn
+    if np.isfinite(apart[is_straight]).any():
+        apart[~is_straight] = np.inf
+    else:
+        turn = turns.ravel()[int(apart.argmin())]
+        raise UsageError(
+            f"the person turns by {np.degrees(turn):.0f} degrees while the movement is repeated, "
+            "and each repetition would snap back by that; choose frames in which they go straight, "
+            "or turn Repeat off"
         )
     # Prefer the longest of nearly equal cycles: a negligible difference must not select the
     # shortest part of a walk.
@@ -112,8 +127,9 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     """Return the keys of a cycle, with times from zero and the last pose equal to the first.
 
     The difference between the two poses is blended in over the last ``blend`` seconds. The
-    horizontal root trajectory is kept, and so is a turn of the body of more than 5 degrees: when
-    the cycle repeats, it continues from where it ended. Height is closed like rotations.
+    horizontal root trajectory is kept: when the cycle repeats, it continues from where it ended.
+    Height is closed like rotations. A turn of the body of more than `MIN_TURN` is kept too, by
+    which curves that repeat snap back.
     """
     chosen = slice(cycle.first, cycle.last + 1)
     times = clip.times[chosen] - clip.times[cycle.first]
@@ -121,7 +137,7 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     root = clip.root[chosen].copy()
     s = np.clip((times - (times[-1] - max(blend, 1e-6))) / max(blend, 1e-6), 0.0, 1.0)
     s = s * s * (3 - 2 * s)
-    heading = np.arctan2(*_vertical_turn(rotations[0, 0], rotations[-1, 0]))
+    heading = _vertical_turns(rotations[[0, -1], 0])[0, 1]
     heading = heading if abs(heading) > MIN_TURN else 0.0
     ahead = exp(np.array([0.0, 0.0, heading]))
     goal = rotations[0].copy()
@@ -132,9 +148,13 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     return Clip(times, rotations, root)
 
 
-def _vertical_turn(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:
-    """Return sine and cosine of the rotation about the vertical that takes ``a`` (3, 3) closest to
-    ``b`` (3, 3).
+def _vertical_turns(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the angles (N, N) in radians of the rotations about the vertical that take each of the
+    rotations (N, 3, 3) closest to each other one, by row and column.
     """
-    turn = b @ a.T
-    return float(turn[1, 0] - turn[0, 1]), float(turn[0, 0] + turn[1, 1])
+    level = rotations[:, :2]
+    turns = np.einsum("bik,ajk->abij", level, level)
+    sine = turns[..., 1, 0] - turns[..., 0, 1]
+    cosine = turns[..., 0, 0] + turns[..., 1, 1]
+    angles: NDArray[np.float64] = np.arctan2(sine, cosine)
+    return angles

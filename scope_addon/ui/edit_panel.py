@@ -259,7 +259,7 @@ class SCOPE_OT_loop(SpanOperator):
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
         """Replace the keys by those of the closed cycle."""
-        from ..edit.loop import best_cycle, close_cycle
+        from ..edit.loop import MIN_TURN, best_cycle, close_cycle
         from ..scene.actions import add_cycles, animated_together
         from ..scene.character.keys import location_path, read_clip, write_clip
         from ..scene.character.other_curves import cut_to_cycle
@@ -277,7 +277,15 @@ class SCOPE_OT_loop(SpanOperator):
         clip = clip_with_root_motion(armature, clip, frames)
         betas = betas_of(armature, body)
         cycle = best_cycle(
-            clip, body, betas, self.start / rate, self.end / rate, self.shortest, self.movement
+            clip,
+            body,
+            betas,
+            self.start / rate,
+            self.end / rate,
+            self.shortest,
+            self.movement,
+            # The curves of rotations repeat without an offset, and would snap back.
+            most_turn=MIN_TURN if self.repeat else math.pi,
         )
         closed: Clip = close_cycle(clip, cycle, self.blend)
         first = float(frames[cycle.first])

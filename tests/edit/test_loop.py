@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit import loop
 from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.edit.root_motion import about_z
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
@@ -31,6 +32,32 @@ def test_the_cycle_of_a_walk_is_found_and_closed():
     assert closed.times[0] == 0.0
     with pytest.raises(UsageError, match="does not fit"):
         loop.best_cycle(clip, BODY, BETAS, 0.0, 0.2)
+
+
+def turning(angles, seconds):
+    """Return a walk whose heading has the given angles (T,), radians."""
+    clip = walk(seconds)
+    turn = about_z(angles)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = turn @ rotations[:, 0]
+    steps = np.diff(clip.root, axis=0, prepend=clip.root[:1])
+    root = clip.root[0] + np.cumsum((turn @ steps[..., None])[..., 0], axis=0)
+    return Clip(clip.times, rotations, root)
+
+
+def test_a_cycle_that_is_repeated_does_not_turn():
+    times = walk(8.0).times
+    curve = turning(0.8 * times[:181], 6.0)
+    with pytest.raises(UsageError, match=r"turns by \d+ degrees.*turn Repeat off"):
+        loop.best_cycle(curve, BODY, BETAS, 0.0, 6.0, most_turn=loop.MIN_TURN)
+    once = loop.best_cycle(curve, BODY, BETAS, 0.0, 6.0)
+    assert curve.times[once.last] - curve.times[once.first] > 0.9
+    # The longest cycle would turn.
+    corner = turning(np.interp(times, [3.5, 4.5], [0.0, 1.5]), 8.0)
+    found = loop.best_cycle(corner, BODY, BETAS, 0.0, 8.0, most_turn=loop.MIN_TURN)
+    closed = loop.close_cycle(corner, found)
+    np.testing.assert_allclose(closed.rotations[-1], closed.rotations[0], atol=1e-9)
+    assert corner.times[found.last] - corner.times[found.first] > 1.9
 
 
 def sitting(seconds=4.0):
