@@ -128,6 +128,16 @@ def sessions_are_opened_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def nothing_waits_for_the_disk() -> Iterator[None]:
+    """Take for synced what this process writes. Tests that cut the power do so in processes of
+    their own, see ``tests/fuzz/test_kills.py``.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", os.fstat)  # which refuses the same handles
+        yield
+
+
 @pytest.fixture(autouse=True)
 def usual_priority() -> Iterator[None]:
     """Give the main thread its priority back. Where root encodes AV1, SVT-AV1 leaves its caller
