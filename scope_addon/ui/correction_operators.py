@@ -17,6 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...solver.errors import ScopeError
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
 from ..scene.datablocks import captures_of, holds, is_person
@@ -90,7 +91,7 @@ def change_world(
     rise: float = 0.0,
 ) -> None:
     """Change the upright line or floor of everybody that the same camera has captured, and move the
-    camera with them.
+    camera with them. People of one clip whose files were imported are in several captures.
 
     :param change: returns the new corrections for the present ones, and changes the same of
         everybody.
@@ -115,8 +116,15 @@ def change_world(
     others.pop(armature, None)
     if not captures:  # a capture is of one clip, also where people were not in all of its frames
         others = {o: None for o in others if same_camera(motion_of(o), motion)}
+    cameras = {camera: armature for c in near for camera in cameras_of_clip(c)}
+    for capture in captures_of(scene) if captures else ():
+        if capture in captures or capture.hide_viewport:
+            continue
+        people = [o for o in capture.all_objects if is_person(o) and _is_in_footage(o, motion)]
+        if people and armature not in people:
+            others |= dict.fromkeys(people)
+            cameras |= {c: people[0] for c in cameras_of_clip(capture) if c not in cameras}
     together = [armature, *others]
-    cameras = list(dict.fromkeys(camera for c in near for camera in cameras_of_clip(c)))
     was = world_of(corrections_of(motion))
     now = world_of(change(corrections_of(motion)))
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
@@ -126,8 +134,19 @@ def change_world(
             change_corrections(
                 person, body_of(person), rate, change, rise=rise if person == armature else 0.0
             )
-        for camera in cameras:
-            turn_camera(camera, armature, turn, to_captured=now is None)
+        for camera, person in cameras.items():
+            turn_camera(camera, person, turn, to_captured=now is None)
+
+
+def _is_in_footage(person: bpy.types.Object, motion: Motion) -> bool:
+    """Return whether a person was captured in the same footage as a motion, and is in its world."""
+    from ..scene.camera import same_camera
+
+    try:
+        own = motion_of(person)
+    except ScopeError:
+        return False  # They can be corrected neither alone nor with others.
+    return bool(motion.source) and own.source == motion.source and same_camera(own, motion)
 
 
 def without_kinds(corrections: tuple[Correction, ...], kinds: set[str]) -> tuple[Correction, ...]:

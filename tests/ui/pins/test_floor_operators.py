@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The floor, corrected through Blender's operator."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.datablocks import captures_of, is_person
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 
 from ...edit.walking import BODY, NAMES, motion_of, walk
@@ -163,6 +166,33 @@ def test_the_floor_is_also_that_of_somebody_whom_a_live_recording_saw_longer():
     people = captured_together(seconds=1.5)
     bpy.ops.scope.floor_here()
     assert [kinds(person) for person in people] == [["FLOOR"]] * 2
+
+
+def test_the_floor_is_that_of_everybody_whose_file_of_one_clip_was_imported(tmp_path):
+    walks = {"one": walk(1.0), "two": walk(1.0, speed=0.8), "other": walk(1.0)}
+    for name, clip in walks.items():
+        source = "elsewhere.mp4" if name == "other" else "walk.mp4"
+        replace(motion_of(clip), source=source).save(tmp_path / f"{name}.npz")
+    files = [{"name": f"{name}.npz"} for name in walks]
+    bpy.ops.scope.import_motion(directory=str(tmp_path), files=files)
+    scene = bpy.context.scene
+    people = [o for c in captures_of(scene) for o in c.all_objects if is_person(o)]
+    cameras = [o for c in captures_of(scene) for o in c.all_objects if o.type == "CAMERA"]
+    assert len(people) == len(cameras) == 3
+    before = [np.array(camera.matrix_basis) for camera in cameras]
+    keys = [everything(person) for person in people]
+    bpy.context.view_layer.objects.active = people[0]
+    scene.frame_set(10)
+    bpy.ops.scope.floor_here()
+    assert [kinds(person) for person in people] == [["FLOOR"], ["FLOOR"], []]
+    rise = [np.array(c.matrix_basis)[2, 3] - b[2, 3] for c, b in zip(cameras, before, strict=True)]
+    assert rise[0] == pytest.approx(rise[1])
+    assert rise[0] != 0.0
+    assert rise[2] == 0.0
+    bpy.context.view_layer.objects.active = people[1]
+    bpy.ops.scope.remove_correction(index=0)
+    for person, expected in zip(people, keys, strict=True):
+        assert_same(everything(person), expected)
 
 
 def test_refused_changes_nothing(rig):
