@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Two seconds of a person who stands straight or bends the knees, with noise, through lifting
+"""A second of a person who stands straight or bends the knees, with noise, through lifting
 network and solver.
 """
 
@@ -20,7 +20,7 @@ from scope.solver.body_file import load_body
 from .standing_views import K, knee_flexion, standing_views
 
 RATE = 30
-FRAMES = 60
+FRAMES = 30
 NOISE_PX = 3.0
 
 

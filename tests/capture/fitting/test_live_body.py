@@ -19,19 +19,19 @@ from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import CancelledError
 from scope.solver.body_file import load_body
 
-WANTED = CaptureOptions(quality="fast", wanted=VideoRange(end_s=1.2))
+WANTED = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.8))
 LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
 
 
 @pytest.fixture(scope="module")
 def watched(body):
-    """The sample's capture, and the live pose of every sixth frame: (frame index, picture,
+    """The sample's capture, and the live pose of every fourth frame: (frame index, picture,
     pose).
     """
     seen = []
 
     def watch(frame, people, live):
-        if frame.index % 6 == 0 and people:
+        if frame.index % 4 == 0 and people:
             seen.append((frame.index, frame.image_rgb, live.fit(people[0])))
 
     return capture(SAMPLE, body, WANTED, watch=watch), seen
@@ -65,18 +65,18 @@ def test_the_result_depends_on_no_watcher_and_no_thread_s_speed(watched, body, m
 
     class Slow(LiveBody):
         def load(self):
-            time.sleep(0.5)
+            time.sleep(0.2)
             super().load()
 
     by_edges = focal_length.camera_by_edges
     costs = FocalFits.costs
 
     def slow_edges(*arguments):
-        time.sleep(0.5)
+        time.sleep(0.2)
         return by_edges(*arguments)
 
     def slow_costs(*arguments):
-        time.sleep(0.3)
+        time.sleep(0.1)
         return costs(*arguments)
 
     monkeypatch.setattr("scope.scope_addon.capture.observe.LiveBody", Slow)
