@@ -427,12 +427,16 @@ def _key_at(clip: Clip, time: float) -> int | None:
 
 def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> NDArray[np.intp]:
     """Return the indices of a clip's keys at the source frames from ``first`` to ``last``, both
-    inclusive.
+    inclusive: those up to half of a step away from them, and nearer to them than to other frames.
     """
     half = 0.5 * float(np.median(np.diff(shot.times))) if len(shot.times) > 1 else 0.01
-    return np.flatnonzero(
-        (clip.times >= shot.time(first) - half) & (clip.times <= shot.time(last) + half)
-    )
+    begin = shot.time(first)
+    end = shot.time(last)
+    earlier = shot.times[shot.frames < first]
+    later = shot.times[shot.frames > last]
+    before = min(half, 0.5 * (begin - earlier[-1])) if len(earlier) else half
+    after = min(half, 0.5 * (later[0] - end)) if len(later) else half
+    return np.flatnonzero((clip.times >= begin - before) & (clip.times <= end + after))
 
 
 def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> list[_Track]:

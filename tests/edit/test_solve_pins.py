@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.edit.corrections import Contact, Pin
-from scope.scope_addon.edit.solve_pins import Shot, missed, resolve
+from scope.scope_addon.edit.solve_pins import Shot, keys_of_span, missed, resolve
 from scope.scope_addon.errors import UsageError
 from scope.solver.rotations import exp
 
@@ -337,6 +337,19 @@ def test_corrections_at_frames_without_keys_are_left_out():
     half = Clip(TRUTH.times[:40], TRUTH.rotations[:40], TRUTH.root[:40])
     same = resolve(half, BODY, BETAS, [*pins((80,)), Contact(80, 85, "right")], SHOT)
     np.testing.assert_array_equal(same.rotations, half.rotations)
+
+
+@pytest.mark.parametrize("short", [0.0165, 0.012])
+def test_a_span_has_no_key_of_a_frame_beside_it_whatever_the_rate(short):
+    steps = [0.033] * 10 + [short] + [0.033] * 10
+    times = np.cumsum([0.0, *steps])
+    n = len(times)
+    shot = Shot(np.arange(n), times, level_camera(n), np.tile(np.eye(3), (n, 1, 1)))
+    clip = Clip(times, np.zeros((n, 1, 3, 3)), np.zeros((n, 3)))
+    np.testing.assert_array_equal(keys_of_span(clip, 11, 14, shot), np.arange(11, 15))
+    np.testing.assert_array_equal(keys_of_span(clip, 8, 10, shot), np.arange(8, 11))
+    np.testing.assert_array_equal(keys_of_span(clip, 0, n - 1, shot), np.arange(n))
+    np.testing.assert_array_equal(keys_of_span(clip, 3, 3, shot), [3])
 
 
 def test_an_unknown_joint_is_an_error_that_lists_the_joints():
