@@ -10,13 +10,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-FRAMES = range(0, 100, 2)  # of the clips, which have 60 per second
+FRAMES = range(0, 100, 4)  # of the clips, which have 60 per second
 
 
 @cache
 def panels(shared: Path, camera: str) -> tuple[list[np.ndarray], np.ndarray]:
     """The middle of `FRAMES` of a clip, 500 pixels high, and the true centre of the trunk in each,
-    (50, 2) pixels.
+    (25, 2) pixels.
     """
     truth = np.load(shared / f"data/pose2sim/truth_{camera}.npz")
     names = [str(n) for n in truth["names"]]
@@ -47,7 +47,7 @@ def composite(
     """Frames, true positions (2, 2), and whether the first person is occluded; the second one
     passes in front.
 
-    30 per second, as of `visit`.
+    15 per second, as of `visit`.
     """
     (back, back_at), (front, front_at) = (panels(shared, camera) for camera in cameras)
     for k, t in enumerate(FRAMES):

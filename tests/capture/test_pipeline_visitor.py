@@ -27,7 +27,7 @@ def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     writer = None
     for image, at in visit(shared):
         writer = writer or cv2.VideoWriter(
-            str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30, image.shape[1::-1]
+            str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15, image.shape[1::-1]
         )
         writer.write(np.ascontiguousarray(image[:, :, ::-1]))
         places.append(at)
@@ -50,9 +50,9 @@ def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
     assert stays.valid.mean() >= 0.98
     inside = places[:, 1, 0] < EDGE - 150
     outside = ~(places[:, 1, 0] < EDGE + 30)
-    assert inside.sum() >= 15
-    assert outside.sum() >= 12
-    assert visitor.valid[inside][8:].all()  # a search every 0.27 s
+    assert inside.sum() >= 8
+    assert outside.sum() >= 6
+    assert visitor.valid[inside][4:].all()  # a search every 0.27 s
     assert not visitor.valid[outside].any()
     for motion, at in zip(everybody.motions, np.moveaxis(places, 1, 0), strict=True):
         trunk = projected_trunk(motion)
@@ -63,7 +63,7 @@ def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
 def test_nobody_jumps_when_entering_or_leaving(everybody: Capture) -> None:
     for motion in everybody.motions:
         steps = np.linalg.norm(np.diff(motion.joints_cam[:, 0], axis=0), axis=1)
-        assert steps.max() < 0.25  # metres a frame; the visitor slides in and out at up to 0.15
+        assert steps.max() < 0.38  # metres a frame; the visitor slides in and out at up to 0.3
         assert (motion.joints_cam[:, 0, 2] > 1.0).all()
 
 

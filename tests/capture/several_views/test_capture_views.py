@@ -51,7 +51,7 @@ def true_place(first, second):
 def test_two_cameras_halve_the_error_of_one(shared):
     folder = shared / "data" / "pose2sim"
     body = load_body("scope")
-    options = CaptureOptions(wanted=VideoRange(end_s=1.3))
+    options = CaptureOptions(wanted=VideoRange(end_s=1.1))
     captured = capture_views([folder / "cam1.mp4", folder / "cam4.mp4"], body, options)
     first, second = (np.load(folder / f"truth_cam{k}.npz") for k in (1, 4))
     (motion,) = captured.motions
