@@ -65,7 +65,7 @@ def change_corrections(
     :param change: returns the new corrections for the present ones.
     :param added: the one that this adds; a pin or an edit holds even if edited keys differ from the
         motion.
-    :param rise: metres by which all keys are raised, which is an edit of its own.
+    :param rise: metres by which all keys are raised, until the floor is no longer corrected.
     :return: the corrected motion.
     :raises UsageError: the motion is no longer there, or keys are missing.
     """
@@ -79,7 +79,8 @@ def change_corrections(
     keys = rewrite_changed_keys(
         armature, body, rate, before, after, stored_keys(armature), added, rise
     )
-    set_motion_of(armature, after, keys.to_bytes() if len(keys.times) else b"")
+    is_changed = len(keys.times) > 0 or keys.rise != 0.0
+    set_motion_of(armature, after, keys.to_bytes() if is_changed else b"")
     store_corrections(armature, after, rate, pinned_places(armature, body, rate, after))
     return after
 

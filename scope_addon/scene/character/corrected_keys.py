@@ -14,7 +14,7 @@ then the change of the motion, as by pins, is applied to them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -24,12 +24,21 @@ from numpy.typing import NDArray
 from ....solver.body import Body
 from ...edit.clip import Clip, sample
 from ...edit.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
-from ...edit.corrections import Correction, FeetOnFloor, Interpolation, Pin, feet_on_floor, world_of
+from ...edit.corrections import (
+    Correction,
+    FeetOnFloor,
+    Floor,
+    Interpolation,
+    Pin,
+    feet_on_floor,
+    world_of,
+)
 from ...edit.edits import edited, floor_above, foot_height, interpolated, moved_clip, refloor
 from ...edit.root_motion import relative_to_trajectory, with_trajectory
 from ...edit.smooth import smoothed
 from ...edit.solve_pins import Shot, missed, resolve
 from ...errors import UsageError
+from ...kinematics.axes import UP
 from ...motion import Motion
 from ..actions import fcurves, read_keys
 from ..stored_values import smoothing_of, start_frame
@@ -65,7 +74,7 @@ def rewrite_changed_keys(
     :param stored: bytes of the ``UncorrectedKeys`` of the last change.
     :param added: a new correction; a pin or an edit holds even if edited keys differ from the
         motion.
-    :param rise: metres by which all keys are raised, which is an edit of its own.
+    :param rise: metres by which all keys are raised, until the floor is no longer corrected.
     :return: the keys that are now different from those without corrections.
     :raises UsageError: when a bone or its keys are missing.
     """
@@ -73,9 +82,6 @@ def rewrite_changed_keys(
     start = start_frame(armature)
     known = UncorrectedKeys.from_bytes(stored, len(channel_curves(armature, body)))
     restored = restore(armature, body, start, rate, known)
-    on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
-    if rise and not on_floor:
-        _raise_keys(armature, body, rate, rise)
     clip, frames = read_clip(armature, body, rate)
     strength = smoothing_of(armature)
     free, old, new = (
@@ -96,6 +102,13 @@ def rewrite_changed_keys(
     rows = frames.astype(np.float32)
     values = keyed_values(armature, body, rows)
     moves = _moves(again, was, now)
+    is_floor_corrected = any(isinstance(c, Floor) for c in corrections_of(after))
+    on_floor = feet_on_floor(corrections_of(after)) is not None  # would undo a rise before it
+    kept_rise = known.rise if is_floor_corrected else 0.0
+    if not on_floor:
+        kept_rise = kept_rise + rise
+        rises = np.where(again, kept_rise, kept_rise - known.rise)
+        clip = _with_raised_keys(armature, body, clip, frames, rises[:, None] * moves[:, 2, :3])
     edits = KeyEdits(
         corrections_of(after), after.betas, shot_of(after, _start(armature, rate)), added, exact
     )
@@ -111,19 +124,27 @@ def rewrite_changed_keys(
         _meet_pin(armature, body, rate, after, added)
     elif isinstance(added, FeetOnFloor) and not exact.all():
         meet_floor(armature, body, rate, after, edits)
-    if rise and on_floor:
-        _raise_keys(armature, body, rate, rise)
+    if on_floor:
+        raised, _ = read_clip(armature, body, rate)
+        _with_raised_keys(armature, body, raised, frames, np.tile(rise * UP, (len(frames), 1)))
     after_values = keyed_values(armature, body, rows)
     same = (values == after_values) | (np.isnan(values) & np.isnan(after_values))
     changed = differ(free, new) | ~same.all(axis=1) | (now is not None)
-    return changed_rows(rows, exact & changed, values, after_values, start, rate)
+    found = changed_rows(rows, exact & changed, values, after_values, start, rate)
+    return replace(found, rise=kept_rise)
 
 
-def _raise_keys(armature: bpy.types.Object, body: Body, rate: float, rise: float) -> None:
-    """Raise all keys by metres; ``rate`` is the scene's, frames per second."""
-    clip, frames = read_clip(armature, body, rate)
-    raised = Clip(clip.times, clip.rotations, clip.root + [0.0, 0.0, rise])
-    write_keys(armature, body, raised, frames, np.ones(len(frames), bool))
+def _with_raised_keys(
+    armature: bpy.types.Object,
+    body: Body,
+    clip: Clip,
+    frames: NDArray[np.float64],
+    rises: NDArray[np.float64],
+) -> Clip:
+    """Raise keys by vectors (T, 3), metres, and return their clip."""
+    raised = Clip(clip.times, clip.rotations, clip.root + rises)
+    write_keys(armature, body, raised, frames, rises.any(axis=1))
+    return raised
 
 
 def pinned_places(

@@ -26,6 +26,7 @@ from ..stored_values import start_frame
 from .keys import channel_curves, write_clip
 
 _SAME = 2e-3  # frames; keys are single precision
+_HIGHEST_M = 1e3
 _NAMES = ("times", "before", "written")
 
 
@@ -37,11 +38,13 @@ class UncorrectedKeys:
     times: NDArray[np.float64]
     before: NDArray[np.float32]  # (R, C)
     written: NDArray[np.float32]  # (R, C)
+    # Metres by which all keys were raised together with the floor, those of other rows too.
+    rise: float = 0.0
 
     def to_bytes(self) -> bytes:
         """Return the arrays as an .npz file."""
         file = io.BytesIO()
-        np.savez_compressed(file, **{name: getattr(self, name) for name in _NAMES})
+        np.savez_compressed(file, **{name: getattr(self, name) for name in (*_NAMES, "rise")})
         return file.getvalue()
 
     @staticmethod
@@ -49,18 +52,22 @@ class UncorrectedKeys:
         """Read what ``to_bytes`` returned; without rows if it is something else: a .blend file may
         be hostile.
         """
-        none = UncorrectedKeys(np.zeros(0), *(np.zeros((0, curves), np.float32) for _ in range(2)))
+        no_rows = np.zeros((0, curves), np.float32)
+        none = UncorrectedKeys(np.zeros(0), no_rows, no_rows)
         if not isinstance(content, bytes):
             return none
         try:
             found = read_npz(Path("keys"), MotionFileError, "record of keys", content)
             times, before, written = (np.asarray(found[name], float) for name in _NAMES)
+            rise = float(found["rise"]) if "rise" in found else 0.0
         except (MotionFileError, KeyError, ValueError, TypeError):
             return none
         shapes = times.ndim == 1 and before.shape == written.shape == (len(times), curves)
         if not shapes or not np.isfinite(times).all() or np.isinf(before).any():
             return none
-        return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32))
+        if not abs(rise) < _HIGHEST_M:
+            return none
+        return UncorrectedKeys(times, before.astype(np.float32), written.astype(np.float32), rise)
 
 
 def keyed_values(

@@ -10,10 +10,11 @@ from scope.scope_addon.edit.edits import moved_motion
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
+from scope.scope_addon.scene.character.keys import read_clip, write_keys
 from scope.scope_addon.scene.datablocks import captures_of, is_person
 from scope.scope_addon.ui.captured_person import motion_of as stored_motion_of
 
-from ...edit.walking import BODY, NAMES, motion_of, walk
+from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ...scene import made_rigs
 from ...scene.made_rigs import captured, captured_together
 
@@ -125,6 +126,40 @@ def test_a_floor_with_a_pin_and_an_upright_line_is_removed_alone_and_with_them(r
     bpy.ops.scope.remove_correction(index=-1)
     assert kinds(rig) == []
     assert_same(everything(rig), before)
+
+
+def raise_keys(rig, height):
+    """Raise all keys, as a user may with the pelvis's curves."""
+    clip, frames = read_clip(rig, BODY, RATE)
+    raised = replace(clip, root=clip.root + [0.0, 0.0, height])
+    write_keys(rig, BODY, raised, frames, np.ones(len(frames), bool))
+    bpy.context.scene.frame_set(FRAME)
+
+
+def test_edited_keys_are_where_they_were_without_the_floor(rig):
+    before = lowest(rig)
+    raise_keys(rig, 0.1)
+    assert lowest(rig) == pytest.approx(before + 0.1, abs=1e-4)
+    edited = everything(rig)
+    bpy.context.scene.frame_set(FRAME)
+    bpy.ops.scope.floor_here()
+    assert abs(lowest(rig)) < 0.002
+    bpy.ops.scope.foot_stands(foot="left", start=40, end=44)
+    assert abs(lowest(rig)) < 0.002
+    bpy.ops.scope.remove_correction(index=0)
+    assert kinds(rig) == ["FLOOR"]
+    assert abs(lowest(rig)) < 0.002
+    raise_keys(rig, 0.03)  # These are no longer the keys that were written.
+    bpy.ops.scope.floor_here()
+    assert abs(lowest(rig)) < 0.002
+    bpy.ops.scope.remove_correction(index=0)
+    assert kinds(rig) == []
+    assert lowest(rig) == pytest.approx(before + 0.13, abs=1e-3)
+    raise_keys(rig, -0.03)
+    bpy.ops.scope.floor_here()
+    bpy.ops.scope.remove_correction(index=0)
+    for name, values in everything(rig).items():
+        np.testing.assert_allclose(values, edited[name], atol=1e-3, err_msg=str(name))
 
 
 def test_keys_that_were_put_on_the_floor_before_are_on_it_afterwards(rig):
