@@ -256,7 +256,7 @@ ANY_NAME = os.fsdecode(b"person \xe9") if sys.platform == "linux" else "person"
 
 
 @pytest.mark.usefixtures("blender_module")
-def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path):
+def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path, capfdbinary):
     import cv2
 
     name = ANY_NAME
@@ -267,9 +267,6 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
     picture.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
     outputs = [tmp_path / f"{name}.npz", tmp_path / f"{name}.glb"]
     argv = [
-        sys.executable,
-        "-m",
-        "scope.scope_addon",
         "capture",
         picture,
         "--json",
@@ -282,11 +279,10 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path)
     ]
     for path in outputs:
         argv += ["-o", path]
-    done = subprocess.run(
-        list(map(os.fsencode, argv)), capture_output=True, env=dict(os.environ), check=False
-    )
-    assert done.returncode == 0, done.stderr
-    report = json.loads(done.stdout.decode())
+    status = main([str(each) for each in argv])
+    out, err = capfdbinary.readouterr()
+    assert status == 0, err
+    report = json.loads(out.decode())
     json.dumps(report, ensure_ascii=False).encode()  # no half characters
     assert report["frames"] == 1
     assert report["people"] == 1
