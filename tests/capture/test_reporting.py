@@ -5,11 +5,12 @@ What a report says of feet that are not on the floor, for motions whose heights 
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scope.scope_addon.capture import reporting
-from scope.scope_addon.capture.reporting import face_frames, up_warnings
+from scope.scope_addon.capture.reporting import camera_warnings, face_frames, up_warnings
 from scope.scope_addon.capture.world.world_frame import BODIES, LINES
 from scope.solver import load_body, rotations
 
@@ -180,3 +181,15 @@ def test_feet_that_are_still_under_the_floor(body):
     height[10:17] = -0.05
     found = floor_warnings("a.mp4", body, [standing(body, height)])
     assert found == ["a.mp4: a foot of the person is up to 5 cm under the floor in 7 of 90 frames"]
+
+
+@pytest.mark.parametrize(("is_certain", "codes"), [(True, []), (False, ["zoom"])])
+def test_a_zoom_of_which_some_may_be_missing_is_told(motion, is_certain, codes):
+    footage = SimpleNamespace(
+        zoom=SimpleNamespace(is_certain=is_certain),
+        timestamps=motion.timestamps,
+        world_from_camera=None,
+    )
+    solved = SimpleNamespace(travel_source=None, motions=[motion], contradictions=[None])
+    warnings = camera_warnings("made.mp4", footage, solved)
+    assert [warning.code for warning in warnings] == codes
