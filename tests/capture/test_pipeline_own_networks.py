@@ -171,7 +171,7 @@ def test_the_track_of_a_person_who_leaves_the_image_ends(
     """The woman on the grass leaves at the left edge between frames 195 and 207."""
     tracker = PeopleTracker("fast", 1, people=2, keypoints=own_networks[1])
     woman = []
-    for index, image in enumerate(frames("clips/walk_side_static", start=188, stop=210), 188):
+    for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=210), 185):
         seen = tracker.step(image)
         woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
     assert len(woman) >= 10
