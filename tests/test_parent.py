@@ -100,7 +100,8 @@ def test_it_ends_and_leaves_no_partial_file_when_its_parent_is_killed(
     ids=["lock kept", "exit of C", "exit of Python", "server", "error"],
 )
 def test_it_ends_although_its_interpreter_stands_still(code):
-    killed_parent(code)
+    """After a second, which is signal 1."""
+    killed_parent("parent._LIMIT_S = 1\n" + code)
 
 
 def test_a_child_ends_within_ten_seconds():

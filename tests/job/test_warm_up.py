@@ -24,7 +24,7 @@ from scope.scope_addon.job.request import ROOT, JobRequest
 from scope.scope_addon.job.worker import Reporter, run
 from scope.scope_addon.machine_code.code_cache import compiled_kernels
 with tempfile.TemporaryDirectory() as folder:
-    request = JobRequest(str(SAMPLE), quality="fast", end="0.5", threads=1)
+    request = JobRequest(str(SAMPLE), quality="fast", end="0.2", threads=1)
     status = run(request, Path(folder), Reporter(sys.stderr))
 print(json.dumps([status, compiled_kernels(ROOT)]))
 """
