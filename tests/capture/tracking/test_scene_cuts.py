@@ -64,19 +64,19 @@ def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path
     writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 30, (540, 960))
     for camera in ("cam3", "cam1"):
         video = cv2.VideoCapture(str(shared / "data" / "pose2sim" / f"{camera}.mp4"))
-        for k in range(50):
+        for k in range(30):
             picture = video.read()[1]
             if k % 2 == 0:
                 writer.write(cv2.resize(picture, (540, 960), interpolation=cv2.INTER_AREA))
     writer.release()
     found = capture(clip, body, CaptureOptions(quality="fast"))
     (motion,) = found.motions
-    assert list(found.report.cuts_s) == [pytest.approx(25 / 30, abs=1e-3)]
+    assert list(found.report.cuts_s) == [pytest.approx(15 / 30, abs=1e-3)]
     assert any(
-        "two.mp4 cuts to another scene at 0.8 s" in text for text in map(str, found.report.warnings)
+        "two.mp4 cuts to another scene at 0.5 s" in text for text in map(str, found.report.warnings)
     )
     assert np.allclose(np.diff(motion.timestamps), 1 / 30, atol=1e-3)
-    assert motion.scene_starts.tolist() == [25]
+    assert motion.scene_starts.tolist() == [15]
     seen = motion.valid
     assert seen.mean() > 0.4  # one of the two, if not both
     assert motion.residual_px[seen].max() < 12
