@@ -182,7 +182,7 @@ SENTENCES = {
     "and the feet were put on the floor; with your file of that model as the body, the motion is "
     "exact",
     "parts_left_out": "the body '{body}' has no {parts}, whose motion was left out",
-    "arrays_left_out": "these arrays of the file hold components rather than rotations, and were "
+    "arrays_left_out": "these arrays of the file do not hold one rotation for each frame, and were "
     "left out: {arrays:names}",
     "rate_not_stated": "the file states no frame rate; {rate:g} frames per second were assumed",
     "no_translation": "the file holds no translation: the pelvis stays in place",

@@ -238,7 +238,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
         usual_up=usual_up,
         models=_models(arrays, names),
         frames=_frames(arrays, count),
-        left_out=_left_out(arrays),
+        left_out=_left_out(arrays, names),
     )
 
 
@@ -312,25 +312,44 @@ def _poses(
     names = [BODY_JOINTS[0], *_JOINTS_OF_BODY[parts[1].shape[1]]]
     for of_part, joints in _PARTS:
         found = _first(arrays, of_part)
-        if found is None or joints[0] in names or _has_components(arrays[found], joints):
+        if found is None or joints[0] in names:
             continue
-        part = _axis_angles(arrays[found], found, path)
-        if part.shape[1] != len(joints):
-            raise MotionFileError(
-                f"{path}: {found} must have {len(joints)} "
-                f"joint{'s' if len(joints) > 1 else ''}, but has {part.shape[1]}"
-            )
-        if len(part) == 1 and joints[0] in FACE_JOINTS:  # as it is where nobody has set it
-            part = np.repeat(part, len(parts[0]), axis=0)
-        parts.append(part)
-        names += joints
+        part = _part(arrays[found], found, joints, len(parts[0]), path)
+        if part is not None:
+            parts.append(part)
+            names += joints
     if len({len(part) for part in parts}) > 1:
         counts = ", ".join(str(len(part)) for part in parts)
         raise MotionFileError(
-            f"{path}: the poses of {root}, {body}, hands and face must have as many frames, not "
-            f"{counts}"
+            f"{path}: the poses of {root}, {body} and hands must have as many frames, not {counts}"
         )
     return tuple(names), np.concatenate(parts, axis=1), "z" if root == "root_orient" else "camera"
+
+
+def _part(
+    array: NDArray[Any], name: str, joints: Sequence[str], frames: int, path: Path
+) -> NDArray[np.float32] | None:
+    """Return axis-angle vectors (T, J, 3) of hands or of a part of the face; None for what is left
+    out: components of MANO's hands, which are no rotations, and a face that does not fit the body's
+    frames, as files without a captured face hold all kinds of numbers there.
+    """
+    if _has_components(array, joints):
+        return None
+    is_face = joints[0] in FACE_JOINTS
+    try:
+        part = _axis_angles(array, name, path)
+        if part.shape[1] != len(joints):
+            raise MotionFileError(
+                f"{path}: {name} must have {len(joints)} "
+                f"joint{'s' if len(joints) > 1 else ''}, but has {part.shape[1]}"
+            )
+    except MotionFileError:
+        if is_face:
+            return None
+        raise
+    if is_face and len(part) == 1:  # as it is where nobody has set it
+        return np.repeat(part, frames, axis=0)
+    return None if is_face and len(part) != frames else part
 
 
 def _has_components(array: NDArray[Any], joints: Sequence[str]) -> bool:
@@ -338,17 +357,19 @@ def _has_components(array: NDArray[Any], joints: Sequence[str]) -> bool:
     and no rotations.
     """
     hands = len(joints) // len(HAND_JOINTS["left"])
-    return hands > 0 and array.ndim == 2 and array.shape[1] == 6 * hands
+    if hands == 0 or array.ndim == 0 or array.shape[-1] != 6 * hands:
+        return False
+    return array.ndim <= 2 or array.shape[1:-1] == (1,)
 
 
-def _left_out(arrays: Mapping[str, NDArray[Any]]) -> tuple[str, ...]:
-    """Return the names of arrays that say something about the person, but are not rotations."""
+def _left_out(arrays: Mapping[str, NDArray[Any]], joint_names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of arrays that say something about the person, but hold no rotations that
+    `_poses` has read.
+    """
     found = []
     if _first(arrays, _ALL_JOINTS) is None:
-        for names, joints in _PARTS:
-            hands = _first(arrays, names)
-            if hands is not None and _has_components(arrays[hands], joints):
-                found.append(hands)
+        parts = [(_first(arrays, names), joints[0]) for names, joints in _PARTS]
+        found += [name for name, joint in parts if name and joint not in joint_names]
     expression = _first(arrays, _EXPRESSION)
     if expression is not None:
         found.append(expression)

@@ -140,6 +140,41 @@ def test_hands_as_components_are_named_as_left_out(tmp_path: Path) -> None:
     assert smpl_motion({"poses": flat(0, 52), "hand_pose": np.ones((T, 12))}, FILE).left_out == ()
 
 
+@pytest.mark.parametrize("shape", [(6,), (T, 6), (T, 1, 6)])
+def test_components_have_other_axes_in_some_files(shape: tuple[int, ...]) -> None:
+    parts = {
+        "global_orient": flat(0, 1),
+        "body_pose": flat(1, 22),
+        "left_hand_pose": np.ones(shape),
+    }
+    motion = smpl_motion(parts, FILE)
+    assert motion.left_out == ("left_hand_pose",)
+    assert not motion.has_fingers
+
+
+@pytest.mark.parametrize(
+    "jaw",
+    [
+        np.ones(3),
+        np.ones((T + 1, 3)),
+        np.full((T, 3), np.nan),
+        np.ones((T, 1, 3, 3)),
+        np.ones((T, 6)),
+    ],
+)
+def test_a_face_that_does_not_fit_is_left_out_rather_than_the_file_refused(jaw: np.ndarray) -> None:
+    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "jaw_pose": jaw}
+    motion = smpl_motion(parts, FILE)
+    assert motion.left_out == ("jaw_pose",)
+    np.testing.assert_allclose(motion.poses, RANDOM[:, :22], atol=1e-6)
+
+
+@pytest.mark.parametrize("jaw", [np.zeros((0, 3)), np.zeros((T, 0)), np.array(None)])
+def test_a_face_of_nothing_says_nothing(jaw: np.ndarray) -> None:
+    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "jaw_pose": jaw}
+    assert smpl_motion(parts, FILE).left_out == ()
+
+
 @pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
 def test_frame_rate_gender_and_shape_are_read(key):
     betas = np.arange(T * 10.0).reshape(T, 10)
