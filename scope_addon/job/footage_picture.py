@@ -53,7 +53,7 @@ def write_picture(request: PictureRequest, job_folder: Path, send: Callable[...,
 
     view = FootageView(int(request.rotate), request.mirror)
     with open_video(request.footage, VideoRange(request.time_s, view=view)) as video:
-        frame = next(iter(video), None)
+        frame = next(video.frames_from(request.time_s), None)  # which need not count frames
     if frame is None:
         raise VideoError(f"{request.footage} has no frame at {request.time_s:.2f} s")
     height, width = frame.image_rgb.shape[:2]
