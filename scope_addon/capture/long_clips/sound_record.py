@@ -37,6 +37,7 @@ def is_sound(observed: Observed) -> bool:
         and all(a < b for a, b in pairwise(times))
         and 0 <= observed.first <= observed.anchor <= frames
         and _are_rows(observed.cut_rows, observed.first, frames)
+        and all(a < b for a, b in pairwise(observed.cut_rows))
         and all(map(_is_region, observed.anchor_regions))
         and _is_background(observed.background, frames)
         and all(_is_tracklet(tracklet, frames) for tracklet in observed.tracklets.values())

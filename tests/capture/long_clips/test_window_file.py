@@ -165,6 +165,7 @@ def _changed(path: Path, change: Callable[[Observed], object]) -> Observed | Non
         lambda r: setattr(r, "background", None),
         lambda r: setattr(r, "first", FRAMES + 1),
         lambda r: r.cut_rows.__setitem__(0, 0),
+        lambda r: r.cut_rows.append(r.cut_rows[-1]),
         lambda r: r.background.bars.__setitem__(0, np.zeros(3)),
         lambda r: r.background.edge_frames.__setitem__(0, FrameEdges(FRAMES, Segments.none())),
         lambda r: setattr(r, "background", replace(r.background, known=np.zeros(FRAMES - 1, bool))),
