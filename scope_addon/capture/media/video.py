@@ -157,9 +157,9 @@ class Video:
         decoding.
 
         Their indices may differ from those of the whole iteration by a constant, where the frame
-        rate varies or frames are missing. Whether images and times are the same depends on the file: one that does not
-        mark its keyframes well gives other images at first, and one that repeats times at a
-        keyframe other times there. The caller has to compare.
+        rate varies or frames are missing. Whether images and times are the same depends on the
+        file: one that does not mark its keyframes well gives other images at first, and one that
+        repeats times at a keyframe other times there. The caller has to compare.
 
         :param start_s: within the range; it must have no frame rate of its own.
         """
