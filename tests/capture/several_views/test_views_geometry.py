@@ -46,11 +46,11 @@ def moving_points(seed=0, center=(0.0, 0.0, 4.0)):
     phase = rng.uniform(0, 2 * np.pi, (len(parts), 3, 3))
     speed = np.array([1.1, 2.3, 4.1])
 
+    @cache
     def points(time_s):
         omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
         wave = np.sin(speed * time_s + phase)
-        for part, vector in zip(parts, (amplitude * wave).sum(axis=2), strict=True):
-            omega[part] = rotations.exp(0.5 * vector)
+        omega[parts] = rotations.exp(0.5 * (amplitude * wave).sum(axis=2))
         turn = rotations.exp(np.array([0.0, 0.5 * np.sin(0.9 * time_s), 0.0]))
         omega[0] = rotations.exp(np.array([np.pi, 0.0, 0.0])) @ turn
         walk = np.array([0.4 * np.sin(0.8 * time_s), 0.0, 0.4 * np.cos(1.1 * time_s)])
