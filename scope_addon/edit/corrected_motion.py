@@ -10,7 +10,7 @@ of these asks for more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -192,21 +192,43 @@ def _changed(clip: Clip, motion: Motion, body: Body, shot: Shot) -> Clip:
     :param shot: with the clip's times.
     """
     corrections = corrections_of(motion)
-    flips = [c for c in corrections if isinstance(c, DepthFlip)]
-    clip = flipped(clip, body, motion.betas, flips, shot)
-    clip = edited(clip, body, motion.betas, corrections, shot)
-    wanted = [c for c in corrections if isinstance(c, Pin | Contact)]
-    if not wanted:
-        return clip
     world = world_of(corrections)
+    flips = [c for c in corrections if isinstance(c, DepthFlip)]
+
+    def mirror(clip: Clip, shot: Shot) -> Clip:
+        return flipped(clip, body, motion.betas, flips, shot)
+
+    # A body that is turned around stands upright, and the floor is level and at z = 0, only in the
+    # world that the corrections have moved.
+    clip = _changed_in_world(clip, shot, world, mirror) if flips else clip
+    clip = edited(clip, body, motion.betas, corrections, shot)
+    required = [c for c in corrections if isinstance(c, Pin | Contact)]
+    if not required:
+        return clip
+    moved = [
+        _in_world(c, world) if isinstance(c, Pin) and world is not None else c for c in required
+    ]
+
+    def solve(clip: Clip, shot: Shot) -> Clip:
+        return resolve(clip, body, motion.betas, moved, shot, floor=floor_of(motion))
+
+    return _changed_in_world(clip, shot, world, solve)
+
+
+def _changed_in_world(
+    clip: Clip,
+    shot: Shot,
+    world: NDArray[np.float64] | None,
+    change: Callable[[Clip, Shot], Clip],
+) -> Clip:
+    """Change a clip in a world that a transform (4, 4) has moved, and move what changes back; other
+    keys stay the same to the bit.
+    """
     if world is None:
-        return resolve(clip, body, motion.betas, wanted, shot, floor=floor_of(motion))
-    # The floor is level, and at z = 0, only in the world that the corrections have moved.
+        return change(clip, shot)
     before = moved_clip(clip, world)
-    moved = [_in_world(c, world) if isinstance(c, Pin) else c for c in wanted]
     shot = replace(shot, world_from_camera=world @ shot.world_from_camera)
-    after = resolve(before, body, motion.betas, moved, shot, floor=floor_of(motion))
-    # Other keys stay the same to the bit.
+    after = change(before, shot)
     new = (after.rotations != before.rotations).any((1, 2, 3)) | (after.root != before.root).any(1)
     back = moved_clip(after.rows(new), np.linalg.inv(world))
     out = clip.copy()

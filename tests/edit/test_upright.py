@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.edit.clip import clip_from_motion
 from scope.scope_addon.edit.corrected_motion import distance_from_pin, shot_of, with_corrections
-from scope.scope_addon.edit.corrections import Contact, Pin, Upright
+from scope.scope_addon.edit.corrections import Contact, DepthFlip, Pin, Upright
 from scope.scope_addon.edit.edits import moved_clip, moved_motion
 from scope.scope_addon.edit.upright import upright_transform, upright_transform_in_view
 from scope.scope_addon.errors import UsageError
@@ -70,17 +70,28 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
             np.testing.assert_array_equal(getattr(again, name), getattr(expected, name))
 
 
+def tilted_by(motion, degrees):
+    """Return a motion in a world that is tilted towards the camera, and the transform of the line
+    that makes it upright, about a point on the floor.
+    """
+    pivot = np.array([0.0, -3.6, 0.0])
+    upright = np.eye(4)
+    upright[:3, :3] = exp(np.radians([degrees, 0.0, 0.0]))
+    upright[:3, 3] = pivot - upright[:3, :3] @ pivot
+    return moved_motion(motion, BODY, np.linalg.inv(upright)), upright
+
+
+def joints_of(motion):
+    return clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)
+
+
 @pytest.mark.parametrize("degrees", [2.0, 4.0])
 def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned(degrees):
     walker = walk(6.0)
     walker.root[:, 2] -= 0.075  # Feet that are down are on the floor.
     truth = motion_of(walker)
-    pivot = np.array([0.0, -3.6, 0.0])
-    upright = np.eye(4)
-    upright[:3, :3] = exp(np.radians([degrees, 0.0, 0.0]))
-    upright[:3, 3] = pivot - upright[:3, :3] @ pivot
-    tilted = moved_motion(truth, BODY, np.linalg.inv(upright))
-    ankle = clip_from_motion(BODY, truth, raw=False).joints(BODY, truth.betas)[100, ANKLE]
+    tilted, upright = tilted_by(truth, degrees)
+    ankle = joints_of(truth)[100, ANKLE]
     pinned = upright[:3, :3].T @ (ankle + [0.0, 0.0, 0.05] - upright[:3, 3])
     in_truth = Pin(100, "left_ankle", position=tuple(ankle + [0.0, 0.0, 0.05]))
     others = [Contact(10, 14, "left"), Contact(158, 162, "left"), Contact(58, 62, "left_knee")]
@@ -88,12 +99,17 @@ def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned(degr
         tilted, BODY, (replace(in_truth, position=tuple(pinned)), *others, Upright.of(upright))
     )
     expected = with_corrections(truth, BODY, (in_truth, *others))
-    np.testing.assert_allclose(
-        *(
-            clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)
-            for motion in (fixed, expected)
-        ),
-        atol=1e-3,
+    np.testing.assert_allclose(joints_of(fixed), joints_of(expected), atol=1e-3)
+
+
+def test_somebody_turned_around_stands_upright_in_the_world_that_a_line_has_turned():
+    tilted, upright = tilted_by(TRUTH, 4.0)
+    turn = DepthFlip(20, 40, "body")
+    fixed = with_corrections(tilted, BODY, (turn, Upright.of(upright)))
+    expected = with_corrections(TRUTH, BODY, (turn,))
+    np.testing.assert_allclose(joints_of(fixed), joints_of(expected), atol=1e-3)
+    np.testing.assert_array_equal(
+        with_corrections(fixed, BODY, (turn,)).poses, with_corrections(tilted, BODY, (turn,)).poses
     )
 
 
