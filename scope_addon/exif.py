@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from .footage import MAX_PICTURE_BYTES
 from .footage_view import AS_IN_FILE, FootageView
 
 PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
@@ -59,9 +60,11 @@ def read_exif(data: bytes) -> Exif:
 
 def picture_view(path: Path) -> FootageView:
     """Return how the EXIF orientation of a picture file turns it; not at all where the file cannot
-    be read.
+    be read, or is larger than a capture accepts.
     """
     try:
+        if path.stat().st_size > MAX_PICTURE_BYTES:
+            return AS_IN_FILE
         data = path.read_bytes()
     except OSError:
         return AS_IN_FILE

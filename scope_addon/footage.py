@@ -40,6 +40,8 @@ PICTURE_SUFFIXES = (
 FOOTAGE_SUFFIXES = VIDEO_SUFFIXES + PICTURE_SUFFIXES
 # of an image, 134 million: more than footage has; a few bytes of a file can declare any number
 MAX_PIXELS = 1 << 27
+# The size of a file is limited to what its image may take, with four channels of 16 bits.
+MAX_PICTURE_BYTES = 8 * MAX_PIXELS
 LAST_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 # An address in a text, to the end of a word: a password may have any character but a space.
 # Taken for a path, it has a single slash; a drive of Windows has one letter.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...arrays import Float32Array, Uint8Array
 from ...errors import VideoError
 from ...exif import PNG, TIFF, animation_length, png_chunks, read_exif, tiff_size
-from ...footage import MAX_PIXELS
+from ...footage import MAX_PICTURE_BYTES
 from ...untrusted.files import check_regular
 from .frame_readers import decode_items
 from .guards import check_depth, check_size, too_large, utf8_name
@@ -30,8 +30,6 @@ _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 
 _OPENEXR = b"v/1\x01"
 _GIF = b"GIF8"
 _READ = (PNG, *TIFF, b"\xff\xd8\xff", b"BM")  # how files begin that OpenCV is given; and WebP
-# The size of a file is limited to what its image may take, with four channels of 16 bits.
-_MAX_BYTES = 8 * MAX_PIXELS
 _ROWS = 256  # that are converted at a time
 
 
@@ -76,7 +74,7 @@ def read_picture(path: Path) -> Picture | None:
     :raises VideoError: it is too large, deep or long (see `guards`), or AVIF or HEIC, and PyAV
         is not installed.
     """
-    check_regular(path, VideoError, "picture", _MAX_BYTES)
+    check_regular(path, VideoError, "picture", MAX_PICTURE_BYTES)
     data = path.read_bytes()
     if _brands(data[:64]) & _HEIF_BRANDS:
         return _read_heif(path, data)

@@ -10,6 +10,9 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.exif import picture_view
+from scope.scope_addon.footage import MAX_PICTURE_BYTES
+from scope.scope_addon.footage_view import AS_IN_FILE
 
 from ..corner_picture import H, W, corner_image, corners, encode
 
@@ -94,3 +97,13 @@ def test_damaged_exif_counts_as_absent(tmp_path):
         path = tmp_path / f"{i}.jpg"
         path.write_bytes(jpeg_with_exif(corner_image(), block))
         assert corners(next(iter(open_video(path))).image_rgb) == "rgbw"
+
+
+def test_a_picture_that_a_capture_would_refuse_is_not_read_into_memory(tmp_path):
+    """A motion file can name any file as its footage; this one has a hole of 1 GB."""
+    path = tmp_path / "photo.jpg"
+    path.write_bytes(jpeg_with_exif(corner_image(), exif_block(6)))
+    assert picture_view(path).clockwise_deg == 90
+    with path.open("r+b") as file:
+        file.truncate(MAX_PICTURE_BYTES + 1)
+    assert picture_view(path) == AS_IN_FILE
