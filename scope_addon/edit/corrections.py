@@ -320,8 +320,7 @@ def _renamed(corrections: tuple[Correction, ...], exchange: Exchange) -> tuple[C
         if each.first < exchange.first or exchange.last < each.last:
             part = f"{each.part}_foot" if each.part in FEET else each.part
             raise UsageError(
-                f"the correction of the {part.replace('_', ' ')} in frames {each.first} to "
-                f"{each.last} is only partly in frames {exchange.first} to {exchange.last}, in "
+                f"one correction of the {part.replace('_', ' ')} is only partly in the frames in "
                 "which left and right would change; remove it first, and add it again afterwards"
             )
         side, joined, kind = each.part.partition("_")

@@ -85,7 +85,7 @@ def test_exchanged_limbs_keep_their_flips_and_contacts_under_the_other_name():
 @pytest.mark.parametrize("span", [(50, 90), (30, 70), (45, 55)])
 def test_sides_are_not_exchanged_in_a_part_of_a_flip(span):
     flips = (DepthFlip(40, 80, "left_arm"),)
-    with pytest.raises(UsageError, match="left arm in frames 40 to 80 is only partly"):
+    with pytest.raises(UsageError, match="of the left arm is only partly"):
         added(flips, Exchange(*span, "arms"))
     assert added(flips, Exchange(*span, "legs"))[0] == flips[0]
     later = (Exchange(*span, "both"), *flips)  # The flip was added to what is shown.
