@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses of the first two seconds of the sample clip: causal, calm, and close to the offline
+"""Poses of the first second of the sample clip: causal, calm, and close to the offline
 capture.
 """
 
@@ -25,8 +25,8 @@ from scope.scope_addon.motion import Motion
 
 LATE = 2  # frames of the delay of 60 ms
 LEAD = 12  # frames until the filters know how the body moves
-# one and a half seconds, and frames without a person after them, a tenth of a second apart
-FRAMES = 46
+# a second and a bit, and frames without a person after them, a tenth of a second apart
+FRAMES = 36
 EMPTY = 8
 
 
