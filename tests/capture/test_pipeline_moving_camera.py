@@ -58,7 +58,7 @@ def pan(clip, tmp_path_factory):
     return path
 
 
-def test_a_given_pan_is_used_and_gives_the_same_path(pan, tmp_path):
+def test_a_given_pan_is_used_and_gives_the_same_path(pan, tmp_path, observe_frames):
     poses = np.tile(np.eye(4), (FRAMES, 1, 1))
     poses[:, :3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) @ exp(TURNS)
     poses[:, :3, 3] = [5.0, -2.0, 40.0]
@@ -71,7 +71,7 @@ def test_a_given_pan_is_used_and_gives_the_same_path(pan, tmp_path):
     file = tmp_path / "camera.json"
     file.write_text(json.dumps(content))
     options = CaptureOptions(quality="fast", camera_path=file)
-    found = capture(pan, load_body("scope"), options)
+    found = capture(pan, load_body("scope"), options, observe_frames=observe_frames)
     motion = found.motions[0]
     assert (found.report.up, found.report.camera) == ("given", "camera path camera.json")
     # A second person walks behind, and is found or not.
@@ -88,17 +88,20 @@ def test_a_given_pan_is_used_and_gives_the_same_path(pan, tmp_path):
     file.write_text(json.dumps(content))
     beginning = replace(options, wanted=VideoRange(end_s=0.3))
     with pytest.raises(InputError, match=r"has poses from 0.00 to 0.16 s, but frames"):
-        capture(pan, load_body("scope"), beginning)
+        capture(pan, load_body("scope"), beginning, observe_frames=observe_frames)
 
 
-def test_the_world_of_a_panning_camera_does_not_move(clip, pan, tmp_path):
+def test_the_world_of_a_panning_camera_does_not_move(clip, pan, tmp_path, observe_frames):
     videos = {"stand": tmp_path / "stand.mp4", "pan": pan, "zoom": tmp_path / "zoom.mp4"}
     film(clip, videos["stand"], lambda _: np.zeros(3))
     factors = 1.6 ** np.clip((np.arange(FRAMES) - 5) / 15, 0, 1)
     film(clip, videos["zoom"], lambda _: np.zeros(3), lambda k: factors[k])
     body = load_body("scope")
     options = CaptureOptions(quality="fast", fov_deg=FOV)
-    found = {name: capture(video, body, options) for name, video in videos.items()}
+    found = {
+        name: capture(video, body, options, observe_frames=observe_frames)
+        for name, video in videos.items()
+    }
     stand, moving, zoomed = (each.motions[0] for each in found.values())
 
     assert stand.zoom is None

@@ -151,14 +151,19 @@ def test_known_offsets_are_recovered(body):
     np.testing.assert_allclose(found, shifts, atol=2e-3)
 
 
-def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(shared, body):
+def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(
+    shared, body, observe_frames
+):
     video = shared / "data" / "pose2sim" / "cam3.mp4"
     wanted = VideoRange(end_s=0.6)
     left_over = []
     for which, replacements in ((body, [WITHOUT_OFFSETS]), (with_keypoint_offsets(body), [])):
         with replaced(replacements):
             (motion,) = capture(
-                video, body, CaptureOptions(quality="balanced", wanted=wanted)
+                video,
+                body,
+                CaptureOptions(quality="balanced", wanted=wanted),
+                observe_frames=observe_frames,
             ).motions
         left_over.append(left_over_px(which, motion))
     assert left_over[1] < 0.9 * left_over[0]

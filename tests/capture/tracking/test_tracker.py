@@ -89,7 +89,7 @@ def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, c
 
 def test_two_people_are_tracked_and_nobody_twice(frames: Frames) -> None:
     tracker = PeopleTracker("fast", threads=2, people=4)
-    for image in frames("clips/two_people_portrait"):
+    for image in frames("clips/two_people_portrait", stop=20):
         observations = dict(tracker.step(image))
         assert sorted(observations) == [0, 1]
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]

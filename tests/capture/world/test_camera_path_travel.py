@@ -140,14 +140,17 @@ def test_a_stance_is_the_same_in_every_camera():
     assert CameraPath.static(5).stance_to_frames(first) is first
 
 
-def test_without_smoothing_the_camera_travels_as_far(shared):
+def test_without_smoothing_the_camera_travels_as_far(shared, observe_frames):
     """Where every frame is fitted alone, positions are still estimated in the same way."""
     body = load_body("scope")
     clip = shared / "data/clips/run_moving_camera.mp4"
     wanted = VideoRange(end_s=1.5)
     smooth, raw = (
         capture(
-            clip, body, CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing)
+            clip,
+            body,
+            CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing),
+            observe_frames=observe_frames,
         ).motions[0]
         for smoothing in (True, False)
     )
