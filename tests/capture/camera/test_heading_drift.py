@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Heading drift: the edges of a hall seen by a camera of known rotation, and a runner on a straight
 path.
+
+The same runner's start without smoothing.
 """
 
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 from scope.scope_addon.capture.camera.heading_drift import FrameEdges, remove_heading_drift
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Segments
+from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.solver import load_body
@@ -85,9 +88,10 @@ def test_edges_in_any_direction_change_nothing():
     assert found is drifted
 
 
-def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared):
+def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared, observe_frames):
     clip = shared / "data/clips/run_moving_camera.mp4"
-    motion = capture(clip, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
+    options = CaptureOptions(quality="fast")
+    (motion,) = capture(clip, load_body("scope"), options, observe_frames=observe_frames).motions
     facing = exp(motion.poses[:, :3].astype(float))[:, :2, 2]
     angle = np.degrees(np.unwrap(np.arctan2(facing[:, 1], facing[:, 0])))
     stride = np.ones(22) / 22  # two steps, in which the pelvis rotates to and fro
@@ -97,3 +101,24 @@ def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared):
     across = path @ [-along[1], along[0]]
     assert np.linalg.norm(path[-1]) > 3
     assert np.abs(np.convolve(across, stride, "valid")).max() < 0.35
+
+
+def test_without_smoothing_the_camera_travels_as_far(shared, observe_frames):
+    """Where every frame is fitted alone, positions are still estimated in the same way."""
+    body = load_body("scope")
+    clip = shared / "data/clips/run_moving_camera.mp4"
+    wanted = VideoRange(end_s=1.5)
+    smooth, raw = (
+        capture(
+            clip,
+            body,
+            CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing),
+            observe_frames=observe_frames,
+        ).motions[0]
+        for smoothing in (True, False)
+    )
+    way = np.linalg.norm(raw.trans[-1] - raw.trans[0])
+    assert way > 0.8
+    assert abs(way - np.linalg.norm(smooth.trans[-1] - smooth.trans[0])) < 0.1
+    np.testing.assert_array_equal(raw.trans, raw.trans_raw)
+    assert np.abs(smooth.trans - smooth.trans_raw).max() > 0.001

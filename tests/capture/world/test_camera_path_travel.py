@@ -5,11 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
 from scope.scope_addon.capture.fitting.prepared_track import Stance
-from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.world.camera_path import CameraPath, camera_travel
-from scope.solver import load_body
 from scope.solver.rotations import exp
 
 UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
@@ -138,24 +134,3 @@ def test_a_stance_is_the_same_in_every_camera():
     np.testing.assert_allclose(turned, expected, atol=1e-12)
     np.testing.assert_array_equal(frames.contact, first.contact)
     assert CameraPath.static(5).stance_to_frames(first) is first
-
-
-def test_without_smoothing_the_camera_travels_as_far(shared, observe_frames):
-    """Where every frame is fitted alone, positions are still estimated in the same way."""
-    body = load_body("scope")
-    clip = shared / "data/clips/run_moving_camera.mp4"
-    wanted = VideoRange(end_s=1.5)
-    smooth, raw = (
-        capture(
-            clip,
-            body,
-            CaptureOptions(quality="fast", wanted=wanted, smoothing=smoothing),
-            observe_frames=observe_frames,
-        ).motions[0]
-        for smoothing in (True, False)
-    )
-    way = np.linalg.norm(raw.trans[-1] - raw.trans[0])
-    assert way > 0.8
-    assert abs(way - np.linalg.norm(smooth.trans[-1] - smooth.trans[0])) < 0.1
-    np.testing.assert_array_equal(raw.trans, raw.trans_raw)
-    assert np.abs(smooth.trans - smooth.trans_raw).max() > 0.001
