@@ -42,6 +42,7 @@ from ...kinematics.axes import UP
 from ...motion import Motion
 from ..actions import fcurves, read_keys
 from ..stored_values import smoothing_of, start_frame
+from ..visibility import world_matrix
 from .keys import ROTATION, channel_curves, read_clip, write_keys
 from .root_object import clip_with_root_motion, removed_root_motion, root_object
 from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
@@ -214,7 +215,7 @@ def captured_points(
     """Convert points of the scene (N, 3) at the current frame to the world of the capture, (N, 3)
     metres.
     """
-    inverse = np.array(armature.matrix_world.inverted_safe())
+    inverse = np.array(world_matrix(armature).inverted_safe())
     points = points_world @ inverse[:3, :3].T + inverse[:3, 3]
     n = len(points)
     still = Clip(np.zeros(n), np.tile(np.eye(3), (n, 1, 1, 1)), points)

@@ -16,6 +16,7 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scope.scope_addon.edit.clip import Clip
+from scope.scope_addon.edit.corrected_motion import corrections_of
 from scope.scope_addon.kinematics.foot_skin import foot_heights
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
@@ -90,6 +91,17 @@ def test_a_pin_in_the_image_is_met_whatever_the_smoothing(rig):
     motion = stored_motion_of(rig)
     assert motion.corrections["pin_joints"].tolist() == ["left_wrist"]
     assert np.isfinite(motion.corrections["pin_uv"]).all()
+
+
+def test_a_pin_of_a_hidden_capture_in_an_opened_file_is_where_the_user_has_put_it(rig, tmp_path):
+    target = seen(rig)[0, WRIST] + [0.1, 0.05, 0.15]
+    rig.location.x = 5.0
+    rig.users_collection[0].hide_viewport = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.scope.add_pin(joint="left_wrist", location=target + [5.0, 0.0, 0.0])
+    (pin,) = corrections_of(stored_motion_of(bpy.data.objects["walk"]))
+    np.testing.assert_allclose(pin.position, target, atol=1e-4)
 
 
 def test_removing_pins_restores_the_motion_in_any_order(rig):
