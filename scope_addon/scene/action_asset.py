@@ -20,6 +20,7 @@ from ..motion import Motion
 from ..review_spans import find_review_spans
 from .character.armature import SIDES, side_of
 from .timing import current_frame_kept
+from .visibility import evaluated
 
 TAGS = ("mocap", "scope")
 CATALOGS_FILE = "blender_assets.cats.txt"
@@ -68,7 +69,7 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
     :param armature: animated by the action.
     """
     scene = bpy.context.scene
-    with current_frame_kept(scene):
+    with evaluated(armature), current_frame_kept(scene):
         scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
         posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         bones = [bone for bone in posed.pose.bones if bone.bone.use_deform] or list(

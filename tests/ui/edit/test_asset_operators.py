@@ -51,6 +51,18 @@ def test_the_action_becomes_an_asset_with_picture_tags_and_details(rig):
     assert min(red.sum(), blue.sum()) > 500  # limbs of both sides, in their colours
 
 
+def test_the_picture_of_a_hidden_capture_is_of_its_own_frame(rig):
+    action = rig.animation_data.action
+    bpy.context.scene.frame_set(29)
+    bpy.ops.scope.mark_asset(current_pose=True)
+    shown = picture(action)
+    bpy.context.scene.frame_set(11)
+    rig.users_collection[0].hide_viewport = True
+    bpy.context.scene.frame_set(29)
+    bpy.ops.scope.mark_asset(current_pose=True)
+    np.testing.assert_array_equal(picture(action), shown)
+
+
 def test_a_lost_motion_still_gives_an_asset(rig):
     del rig["scope_motion"]
     bpy.ops.scope.mark_asset(description_text="A walk")
