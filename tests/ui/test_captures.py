@@ -431,6 +431,20 @@ def test_the_users_own_actions_are_not_deleted_with_a_capture(fake_worker, foota
     assert bpy.data.actions.keys() == ["my edit"]
 
 
+@pytest.mark.parametrize("change", ["none", "renamed", "in the NLA"])
+def test_a_capture_from_before_actions_had_a_tag_leaves_none(fake_worker, footage, change):
+    collection = capture(fake_worker, footage)
+    person = bpy.data.objects["person"]
+    for block in (person.animation_data.action, *collection.all_objects):
+        block.pop("scope_part", None)
+    if change == "renamed":
+        person.name = "hero"
+    elif change == "in the NLA":
+        bpy.ops.scope.push_to_nla()
+    bpy.ops.scope.delete_capture()
+    assert not bpy.data.actions
+
+
 def test_a_motion_that_is_an_asset_is_not_deleted_with_its_capture(fake_worker, footage):
     capture(fake_worker, footage)
     bpy.ops.scope.mark_asset()
