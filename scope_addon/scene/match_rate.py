@@ -136,10 +136,17 @@ def _retime(datablock: bpy.types.ID, retiming: Retiming, done: _Done) -> None:
     for strip in strips:
         retime_strip(strip, retiming)
     for user in [animation, *strips]:
+        if user.action is None:
+            continue
         slot = getattr(user, "action_slot", None)
-        used = user.action, slot.handle if slot else 0
-        if user.action is not None and used not in done:
-            done.add(used)
+        is_written = is_retargeted(user.action)
+        used = user.action, _ALL_SLOTS if is_written or slot is None else slot.handle
+        if used in done:
+            continue
+        done.add(used)
+        if is_written:
+            retime_written_keys(user.action, retiming)
+        else:
             retime_keys(fcurves_in_slot(user.action, slot), retiming)
 
 

@@ -265,14 +265,18 @@ def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
     np.testing.assert_allclose(at_times(rig, list(bones.values()), 101.0), take_2, atol=1e-3)
 
 
+# below the captured armature, with keys of all names that a captured body has
+@pytest.mark.parametrize("is_below", [False, True])
 @pytest.mark.parametrize("in_nla", [False, True])
 def test_a_retargeted_face_moves_along_in_the_nla_too(
-    scene: bpy.types.Scene, *, in_nla: bool
+    scene: bpy.types.Scene, *, in_nla: bool, is_below: bool
 ) -> None:
     person = built()
     face = scene["cube"]
-    for name in ("Basis", "jawOpen", "A"):
+    for name in ("Basis", "A", *(EXPRESSIONS if is_below else ("jawOpen",))):
         face.shape_key_add(name=name)
+    if is_below:
+        face.parent = person
     frames = START + np.arange(41.0)
     weights = np.zeros((41, len(EXPRESSIONS)))
     weights[:, EXPRESSIONS.index("jawOpen")] = np.linspace(0.0, 1.0, 41)
