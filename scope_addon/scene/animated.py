@@ -34,7 +34,7 @@ def other_animation(
     """
     moved = {obj for collection in captures_of(scene) for obj in parts_of(collection)}
     moved |= {obj for person in people for obj in (person, root_object(person))}
-    moved |= {rig for rig, _ in rigs}
+    moved |= {obj for rig, _ in rigs for obj in (rig, root_object(rig))}
     others = _blocks_of(obj for obj in scene.objects if obj not in moved)
     return _is_itself_animated(scene) or any(_has_keys(block, retargeted=False) for block in others)
 

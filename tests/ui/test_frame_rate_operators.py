@@ -265,6 +265,22 @@ def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
     np.testing.assert_allclose(at_times(rig, list(bones.values()), 101.0), take_2, atol=1e-3)
 
 
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_only_animation_that_was_not_captured_is_said_to_play_faster(scene, capfd, root):
+    person = built()
+    bpy.data.objects.remove(scene["cube"])
+    rig, _ = build_rig("mixamo")
+    scene.scope_retarget.rig = rig
+    scene.scope_retarget.root = root
+    bpy.context.view_layer.objects.active = person
+    bpy.ops.scope.retarget()
+    assert (rig.parent is None) == (root == "bone")
+    bpy.ops.scope.match_frame_rate()
+    said = capfd.readouterr().out
+    assert "30 frames/s, like the motion" in said
+    assert "not captured" not in said
+
+
 # below the captured armature, with keys of all names that a captured body has
 @pytest.mark.parametrize("is_below", [False, True])
 @pytest.mark.parametrize("in_nla", [False, True])
