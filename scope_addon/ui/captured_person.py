@@ -54,13 +54,18 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
 def stored_person(rig: bpy.types.Object) -> bpy.types.Object | str | None:
     """Return the captured armature that a rig was retargeted from, or its name.
 
-    Blender does not save what a library override of a rig stores, but its action.
+    Blender does not save what a library override of a rig stores, so that an opened file has what
+    the library stores; it saves the override's own action.
     """
     person: bpy.types.Object | str | None = rig.get(PERSON)
     animation = rig.animation_data
-    if person is not None or rig.override_library is None or animation is None:
+    action = animation.action if animation is not None else None
+    if rig.override_library is None or action is None or action.library is not None:
         return person
-    return source_of(animation.action) if animation.action is not None else None
+    name = source_of(action)
+    is_local = isinstance(person, bpy.types.Object) and person.library is None
+    is_renamed = is_local and bpy.data.objects.get((name, None)) is None
+    return name if name and not is_renamed else person
 
 
 def retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:

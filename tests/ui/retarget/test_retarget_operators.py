@@ -8,7 +8,7 @@ from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import PARTS
 from scope.scope_addon.scene.character.root_object import root_object
 from scope.scope_addon.scene.visibility import hide_again, show
-from scope.scope_addon.ui.captured_person import captured_armature, retargeted_from
+from scope.scope_addon.ui.captured_person import captured_armature, retargeted_from, stored_person
 from scope.scope_addon.ui.retarget_panel import offered_parts
 
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
@@ -398,10 +398,19 @@ def test_exporting_without_a_rig_is_an_error_that_says_what_to_do(rig, tmp_path)
         bpy.ops.scope.export(filepath=str(tmp_path / "hero.fbx"), format="FBX", which="RIG")
 
 
-def _linked_character(folder):
-    """A rig in a collection that is linked from another file."""
+def _linked_character(folder, person=""):
+    """A rig in a collection that is linked from another file.
+
+    :param person: name of the captured armature that it was retargeted from there, if any.
+    """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     rig, _ = build_rig("unreal")
+    if person:
+        source = captured(motion_of(walk(1.0)))
+        source["scope_body_file"] = "scope"
+        source.name = person
+        bpy.context.scene.scope_retarget.rig = rig
+        bpy.ops.scope.retarget()
     character = bpy.data.collections.new("Character")
     character.objects.link(rig)
     bpy.data.libraries.write(str(folder / "hero.blend"), {character})
@@ -434,6 +443,30 @@ def test_a_library_override_is_animated_and_saved(tmp_path, root):
     rig = bpy.context.scene.scope_retarget.rig
     np.testing.assert_allclose(seen(rig, ["pelvis", "hand_l"]), moving, atol=1e-4)
     assert retargeted_from(bpy.context.scene, rig) == bpy.data.objects["walk"]
+
+
+@pytest.mark.parametrize("name", ["walk", "run"])
+def test_an_override_of_a_retargeted_rig_has_the_person_of_its_own_action(tmp_path, name):
+    character = _linked_character(tmp_path, name)
+    scene = bpy.context.scene
+    character.override_hierarchy_create(scene, bpy.context.view_layer)
+    rig = next(obj for obj in scene.objects if obj.override_library)
+    assert retargeted_from(scene, rig) is None  # the library's person is not in the scene
+    assert stored_person(rig).library is not None
+    scene.scope_retarget.rig = rig
+    bpy.ops.scope.retarget()
+    walk_here = bpy.data.objects["walk", None]
+    assert retargeted_from(scene, rig) == walk_here
+    walk_here.name = "renamed"
+    assert retargeted_from(scene, rig) == walk_here
+    walk_here.name = "walk"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    rig = bpy.context.scene.scope_retarget.rig
+    walk_here = bpy.data.objects["walk", None]
+    assert retargeted_from(bpy.context.scene, rig) == walk_here
+    bpy.data.objects.remove(walk_here)
+    assert retargeted_from(bpy.context.scene, rig) is None
 
 
 def test_a_rig_outside_the_view_layer_is_an_error(rig):
