@@ -27,7 +27,7 @@ from ..retarget.rest_pose import rest_faults
 from ..retarget.rig_source import ROOTS
 from ..retarget.skeleton import BoneMotion, Pose, Skeleton, basis
 from ..retarget.transfer import Transfer, leg_ratio
-from .actions import add_cycles, bone_path, is_cyclic
+from .actions import add_cycles, bone_path, fcurves, is_cyclic, nla_strips
 from .character.keys import read_clip
 from .character.root_object import (
     clip_as_displayed,
@@ -364,18 +364,18 @@ def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np
     empty = root_object(source)
     scene = bpy.context.scene
     if not _is_carried(source):
-        return np.array([_place_of(source, empty)], float)
+        place = world_matrix(source) if empty is None else parent_transform(empty)
+        return np.array([place], float)
     places = []
     with evaluated(empty or source), current_frame_kept(scene):
         for frame in frames:
             whole = math.floor(frame)
-            scene.frame_set(whole, subframe=frame - whole)
-            places.append(_place_of(source, empty))
+            scene.frame_set(whole, subframe=frame - whole)  # evaluates both, once
+            if empty is None:
+                places.append(source.matrix_world.copy())
+            else:
+                places.append(empty.matrix_world @ empty.matrix_basis.inverted_safe())
     return np.array(places, float)
-
-
-def _place_of(source: bpy.types.Object, empty: bpy.types.Object | None) -> Matrix:
-    return world_matrix(source) if empty is None else parent_transform(empty)
 
 
 def _is_carried(source: bpy.types.Object) -> bool:
@@ -387,10 +387,17 @@ def _is_carried(source: bpy.types.Object) -> bool:
         return True
     above = source.parent if empty is None else empty.parent
     while above is not None:
-        if above.animation_data is not None or moved_by(above):
+        if _is_animated(above) or moved_by(above):
             return True
         above = above.parent
     return False
+
+
+def _is_animated(obj: bpy.types.Object) -> bool:
+    """Return whether keys, drivers or strips animate anything of an object, such as its bones."""
+    animation = obj.animation_data
+    drivers = animation.drivers if animation is not None else ()
+    return bool(fcurves(obj) or len(drivers) or nla_strips(obj))
 
 
 def _repeat(rig: bpy.types.Object, action: bpy.types.Action, keys: Sequence[BoneMotion]) -> None:

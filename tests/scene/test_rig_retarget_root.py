@@ -2,6 +2,7 @@
 """Root motion of rig and capture: in the bones, on a root object, or in place."""
 
 import math
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ from scope.scope_addon.scene.character.root_object import (
     root_object,
 )
 from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.visibility import hide
 
 from ..edit.walking import BODY, RATE, motion_of, walk
 from .made_rigs import FBX, FRAMES, build_rig, captured, seen
@@ -152,6 +154,42 @@ def test_the_rig_follows_a_capture_that_is_carried(source, root, carried):
     assert bpy.context.scene.frame_current == 30
     wanted = before @ np.swapaxes(places[:, :3, :3], 1, 2) + places[:, None, :3, 3]
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=5e-3)
+
+
+@contextmanager
+def counted(handlers):
+    """Return a list that gets one entry whenever Blender calls the handlers."""
+    calls = []
+
+    def count(*_):
+        calls.append(1)
+
+    handlers.append(count)
+    try:
+        yield calls
+    finally:
+        handlers.remove(count)
+
+
+def test_a_hidden_capture_that_is_carried_is_not_evaluated_again_for_each_key(source):
+    rig, _ = build_rig("unreal")
+    drive_around(source)
+    hide(source, bpy.context.view_layer)
+    with counted(bpy.app.handlers.depsgraph_update_post) as updates:
+        run(source, rig)
+    assert len(updates) < len(walk(2.0))
+
+
+def test_a_capture_whose_parent_has_lost_its_keys_is_not_followed_from_key_to_key(source):
+    rig, _ = build_rig("unreal")
+    car = bpy.data.objects.new("car", None)
+    bpy.context.scene.collection.objects.link(car)
+    source.parent = car
+    drive_around(car)
+    car.animation_data.action = None
+    with counted(bpy.app.handlers.frame_change_post) as frames:
+        run(source, rig)
+    assert not frames
 
 
 def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
