@@ -221,8 +221,8 @@ def _check_own_transform(armature: bpy.types.Object) -> None:
     """
     if moving := moved_by(armature):
         raise UsageError(
-            f"the armature '{armature.name}' is itself moved by '{moving[0]}': remove that first, "
-            "or move a parent of the armature instead"
+            f"the armature '{armature.name}' is itself keyed, driven or constrained by "
+            f"'{moving[0]}': remove that first, or move a parent of the armature instead"
         )
 
 
