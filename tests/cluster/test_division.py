@@ -148,7 +148,7 @@ def test_real_windows_of_two_workers_give_the_result_in_one_piece(
     cluster: Any, folder: Path, networks: Path
 ) -> None:
     (folder / "clip.mp4").write_bytes(SAMPLE.read_bytes())
-    options = ["--quality", "fast", "--end", "0.5", "--window-seconds", "0.3", "--formats", "npz"]
+    options = ["--quality", "fast", "--end", "0.8", "--window-seconds", "0.3", "--formats", "npz"]
     whole = folder.parent / "whole.npz"
     capture = ["capture", str(SAMPLE), "-o", str(whole), *options[:-2], "--threads", "1"]
     assert main(capture) == 0
