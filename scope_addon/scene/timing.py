@@ -165,6 +165,14 @@ def is_cycle(armature: bpy.types.Object) -> bool:
     return bool(_stored_ranges(armature)[0])
 
 
+def cycle_span(armature: bpy.types.Object) -> tuple[int, int] | None:
+    """Return the frames of the first and the last key of an armature's cycle, rounded; None without
+    a cycle. The last key is that of the first pose once more, which is not played.
+    """
+    cycle, _ = _stored_ranges(armature)
+    return (cycle[0], cycle[1] + 1) if cycle else None
+
+
 def retime_cycle(scene: bpy.types.Scene, armature: bpy.types.Object, retiming: Retiming) -> None:
     """Move the stored cycle with the armature's keys, and the scene's frame range if it is that of
     the cycle.

@@ -42,6 +42,7 @@ from ...kinematics.axes import UP
 from ...motion import Motion
 from ..actions import fcurves, read_keys
 from ..stored_values import smoothing_of, start_frame
+from ..timing import cycle_span
 from ..visibility import world_matrix
 from .keys import ROTATION, channel_curves, read_clip, write_keys
 from .root_object import clip_with_root_motion, removed_root_motion, root_object
@@ -50,6 +51,11 @@ from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_value
 _SAME_FRAME = 2e-3
 _WHOLE = 1e-3  # frames; timestamps are rounded
 _WHOLE_SHARE = 0.9  # of its keys that a motion has at least where it was captured
+_ROUNDED = 0.99  # frames by which keys on whole frames begin later than the motion, or end earlier
+_ROUNDED_LOOP = 2.0  # the same for a loop, whose ends were rounded, perhaps for another rate
+_SHIFTED_TOGETHER = 2.0  # frames by which shifts of both ends may differ, which are rounded
+_ADDED_POSES = 2  # that may be keyed before and after any motion
+_ADDED_SHARE = 0.1  # of all keys that may be
 _SAME_S = 1e-4  # keys' frames are single precision
 _MISSED_PX = 1.0
 _MISSED_M = 0.005
@@ -285,9 +291,10 @@ def _longest_shown(motion: Motion, rate: float) -> float:
 
 
 def check_times_of_keys(armature: bpy.types.Object, motion: Motion, rate: float) -> None:
-    """Check that the keys are at the times of the captured motion.
+    """Check that the keys are at the times of the captured motion, or of the loop made from it.
 
-    A loop has fewer keys, and further ones may have been added before and after the motion.
+    There may be fewer keys, if they were reduced, baked or deleted, and further ones may have been
+    added before and after the motion.
 
     :param rate: scene frames per second.
     :raises UsageError: they were moved or stretched.
@@ -295,16 +302,66 @@ def check_times_of_keys(armature: bpy.types.Object, motion: Motion, rate: float)
     curves = [curve for curve in fcurves(armature) if curve.data_path.endswith(ROTATION)]
     if not curves:
         return
-    first, last = whole_span(armature, motion, rate)
-    frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for curve in curves]))
-    inside = (frames >= first - 1) & (frames <= last + 1)
-    is_whole = inside.sum() >= _WHOLE_SHARE * min(len(motion), last - first + 1)
-    if not inside.all() and not is_whole:
+    frames = np.unique(np.concatenate([read_keys(curve)[:, 0] for curve in curves])).astype(float)
+    captured = (motion.timestamps + _start(armature, rate)) * rate
+    cycle = cycle_span(armature)
+    if cycle is None:
+        begins, ends = whole_span(armature, motion, rate)
+        known = "motion was captured"
+        is_moved = _are_moved(frames, captured, captured[0], captured[-1], _ROUNDED)
+    else:
+        begins, ends = cycle
+        known = "loop was made"
+        is_moved = _are_moved(frames, captured, begins, ends, _ROUNDED_LOOP)
+    if is_moved:
         raise UsageError(
             f"the keys of '{armature.name}' are in frames {frames[0]:g} to {frames[-1]:g}, but its "
-            f"motion was captured in frames {first} to {last}: put them back there in the Dope "
+            f"{known} in frames {begins} to {ends}: put them back there in the Dope "
             "Sheet; after this change, they can be moved again"
         )
+
+
+def _are_moved(
+    frames: NDArray[np.float64],
+    captured: NDArray[np.float64],
+    first: float,
+    last: float,
+    rounded: float,
+) -> bool:
+    """Return whether keys were moved or stretched in time.
+
+    :param frames: (N,) scene frames of the keys, increasing.
+    :param captured: (T,) scene frames of the captured poses.
+    :param first: scene frame of the first key as it was written; ``last`` of the last.
+    :param rounded: frames by which the first and the last key may be off these.
+    """
+    if _are_later(frames, first, last, rounded) or _are_later(
+        -frames[::-1], -last, -first, rounded
+    ):
+        return True
+    inside = (frames >= first - rounded) & (frames <= last + rounded)
+    poses = ((captured >= first - rounded) & (captured <= last + rounded)).sum()
+    if inside.sum() >= _WHOLE_SHARE * min(poses, last - first + 1):
+        return False
+    return bool((~inside).sum() > max(_ADDED_POSES, _ADDED_SHARE * len(frames)))
+
+
+def _are_later(frames: NDArray[np.float64], first: float, last: float, rounded: float) -> bool:
+    """Return whether all keys were shifted to later frames, whatever was added to them: there is
+    none at the first frame, but there are some after the last.
+
+    Keys that were deleted at the beginning are not there either; then, a pose that was added after
+    the end is hardly as far from the end as the first key is from the beginning.
+
+    :param frames: (N,) scene frames of the keys, increasing.
+    """
+    begun = frames[frames >= first - rounded]
+    if not len(begun) or begun[0] <= first + rounded:
+        return False
+    after = frames[frames > last + rounded]
+    shift = begun[0] - first
+    is_shifted_end = np.abs(after - (last + shift)) <= _SHIFTED_TOGETHER
+    return len(after) > _ADDED_POSES or bool(is_shifted_end.any())
 
 
 def whole_span(armature: bpy.types.Object, motion: Motion, rate: float) -> tuple[int, int]:

@@ -396,7 +396,10 @@ def move_keys(rig, factor, shift):
         curve.update()
 
 
-@pytest.mark.parametrize(("factor", "shift"), [(1.0, 20.0), (1.0, -20.0), (2.0, 0.0)])
+@pytest.mark.parametrize(
+    ("factor", "shift"),
+    [(1.0, 20.0), (1.0, -20.0), (1.0, 5.0), (1.0, -1.0), (2.0, 0.0), (1.2, 0.0)],
+)
 def test_keys_that_were_moved_in_time_are_not_corrected_at_another_moment(rig, factor, shift):
     move_keys(rig, factor, shift)
     before = keys(rig)
@@ -449,11 +452,50 @@ def test_a_strip_at_its_own_frames_is_edited(rig):
 
 def test_keys_that_were_added_after_the_motion_do_not_prevent_corrections(rig):
     for curve in fcurves(rig):
-        curve.keyframe_points.insert(150, curve.evaluate(91))
+        for frame in range(110, 151):
+            curve.keyframe_points.insert(frame, curve.evaluate(91))
     before = keys(rig)
     bpy.ops.scope.exchange_sides(start=40, end=52)
     for curve, now in keys(rig).items():
-        np.testing.assert_array_equal(now[-1], before[curve][-1])
+        np.testing.assert_array_equal(now[-41:], before[curve][-41:])
+
+
+def delete_beginning(rig, before):
+    """Delete the keys before a frame."""
+    for curve in fcurves(rig):
+        points = curve.keyframe_points
+        for index in reversed(range(int((read_keys(curve)[:, 0] < before).sum()))):
+            points.remove(points[index])
+
+
+CHANGES = {
+    "reduced": lambda rig: bpy.ops.scope.reduce_keys(degrees=40, millimetres=50),
+    "baked": lambda rig: bpy.ops.scope.bake_rate(rate=5.0),
+    "loop": lambda rig: bpy.ops.scope.loop(start=12, end=80),
+    "cut": lambda rig: delete_beginning(rig, 21),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize("poses", [(-20,), (-20, 150)], ids=["before", "around"])
+def test_a_pose_beside_fewer_keys_does_not_prevent_corrections(rig, change, poses):
+    change(rig)
+    for frame in poses:
+        rig.pose.bones["pelvis"].keyframe_insert("rotation_quaternion", frame=frame)
+    bpy.ops.scope.foot_stands(start=50, end=55, foot="left")
+    assert len(listed_corrections(rig)) == 1
+    bpy.ops.scope.smooth()
+
+
+@pytest.mark.parametrize("shift", [-10.0, 4.0])
+def test_a_loop_that_was_moved_within_the_captured_frames_is_not_corrected(rig, shift):
+    bpy.ops.scope.loop(start=12, end=80)
+    first, last = bpy.context.scene.frame_start, bpy.context.scene.frame_end + 1
+    move_keys(rig, 1.0, shift)
+    with pytest.raises(RuntimeError, match=f"loop was made in frames {first} to {last}: put them"):
+        bpy.ops.scope.foot_stands(start=50, end=55, foot="left")
+    move_keys(rig, 1.0, -shift)
+    bpy.ops.scope.foot_stands(start=50, end=55, foot="left")
 
 
 def outside(frame):
