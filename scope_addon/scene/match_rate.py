@@ -174,7 +174,7 @@ def _retime_faces(scene: bpy.types.Scene, moves: dict[bpy.types.Object, Retiming
         if keys in moved or keys.library is not None or keys.animation_data is None:
             continue
         for strip in action_strips(keys.animation_data):
-            if is_retargeted(strip.action) and source_of(strip.action) in sources:
+            if _is_written_here(strip.action) and source_of(strip.action) in sources:
                 retime_strip(strip, sources[source_of(strip.action)])
 
 
@@ -183,9 +183,8 @@ def _retime_written_actions(moves: dict[bpy.types.Object, Retiming], done: _Done
     sources = _retiming_by_name(moves)
     for action in bpy.data.actions:
         if (
-            action.library is None
-            and (action, _ALL_SLOTS) not in done
-            and is_retargeted(action)
+            (action, _ALL_SLOTS) not in done
+            and _is_written_here(action)
             and source_of(action) in sources
         ):
             done.add((action, _ALL_SLOTS))
@@ -204,7 +203,7 @@ def _retime_rig(
     done: _Done,
 ) -> None:
     """Move the keys that retargeting has written, and the strips that play them; the rig's other
-    actions stay.
+    actions stay, and those of a library, whose keys Blender does not change.
 
     :param retiming: of the capture that the rig was retargeted to last.
     :param sources: of every capture, by the name of its armature.
@@ -212,15 +211,11 @@ def _retime_rig(
     animation = rig.animation_data
     if animation is None:
         return
-    strips = [strip for strip in action_strips(animation) if is_retargeted(strip.action)]
+    strips = [strip for strip in action_strips(animation) if _is_written_here(strip.action)]
     for strip in strips:
         retime_strip(strip, sources.get(source_of(strip.action), retiming))
-    own = (
-        [animation.action]
-        if animation.action is not None and is_retargeted(animation.action)
-        else []
-    )
-    written = {*own, *(strip.action for strip in strips)}
+    actions = [animation.action, *(strip.action for strip in strips)]
+    written = {action for action in actions if action is not None and _is_written_here(action)}
     moved = {action for action in written if (action, _ALL_SLOTS) not in done}
     for action in moved:
         done.add((action, _ALL_SLOTS))
@@ -230,6 +225,11 @@ def _retime_rig(
     if (root := root_object(rig)) is not None:
         retime_unused_trajectory(root, retiming)
         _retime(root, retiming, done)
+
+
+def _is_written_here(action: bpy.types.Action) -> bool:
+    """Return whether retargeting has written an action that this file stores."""
+    return action.library is None and is_retargeted(action)
 
 
 def _retime_markers(

@@ -11,7 +11,7 @@ from scope.scope_addon.edit.corrected_motion import corrections_of
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.motion import Motion
 from scope.scope_addon.retarget.expression_map import ExpressionMap
-from scope.scope_addon.scene.actions import fcurves, has_slots, push_to_nla, read_keys
+from scope.scope_addon.scene.actions import fcurves, fcurves_of, has_slots, push_to_nla, read_keys
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.face_retarget import CapturedExpressions, retarget_expressions
@@ -263,6 +263,27 @@ def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
     if hasattr(rig.animation_data, "action_slot"):
         rig.animation_data.action_slot = kept.slots[0]
     np.testing.assert_allclose(at_times(rig, list(bones.values()), 101.0), take_2, atol=1e-3)
+
+
+def test_a_strip_that_plays_the_action_of_a_library_stays_with_its_keys(scene, tmp_path):
+    person = built()
+    rig, _ = build_rig("mixamo")
+    scene.scope_retarget.rig = rig
+    bpy.context.view_layer.objects.active = person
+    bpy.ops.scope.retarget()
+    action = rig.animation_data.action
+    path = str(tmp_path / "take.blend")
+    bpy.data.libraries.write(path, {action})
+    with bpy.data.libraries.load(path, link=True) as (_, here):
+        here.actions = [action.name]
+    (linked,) = here.actions
+    rig.animation_data.action = None
+    strip = rig.animation_data.nla_tracks.new().strips.new("take", int(START), linked)
+    played = strip.frame_start, strip.frame_end
+    keys = [read_keys(curve) for curve in fcurves_of(linked)]
+    bpy.ops.scope.match_frame_rate()
+    assert (strip.frame_start, strip.frame_end) == played
+    np.testing.assert_array_equal([read_keys(curve) for curve in fcurves_of(linked)], keys)
 
 
 @pytest.mark.parametrize("root", ["bone", "object"])
