@@ -39,7 +39,7 @@ def heard(sound, offset_s, drift=0.0, noise=0.02, seed=1):
 def write_video(path, sound, codec="pcm_s16le", video_late_s=0.0):
     """Write a video with a sound, or without one, whose first image comes later than the sound.
 
-    :param codec: of the sound; encoding AAC takes ten times as long as all the rest.
+    :param codec: of the sound; encoding AAC takes longer than all the rest.
     """
     with av.open(str(path), "w") as container:
         film = container.add_stream("mpeg4", rate=10)
