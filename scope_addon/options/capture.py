@@ -101,12 +101,14 @@ def _range_limit(settings: Any, name: str) -> str | None:
     return f"{getattr(settings, name):.6f}" if settings.use_range else None
 
 
-def _forget_person(settings: Any, _context: Any) -> None:
-    """Forget the chosen person, whose place is in the picture as it was turned before."""
-    settings.person = ""
+def _forget_places(settings: Any, _context: Any) -> None:
+    """Forget the chosen person and the part in which people are looked for, whose places are in the
+    picture as it was turned before.
+    """
+    settings.forget_places()
 
 
-_TURNS_PICTURE = {"update": _forget_person}
+_TURNS_PICTURE = {"update": _forget_places}
 _TIME = {"step": 10, "precision": 2, "subtype": "TIME_ABSOLUTE", "unit": "TIME_ABSOLUTE"}
 
 

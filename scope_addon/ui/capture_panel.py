@@ -57,7 +57,7 @@ _PIXELS_PER_CHARACTER = 7.0
 _EXPORT_BUTTONS = 4
 _STATUS_ICONS = {WAITING: "TIME", CAPTURING: "PLAY", DONE: "CHECKMARK", FAILED: "ERROR"}
 # What belongs to one clip, or to one person, is no preset.
-_OF_THE_CLIP = ("take", "person", "use_range", "start", "end", "heights_m")
+_OF_THE_CLIP = ("take", "person", "crop", "use_range", "start", "end", "heights_m")
 _VIEW = {"name": "View", "description": "Video of the same moment, by another camera"}
 _FOOTAGE = {"name": "Footage", "description": "Video or image of a person to capture"}
 
@@ -579,8 +579,8 @@ class SCOPE_PG_settings(bpy.types.PropertyGroup):
     no_result: PointerProperty(type=SCOPE_PG_result)  # stays empty
 
     def forget_places(self) -> None:
-        """Forget what is a place in the picture of other footage: the person to capture, and the
-        part in which people are looked for.
+        """Forget what is a place in a picture that is no longer shown: the person to capture, and
+        the part in which people are looked for.
         """
         self.person = ""
         self.crop = ""

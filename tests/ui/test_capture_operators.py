@@ -224,6 +224,14 @@ def test_a_place_of_a_person_is_of_one_picture_alone(footage):
         assert settings.person == ""
 
 
+def test_the_part_of_a_picture_is_forgotten_where_the_picture_is_turned():
+    settings = bpy.context.scene.scope
+    for name, value in (("rotate", "90"), ("mirror", True)):
+        settings.crop = "0,0,400,540"
+        setattr(settings, name, value)
+        assert settings.crop == ""
+
+
 def test_places_in_a_picture_are_forgotten_where_other_footage_is_chosen(footage):
     settings = bpy.context.scene.scope
     settings.footage = str(footage)
