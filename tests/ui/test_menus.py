@@ -98,7 +98,7 @@ def test_presets_store_settings_but_nothing_of_one_clip():
         for value in SCOPE_OT_add_capture_preset.preset_values
     }
     assert {"quality", "people", "hands", "face", "frame_rate"} <= names
-    of_one_clip = {"take", "person", "crop", "use_range", "start", "end", "heights_m", "footage"}
+    of_one_clip = {"take", "person", "crop", "range_start", "range_end", "height_cm", "footage"}
     assert not names & of_one_clip
     settings = bpy.context.scene.scope
     assert all(hasattr(settings, name) for name in names | of_one_clip)
