@@ -145,12 +145,10 @@ def evaluated(shared, body, camera, folder, **options):
 
 
 def test_a_smaller_network_does_not_flip_a_person_with_a_blurred_face(shared, body, tmp_path):
-    """BlazePose-full confuses front and back, or left and right, in 29 % of this camera's
-    frames.
-    """
-    wanted = VideoRange(end_s=0.6)
+    """Without the repair of tracks, left and right are exchanged in half of these frames."""
+    wanted = VideoRange(start_s=0.8, end_s=1.3)
     figures = evaluated(shared, body, "cam2", tmp_path, quality="balanced", wanted=wanted)
-    assert figures["coverage"] >= 0.36  # of the whole clip
+    assert figures["coverage"] > 0.3  # of the whole clip
     assert figures["lr_swap"] + figures["mirror"] + figures["mirror_swap"] <= 0.01
 
 
