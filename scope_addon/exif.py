@@ -26,7 +26,7 @@ _DEEPEST = 64  # bits of one channel
 _ORIENTATION = 0x0112
 _EXIF_DIRECTORY = 0x8769
 _FOCAL_35MM = 0xA405
-_VIEWS = {  # by the orientation
+_VIEWS = {  # how a picture is shown, by its orientation
     1: AS_IN_FILE,
     2: FootageView(0, True),
     3: FootageView(180),
@@ -48,6 +48,11 @@ class Exif:
     orientation: int = 1
     focal_35mm: float | None = None
 
+    @property
+    def view(self) -> FootageView:
+        """How the stored picture is turned and mirrored to be shown."""
+        return _VIEWS[self.orientation]
+
 
 def read_exif(data: bytes) -> Exif:
     """Read the orientation and the focal length of an encoded picture (the bytes of the file)."""
@@ -68,7 +73,7 @@ def picture_view(path: Path) -> FootageView:
         data = path.read_bytes()
     except OSError:
         return AS_IN_FILE
-    return _VIEWS[read_exif(data).orientation]
+    return read_exif(data).view
 
 
 def animation_length(data: bytes) -> int:

@@ -96,7 +96,7 @@ def read_picture(path: Path) -> Picture | None:
     exif = read_exif(data)
     rgb = _as_rgb8(image)
     if not data.startswith(TIFF):  # OpenCV rotates a TIFF upright even with IMREAD_UNCHANGED
-        rgb = _upright(rgb, exif.orientation)
+        rgb = exif.view.show(rgb)
     return Picture(rgb, exif.focal_35mm, animation_length(data))
 
 
@@ -162,12 +162,3 @@ def _on_white(bgra: Uint8Array) -> Uint8Array:
     alpha = bgra[..., 3:].astype(np.float32) / 255
     blended: Float32Array = bgra[..., :3] * alpha + 255 * (1 - alpha) + 0.5
     return blended.astype(np.uint8)
-
-
-def _upright(image: Uint8Array, orientation: int) -> Uint8Array:
-    """Undo an EXIF orientation (1..8)."""
-    if orientation in (5, 6, 7, 8):
-        image = image.transpose(1, 0, 2)
-    vertical = orientation in (3, 4, 7, 8)
-    horizontal = orientation in (2, 3, 6, 7)
-    return np.ascontiguousarray(image[:: -1 if vertical else 1, :: -1 if horizontal else 1])
