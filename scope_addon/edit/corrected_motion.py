@@ -98,8 +98,7 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
 
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:
     """Return a pin in the world of the motion, which an upright line or a floor may have moved."""
-    transform = world_of(corrections_of(motion))
-    return pin if transform is None else _in_world(pin, transform)
+    return _in_world(pin, world_of(corrections_of(motion)))
 
 
 def uncorrected(motion: Motion) -> Motion:
@@ -205,9 +204,7 @@ def _changed(clip: Clip, motion: Motion, body: Body, shot: Shot) -> Clip:
     required = [c for c in corrections if isinstance(c, Pin | Contact)]
     if not required:
         return clip
-    moved = [
-        _in_world(c, world) if isinstance(c, Pin) and world is not None else c for c in required
-    ]
+    moved = [_in_world(c, world) if isinstance(c, Pin) else c for c in required]
 
     def solve(clip: Clip, shot: Shot) -> Clip:
         return resolve(clip, body, motion.betas, moved, shot, floor=floor_of(motion))
@@ -237,9 +234,9 @@ def _changed_in_world(
     return out
 
 
-def _in_world(pin: Pin, transform: NDArray[np.float64]) -> Pin:
-    """Return a pin in a world that ``transform`` (4, 4) has moved."""
-    if pin.position is None:
+def _in_world(pin: Pin, transform: NDArray[np.float64] | None) -> Pin:
+    """Return a pin in a world that ``transform`` (4, 4) has moved; None: it was not moved."""
+    if pin.position is None or transform is None:
         return pin
     x, y, z = transform[:3, :3] @ pin.position + transform[:3, 3]
     return replace(pin, position=(float(x), float(y), float(z)))

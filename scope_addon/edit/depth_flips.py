@@ -33,11 +33,10 @@ from ..kinematics.mirrored_limbs import LIMBS
 from .clip import Clip
 from .corrections import BODY, DepthFlip
 from .solve_pins import Shot, keys_of_span
-from .spans import interpolate
+from .spans import SIDES_EXCHANGED, interpolate
 
 # Around each end of a span, its poses are blended into those beside it within this time.
 _BLEND_S = 0.1
-_SIDES = np.diag([-1.0, 1.0, 1.0])
 _NEAREST_M = 0.1  # from the camera
 # A limb bent by less than about 6 degrees says nothing about the plane in which it bends, and one
 # bent by more than about 20 all.
@@ -112,8 +111,8 @@ def _turned_around(clip: Clip, body: Body, centers: NDArray[np.float64]) -> NDAr
     is_level = np.linalg.norm(level, axis=1, keepdims=True) > _LEAST_HORIZONTAL
     v = _unit(np.where(is_level, level, sight))
     M = np.eye(3) - 2.0 * v[:, :, None] * v[:, None, :]
-    rotations: NDArray[np.float64] = _SIDES @ clip.rotations[:, opposite] @ _SIDES
-    rotations[:, 0] = M @ clip.rotations[:, 0] @ _SIDES
+    rotations: NDArray[np.float64] = SIDES_EXCHANGED @ clip.rotations[:, opposite] @ SIDES_EXCHANGED
+    rotations[:, 0] = M @ clip.rotations[:, 0] @ SIDES_EXCHANGED
     return rotations
 
 

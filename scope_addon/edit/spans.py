@@ -17,9 +17,9 @@ from ...solver.rotations import exp, log
 from ..errors import UsageError
 from .clip import Clip, keys_within
 
-FINGERS = ("index", "middle", "pinky", "ring", "thumb")
+_FINGERS = ("index", "middle", "pinky", "ring", "thumb")
 LIMBS = {
-    "arms": ("collar", "shoulder", "elbow", "wrist", "hand", *FINGERS),
+    "arms": ("collar", "shoulder", "elbow", "wrist", "hand", *_FINGERS),
     "legs": ("hip", "knee", "ankle", "foot"),
 }
 # The arms point in opposite directions at rest. A half turn about z maps one arm's rotations to the
@@ -27,7 +27,7 @@ LIMBS = {
 _HALF_ABOUT_Z = np.diag([-1.0, -1.0, 1.0])
 # A half turn would bend fingers backwards: both palms look down at rest, and it turns them up. The
 # mirror image of a finger's rotation bends it as far towards the other hand's palm.
-_SIDES_EXCHANGED = np.diag([-1.0, 1.0, 1.0])
+SIDES_EXCHANGED = np.diag([-1.0, 1.0, 1.0])
 
 
 def interpolate(clip: Clip, start: float, end: float) -> Clip:
@@ -87,8 +87,8 @@ def swap_sides(clip: Clip, body: Body, start: float, end: float, limbs: str = "b
         for left, right in _pairs_of_joints(body, kind):
             for to, source in ((left, right), (right, left)):
                 rotation = clip.rotations[span, source]
-                if names[to].partition("_")[2].startswith(FINGERS):
-                    out.rotations[span, to] = _SIDES_EXCHANGED @ rotation @ _SIDES_EXCHANGED
+                if names[to].partition("_")[2].startswith(_FINGERS):
+                    out.rotations[span, to] = SIDES_EXCHANGED @ rotation @ SIDES_EXCHANGED
                     continue
                 # Omega' = before^T Omega turn: the parent of the limb's first joint is the trunk,
                 # which is not turned.

@@ -19,7 +19,7 @@ from ..errors import UsageError
 from ..motion import Motion
 from ..review_spans import find_review_spans
 from .character.armature import SIDES, side_of
-from .timing import current_frame_kept
+from .timing import current_frame_kept, show_frame
 from .visibility import evaluated
 
 TAGS = ("mocap", "scope")
@@ -70,7 +70,7 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
     """
     scene = bpy.context.scene
     with evaluated(armature), current_frame_kept(scene):
-        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+        show_frame(scene, frame)
         posed = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         bones = [bone for bone in posed.pose.bones if bone.bone.use_deform] or list(
             posed.pose.bones

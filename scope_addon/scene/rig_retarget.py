@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -52,7 +51,7 @@ from .rig_action import (
 )
 from .rig_probe import at_rest, blocked_bones, probe, rest_pose
 from .rigify_ik import ik_keys
-from .timing import current_frame_kept
+from .timing import current_frame_kept, show_frame
 from .transaction import all_or_nothing
 from .visibility import evaluated, world_matrix
 
@@ -369,8 +368,7 @@ def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np
     places = []
     with evaluated(empty or source), current_frame_kept(scene):
         for frame in frames:
-            whole = math.floor(frame)
-            scene.frame_set(whole, subframe=frame - whole)  # evaluates both, once
+            show_frame(scene, frame)  # evaluates both, once
             if empty is None:
                 places.append(source.matrix_world.copy())
             else:

@@ -129,6 +129,12 @@ def keyed_rate(armature: bpy.types.Object, scene: bpy.types.Scene) -> float:
     return stored_rate(armature, scene_rate(scene))
 
 
+def show_frame(scene: bpy.types.Scene, frame: float) -> None:
+    """Set the current frame, which may lie between two whole ones, and evaluate the scene there."""
+    whole = math.floor(frame)
+    scene.frame_set(whole, subframe=float(frame - whole))
+
+
 @contextmanager
 def current_frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
     """Go back to the scene's current frame when the block ends."""
