@@ -67,9 +67,11 @@ def change_rate(
     for root, retiming in roots.items():
         if root is not None:
             retime_unused_trajectory(root, retiming)
-    _retime_rigs(rigs, moves, done)
-    _retime_faces(scene, moves)
-    _retime_written_actions(moves, done)
+    sources = {person.name: retiming for person, retiming in moves.items()}
+    for rig, person in rigs:
+        _retime_rig(rig, moves[person], sources, done)
+    _retime_faces(scene, moves, sources)
+    _retime_written_actions(sources, done)
     for collection in captures_of(scene):
         here = [person for person in people if holds(collection, person)]
         for camera in cameras_in(collection) if here else ():
@@ -150,25 +152,18 @@ def _retime(datablock: bpy.types.ID, retiming: Retiming, done: _Done) -> None:
             retime_keys(fcurves_in_slot(user.action, slot), retiming)
 
 
-def _retime_rigs(
-    rigs: Iterable[tuple[bpy.types.Object, bpy.types.Object]],
-    moves: dict[bpy.types.Object, Retiming],
-    done: _Done,
+def _retime_faces(
+    scene: bpy.types.Scene,
+    people: Iterable[bpy.types.Object],
+    sources: dict[str, Retiming],
 ) -> None:
-    """Move what retargeting has written to rigs, also of captures other than the one that a rig has
-    now.
-    """
-    sources = _retiming_by_name(moves)
-    for rig, person in rigs:
-        _retime_rig(rig, moves[person], sources, done)
-
-
-def _retime_faces(scene: bpy.types.Scene, moves: dict[bpy.types.Object, Retiming]) -> None:
     """Move the strips by which shape keys of the user's meshes play what retargeting has written;
     the actions are not moved.
+
+    :param people: captured armatures, whose own shape keys are left out.
+    :param sources: of every capture, by the name of its armature.
     """
-    sources = _retiming_by_name(moves)
-    moved = {keys for person in moves for keys in _datablocks(person)}
+    moved = {keys for person in people for keys in _datablocks(person)}
     for face in faces_of(scene.objects):
         keys = face.data.shape_keys
         if keys in moved or keys.library is not None or keys.animation_data is None:
@@ -178,9 +173,11 @@ def _retime_faces(scene: bpy.types.Scene, moves: dict[bpy.types.Object, Retiming
                 retime_strip(strip, sources[source_of(strip.action)])
 
 
-def _retime_written_actions(moves: dict[bpy.types.Object, Retiming], done: _Done) -> None:
-    """Move the keys of the other actions that retargeting has written, used or not."""
-    sources = _retiming_by_name(moves)
+def _retime_written_actions(sources: dict[str, Retiming], done: _Done) -> None:
+    """Move the keys of the other actions that retargeting has written, used or not.
+
+    :param sources: of every capture, by the name of its armature.
+    """
     for action in bpy.data.actions:
         if (
             (action, _ALL_SLOTS) not in done
@@ -191,19 +188,15 @@ def _retime_written_actions(moves: dict[bpy.types.Object, Retiming], done: _Done
             retime_written_keys(action, sources[source_of(action)])
 
 
-def _retiming_by_name(moves: dict[bpy.types.Object, Retiming]) -> dict[str, Retiming]:
-    """Return how every capture moves, by the name of its armature."""
-    return {person.name: retiming for person, retiming in moves.items()}
-
-
 def _retime_rig(
     rig: bpy.types.Object,
     retiming: Retiming,
     sources: dict[str, Retiming],
     done: _Done,
 ) -> None:
-    """Move the keys that retargeting has written, and the strips that play them; the rig's other
-    actions stay, and those of a library, whose keys Blender does not change.
+    """Move the keys that retargeting has written, also of captures other than the one that the rig
+    has now, and the strips that play them; the rig's other actions stay, and those of a library,
+    whose keys Blender does not change.
 
     :param retiming: of the capture that the rig was retargeted to last.
     :param sources: of every capture, by the name of its armature.
