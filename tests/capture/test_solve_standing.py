@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A second of a person who stands straight or bends the knees, with noise, through lifting
-network and solver.
+"""A person who stands straight, or with bent knees, for one second: noisy keypoints through the
+lifting network and the solver.
 """
 
 from __future__ import annotations

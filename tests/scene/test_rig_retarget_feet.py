@@ -112,23 +112,27 @@ def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(l
     np.testing.assert_allclose(seen(rig, bone_of.values(), frames), wanted, atol=1e-3)
 
 
-def test_feet_of_a_capture_below_the_floor_stay_on_it():
+def feet_of_lowered_walk(by):
+    """Heel and ball of each foot of a rig that follows somebody who walks lower by metres, and the
+    rig's bones.
+    """
     clip, _ = rolling_walk()
-    clip.root[:, 2] -= 0.05
+    clip.root[:, 2] -= by
     rig, bone_of = build_rig("mixamo")
     run(captured(motion_of(clip)), rig)
     feet = points(rig, [(bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"]) for side in STANDS])
+    return feet, rig, bone_of
+
+
+def test_feet_of_a_capture_below_the_floor_stay_on_it():
+    feet, _, _ = feet_of_lowered_walk(0.05)
     for side, (moved, rest) in zip(STANDS, feet, strict=True):
         assert (moved[..., 2] - rest[:, 2]).min() > -0.01
         assert np.abs(moved[STANDS[side][:, 1], 1, 2] - rest[1, 2]).max() < 0.01
 
 
 def test_feet_of_somebody_on_a_lower_floor_go_down_to_it():
-    clip, _ = rolling_walk()
-    clip.root[:, 2] -= 0.5
-    rig, bone_of = build_rig("mixamo")
-    run(captured(motion_of(clip)), rig)
-    feet = points(rig, [(bone_of[f"{side}_ankle"], bone_of[f"{side}_foot"]) for side in STANDS])
+    feet, rig, bone_of = feet_of_lowered_walk(0.5)
     scale = leg_length(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"]) / sum(
         np.linalg.norm(joint(f"left_{a}") - joint(f"left_{b}"))
         for a, b in (("hip", "knee"), ("knee", "ankle"))

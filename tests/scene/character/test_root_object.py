@@ -80,7 +80,7 @@ def test_the_armature_follows_the_trajectory_and_its_parent():
 
 
 def test_the_heading_of_one_scene_has_nothing_of_the_next():
-    """In place, somebody who stands looks ahead until the cut, after which another one stands."""
+    """In place, a person faces ahead up to the cut, although the next scene faces another way."""
     still = walk(2.0, speed=0.0)
     still.rotations[30:, 0] = exp(np.array([0.0, 0.0, 1.5])) @ still.rotations[0, 0]
     motion = replace(motion_of(still), scene_starts=[30])
