@@ -220,6 +220,7 @@ def test_an_interrupt_during_the_overlay_leaves_complete_files(tmp_path, capsys,
     assert files_below(tmp_path) == ["a.npz"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("blender_module")
 def test_no_command_writes_into_scopes_own_folders(tmp_path, capfd, monkeypatch):
     def state():

@@ -115,6 +115,7 @@ def test_threads_that_run_already_do_not_connect_either() -> None:
     assert "PermissionError" in ended.stderr
 
 
+@pytest.mark.slow
 def test_a_command_is_confined_and_writes_its_results(
     outside: Path, port: int, tmp_path: Path, temporary: Path
 ) -> None:

@@ -42,6 +42,7 @@ def test_opencv_without_memory() -> None:
     assert lacks_memory(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Linux on x86-64")
 def test_libraries_that_cannot_be_loaded(tmp_path) -> None:
     command = [sys.executable, "-c", LOADING]

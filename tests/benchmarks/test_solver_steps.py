@@ -37,6 +37,7 @@ def test_dense_matrix_and_elimination_give_the_same_step():
     np.testing.assert_allclose(shared, factor.dg[:count], rtol=0, atol=1e-8 * np.abs(d).max())
 
 
+@pytest.mark.slow
 def test_gradients_and_elimination_agree():
     problem, poses = make_clip(23, 6, gap=1, fixed=True, contacts=0)
     system = problem.make_system()
@@ -50,6 +51,7 @@ def test_gradients_and_elimination_agree():
     np.testing.assert_allclose(d, factor.d[:, :used], rtol=0, atol=1e-8 * np.abs(d).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("K", "P", "N", "prior"),
     [

@@ -144,6 +144,7 @@ def evaluated(shared, body, camera, folder, **options):
     )
 
 
+@pytest.mark.slow
 def test_a_smaller_network_does_not_flip_a_person_with_a_blurred_face(shared, body, tmp_path):
     """Without the repair of tracks, left and right are exchanged in half of these frames."""
     wanted = VideoRange(start_s=0.8, end_s=1.3)
@@ -167,6 +168,7 @@ def test_real_footage_with_truth_beats_the_raw_landmarks(shared, body, tmp_path)
     assert figures["jitter_rel"] < 17
 
 
+@pytest.mark.slow
 def test_frames_without_the_person_are_filled_and_marked(body, tmp_path):
     footage = cv2.VideoCapture(str(SAMPLE))
     blanked = tmp_path / "blanked.avi"
@@ -227,6 +229,7 @@ def test_a_motion_is_the_same_after_saving_and_loading(sample, tmp_path):
     assert np.array_equal(Motion.load(tmp_path / "m.npz").poses, sample.motions[0].poses)
 
 
+@pytest.mark.slow
 def test_no_foot_is_under_the_floor(shared, body):
     """A man walks out of the image, close to the camera: every vertex of his feet counts."""
     options = CaptureOptions(quality="fast", wanted=VideoRange(8.2, 9.4))
@@ -246,6 +249,7 @@ def test_no_foot_is_under_the_floor(shared, body):
     assert not any("floor" in warning for warning in map(str, found.report.warnings))
 
 
+@pytest.mark.slow
 def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
     """Squats, cut off at the hips: the visible part of the body moves up and down, as in the
     image.
@@ -267,6 +271,7 @@ def test_feet_outside_the_image_are_not_locked(shared, body, tmp_path):
     assert motion.residual_px[motion.valid].max() < 10
 
 
+@pytest.mark.slow
 def test_a_warning_names_the_person_without_hands(shared):
     clip = shared / "data" / "clips" / "two_people_portrait.mp4"
     body = load_body("scope_h")

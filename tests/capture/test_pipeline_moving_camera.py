@@ -58,6 +58,7 @@ def pan(clip, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_given_pan_is_used_and_gives_the_same_path(pan, tmp_path, observe_frames):
     poses = np.tile(np.eye(4), (FRAMES, 1, 1))
     poses[:, :3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) @ exp(TURNS)
@@ -91,6 +92,7 @@ def test_a_given_pan_is_used_and_gives_the_same_path(pan, tmp_path, observe_fram
         capture(pan, load_body("scope"), beginning, observe_frames=observe_frames)
 
 
+@pytest.mark.slow
 def test_the_world_of_a_panning_camera_does_not_move(clip, pan, tmp_path, observe_frames):
     videos = {"stand": tmp_path / "stand.mp4", "pan": pan, "zoom": tmp_path / "zoom.mp4"}
     film(clip, videos["stand"], lambda _: np.zeros(3))

@@ -56,6 +56,7 @@ def captured(detector: Path | None = None, keypoints: Path | None = None) -> Cap
     return capture(SAMPLE, load_body("scope"), options)
 
 
+@pytest.mark.slow
 def test_a_capture_with_both_is_as_good_as_ours(own_networks: tuple[Path, Path]) -> None:
     ours = captured()
     theirs = captured(*own_networks)
@@ -115,6 +116,7 @@ def test_a_detector_of_upright_boxes_finds_people_who_are_not_upright(
             assert off_px.mean() < 0.02 * expected.region.side_px
 
 
+@pytest.mark.slow
 def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path: Path) -> None:
     """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly
     visible.
@@ -165,6 +167,7 @@ def test_a_runner_is_tracked_at_a_low_frame_rate(
     assert numbers == {0}
 
 
+@pytest.mark.slow
 def test_the_track_of_a_person_who_leaves_the_image_ends(
     own_networks: tuple[Path, Path], frames: Frames
 ) -> None:

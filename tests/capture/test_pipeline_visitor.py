@@ -41,6 +41,7 @@ def everybody(footage: tuple[Path, np.ndarray], body: Body) -> Capture:
     return capture(footage[0], body, CaptureOptions(quality="fast", people="all"))
 
 
+@pytest.mark.slow
 def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
     everybody: Capture, footage: tuple[Path, np.ndarray]
 ) -> None:
@@ -67,6 +68,7 @@ def test_nobody_jumps_when_entering_or_leaving(everybody: Capture) -> None:
         assert (motion.joints_cam[:, 0, 2] > 1.0).all()
 
 
+@pytest.mark.slow
 def test_the_visitor_is_the_same_at_six_frames_a_second(
     footage: tuple[Path, np.ndarray], body: Body
 ) -> None:

@@ -41,6 +41,7 @@ def of_given_height(exact_lifting: None, tracks: list[Track]) -> list[Motion]:
     return solve(seen(tracks[0]), tracks, lambda *_: None, (TALL_M,)).motions
 
 
+@pytest.mark.slow
 def test_the_size_of_others_follows_from_a_given_height(tracks, of_given_height):
     motions = solve(seen(tracks[0]), tracks, lambda *_: None).motions
     unknown, tall, short = (BODY.stature(motion.betas) for motion in (motions[1], *of_given_height))
@@ -48,6 +49,7 @@ def test_the_size_of_others_follows_from_a_given_height(tracks, of_given_height)
     assert abs(short - SHORT_M) < min(0.6 * abs(unknown - SHORT_M), 0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_seen_by_both", [False, True])
 def test_a_given_height_corrects_only_whom_no_second_camera_sees(is_seen_by_both):
     """A second camera at 90° to the first one."""

@@ -47,6 +47,7 @@ def solved(track: Track, **options: Any) -> Solved:
     return solve(replace(seen(track), **options), [track], lambda *_: None, [BODY.stature()])
 
 
+@pytest.mark.slow
 def test_on_a_treadmill_people_stay_and_no_foot_is_held(on_the_spot):
     warned = solved(on_the_spot)
     assert warned.contradictions[0] is not None

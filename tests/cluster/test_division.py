@@ -144,6 +144,7 @@ def test_a_part_that_fails_is_left_to_the_capture_of_the_clip(cluster: Any, fold
     assert sum(row["frames"] for row in report["workers"]) == 12
 
 
+@pytest.mark.slow
 def test_real_windows_of_two_workers_give_the_result_in_one_piece(
     cluster: Any, folder: Path, networks: Path
 ) -> None:
@@ -162,6 +163,7 @@ def test_real_windows_of_two_workers_give_the_result_in_one_piece(
     assert set(different) <= {"source", "report"}
 
 
+@pytest.mark.slow
 def test_the_windows_of_a_killed_worker_are_observed_by_another(cluster: Any, folder: Path) -> None:
     clip = folder / "a.mp4"
     clip.write_text("6")

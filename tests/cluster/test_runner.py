@@ -388,6 +388,7 @@ def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
     )
 
 
+@pytest.mark.slow
 def test_a_lost_scheduler_is_a_sentence_and_finished_clips_are_kept(
     folder, tmp_path, monkeypatch, capsys
 ):

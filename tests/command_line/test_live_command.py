@@ -157,6 +157,7 @@ def times_seen(lines):
     return np.array([pose["time_s"] for pose in poses if pose["presence"] == "seen"])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT of POSIX")
 @pytest.mark.usefixtures("networks")
 def test_ctrl_c_ends_a_capture_that_sends_its_poses_and_keeps_the_recording(tmp_path):

@@ -108,6 +108,7 @@ def test_an_export_is_the_old_or_the_new_one(tmp_path, temporary, small, motion,
     assert not any("\n" in text for text in said)
 
 
+@pytest.mark.slow
 def test_all_outputs_of_a_capture_are_old_or_new(tmp_path, temporary, monkeypatch, motion, capfd):
     cv2.imwrite(str(tmp_path / "walk.png"), np.full((480, 640, 3), 90, np.uint8))
     report = Report(people=1, frames=2, fps={"total": 1.0}, reprojection_px=1.0, execution="CPU")

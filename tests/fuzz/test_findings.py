@@ -143,6 +143,7 @@ GLTF: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @linux
 def test_f4_rigs_that_ask_for_everything(tmp_path: Path) -> None:
     """NaN gave a traceback; a count or /dev/zero took 9 GiB; a pipe was waited for; FBX took 60 s
@@ -365,6 +366,7 @@ with atomic_path(pathlib.Path("o.fbx")) as temporary:
 """
 
 
+@pytest.mark.slow
 @posix
 def test_f11_nothing_is_left_and_fbx_files_are_the_same(tmp_path: Path) -> None:
     """Exports left ``blender_XXXXXX`` in TMPDIR, a killed one also ``.o.xxxx.fbx``; the same

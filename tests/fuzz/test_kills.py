@@ -19,6 +19,7 @@ pytestmark = pytest.mark.skipif(not AVAILABLE, reason="traces system calls of Li
 BY_NAME = {command.name: command for command in COMMANDS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "action", "calls"),
     [
@@ -37,6 +38,7 @@ def test_files_are_old_or_whole_and_the_next_run_is_good(
     assert check_command(BY_NAME[name], action, calls) == (len(calls), [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ext4", "btrfs"])
 def test_a_power_cut_leaves_old_or_whole_files_and_keeps_what_was_said_to_be_there(
     kind: str,

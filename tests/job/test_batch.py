@@ -538,6 +538,7 @@ def test_invalid_options_are_reported_once_before_the_first_clip(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_the_real_capture_of_a_folder(tmp_path, capfd):
     clips = tmp_path / "clips"
     clips.mkdir()

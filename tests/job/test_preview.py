@@ -6,6 +6,7 @@ is.
 import threading
 
 import numpy as np
+import pytest
 from scope.scope_addon.capture.media.frame import Frame
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
@@ -160,6 +161,7 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
             writer._rasterizer.result()
 
 
+@pytest.mark.slow
 def test_the_preview_shows_the_body_at_the_ground_truth(body):
     """The image has the body's colour at the joints, and is unchanged away from them."""
     truth = np.load(SAMPLE.with_name("sample_truth.npz"))

@@ -37,6 +37,7 @@ def folder(tmp_path):
     return tmp_path / "job"
 
 
+@pytest.mark.slow
 def test_an_isolated_worker_starts_and_reports(folder, tmp_path):
     """-I ignores PYTHONPATH, the script's folder and the current folder, as inside Blender."""
     request = JobRequest(played_again_and_again(tmp_path / "long.mp4"), quality="fast", threads=1)

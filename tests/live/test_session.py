@@ -71,6 +71,7 @@ def jerk(joints):
     return np.linalg.norm(np.diff(joints[LEAD:], 3, axis=0), axis=-1).mean()
 
 
+@pytest.mark.slow
 def test_the_recording_is_close_to_the_offline_capture(body, recorded):
     (offline,) = capture(
         SAMPLE,

@@ -50,6 +50,7 @@ def played(body, networks):
     return poses, np.array(focal), 2 * np.array(order), people
 
 
+@pytest.mark.slow
 def test_the_estimates_settle_when_they_are_said_to_and_stay(played):
     poses, focal, _, _ = played
     settled = np.array([pose.is_settled for pose in poses])

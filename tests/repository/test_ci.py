@@ -113,6 +113,7 @@ PathFinder.find_spec = classmethod(
 """
 
 
+@pytest.mark.slow
 def test_what_runs_without_blender_can_be_collected_without_it(tmp_path: Path) -> None:
     """On Windows and macOS; a test file that imports Blender's module would keep all the others
     from running.

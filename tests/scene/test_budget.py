@@ -55,6 +55,7 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="measures memory with a limit of Linux")
 def test_an_hour_of_zeros_is_refused(tmp_path: Path) -> None:
     """Before Blender has a key of it, so for every format."""

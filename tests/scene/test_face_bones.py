@@ -52,6 +52,7 @@ def keyed(rig):
     return {curve.data_path.split('"')[1] for curve in actions.fcurves(rig)}
 
 
+@pytest.mark.slow
 def test_the_jaw_opens_as_far_as_on_the_body_in_widths_of_the_mouth(rigify_face):
     lower, upper = moved(rigify_face, "DEF-lip.B.L", "DEF-lip.T.L", jawOpen=1.0)
     corners = heads(rigify_face, 1, "lips.L", "lips.R")

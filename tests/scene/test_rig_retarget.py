@@ -126,6 +126,7 @@ def test_a_rig_of_controls_alone_stands_on_its_lowest_bone(source):
     np.testing.assert_allclose(seen(rig, bone_of.values()), before, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_rigify(rigify_rigs):
     source = captured(motion_of(walk(1.0)))
     frames = range(1, 31, 6)

@@ -156,6 +156,7 @@ def test_toes_without_captured_bending_stay_flat():
             assert np.degrees(np.arccos(np.clip(along @ rest, -1, 1))) < 2.0
 
 
+@pytest.mark.slow
 def test_feet_of_rigify_stand(source, rigify_rigs):
     for rig, prefix in rigify_rigs:
         run(source, rig)

@@ -173,6 +173,7 @@ def test_fingers_point_where_the_body_points(source, scheme, twist):
     check_hands(rig, bone_of)
 
 
+@pytest.mark.slow
 def test_fingers_of_rigify(source, rigify_rigs):
     for rig, prefix in rigify_rigs:
         bone_of = {}

@@ -93,6 +93,7 @@ def test_a_librarys_name_is_read_from_its_file(bills, file, name, version):
     assert bills.library_name(file) == (name, version)
 
 
+@pytest.mark.slow
 def test_third_party_states_what_the_installed_packages_contain(bills, installed):
     """The wheels of other platforms are compared by the build."""
     text = (ROOT / "THIRD_PARTY.md").read_text("utf-8")

@@ -199,6 +199,7 @@ def test_every_permission_has_a_reason_that_the_platform_accepts():
         assert not reason.endswith("."), reason
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_path):
     builder = with_empty_wheels
@@ -314,6 +315,7 @@ def test_blender_installs_a_wheel_that_is_compressed_again(builder, tmp_path):
     assert (tmp_path / "local" / "packages" / "small" / "__init__.py").read_text() == module
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_a_repeated_build_gives_the_same_bytes(with_empty_wheels, monkeypatch):
     builder = with_empty_wheels

@@ -117,6 +117,7 @@ def test_what_cannot_be_compiled_is_refused_with_a_sentence(folder, files, forma
     assert says in compiled(given(folder, formats=formats))["error"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="the stand-in for Blender is a script")
 @pytest.mark.usefixtures("networks")
 def test_the_commands_capture(folder, tmp_path):

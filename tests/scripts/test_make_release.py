@@ -124,6 +124,7 @@ def test_the_hashes_are_those_that_sha256sum_checks(release, tmp_path):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="the wheel is built of tracked files")
 def test_a_repeated_build_of_the_wheel_gives_the_same_bytes(release, tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")

@@ -81,6 +81,7 @@ def weight_of_joint(arrays):
     return dense
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_rebuilding_gives_the_committed_file(shaped, name):
     built = rig_body(shaped, make_skeleton(shaped.source, with_hands=name == "scope_h"))
@@ -365,6 +366,7 @@ def mouth(shaped):
     return build_mouth(wheel, grown), kept
 
 
+@pytest.mark.slow
 def test_teeth_and_tongue_are_rebuilt(mouth):
     built, kept = mouth
     assert set(kept) == set(built)

@@ -58,6 +58,7 @@ def check_truth(truth: dict, body: Body, tolerance: float) -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_clip_in_the_assets_fits_its_truth_and_the_body(body):
     truth = dict(np.load(ASSETS / "sample" / "sample_truth.npz"))
     # another build of the body may move a joint a little: the clip still shows it

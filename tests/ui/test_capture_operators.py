@@ -311,6 +311,7 @@ def test_a_capture_that_ends_in_another_scene_hides_no_startup_cube_of_the_shown
     assert cube.hide_get()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "suffix"), [("NPZ", ".npz"), ("GLB", ".glb")])
 def test_clips_of_a_queue_are_written_as_files_beside_those_that_exist(
     fake_worker, footage, tmp_path, kind, suffix

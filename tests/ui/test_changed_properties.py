@@ -91,6 +91,7 @@ def try_all():
     listed_corrections(bpy.context.object)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["text", "group"])
 def test_no_operator_fails_with_a_traceback(rig, kind):
     for name in PROPERTIES:

@@ -63,6 +63,7 @@ def test_a_pan_with_tilt_and_roll_is_found(panorama):
     assert found.known.sum() >= T / 3
 
 
+@pytest.mark.slow
 def test_a_camera_on_a_tripod_is_static_despite_noise_and_a_passer_by(panorama):
     rng = np.random.default_rng(1)
     still = view(panorama, np.eye(3))

@@ -88,6 +88,7 @@ def test_edges_in_any_direction_change_nothing():
     assert found is drifted
 
 
+@pytest.mark.slow
 def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared, observe_frames):
     clip = shared / "data/clips/run_moving_camera.mp4"
     options = CaptureOptions(quality="fast")
@@ -103,6 +104,7 @@ def test_a_runner_alongside_the_camera_stays_on_a_straight_path(shared, observe_
     assert np.abs(np.convolve(across, stride, "valid")).max() < 0.35
 
 
+@pytest.mark.slow
 def test_without_smoothing_the_camera_travels_as_far(shared, observe_frames):
     """Where every frame is fitted alone, positions are still estimated in the same way."""
     body = load_body("scope")

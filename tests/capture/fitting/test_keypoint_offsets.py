@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
+import pytest
 from scope.benchmarks.ablation import WITHOUT_OFFSETS, replaced
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting.frame_measurements import Measurer
@@ -151,6 +152,7 @@ def test_known_offsets_are_recovered(body):
     np.testing.assert_allclose(found, shifts, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_offsets_lower_the_reprojection_error_of_a_man_they_were_not_estimated_from(
     shared, body, observe_frames
 ):

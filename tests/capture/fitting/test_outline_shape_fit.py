@@ -78,6 +78,7 @@ def test_a_body_without_garments_keeps_its_girths(
     assert abs(mass) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "seed"), [("skirt", None), ("coat", 0)])
 def test_garments_fatten_a_body_up_to_a_limit_however_wide_they_are(
     body: Body, seen: dict[object, Track], name: str, seed: int | None

@@ -255,6 +255,7 @@ def test_impossible_heights_are_refused(height_m, says):
         check_options(load_body("scope"), CaptureOptions(heights_m=(1.8, height_m)))
 
 
+@pytest.mark.slow
 def test_a_known_height_sets_size_and_distance():
     """If a person is a quarter taller, the same pixels mean a quarter more distance."""
     body = load_body("scope")

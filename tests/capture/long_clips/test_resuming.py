@@ -54,6 +54,7 @@ def assert_same(resumed, whole):
         assert np.array_equal(getattr(resumed, name), getattr(whole, name)), name
 
 
+@pytest.mark.slow
 def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks, runs):
     options = CaptureOptions(quality="fast", threads=1, wanted=VideoRange(0.0, 0.6, Fraction(30)))
     folder = tmp_path / "unfinished"
@@ -68,6 +69,7 @@ def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks
     assert_same(resumed, whole)
 
 
+@pytest.mark.slow
 def test_a_stopped_capture_of_a_long_clip_goes_on_in_its_middle(tmp_path, body, networks, runs):
     """Three windows of 0.2 s, of which two are finished, without the estimates that would give the
     same.

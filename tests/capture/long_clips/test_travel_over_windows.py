@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
+import pytest
 from scope.scope_addon.capture.camera.background_record import joined_backgrounds
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.clock import StageClock
@@ -48,6 +49,7 @@ def no_people() -> Trackers:
     return Trackers(people, None, None)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_camera_has_one_path_over_both_windows():
     camera = Camera(pinhole(WIDTH, HEIGHT, FOCAL_PX), np.zeros(5), "given")
     video = SimpleNamespace(width=WIDTH, height=HEIGHT, expected_frames=FRAMES)

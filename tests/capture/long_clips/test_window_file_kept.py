@@ -50,6 +50,7 @@ def all_kept(
     return Path(shutil.copytree(finished, tmp_path / "kept"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("people", "frame", "goes_on_at_s"),
     [

@@ -22,6 +22,7 @@ def places(track: Track) -> np.ndarray:
     return track.keypoints_px[:, [23, 24]].mean(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("people", ["largest", 2])
 def test_windows_of_several_processes_are_the_clip_in_one_piece(
     windows_of: Callable[..., list[Track]],
@@ -87,6 +88,7 @@ def test_windows_that_are_missing_or_damaged_are_observed_by_the_process_that_jo
     assert_same(windows_of(given, tmp_path), undisturbed())
 
 
+@pytest.mark.slow
 def test_a_window_that_was_decoded_to_other_images_is_observed_again(
     windows_of: Callable[..., list[Track]],
     undisturbed: Callable[..., list[Track]],

@@ -47,6 +47,7 @@ def test_brightness_does_not_flicker() -> None:
     assert exposure.brighten(picture(200)).max() <= 201  # the light is switched on
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_a_person_in_the_dark_is_captured(shared: Path, body: Body, tmp_path: Path) -> None:
     """At 6 % of the light, at which the networks find nobody without the gain."""

@@ -157,6 +157,7 @@ def real_people(estimates):
     ]
 
 
+@pytest.mark.slow
 def test_lifting_real_people_is_more_accurate_than_their_world_landmarks(lifter, real_people):
     (rays, confidence, world, truth), limbs = real_people
     lifted = lifter.lift(rays, confidence, world)

@@ -93,6 +93,7 @@ def pixels_of(points):
     return projected[:, :2] / projected[:, 2:]
 
 
+@pytest.mark.slow
 def test_each_hand_comes_from_the_camera_that_sees_it(body):
     place = beside(60.0)
     points = points_of(body)

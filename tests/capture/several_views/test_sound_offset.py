@@ -88,6 +88,7 @@ def test_clock_is_that_of_the_images(tmp_path):
     assert offset_by_sound(first, second).seconds == pytest.approx(-0.5, abs=0.003)
 
 
+@pytest.mark.slow
 def test_clocks_that_drift_apart_in_minutes(tmp_path):
     sound = scene_sound(180.0)
     first = loud_of(tmp_path, heard(sound, 0.0), "first")

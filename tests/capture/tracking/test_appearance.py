@@ -32,6 +32,7 @@ def test_each_histogram_is_normalized() -> None:
     np.testing.assert_allclose(np.square(found).reshape(2, -1).sum(axis=1), 1.0)
 
 
+@pytest.mark.slow
 def test_distances_order_people_by_their_clothes() -> None:
     first = appearance(picture(RED, GREY), BODY)
     darker = appearance(picture(RED, GREY, light=0.9), BODY)

@@ -344,6 +344,7 @@ def test_who_passes_by_the_main_person_of_a_long_clip_is_kept() -> None:
     assert people_of(times, [main, passes, tiny]) == [[main], [passes]]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_identities_of_real_people_are_not_switched_where_they_cross(shared: Path) -> None:
     """The same man twice, so that appearance does not help; occluded for a third of a second where

@@ -55,6 +55,7 @@ def test_other_changes_are_not_cuts(frames: list[np.ndarray]) -> None:
     assert cuts(frames) == []
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path) -> None:
     """A man from two sides, one after the other: the cut is reported, and he is followed before and

@@ -32,6 +32,7 @@ def largest(tracker: PeopleTracker, image: np.ndarray) -> tuple[int, Observation
     return max(tracker.step(image), key=lambda entry: entry[1].region.side_px, default=None)
 
 
+@pytest.mark.slow
 def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
     tracker = PeopleTracker("best", threads=2)
@@ -51,6 +52,7 @@ def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     assert head_above_hips[186] > 0
 
 
+@pytest.mark.slow
 def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
     """The woman on the grass leaves at the left edge between frames 195 and 207, and nothing
     replaces her.
@@ -145,6 +147,7 @@ def test_two_people_side_by_side_are_both_found(frames: Frames, apart_px: int) -
         assert off_px < 20  # pixels of a person with a height of about 260
 
 
+@pytest.mark.slow
 def test_somebody_half_hidden_by_another_person_is_found_and_followed(frames: Frames) -> None:
     """The one in front hides one arm, half of the trunk and a leg."""
     tracker = PeopleTracker("best", threads=2, people=12)

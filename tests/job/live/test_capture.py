@@ -31,6 +31,7 @@ def folder(tmp_path):
     return tmp_path / "job"
 
 
+@pytest.mark.slow
 def test_what_is_recorded_is_what_was_shown(folder, tmp_path, networks, body, monkeypatch):
     """A busy computer drops most frames, and shows some of the other poses: they are compared with
     all that came.

@@ -106,6 +106,7 @@ def morph_animation(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(names, values.reshape(-1, len(names)).T, strict=True))
 
 
+@pytest.mark.slow
 def test_a_glb_of_a_baked_shape_has_the_expressions_as_animated_morph_targets(
     whole_body, motion, tmp_path
 ):

@@ -221,6 +221,7 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path):
     jaw = np.array([0.0, 0.3, 0.9, 0.2, 0.5])
     face = made_face(5, jawOpen=jaw, eyeBlinkLeft=0.4)

@@ -4,6 +4,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scope.solver import (
     Keypoints2D,
     Measurements,
@@ -44,6 +45,7 @@ def both_fits(seed):
     return learned, plain
 
 
+@pytest.mark.slow
 def test_a_cost_as_low_in_fewer_steps():
     """In the median: depth is free in 2D, so that both may end in different minima of one clip,
     some of which neither finds in 200 steps.

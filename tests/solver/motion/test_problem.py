@@ -21,6 +21,7 @@ def turned(body, state, d):
     return rotations.exp(d[:3]) @ R0, t0 + d[3:6], Omega, beta + d[6 + 3 * K :]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "cameras"), [(0, 2), (1, 1)])
 def test_gradient_of_the_clips_whole_objective_by_finite_differences(seed, cameras):
     clip = noisy_clip(seed, cameras=cameras)

@@ -82,6 +82,7 @@ def flexions(fit, body):
     return knee_flexions({joint: at(fit, body, joint) for joint in JOINTS})
 
 
+@pytest.mark.slow
 def test_the_straightest_legs_of_people_who_stand_and_walk_are_nearly_straight(fitted, body):
     for source in ("cmu_asf_amc", *STANDING_AND_WALKING):
         for kind in ("stand", "walk"):

@@ -177,6 +177,7 @@ def test_a_pin_under_the_floor_is_said_with_its_depth(rig, tmp_path, capfd):
     )
 
 
+@pytest.mark.slow
 def test_a_foot_that_stands_and_goes_under_the_floor_is_said_by_name(rig, capfd):
     """A pin elsewhere on the body is not what puts it there, nor one of the same foot later."""
     hand = seen(rig)[0, WRIST] + [0.0, 0.0, 0.1]
@@ -354,6 +355,7 @@ def test_a_flip_mirrors_depth_and_once_more_mirrors_it_back(rig):
         assert listed_corrections(rig) == []
 
 
+@pytest.mark.slow
 def test_what_rests_is_on_the_floor_or_it_is_said_how_far_it_stays_away(rig, capfd):
     """The person walks upright: the body can sit down, but no hand reaches the floor."""
     bpy.ops.scope.this_rests(start=46, end=48, part="left_hand")
@@ -626,6 +628,7 @@ def check(places, before, target):
     assert np.abs(ours - directions(before, "left")[middle]).max() > 0.1
 
 
+@pytest.mark.slow
 def test_the_rig_that_the_motion_is_retargeted_to_and_exported_files_are_corrected(
     retargeted_rig, tmp_path
 ):

@@ -121,6 +121,7 @@ def test_a_damaged_file_says_what_to_do(tmp_path, monkeypatch):
         expression_fit.load_response.__wrapped__()
 
 
+@pytest.mark.slow
 def test_a_rendered_face_that_the_network_sees(tmp_path):
     """The default body, which nothing was calibrated on, turned by 20°, through the real landmark
     network.

@@ -155,6 +155,7 @@ def test_a_head_too_small_is_not_looked_at(tracker):
     assert tracker._network.calls == 0
 
 
+@pytest.mark.slow
 def test_a_real_face_is_captured_and_moves_little_but_the_head(shared):
     clip = shared / "data" / "clips" / "squats_5fps.mp4"
     body = load_body("scope")

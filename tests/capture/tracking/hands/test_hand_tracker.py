@@ -286,6 +286,7 @@ def test_a_hand_that_is_found_again_is_followed_back_through_the_frames_in_which
     assert not track.hands[:, 1].any()
 
 
+@pytest.mark.slow
 def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
     """They measure some 25 pixels. At first they hang down edge-on, afterwards they are raised."""
     people = PeopleTracker("fast", 1)
@@ -304,6 +305,7 @@ def test_hands_are_found_in_most_frames_of_a_gesturing_person(frames):
     assert np.median(apart) < 10  # pixels, between the body's and the hand's wrist
 
 
+@pytest.mark.slow
 def test_a_capture_with_hands_from_file_to_motion(shared):
     """Fingers are near the keypoints in the image, and all arrays of the motion are consistent."""
     body = load_body("scope_h")
@@ -331,6 +333,7 @@ def test_a_capture_with_hands_from_file_to_motion(shared):
     assert np.array_equal(m.joint_confidence[:, finger] > 0, m.keypoints2d[:, 33, 2] > 0)
 
 
+@pytest.mark.slow
 def test_auto_captures_large_hands_and_leaves_the_fingers_of_small_ones_at_rest(shared):
     """Hands of 37 pixels from wrist to middle knuckle in the first clip, of 13 in the second."""
     body = load_body("scope_h")

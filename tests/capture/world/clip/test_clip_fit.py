@@ -332,6 +332,7 @@ LIMB_SEARCH_FRAMES = 64
 SPAN = slice(12, 52)
 
 
+@pytest.mark.slow
 def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was() -> None:
     """For forty frames of a moving camera, the lifter cannot tell the thigh before the hip from one
     behind it, and the start is wrong.
