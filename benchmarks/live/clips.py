@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from ...scope_addon.atomic_write import atomic_path
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.cli import SAMPLE
-from ...scope_addon.live.source import Clock, Picture
+from ...scope_addon.live.source import Clock, Picture, Playback
+from ...scope_addon.notices import Notice
 from ..frames import CACHE
 from .observed import there_and_back
 
@@ -101,10 +102,12 @@ class RepeatedFile:
         self._seconds = seconds
         self.name = path.name
         self.fps = Fraction(FPS)
+        self.speed = 1.0
+        self.warnings: list[Notice] = []
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:
         """See `Source`."""
-        began_s = clock.now()
+        playback = Playback(clock)
         index = 0
         while True:
             with open_video(self._path) as video:
@@ -112,8 +115,5 @@ class RepeatedFile:
                     time_s = index / FPS
                     if time_s >= self._seconds:
                         return
-                    clock.sleep(began_s + time_s - clock.now())
-                    yield Picture(
-                        index, time_s, max(began_s + time_s, clock.now()), frame.image_rgb
-                    )
+                    yield Picture(index, time_s, playback.wait(time_s), frame.image_rgb)
                     index += 1

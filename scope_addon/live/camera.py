@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import VideoError
+from ..notices import Notice
 from . import system_cameras
 from .source import DEFAULT_FPS, Clock, Picture
 
@@ -52,6 +53,8 @@ class CameraSource:
         self._path = Path(f"/dev/video{device}" if isinstance(device, int) else device)
         self.fps = DEFAULT_FPS
         self.focal_35mm: float | None = None
+        self.speed = 1.0
+        self.warnings: list[Notice] = []
         self._require_device()
 
     def pictures(self, clock: Clock) -> Iterator[Picture]:

@@ -90,6 +90,7 @@ class NewestFrame:
         self._newest: Picture | None = None
         self._error: BaseException | None = None
         self._is_over = False
+        self._warned = 0  # of the source's warnings, how many were said
         self._said = ""  # what was said of the interruption that lasts
         self._next_index = 0
         self._last_s = 0.0
@@ -170,6 +171,8 @@ class NewestFrame:
                         self._note_damage()
                         continue
                     self._give(picture, is_first=self.received == before)
+                    self._say_warnings()
+            self._say_warnings()
             problem = f"{self._source.name} has ended"
         except ScopeError as error:
             if self._source.ends or self._reconnect_s <= 0 or not self.received:
@@ -216,6 +219,13 @@ class NewestFrame:
             self._next_index = index + 1
             self._last_s = time_s
             self._changed.notify_all()
+
+    def _say_warnings(self) -> None:
+        """Say what the source has found to warn of since the last call."""
+        new = self._source.warnings[self._warned :]
+        self._warned += len(new)
+        for warning in new:
+            self._say(str(warning))
 
     def _note_damage(self) -> None:
         """Count a damaged frame, and say it, though not again and again."""

@@ -15,8 +15,9 @@ from ..capture.media.frame_readers import orientation, rgb, upright
 from ..capture.media.guards import check_size
 from ..errors import VideoError
 from ..footage import display_address
+from ..notices import Notice
 from .damage import Damage
-from .source import DEFAULT_FPS, Clock, Picture
+from .source import DEFAULT_FPS, LEAP_S, Clock, Picture, Playback
 
 if TYPE_CHECKING:
     import av
@@ -31,6 +32,8 @@ _FORMATS = (
     "avi,h264,hevc,m4v,ogg,asf,"
     "nut"
 )
+# whose pieces are fetched, and not sent while they are filmed
+_PLAYLISTS = ("hls", "dash")
 STALLED_S = 5.0  # without data, after which a stream counts as interrupted
 # for which a stream that is joined in the middle is left out until its next key frame
 KEY_FRAME_S = 10.0
@@ -50,6 +53,8 @@ class StreamSource:
         self.name = display_address(url)
         self.fps = DEFAULT_FPS
         self.focal_35mm: float | None = None
+        self.speed = 1.0
+        self.warnings: list[Notice] = []
 
     def pictures(self, clock: Clock) -> Iterator[Picture | None]:
         """See `Source`.
@@ -68,19 +73,23 @@ class StreamSource:
                 stream.codec_context.thread_count = 1
             if stream.average_rate and 1 <= stream.average_rate <= 240:
                 self.fps = Fraction(stream.average_rate)
+            is_fetched = container.format.name in _PLAYLISTS or container.size > 0
+            playback = Playback(clock)
+            last_s = -np.inf
             try:
                 index = 0
                 for frame in self._frames(container, stream, clock):
                     if frame is None:
                         yield None
                         continue
-                    now_s = clock.now()
-                    yield Picture(
-                        index,
-                        now_s,
-                        now_s,
-                        self._image(frame, float(stream.sample_aspect_ratio or 1)),
-                    )
+                    image_rgb = self._image(frame, float(stream.sample_aspect_ratio or 1))
+                    due_s = clock.now()
+                    if is_fetched and frame.time is not None:
+                        if not 0.0 <= frame.time - last_s <= LEAP_S:  # another programme begins
+                            playback = Playback(clock)
+                        last_s = frame.time
+                        due_s = playback.wait(last_s)
+                    yield Picture(index, due_s, due_s, image_rgb)
                     index += 1
             except (av.error.FFmpegError, OSError, ValueError) as error:
                 raise VideoError(f"{self.name} was interrupted ({_reason(error)})") from error

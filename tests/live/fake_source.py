@@ -37,6 +37,7 @@ class FakeSource:
     name = "fake"
     fps = Fraction(30)
     focal_35mm = None
+    speed = 1.0
 
     def __init__(self, *runs, ends=False, before=lambda _: None, error=None, images=None):
         self.runs = list(runs)
@@ -44,6 +45,7 @@ class FakeSource:
         self.before = before
         self.error = error
         self.images = images
+        self.warnings = []
         self.opened = self.closed = 0
 
     def pictures(self, clock):

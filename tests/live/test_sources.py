@@ -11,9 +11,10 @@ from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.errors import OfflineError, VideoError
 from scope.scope_addon.live import newest_frame, stream
+from scope.scope_addon.live import source as live_source
 from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.open_source import is_stream, open_source
-from scope.scope_addon.live.source import Clock
+from scope.scope_addon.live.source import LEAP_S, Clock
 from scope.scope_addon.live.stream import DAMAGED_S
 
 from .fake_source import FakeClock
@@ -61,6 +62,49 @@ def test_a_file_goes_on_where_it_was_when_the_computer_slept():
     expected = np.arange(8) / 30
     expected[4:] += 3600.0 - 1 / 30  # the next picture was due a thirtieth of a second later
     assert arrived == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_file_that_cannot_be_read_in_time_is_as_late_as_it_is_and_said_once():
+    """Each frame takes 0.2 s, but plays for a thirtieth of one."""
+    clock = FakeClock()
+    source = open_source(str(SAMPLE))
+    late_s = []
+    for picture in islice(source.pictures(clock), 20):
+        late_s.append(clock.time_s - picture.arrived_s)
+        clock.time_s += 0.2
+    assert late_s[6] == pytest.approx(6 * (0.2 - 1 / 30), abs=1e-3)
+    assert max(late_s) <= LEAP_S
+    assert [str(warning) for warning in source.warnings] == [
+        "this computer cannot read sample.mp4 as fast as it plays, so it runs in slow motion; "
+        "convert it to 720p"
+    ]
+
+
+def test_slow_motion_is_played_at_the_speed_of_what_happened(monkeypatch):
+    def tagged(path):
+        video = open_video(path)
+        video.recorded_speed = 8.0
+        return video
+
+    monkeypatch.setattr(live_source, "open_video", tagged)
+    clock = FakeClock()
+    source = open_source(str(SAMPLE))
+    times = [(p.timestamp_s, p.arrived_s - 100.0) for p in islice(source.pictures(clock), 6)]
+    assert np.array(times) == pytest.approx(np.arange(6)[:, None] / 240 * [1, 1], abs=1e-3)
+    assert (source.fps, source.speed) == (240, 8.0)
+    assert str(source.warnings[0]).startswith("sample.mp4 was recorded 8 times as fast as it plays")
+
+
+def test_what_is_wrong_with_a_file_is_said(tmp_path):
+    said = []
+    data = encoded(moving(60), "libx264", kind="matroska")
+    (tmp_path / "cut.mkv").write_bytes(data[: len(data) // 2])
+    with NewestFrame(
+        open_source(str(tmp_path / "cut.mkv")), FakeClock(), say=said.append
+    ) as reader:
+        reader._thread.join(300)
+    assert len(said) == 1
+    assert said[0].startswith("decoding cut.mkv stopped after ")
 
 
 @pytest.fixture(scope="module")
@@ -159,9 +203,22 @@ def test_a_stream_all_of_whose_pictures_are_damaged_is_shown_after_a_while(tmp_p
 def test_the_segments_of_a_playlist_are_read(tmp_path):
     parts = [encoded(moving(18)), encoded(moving(18, first=18), begins_s=0.6)]
     with served_as_hls(tmp_path, parts, 1) as address:
-        shown = [which(picture.image_rgb) for picture in all_pictures(address)]
+        read = all_pictures(address)
+    shown = [which(picture.image_rgb) for picture in read]
     assert [k for k, _ in shown] == list(range(36))
     assert max(off for _, off in shown) < 10
+    # when they were filmed, though they come all at once
+    times = np.array([picture.timestamp_s for picture in read])
+    np.testing.assert_allclose(times - times[0], np.arange(36) / 30, atol=0.04)
+
+
+def test_another_programme_of_a_stream_is_shown_at_once(tmp_path):
+    """Its times go back, or are hours later."""
+    data = encoded(moving(6), begins_s=50.0) + encoded(moving(6), begins_s=9.0)
+    with served(tmp_path, "a.ts", data + encoded(moving(6), begins_s=9000.0)) as address:
+        times = [picture.timestamp_s for picture in all_pictures(address)]
+    assert len(times) > 15
+    assert max(np.diff(times)) < 0.1
 
 
 def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
