@@ -75,15 +75,17 @@ class Cache:
         """
         import json
 
+        from .finished_clip import has_content
         from .process import is_result
 
         folder = self.root / "captures" / key
         if not (folder / REPORT).is_file():  # opening a pipe would wait for a writer
             return None
         try:
-            content = json.loads((folder / REPORT).read_text(encoding="utf-8"))
-            motions = [folder / name for name in content["motions"]] if is_result(content) else []
-            if not motions or not all(m.is_file() for m in motions):
+            found = json.loads((folder / REPORT).read_text(encoding="utf-8"))
+            if not is_result(found):
+                return None
+            if not has_content(folder, found["motions"], found.get("content")):
                 return None
         except (OSError, ValueError, RecursionError):
             return None
@@ -92,7 +94,7 @@ class Cache:
         # Nobody else may come to write here.
         for each in (self.root, self.root / "jobs"):
             remove_abandoned(each)
-        return CachedCapture(motions, content["report"])
+        return CachedCapture([folder / name for name in found["motions"]], found["report"])
 
     def recordings(self) -> list[Path]:
         """Return the growing files of recordings here and in the user's own folder, where they are
@@ -133,17 +135,19 @@ class Cache:
         """Move a job's folder to the finished captures.
 
         :param motions: names of the motion files in the folder.
-        :raises OutputError: the cache folder cannot be written to.
+        :raises OutputError: the cache folder cannot be written to, or a motion file not be read.
         """
         import json
 
         from ..atomic_write import atomic_path, replace_durably
+        from .finished_clip import content_of
 
         target = self.root / "captures" / key
         try:
-            content = json.dumps({"motions": motions, "report": report})
+            content = content_of(job_folder, motions)
+            text = json.dumps({"motions": motions, "content": content, "report": report})
             with atomic_path(job_folder / REPORT) as temporary:
-                temporary.write_text(content, encoding="utf-8")
+                temporary.write_text(text, encoding="utf-8")
             target.parent.mkdir(parents=True, exist_ok=True)
             # Its name begins with the job's, so that it is removed with the job.
             former = job_folder.with_name(f"{job_folder.name}.former")

@@ -19,6 +19,7 @@ from typing import Any
 
 from ...solver.errors import ScopeError
 from ..errors import SetupError
+from ..footage import is_utf8
 from ..temporary import discard, remove
 from .request import WARM_UP, FormatsRequest, JobRequest, LiveRequest, PictureRequest
 from .start_worker import worker_command
@@ -67,16 +68,29 @@ def _are_names(value: object) -> bool:
 
 
 def _is_report(value: object) -> bool:
+    """Whether it is a report, all of which that the panel uses has its type."""
     if not isinstance(value, dict):
         return False
     warnings = value.get("warnings", [])
     rates = value.get("fps", {})
+    people = value.get("per_person", [])
     if not isinstance(warnings, list) or not isinstance(rates, dict):
         return False
-    are_finite = all(
-        type(rate) in (int, float) and 0 <= rate < _LARGEST_NUMBER for rate in rates.values()
+    if not isinstance(people, list) or not all(isinstance(each, dict) for each in people):
+        return False
+    heights = [person["height_m"] for person in people if "height_m" in person]
+    sigmas = [person.get("height_sigma_m") for person in people]
+    known_sigmas = [sigma for sigma in sigmas if sigma is not None]
+    texts = [value.get(name, "") for name in ("camera", "execution")]
+    return (
+        all(map(_is_figure, [*rates.values(), *heights, *known_sigmas]))
+        and all(isinstance(text, str) for text in warnings)
+        and all(is_text(text) and is_utf8(text) for text in texts)
     )
-    return are_finite and all(isinstance(text, str) for text in warnings)
+
+
+def _is_figure(value: object) -> bool:
+    return type(value) in (int, float) and 0 <= value < _LARGEST_NUMBER  # type: ignore[operator]
 
 
 # The fields that a message must have, by its event, and what they may be.

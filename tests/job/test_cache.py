@@ -44,6 +44,9 @@ def test_kept_captures_are_found(cache):
 
 def test_a_damaged_capture_is_not_found(cache):
     kept = add(cache, "a")
+    for content in (b"", b"y" * 1000):
+        kept.motions[0].write_bytes(content)
+        assert cache.find(key("a")) is None
     kept.motions[0].unlink()
     assert cache.find(key("a")) is None
     (kept.motions[0].parent / "report.json").write_text("{")
@@ -200,7 +203,7 @@ def test_clearing_keeps_compiled_code_except_that_of_replaced_versions(cache):
     marker.touch()
     os.utime(replaced.parent, (1, 1))
     freed = cache.size()
-    assert 1100 <= freed < 1200
+    assert 1100 <= freed < 1300
     assert cache.clear() == freed
     assert cache.find(key("a")) is None
     assert [path.exists() for path in (of_others, replaced, used, other, marker)] == [
