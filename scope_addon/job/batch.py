@@ -6,6 +6,7 @@ clips are skipped.
 can continue. A clip is finished if its content (SHA-256), the options and the program are unchanged
 and its result files have the sizes and SHA-256 that the report says. Clips whose results were
 complete when a batch was killed, before it has written the report, are known by `clips.finished`.
+A folder whose clips would replace results of another folder is refused.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 from ...solver.errors import InputError
 from ..atomic_write import complete_file, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, json_text, unicode_text
+from ..footage import FOOTAGE_SUFFIXES, display_text, json_text, unicode_text
 from ..temporary import remove
 from .clip_runner import LocalRunner, Runner
 from .clip_task import (
@@ -34,6 +35,7 @@ from .clip_task import (
     ClipTask,
     Entry,
     Extras,
+    clip_key,
     find_clips,
     names_of_results,
 )
@@ -129,7 +131,8 @@ class Batch:
         :param runner: captures the clips; None for this machine.
         :return: the report; its ``exit_status`` is 1 if a clip failed, else 3 if a clip showed no
             person, else 0.
-        :raises UsageError: the folder contains no footage.
+        :raises UsageError: the folder contains no footage, or the output folder has results of the
+            same names from another one.
         :raises OutputError: the output folder cannot be created, or the report cannot be written.
         """
         clips = self.clips(recursive, views)
@@ -146,9 +149,11 @@ class Batch:
             raise OutputError(
                 f"cannot create the folder {out}: {error.strerror}; choose another with --out"
             ) from error
-        previous = {} if again else self._previous_entries(clips)
-        entries: dict[str, Entry] = {}
         runner = runner or LocalRunner(self._program, jobs)
+        previous = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
+        if again:
+            previous = {}
+        entries: dict[str, Entry] = {}
         try:
             # The tasks are made within the try, because a signal can arrive as soon as the first
             # clip has begun.
@@ -198,24 +203,42 @@ class Batch:
             return has_content(self.out, files, content, sizes_alone=self._is_mirror)
         return False
 
-    def _previous_entries(self, clips: Iterable[str]) -> dict[str, Entry]:
+    def _previous_entries(self, clips: dict[str, Path], folder: str) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or
-        damaged.
+        damaged. Of a report of another folder, only entries of clips that are here, too, as after
+        the folder was renamed.
 
-        :param clips: their names.
+        :param folder: of the footage, as the report has it.
         :raises OutputError: what has its name is no file, so that no report could be written.
+        :raises UsageError: the report is of another folder, and a clip has the name of its results.
         """
         resolve_link(self.report_file)
         try:
-            entries = json.loads(self.report_file.read_text(encoding="utf-8"))["files"]
+            report = json.loads(self.report_file.read_text(encoding="utf-8"))
+            former = str(Path(report["folder"]).resolve())
+            is_same = unicode_text(folder) == report["folder"]
+            is_same |= unicode_text(self.folder) == former
             of_clips = {unicode_text(name): name for name in clips}
-            return {
+            entries = {
                 of_clips.get(e["name"], e["name"]): e
-                for e in entries
+                for e in report["files"]
                 if isinstance(e["status"], str)
             }
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return {}
+        if is_same:
+            return entries
+        shared = {name: e for name, e in entries.items() if name in clips and e.get("outputs")}
+        for name, entry in shared.items():
+            with suppress(OSError):  # what cannot be read replaces nothing
+                key = clip_key(self._basis, clips[name], RATE in self.settings.options)
+                if entry.get("key") != key:
+                    raise UsageError(
+                        f"'{display_text(name)}' of {folder} would replace the result of the same "
+                        f"name of {display_text(report['folder'])}; give another --out, or remove "
+                        f"{self.report_file} if it may be replaced"
+                    )
+        return shared
 
     def _write_report(
         self, entries: dict[str, Entry], previous: dict[str, Entry], runner: Runner, *, last: bool

@@ -162,7 +162,7 @@ def capture_clip(
     out = Path(task.out)
     entry: Entry = {"file": task.file, "name": task.name}
     try:
-        entry["key"] = task.key or _key(task.basis, footage, RATE in task.settings.options)
+        entry["key"] = task.key or clip_key(task.basis, footage, RATE in task.settings.options)
     except OSError as error:
         return failure(task, f"{footage} cannot be read: {error.strerror}")
     # on a cluster, results are moved when they are finished
@@ -304,10 +304,12 @@ def _window_arguments(task: ClipTask) -> list[str]:
     return [f"{option}={value}" for option, value in given.items() if value]
 
 
-def _key(basis: str, footage: Path, rate_given: bool) -> str:
+def clip_key(basis: str, footage: Path, rate_given: bool) -> str:
     """Hash the program, the options and the footage.
 
+    :param basis: see `CaptureSettings.basis`.
     :param rate_given: whether a frame rate is given, so that a picture begins a sequence.
+    :raises OSError: the footage cannot be read.
     """
     digest = hashlib.sha256(basis.encode())
     files = [footage]

@@ -173,7 +173,7 @@ def read_batch_report(path: Path) -> None:
     folder.mkdir(exist_ok=True)
     shutil.copy(path, folder / REPORT_NAME)
     batch = Batch(folder, folder, ["scope"], {}, [".npz"])
-    for entry in batch._previous_entries(["a"]).values():
+    for entry in batch._previous_entries({"a": folder / "a.mp4"}, "clips").values():
         batch._is_finished("a", entry)
 
 

@@ -155,6 +155,25 @@ def test_finished_clips_are_skipped_and_changed_ones_captured(folder, tmp_path):
     assert calls(folder) == ["a.mp4", "b.mov", "c.png", "e.webm"]
 
 
+def test_results_of_another_folder_are_kept(folder, tmp_path):
+    """The cameras' cards name their clips alike. A folder that was renamed continues."""
+    for name in ("b.mov", "c.png", "d.avi"):
+        (folder / name).unlink()
+    out = tmp_path / "out"
+    batch(folder, out).run(1)
+    renamed = folder.rename(tmp_path / "renamed")
+    assert batch(renamed, out).run(1)["counts"]["skipped"] == 2
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "a.mp4").write_text("another day")
+    for again in (False, True):
+        with pytest.raises(UsageError, match=f"'a' of {other} .* name of {renamed}; .* --out"):
+            batch(other, out).run(1, again=again)
+    assert (out / "a.npz").read_text() == "result of ok"
+    (other / "a.mp4").rename(other / "f.mp4")
+    assert [entry["name"] for entry in batch(other, out).run(1)["files"]] == ["f"]
+
+
 NAMES = b"caf\xe8.mp4", b"caf\xe9.mp4", "caf\ufffd.mp4".encode(), b"a.mp4"
 
 
@@ -241,7 +260,7 @@ def test_a_damaged_report_is_ignored(folder, tmp_path):
     outputs = {"a": ["x" * 300], "c": "c.npz"}
     unusable = [{"name": n, "status": "done", "outputs": o} for n, o in outputs.items()]
     texts = ("", "{", "[]", '{"files": 3}', '{"files": [{"name": "a", "status": {}, "key": 1}]}')
-    for text in (*texts, '{"a":' * 100_000, json.dumps({"files": unusable})):
+    for text in (*texts, '{"a":' * 100_000, json.dumps({"folder": str(folder), "files": unusable})):
         calls(folder)
         (out / REPORT_NAME).write_text(text)
         batch(folder, out).run(1)
