@@ -15,15 +15,18 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...solver.errors import InputError
 from ..errors import UsageError
 from ..motion import Motion
 from ..review_spans import find_review_spans
+from ..untrusted.files import check_regular
 from .character.armature import SIDES, side_of
 from .timing import current_frame_kept, show_frame
 from .visibility import evaluated
 
 TAGS = ("mocap", "scope")
 CATALOGS_FILE = "blender_assets.cats.txt"
+_LARGEST_BYTES = 1 << 24  # of that file
 _ID = re.compile(r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII | re.IGNORECASE)
 _SIZE = 256  # pixels of Blender's large previews
 _MAX_BONES = 200
@@ -100,15 +103,19 @@ def first_reliable_frame(motion: Motion) -> int:
 
 def catalogs() -> dict[str, str]:
     """Return the ids of the asset catalogs of the current file, by their paths; empty if it is not
-    saved.
+    saved, or if they cannot be read.
     """
     folder = _library_folder()
     found: dict[str, str] = {}
-    try:
-        lines = (folder / CATALOGS_FILE).read_text(encoding="utf-8").splitlines() if folder else []
-    except (OSError, ValueError):
+    if folder is None:
         return {}
-    for line in lines:
+    file = folder / CATALOGS_FILE
+    try:
+        check_regular(file, InputError, "list of catalogs", _LARGEST_BYTES)
+        text = file.read_text(encoding="utf-8")
+    except (InputError, OSError, ValueError):
+        return {}
+    for line in text.splitlines():
         parts = [part.strip() for part in line.split(":")]
         if len(parts) >= 2 and _ID.fullmatch(parts[0]):  # Blender leaves out other lines too
             found[parts[1]] = parts[0]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Marking captured motion as an asset: picture, metadata, catalog."""
 
+import os
 from types import SimpleNamespace
 
 import bpy
@@ -102,6 +103,13 @@ def test_a_catalog_of_the_file_is_assigned_and_an_unknown_one_changes_nothing(ri
     other = captured(motion_of(walk(1.0, speed=0.5)))
     assert suggested(other) == ""
     assert suggested(rig) == "Motions/Walks"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such pipes")
+def test_a_pipe_in_the_place_of_the_catalogs_is_not_waited_for(rig, tmp_path):
+    os.mkfifo(tmp_path / "blender_assets.cats.txt")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walks.blend"))
+    assert suggested(rig) == ""
 
 
 def suggested(rig):
