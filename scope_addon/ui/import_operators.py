@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -165,7 +166,8 @@ def _build(scene: bpy.types.Scene, path: Path, imported: Imported, options: Buil
 def _footage_beside(path: Path, source: str) -> Path | None:
     """Return the footage that lies beside a motion file; None if it does not."""
     beside = path.parent / Path(source).name
-    is_footage = beside.suffix.lower() in FOOTAGE_SUFFIXES and beside.is_file()
+    # Path.is_file raises where the name, which the motion's file says, is too long.
+    is_footage = beside.suffix.lower() in FOOTAGE_SUFFIXES and os.path.isfile(beside)
     return beside if is_footage else None
 
 

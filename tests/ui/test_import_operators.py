@@ -79,6 +79,11 @@ def test_our_own_file_has_its_camera_and_footage(footage):
     assert len(bpy.context.scene.scope.result.warnings) == 0
 
 
+def test_a_footage_name_that_no_file_can_have_is_no_footage(tmp_path):
+    replace(motion_of(walk(0.3)), source="x" * 300 + ".mp4").save(tmp_path / "own.npz")
+    assert bpy.ops.scope.import_motion(filepath=str(tmp_path / "own.npz")) == {"FINISHED"}
+
+
 def test_a_file_of_several_cameras_brings_all_with_the_footage_beside_it(footage):
     own = replace(motion_of(walk(0.3)), source=footage.name)
     sources = np.array([f"second{footage.suffix}", "gone.mp4"])
