@@ -6,6 +6,7 @@ Footage in the 3D viewport, which the user can change in the preferences.
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from pathlib import Path
@@ -132,13 +133,16 @@ def preferences() -> SCOPE_AP_preferences | None:
 
 
 def cache() -> Cache:
-    """Return the cache: in the folder of the preferences, or else in the user folder"""
+    """Return the cache: in the folder of the preferences, or else in the user folder, also where
+    that of the preferences is relative to a .blend file that was never saved.
+    """
     from ..job.cache import Cache
 
     chosen = preferences()
-    if chosen and chosen.cache_folder:
+    folder = bpy.path.abspath(chosen.cache_folder) if chosen else ""
+    if os.path.isabs(folder):
         # In a subfolder, because clearing the cache must never remove the user's files.
-        return Cache(Path(bpy.path.abspath(chosen.cache_folder)) / "scope-cache")
+        return Cache(Path(folder) / "scope-cache")
     return Cache(user_folder() / "cache")
 
 

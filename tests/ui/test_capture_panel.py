@@ -15,7 +15,7 @@ from scope.scope_addon.scene.build import build_scene
 from scope.scope_addon.scene.footage_strip import strips_of
 from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.scene.stored_values import parse_spans
-from scope.scope_addon.ui import capture_job
+from scope.scope_addon.ui import capture_job, preferences
 from scope.scope_addon.ui.capture_operators import SAMPLE, end_capture, state
 from scope.scope_addon.ui.preferences import cache
 from scope.solver.body_file import load_body
@@ -350,6 +350,13 @@ def test_clearing_the_cache_leaves_the_scene(fake_worker, footage):
     assert cache().size() == 0
     assert bystander.exists()
     assert bpy.context.scene.scope.result.collection is not None
+
+
+def test_a_cache_beside_a_file_that_was_never_saved_is_not_in_the_current_folder(monkeypatch):
+    unsaved = SimpleNamespace(cache_folder="//cache")
+    with monkeypatch.context() as patch:
+        patch.setattr(preferences, "preferences", lambda: unsaved)
+        assert cache().root == preferences.user_folder() / "cache"
 
 
 def test_the_preview_is_shown_during_a_capture(fake_worker, footage):
