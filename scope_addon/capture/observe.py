@@ -77,7 +77,7 @@ def given_camera(video: Video, options: CaptureOptions) -> Camera:
         video.height,
         focal_mm=options.focal_mm,
         fov_deg=options.fov_deg,
-        calibration=options.calibration,
+        calibration=options.known_calibration or options.calibration,
         camera_path=options.camera_path,
         metadata_focal_mm=video.focal_35mm,
         view=video.wanted.view,

@@ -16,7 +16,7 @@ from ..errors import UsageError
 from ..footage_view import AS_IN_FILE, FootageView
 from ..options import Place, option, options_at
 from ..options.capture import ALL, AUTO, LARGEST, OFF, CaptureDeclaration, NetworkDeclaration
-from .camera.calibration import read_calibration
+from .camera.calibration import Calibration, read_calibration
 from .camera.given_path import read_camera_path
 from .camera.intrinsics import choose_camera
 from .fitting.hand_measurements import require_fingers
@@ -43,6 +43,8 @@ class CaptureOptions(NetworkDeclaration, CaptureDeclaration):
     wanted: FootageRange = VideoRange()  # range of frames
     part: Crop | None = None  # of the picture in which people are looked for
     chosen: ChosenPerson | None = None  # who is captured first; None: the most prominent one
+    # The calibration, if it was read before; None: as ``calibration`` says.
+    known_calibration: Calibration | None = None
     # Of the clocks of further cameras, seconds; None: unknown. Empty: all are unknown.
     offsets_s: Sequence[float | None] = ()
     # The length of the windows in which clips at least twice as long are observed.

@@ -99,8 +99,9 @@ def test_command_line_and_worker_have_the_same_defaults():
 def test_the_typed_fields_of_the_pipeline_are_the_declared_options():
     fields = {field.name for field in dataclasses.fields(CaptureOptions)}
     # wanted: start, end, fps, rotate and mirror; part: crop; chosen: person; offsets_s: offset;
-    # window_s: of long clips, which the parts of one on several machines have in common
-    others = {"wanted", "part", "chosen", "offsets_s", "window_s"}
+    # known_calibration: of one of several cameras; window_s: of long clips, which the parts of one
+    # on several machines have in common
+    others = {"wanted", "part", "chosen", "known_calibration", "offsets_s", "window_s"}
     assert fields == {each.name for each in options_at(Place.CAPTURE)} | others
     for each in options_at(Place.CAPTURE | Place.WORKER):
         assert getattr(CaptureOptions(), each.name) == each.default

@@ -105,7 +105,7 @@ def choose_camera(
     *,
     focal_mm: float | None = None,
     fov_deg: float | None = None,
-    calibration: str | Path | None = None,
+    calibration: Calibration | str | Path | None = None,
     camera_path: Path | None = None,
     metadata_focal_mm: float | None = None,
     view: FootageView = AS_IN_FILE,
@@ -169,12 +169,13 @@ def choose_camera(
 
 
 def _lens_of_file(
-    calibration: str | Path | None, camera_path: Path | None
+    calibration: Calibration | str | Path | None, camera_path: Path | None
 ) -> tuple[Calibration, str] | None:
     """Return the calibration that one of two files holds, and its source; None without a file."""
     if calibration is not None:
-        known = read_calibration(Path(calibration))
-        return known, f"calibration {known.path.name}"
+        if not isinstance(calibration, Calibration):
+            calibration = read_calibration(Path(calibration))
+        return calibration, f"calibration {calibration.path.name}"
     if camera_path is not None:
         return read_camera_path(camera_path).calibration, f"camera path {camera_path.name}"
     return None

@@ -19,7 +19,7 @@ from ...errors import UsageError
 from ...footage import display_text
 from ...notices import Notice, notice
 from ...options.capture import ALL
-from ..camera.calibration import placed_cameras, read_calibration
+from ..camera.calibration import Calibration, placed_cameras, read_calibration
 from ..camera.intrinsics import Camera
 from ..clock import FINDING, PLACING, Progress, StageClock
 from ..fitting.keypoint_offsets import with_keypoint_offsets
@@ -96,22 +96,23 @@ def capture_views(
     """
     check_options(body, options, has_views=True)
     _check_paths(paths, options)
-    files = _calibration_files(paths, options)
+    # Once for all videos: the file may be written again before the last one is observed.
+    calibrations = _calibrations(paths, options)
     clock = StageClock()
     views = [
         _observe_view(
             Path(path),
             body,
-            _options_of_view(options, number, file),
+            _options_of_view(options, number, lens),
             clock,
             _progress_of_view(progress, number, len(paths)),
             watch,
         )
-        for number, (path, (file, _)) in enumerate(zip(paths, files, strict=True))
+        for number, (path, (lens, _)) in enumerate(zip(paths, calibrations, strict=True))
     ]
     with clock.stage("solver"):
         progress(PLACING, 0, 0)
-        given = _given(views, options, [T for _, T in files])
+        given = _given(views, options, [T for _, T in calibrations])
         matches = calibrate(
             [view.people for view in views],
             given,
@@ -184,9 +185,11 @@ def _check_paths(paths: Sequence[str | Path], options: CaptureOptions) -> None:
             )
 
 
-def _options_of_view(options: CaptureOptions, number: int, file: Path | None) -> CaptureOptions:
+def _options_of_view(
+    options: CaptureOptions, number: int, lens: Calibration | None
+) -> CaptureOptions:
     """Return the options of one of the videos, with its calibration."""
-    of_view = replace(options, calibration=file)
+    of_view = replace(options, known_calibration=lens)
     if number == 0:
         return of_view
     # Who is captured is known from the first video, and the part of the picture is of that one; the
@@ -204,9 +207,9 @@ def _progress_of_view(progress: Progress, number: int, count: int) -> Progress:
     return report
 
 
-def _calibration_files(
+def _calibrations(
     paths: Sequence[str | Path], options: CaptureOptions
-) -> list[tuple[Path | None, Float64Array | None]]:
+) -> list[tuple[Calibration | None, Float64Array | None]]:
     """Return each video's calibration, and its (4, 4) world to camera, as far as they are given.
 
     :raises UsageError: the footage is mirrored, which no place of a camera is.
@@ -215,11 +218,11 @@ def _calibration_files(
     if options.calibration is None:
         return [(None, None)] * len(paths)
     stems = [Path(path).stem for path in paths]
-    files: list[tuple[Path | None, Float64Array | None]] = []
+    calibrations: list[tuple[Calibration | None, Float64Array | None]] = []
     for file, T_camera_world in placed_cameras(options.calibration, stems):
-        read_calibration(file)
+        lens = read_calibration(file)
         if T_camera_world is None:
-            files.append((file, None))
+            calibrations.append((lens, None))
             continue
         if options.wanted.view.is_mirrored:
             raise UsageError(
@@ -228,8 +231,8 @@ def _calibration_files(
             )
         T_view_world = T_camera_world.copy()
         T_view_world[:3] = options.wanted.view.axes @ T_camera_world[:3]
-        files.append((file, T_view_world))
-    return files
+        calibrations.append((lens, T_view_world))
+    return calibrations
 
 
 def _given(

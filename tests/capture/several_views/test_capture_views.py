@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
+from scope.scope_addon.capture.observe import given_camera
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.region import parse_crop
 from scope.scope_addon.capture.pipeline import capture
@@ -214,6 +215,29 @@ def test_cuts_of_further_cameras_are_told_by_the_first_ones_clock():
         ("second.mp4", times[0]),
         ("third.mp4", times[1]),
     ]
+
+
+def test_a_calibration_that_is_written_again_between_two_videos_is_not_mixed(
+    shared, tmp_path, monkeypatch
+):
+    file = tmp_path / "calib.toml"
+    lens = "matrix = [[{f}, 0, 540.0], [0, {f}, 960.0], [0, 0, 1]]\nsize = [1080, 1920]\n"
+    cameras = "\n".join(f"[cam_{k}]\n{lens}" for k in (1, 4))
+    file.write_text(cameras.replace("{f}", "1670.0"))
+    seen = []
+
+    def observe_view(path, body, options, *_):
+        video = SimpleNamespace(width=1080, height=1920, focal_35mm=None, wanted=options.wanted)
+        seen.append(given_camera(video, options).intrinsics[0, 0])
+        file.write_text(cameras.replace("{f}", "2000.0"))
+        if len(seen) == 2:
+            raise CancelledError
+
+    monkeypatch.setattr(several, "_observe_view", observe_view)
+    videos = [shared / "data" / "pose2sim" / f"cam{k}.mp4" for k in (1, 4)]
+    with pytest.raises(CancelledError):
+        capture_views(videos, load_body("scope"), CaptureOptions(calibration=file))
+    assert seen == [1670.0, 1670.0]
 
 
 def test_what_is_given_of_cameras_has_to_suit_the_videos(shared, tmp_path):
