@@ -31,6 +31,7 @@ from ..footage import (
     pictures_in,
     unicode_text,
 )
+from ..temporary import remove
 from .finished_clip import (
     FINISHED_FILE,
     content_of,
@@ -39,6 +40,7 @@ from .finished_clip import (
     read_finished,
     remove_finished,
 )
+from .request import program_version
 
 # options that only a batch passes
 SHOWN_COMMAND = "--shown-command"
@@ -197,11 +199,18 @@ def capture_clip(
         return entry | failure(task, system_error_message(error))
     entry["seconds"] = round(time.monotonic() - start, 2)
     report = _last_object(stdout)
-    if status == 0 and report is not None:
-        try:
+    try:
+        if status in (0, NO_PERSON) and not task.windows and not _is_unchanged(task, entry["key"]):
+            remove(record)
+            return entry | failure(
+                task,
+                "the footage, or a file that the options name, was changed while it was captured; "
+                "run the same command again",
+            )
+        if status == 0 and report is not None:
             return entry | _outcome(report, out, task.name)
-        except OSError as error:
-            return entry | failure(task, f"a result cannot be read again ({error})")
+    except OSError as error:
+        return entry | failure(task, f"the footage or a result cannot be read again ({error})")
     if status == NO_PERSON:
         return entry | {"status": "no_person", "outputs": [], "message": _error_message(stderr)}
     return entry | failure(
@@ -227,6 +236,16 @@ def _finished_before(task: ClipTask, entry: Entry, record: Path | None) -> Entry
         return entry | _outcome(report, Path(task.out), task.name) | {"status": "skipped"}
     except OSError:
         return None
+
+
+def _is_unchanged(task: ClipTask, key: str) -> bool:
+    """Return whether footage and options are those of a clip's key, by which its results count as
+    finished: its process has read them later.
+
+    :raises OSError: a file cannot be read any more.
+    """
+    basis = task.settings.basis(program_version())
+    return clip_key(basis, Path(task.footage), RATE in task.settings.options) == key
 
 
 def names_of_results(reported: Iterable[str], name: str) -> list[str]:

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the key of a clip depends on, besides the footage."""
+"""What the key of a clip depends on, besides the footage, and when a clip counts as finished."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
+from scope.scope_addon.errors import NO_PERSON
 from scope.scope_addon.footage import is_sequence, pictures_in
 from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask, Extras, capture_clip
+from scope.scope_addon.job.request import program_version
 
 
 def basis(**options: str | None) -> str:
@@ -43,6 +46,28 @@ def key(footage: Path, out: Path, **options: str | None) -> str:
 
     capture_clip(task, ["scope"], run)
     return found[0]
+
+
+@pytest.mark.parametrize("changed", ["a.mp4", "body.npz"])
+@pytest.mark.parametrize("status", [0, NO_PERSON])
+def test_a_clip_is_not_finished_if_what_it_is_made_of_changed_after_its_key_was_made(
+    tmp_path: Path, changed: str, status: int
+) -> None:
+    """Where that was undone later, the next batch skipped it."""
+    for name in ("a.mp4", "body.npz"):
+        (tmp_path / name).write_text("old")
+    settings = CaptureSettings({"--body": str(tmp_path / "body.npz")}, (".npz",))
+    task_basis = settings.basis(program_version())
+    footage = str(tmp_path / "a.mp4")
+    task = ClipTask("a", "a.mp4", footage, str(tmp_path), task_basis, settings)
+
+    def run(arguments: list[str]) -> tuple[int, str, str]:
+        (tmp_path / changed).write_text("new")
+        (tmp_path / "a.npz").touch()
+        return status, json.dumps({"outputs": [str(tmp_path / "a.npz")]}), ""
+
+    entry = capture_clip(task, ["scope"], run)
+    assert (entry["status"], "was changed" in entry["message"]) == ("failed", True)
 
 
 @pytest.mark.parametrize(
