@@ -21,7 +21,7 @@ from ...solver.errors import InputError
 from ..atomic_write import write_result
 from ..capture_report import Report
 from ..confinement import limits_files
-from ..footage import json_text
+from ..footage import display_text, json_text
 from ..installed import machine, versions
 from ..json_file import read_json_object
 from ..notices import PHRASES, SENTENCES
@@ -80,8 +80,10 @@ def run_problem_report(args: argparse.Namespace) -> dict[str, Any]:
         content["capture"] = figures_without_names(_read_report(args.report))
     write_result(args.output, json_text(content, indent=1) + "\n")
     print(
-        f"wrote {args.output}, which names no file, folder, person or address; read it, then "
-        "attach it to your problem report",
+        display_text(
+            f"wrote {args.output}, which names no file, folder, person or address; read it, then "
+            "attach it to your problem report"
+        ),
         file=sys.stderr,
     )
     return content

@@ -2,6 +2,7 @@
 """A problem report has what developers need, and nothing that names the user's files or people."""
 
 import json
+import os
 import platform
 from pathlib import Path
 
@@ -71,6 +72,12 @@ def test_no_name_of_the_users_is_in_the_file_and_every_figure_is(tmp_path, capsy
     ]
     assert capture["notices"][0]["values"] == {"footage": "left out", "times": [2.0, 4.125]}
     assert capture["notices"][1]["values"]["provider"] == "CUDA"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such names")
+def test_the_name_of_the_file_cannot_forge_a_line(tmp_path, capsys):
+    assert main(["report-a-problem", "-o", str(tmp_path / "\x1b[2K\nscope: done.json")]) == 0
+    assert capsys.readouterr().err.rstrip("\n").isprintable()
 
 
 def test_without_a_capture_the_computer_alone_is_described(tmp_path):
