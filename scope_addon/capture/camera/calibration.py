@@ -264,7 +264,7 @@ def calibration_text(motion: Motion) -> str:
         turned = np.linalg.inv(each.world_from_camera[0])
         turned[:3] = view.axes.T @ turned[:3]
         name = display_text(Path(each.source).stem)
-        if name in names:
+        while name in names:
             name = f"{name}_{number}"
         names.append(name)
         dist = view.inverse.distortion(each.dist)

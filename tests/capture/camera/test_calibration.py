@@ -238,6 +238,17 @@ def test_a_place_that_is_none_is_refused(tmp_path):
         placed_cameras(path, ["a", "b"])
 
 
+def test_saved_cameras_have_names_of_their_own(tmp_path):
+    body = load_body("scope")
+    views = made_views(0.5, -0.2) | {"view_sources": np.array(["walk_3.mp4", "walk.mp4"])}
+    poses = np.zeros((2, 3 * (body.K + 1)))
+    motion = made_motion(body, poses, np.zeros((2, 3)), views=views, source="walk.mp4")
+    path = tmp_path / "found.toml"
+    path.write_text(calibration_text(motion), "utf-8")
+    names = [file.name for file, _ in placed_cameras(path, ["a", "b", "c"])]
+    assert names == ["found.toml#walk", "found.toml#walk_3", "found.toml#walk_3_3"]
+
+
 @pytest.mark.parametrize("rotation", [0, 90, 180, 270])
 def test_saved_cameras_are_read_again_as_they_were(tmp_path, rotation):
     body = load_body("scope")
