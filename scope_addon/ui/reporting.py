@@ -98,6 +98,15 @@ class ReportingOperator(bpy.types.Operator):
             self.report({"INFO"}, display_text(message))
         return {"FINISHED"}
 
+    def report_all(self, message: str, warnings: Sequence[Notice]) -> str:
+        """Report a result and then its warnings, because Blender's status bar shows the last report
+        alone; return the empty message of ``work``.
+        """
+        self.report({"INFO"}, display_text(message))
+        for warning in warnings:
+            self.report({"WARNING"}, warning_text(warning))
+        return ""
+
 
 def restore_libraries() -> None:
     """Have Blender unpack the extension's wheels again if some are missing.

@@ -13,7 +13,7 @@ from bpy.props import StringProperty
 from ..errors import UsageError
 from ..scene.datablocks import enter_object_mode
 from .captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from .reporting import ReportingOperator, refuse, rpt_, tip_, warning_text
+from .reporting import ReportingOperator, refuse, rpt_, tip_
 from .retarget_maps import (
     EditListOperator,
     LoadMapOperator,
@@ -61,16 +61,14 @@ class SCOPE_OT_guess_bones(_RigOperator):
         settings = context.scene.scope_retarget
         found = guess_bone_map(settings.rig)
         fill_list(settings, found)
-        for warning in map_notices(settings.rig, found)[:1]:
-            self.report({"WARNING"}, warning_text(warning))
-            return ""
         count = len(found.parts)
-        return rpt_(
+        message = rpt_(
             "Found {count} bone; check the list"
             if count == 1
             else "Found {count} bones; check the list",
             count=count,
         )
+        return self.report_all(message, map_notices(settings.rig, found))
 
 
 class SCOPE_OT_retarget(_RigOperator):
@@ -118,10 +116,7 @@ class SCOPE_OT_retarget(_RigOperator):
         source = captured_armature(context)
         assert source is not None  # checked by poll
         result = retarget_to_chosen_rig(context, source)
-        if result.warnings:
-            self.report({"WARNING"}, warning_text(result.warnings[0]))
-            return ""
-        return rpt_(
+        message = rpt_(
             "'{rig}' is now animated by the action '{action}'"
             if settings.root == "in-place"  # where it has no path to scale
             else "'{rig}' is now animated by the action '{action}', with positions on the floor "
@@ -130,6 +125,7 @@ class SCOPE_OT_retarget(_RigOperator):
             action=result.action.name,
             scale=result.travel,
         )
+        return self.report_all(message, result.warnings)
 
 
 def retarget_to_chosen_rig(context: bpy.types.Context, source: bpy.types.Object) -> RetargetResult:

@@ -61,6 +61,20 @@ def test_the_scale_of_the_path_is_reported_where_there_is_a_path(rig, capfd, roo
     assert ("positions on the floor scaled by 1.3" in said) is (root != "in-place")
 
 
+def test_all_warnings_are_reported_after_the_result(rig, capfd):
+    bpy.ops.scope.guess_bones()
+    pairs = bpy.context.scene.scope_retarget.pairs
+    pairs.remove([pair.part for pair in pairs].index("head"))
+    limit = rig.pose.bones["calf_l"].constraints.new("LIMIT_ROTATION")
+    limit.use_limit_x = limit.use_limit_y = limit.use_limit_z = True
+    limit.owner_space = "LOCAL"
+    limit.influence = 0.5
+    bpy.ops.scope.retarget()
+    said = capfd.readouterr().out
+    order = [said.find(text) for text in ("scaled by", "no bones for 'head'", "'calf_l'")]
+    assert -1 < order[0] < order[1] < order[2]
+
+
 def test_saving_a_bone_map_overwrites_bone_maps_only(rig, tmp_path):
     bpy.ops.scope.guess_bones()
     saved, other, empty = (tmp_path / name for name in ("bones.json", "package.json", "empty.json"))
