@@ -173,6 +173,8 @@ SENTENCES = {
     "blocked_bones": "these bones of '{rig}' cannot follow the motion: {bones:names}; mute the "
     "constraints or drivers that control them, such as IK, or put the bones that control them "
     "into the list",
+    "modifiers_left_out": "{file} does not show '{mesh}' as its modifiers do: {modifiers:names}; "
+    "apply or remove these, and export again",
     # an imported motion
     "other_gender": "the motion is of a {gender} body, but '{body}' is {body_gender}",
     "other_body": "the poses were applied as they are to Scope's own body, whose rest pose and "

@@ -470,7 +470,8 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
             pairs = [(obj, None) for obj in blended if (obj.pose is not None) is posed]
             if pairs:
                 baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
-        baked += _baked_shape_keys(scene, shaped, frames)
+        shown = shape_key_values(scene, shaped, frames)
+        baked += [key_shape_keys(keys, frames, values) for keys, values in shown.items()]
         for animation in animations:
             animation.use_nla = False
         yield
@@ -482,26 +483,27 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
         bpy.data.batch_remove([action for action in baked if action is not None])
 
 
-def _baked_shape_keys(
-    scene: bpy.types.Scene, shaped: list[bpy.types.Key], frames: range
-) -> list[bpy.types.Action]:
-    """Give shape keys an action each with the values that they show at scene frames; return the
-    actions.
-    """
-    shown = {keys: np.empty((len(frames), len(keys.key_blocks)), np.float32) for keys in shaped}
-    for row, frame in enumerate(frames if shaped else ()):
+def shape_key_values(
+    scene: bpy.types.Scene, shaped: Iterable[bpy.types.Key], frames: range
+) -> dict[bpy.types.Key, NDArray[np.float32]]:
+    """Return the values (T, keys), without the basis, that shape keys show at T scene frames."""
+    shown = {keys: np.empty((len(frames), len(keys.key_blocks) - 1), np.float32) for keys in shaped}
+    for row, frame in enumerate(frames if shown else ()):
         scene.frame_set(frame)
         evaluated = bpy.context.evaluated_depsgraph_get()
         for keys, values in shown.items():
-            values[row] = [block.value for block in keys.evaluated_get(evaluated).key_blocks]
-    made = []
-    for keys, values in shown.items():
-        channels = Channels(keys, bpy.data.actions.new(keys.name))
-        made.append(channels.action)
-        # without the basis
-        for name, column in list(zip(keys.key_blocks.keys(), values.T, strict=True))[1:]:
-            channels.write(shape_key_path(name), np.array(frames, float), column)
-    return made
+            values[row] = [block.value for block in keys.evaluated_get(evaluated).key_blocks[1:]]
+    return shown
+
+
+def key_shape_keys(
+    keys: bpy.types.Key, frames: range, values: NDArray[np.float32]
+) -> bpy.types.Action:
+    """Give shape keys an action with the values of ``shape_key_values``; return it."""
+    channels = Channels(keys, bpy.data.actions.new(keys.name))
+    for name, column in zip(keys.key_blocks.keys()[1:], values.T, strict=True):
+        channels.write(shape_key_path(name), np.array(frames, float), column)
+    return channels.action
 
 
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:

@@ -84,8 +84,9 @@ def export_on_rig(
         bpy.data.batch_remove(
             [obj for person in result.people for obj in (person.armature, person.mesh)]
         )
+        options = replace(export_options or ExportOptions(), warn=warnings.append)
         for path in paths:
-            written += export(path, [result.collection], options=export_options)
+            written += export(path, [result.collection], options=options)
     return written, warnings
 
 

@@ -22,7 +22,7 @@ from .captures import people_of, shown_capture
 from .comparison import cameras_of
 from .declared_properties import with_options
 from .file_field import SavingOperator, output_file
-from .reporting import refuse, rpt_, tip_
+from .reporting import refuse, rpt_, tip_, warning_text
 
 if TYPE_CHECKING:
     from ..scene.export.export import ExportOptions
@@ -206,6 +206,7 @@ class SCOPE_OT_export(SavingOperator):
             shape=self.shape.lower(),
             separate=self.separate,
             bvh_unit=self.bvh_unit.lower(),
+            warn=lambda notice: self.report({"WARNING"}, warning_text(notice, rpt_)),
         )
 
     def _captures(self, context: bpy.types.Context) -> list[bpy.types.Collection]:

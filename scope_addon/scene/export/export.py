@@ -48,6 +48,7 @@ from .export_states import (
     temporary_scene,
     unit_of_captures,
 )
+from .mesh_modifiers import modifiers_applied
 
 SHAPES = ("auto", "keys", "baked")
 
@@ -67,6 +68,8 @@ class ExportOptions:
     skeleton: str = OWN  # whose names the bones have, in all formats but .blend
     take: str = ""  # name of the animation; empty: the capture's
     unit: float = 0.0  # metres that a length of 1 stands for; 0: as ``unit_of_captures`` says
+    # is called with what users should know about the files
+    warn: Callable[[Notice], None] = lambda _notice: None
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -164,6 +167,9 @@ def _write_one(
         if suffix == ".glb" or options.bakes(suffix)
         else nullcontext(),
         baked_meshes(scene) if options.bakes(suffix) else nullcontext(),
+        modifiers_applied(scene, path.name)
+        if suffix in (".glb", ".fbx", ".usdc")
+        else nullcontext(()) as notices,
         actions_over_scene_range(scene),
     ):
         rig = next((obj for obj in scene.objects if obj.type == "ARMATURE"), None)
@@ -181,6 +187,8 @@ def _write_one(
             ".blend": lambda temporary: formats.write_blend(temporary, scene),
         }
         _write(path, writers[suffix])
+    for each in notices:
+        options.warn(each)
 
 
 def export_motions(

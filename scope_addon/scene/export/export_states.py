@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import bpy
@@ -210,22 +210,29 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
     }
     objects = {obj for collection in collections for obj in collection.all_objects}
     hidden = [(each, each.hide_viewport, each.hide_render) for each in (*groups, *objects)]
-    positions = [
-        (armature, armature.pose_position)
-        for armature in {o.data for o in objects if o.type == "ARMATURE"}
-    ]
     try:
         for each, _, _ in hidden:
             each.hide_viewport = each.hide_render = False
-        for armature, _ in positions:
-            armature.pose_position = "POSE"
-        yield
+        with in_position(objects, "POSE"):
+            yield
     finally:
-        for armature, position in positions:
-            armature.pose_position = position
         for each, in_viewports, in_renders in hidden:
             each.hide_viewport = in_viewports
             each.hide_render = in_renders
+
+
+@contextmanager
+def in_position(objects: Iterable[bpy.types.Object], position: str) -> Iterator[None]:
+    """Show the armatures among the objects in ``POSE`` or ``REST`` position inside the block."""
+    armatures = {obj.data for obj in objects if obj.type == "ARMATURE"}
+    before = [(armature, armature.pose_position) for armature in armatures]
+    try:
+        for armature in armatures:
+            armature.pose_position = position
+        yield
+    finally:
+        for armature, kept in before:
+            armature.pose_position = kept
 
 
 @contextmanager
@@ -262,30 +269,44 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
     """
     meshes = [obj for obj in scene.objects if obj.type == "MESH" and obj.data.shape_keys]
     bodies = [obj for obj in meshes if shape_key_name(0) in obj.data.shape_keys.key_blocks]
-    shaped = [(obj, obj.data, obj.data.name) for obj in bodies]
-    baked = []
+    baked = {}
+    offsets = {obj: expression_offsets(obj) for obj in bodies}
+    for obj in bodies:
+        vertices = mixed_vertices(obj, without=offsets[obj])
+        baked[obj] = bpy.data.meshes.new_from_object(obj)
+        baked[obj].vertices.foreach_set("co", vertices.ravel())
+        baked[obj].update()
+    sources = {obj: obj.data.shape_keys for obj in bodies}
     actions_made = []
     try:
-        for obj, mesh, name in shaped:
-            expressions = expression_offsets(obj)
-            vertices = mixed_vertices(obj, without=expressions)
-            plain = bpy.data.meshes.new_from_object(obj)
-            baked.append(plain)
+        with replaced_meshes(baked):
+            for obj in bodies:
+                if offsets[obj]:
+                    actions_made.append(copy_expressions(obj, sources[obj], offsets[obj]))
+            bpy.context.view_layer.update()
+            yield
+    finally:
+        bpy.data.batch_remove(actions_made)
+
+
+@contextmanager
+def replaced_meshes(new: Mapping[bpy.types.Object, bpy.types.Mesh]) -> Iterator[None]:
+    """Give objects new meshes under the names of theirs inside the block, and remove these after
+    it.
+    """
+    before = [(obj, obj.data, obj.data.name) for obj in new]
+    try:
+        for obj, mesh, name in before:
             if mesh.library is None:  # a linked mesh's name does not conflict with one in this file
-                mesh.name = f"{name} shaped"
-            plain.name = name
-            plain.vertices.foreach_set("co", vertices.ravel())
-            plain.update()
-            obj.data = plain
-            if expressions:
-                actions_made.append(copy_expressions(obj, mesh.shape_keys, expressions))
-        bpy.context.view_layer.update()
+                mesh.name = f"{name} replaced"
+            new[obj].name = name
+            obj.data = new[obj]
         yield
     finally:
-        for obj, mesh, _ in shaped:
+        for obj, mesh, _ in before:
             obj.data = mesh
-        bpy.data.batch_remove([*baked, *actions_made])
-        for _, mesh, name in shaped:
+        bpy.data.batch_remove(list(new.values()))
+        for _, mesh, name in before:
             if mesh.library is None:
                 mesh.name = name
 

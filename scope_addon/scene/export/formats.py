@@ -77,7 +77,7 @@ def write_glb(path: Path, camera: bool = False, take: str = "Animation") -> None
             use_selection=False,
             use_active_scene=True,
             export_yup=True,
-            export_apply=False,
+            export_apply=False,  # it would leave out the shape keys, see mesh_modifiers
             export_cameras=camera,
             export_skins=True,
             export_influence_nb=4,
@@ -121,7 +121,7 @@ def write_fbx(path: Path, camera: bool = False, take: str = "Take") -> None:
         bake_space_transform=False,  # broken with armatures
         axis_forward="-Z",
         axis_up="Y",
-        use_mesh_modifiers=True,
+        use_mesh_modifiers=False,  # they would leave out the shape keys, see mesh_modifiers
         mesh_smooth_type="FACE",
         add_leaf_bones=False,
         primary_bone_axis="Y",

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The modifiers of a rig's meshes in exported files: Blender's exporters leave them out, or leave
+out the shape keys.
+
+Each mesh is replaced by what its modifiers make of it at rest, as if all came before the Armature
+modifier, which remains; and each shape key by what they make of the mesh with that key. So a file
+holds what the viewport shows, except for a modifier that follows the motion itself, such as a
+lattice, and one under which a shape key has other faces than the mesh, such as a decimation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...notices import Notice, notice
+from .. import actions
+from .export_states import in_position, replaced_meshes
+
+# Modifiers whose effect depends on the pose or the time.
+_MOVING = frozenset(
+    ("BUILD", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DYNAMIC_PAINT", "EXPLODE", "HOOK")
+    + ("LAPLACIANDEFORM", "LATTICE", "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "OCEAN")
+    + ("SHRINKWRAP", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE")
+)
+
+
+@contextmanager
+def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[Notice]]:
+    """Replace meshes by what their modifiers make of them inside the block, with their shape keys
+    and the values of these at the scene's frames.
+
+    :param file_name: of the file that is written, for the notices.
+    :return: a notice for each mesh that the file does not hold as the viewport shows it.
+    """
+    meshes = [obj for obj in scene.objects if obj.type == "MESH"]
+    shown = {obj: modifiers for obj in meshes if (modifiers := _shown_modifiers(obj))}
+    hidden = [(m, m.show_viewport, m.show_render) for each in shown.values() for m in each]
+    shaped = {obj: obj.data.shape_keys for obj in shown if obj.data.shape_keys}
+    animated = {keys for keys in shaped.values() if keys.animation_data}
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    modified: dict[bpy.types.Object, bpy.types.Mesh] = {}
+    actions_made: list[bpy.types.Action] = []
+    notices: list[Notice] = []
+    with in_position(scene.objects, "REST"):
+        for obj, modifiers in shown.items():
+            mesh = _modified_mesh(scene, obj)
+            if mesh is not None:
+                modified[obj] = mesh
+            missing = [m.name for m in modifiers if mesh is None or m.type in _MOVING]
+            if missing:
+                values = {"file": file_name, "mesh": obj.name, "modifiers": missing}
+                notices.append(notice("modifiers_left_out", **values))
+    try:
+        for modifier, _, _ in hidden:
+            modifier.show_viewport = modifier.show_render = False
+        values = actions.shape_key_values(scene, animated, frames)
+        with replaced_meshes(modified):
+            for obj, mesh in modified.items():
+                if shaped.get(obj) in animated:
+                    keys = mesh.shape_keys
+                    actions_made.append(actions.key_shape_keys(keys, frames, values[shaped[obj]]))
+            bpy.context.view_layer.update()
+            yield notices
+    finally:
+        bpy.data.batch_remove(actions_made)
+        for modifier, in_viewports, in_renders in hidden:
+            modifier.show_viewport = in_viewports
+            modifier.show_render = in_renders
+
+
+def _shown_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    return [m for m in obj.modifiers if m.show_viewport and m.type != "ARMATURE"]
+
+
+def _modified_mesh(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Mesh | None:
+    """Return what the modifiers of an object make of its mesh, with its shape keys; None where a
+    key would have other faces.
+    """
+    copy = obj.copy()
+    copy.data = obj.data.copy()
+    scene.collection.objects.link(copy)
+    copy.show_only_shape_key = False
+    for modifier in [m for m in copy.modifiers if m.type == "ARMATURE"]:
+        copy.modifiers.remove(modifier)
+    blocks = _keys_at_zero(copy.data)
+    mesh = _evaluated_mesh(copy)
+    try:
+        corners = _corners(mesh)
+        places = []
+        for block in blocks[1:]:
+            block.value = 1.0
+            keyed = _evaluated_mesh(copy)
+            block.value = 0.0
+            same = np.array_equal(_corners(keyed), corners)
+            places.append(_vertices(keyed))
+            bpy.data.meshes.remove(keyed)
+            if not same:
+                bpy.data.meshes.remove(mesh)
+                return None
+    finally:
+        bpy.data.batch_remove([copy, copy.data])
+    if blocks:
+        _add_keys(mesh, obj.data.shape_keys, places)
+    return mesh
+
+
+def _keys_at_zero(mesh: bpy.types.Mesh) -> list[bpy.types.ShapeKey]:
+    """Let the shape keys of a mesh take values from 0 to 1, set them to 0, and return them."""
+    if mesh.shape_keys is None:
+        return []
+    mesh.shape_keys.animation_data_clear()
+    for block in mesh.shape_keys.key_blocks:
+        block.slider_min = -1.0
+        block.slider_max = 1.0
+        block.value = 0.0
+        block.mute = False
+    return list(mesh.shape_keys.key_blocks)
+
+
+def _add_keys(
+    mesh: bpy.types.Mesh, source: bpy.types.Key, places: list[NDArray[np.float32]]
+) -> None:
+    """Give a mesh shape keys with the names, ranges and values of another one's.
+
+    :param places: (V, 3) of each key but the basis.
+    """
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    for block, vertices in zip(source.key_blocks, [_vertices(mesh), *places], strict=True):
+        key = obj.shape_key_add(name=block.name, from_mix=False)
+        key.data.foreach_set("co", vertices.ravel())
+        key.slider_min = block.slider_min
+        key.slider_max = block.slider_max
+        key.value = block.value
+        key.mute = block.mute
+    bpy.data.objects.remove(obj)
+
+
+def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
+    """Return a new mesh as an object's modifiers make it."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    return bpy.data.meshes.new_from_object(
+        obj.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
+    )
+
+
+def _vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """Return the vertices (V, 3) of a mesh."""
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    return vertices
+
+
+def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
+    """Return the vertex at each corner of the faces."""
+    corners = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    return corners
