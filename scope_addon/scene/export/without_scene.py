@@ -31,6 +31,7 @@ from ...kinematics.axes import R_OPENSIM_MODEL, R_OPENSIM_WORLD
 from ...motion import Motion
 from ...output_paths import person_paths
 from ..budget import check_rows
+from .bvh import euler_zyx_degrees
 from .c3d import c3d_bytes
 from .vrma import vrma_bytes
 
@@ -233,8 +234,8 @@ def write_angles(path: Path, motion: Motion, body: Body) -> None:
 
 
 def joint_angles(motion: Motion, body: Body) -> dict[str, NDArray[np.float64]]:
-    """Return the angles (T,) of each joint, degrees without jumps by whole turns, and the place of
-    the pelvis, metres, by OpenSim's names.
+    """Return the angles (T,) of each joint, degrees without jumps, and the place of the pelvis,
+    metres, by OpenSim's names.
     """
     R_world_part, joints = motion.parts_in_world(body)
     R_opensim_part = R_OPENSIM_WORLD @ R_world_part @ R_OPENSIM_MODEL.T
@@ -313,14 +314,10 @@ def _between(
 def _angles(
     R: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return a, b and c of R = R_z(a) R_x(b) R_y(c), (T, 3, 3), in degrees without jumps by whole
-    turns.
+    """Return a, b and c of R = R_z(a) R_x(b) R_y(c), (T, 3, 3), in degrees without jumps.
+
+    With the axes x and y exchanged, which is a reflection, it is R_z(−a) R_y(−b) R_x(−c).
     """
-    about_z = np.arctan2(-R[:, 0, 1], R[:, 1, 1])
-    about_x = np.arcsin(np.clip(R[:, 2, 1], -1.0, 1.0))
-    about_y = np.arctan2(-R[:, 2, 0], R[:, 2, 2])
-    return (
-        np.degrees(np.unwrap(about_z)),
-        np.degrees(about_x),
-        np.degrees(np.unwrap(about_y)),
-    )
+    exchanged = R[:, [1, 0, 2]][:, :, [1, 0, 2]]
+    about_z, about_x, about_y = -euler_zyx_degrees(exchanged[:, None])[:, 0].T
+    return about_z, about_x, about_y

@@ -4,9 +4,11 @@
 import csv
 from dataclasses import replace
 
+import mathutils
 import numpy as np
 import pytest
 from scope.scope_addon.kinematics.axes import R_OPENSIM_WORLD, R_WORLD_MODEL
+from scope.scope_addon.scene.export.bvh import euler_zyx_degrees
 from scope.scope_addon.scene.export.without_scene import joint_angles, write_angles
 from scope.solver.rotations import exp, log
 
@@ -94,6 +96,28 @@ def test_a_turn_through_a_half_does_not_jump(make_motion, whole_body):
     poses[:, 0] = log(turned)
     angles = joint_angles(replace(motion, poses=poses.reshape(40, -1)), whole_body)
     np.testing.assert_allclose(np.diff(angles["pelvis_rotation"]), 540.0 / 39, atol=1e-2)
+
+
+def test_an_arm_that_is_raised_sideways_does_not_fold_at_the_shoulder(make_motion, whole_body):
+    """From hanging to 30° beside the head: in the rest pose, arms are spread."""
+    motion = make_motion(whole_body, 40)
+    poses = np.zeros((40, whole_body.K + 1, 3))
+    raised = np.linspace(0.0, 150.0, 40)
+    poses[:, whole_body.joint_names.index("right_shoulder"), 2] = np.radians(90.0 - raised)
+    angles = joint_angles(replace(motion, poses=poses.reshape(40, -1)), whole_body)
+    np.testing.assert_allclose(angles["arm_add_r"], -raised, atol=1e-3)
+    np.testing.assert_allclose(angles["arm_flex_r"], 0.0, atol=1e-3)
+    np.testing.assert_allclose(angles["arm_rot_r"], 0.0, atol=1e-3)
+
+
+def test_angles_are_those_of_blenders_decomposition_nearest_to_the_frame_before():
+    rng = np.random.default_rng(4)
+    turned = np.cumsum(rng.normal(0.0, 0.1, (200, 1, 3)), axis=0)
+    found = euler_zyx_degrees(exp(turned))[:, 0]
+    before = mathutils.Euler(np.radians(found[0, ::-1]))
+    for R, angles in zip(exp(turned)[:, 0], found, strict=True):
+        before = mathutils.Matrix(R).to_euler("XYZ", before)
+        np.testing.assert_allclose(angles, np.degrees(before)[::-1], atol=1e-2)
 
 
 def test_the_files_hold_the_angles_at_one_rate(tmp_path, posed, whole_body):
