@@ -149,6 +149,28 @@ def test_a_rig_of_a_scene_in_centimetres_has_its_true_size(tmp_path, suffix):
     )
 
 
+def test_a_pelvis_moves_under_a_bone_on_the_ground_in_bvh(tmp_path):
+    rig, bone_of = build_rig("unreal")
+    bpy.ops.object.mode_set(mode="EDIT")
+    ground = rig.data.edit_bones.new("ground")
+    ground.tail = (0.0, 0.1, 0.0)
+    rig.data.edit_bones[bone_of["pelvis"]].parent = ground
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for frame in (1, 3):
+        for name in ("ground", bone_of["pelvis"]):
+            bone = rig.pose.bones[name]
+            bone.rotation_mode = "XYZ"
+            bone.rotation_euler.z = bone.location.x = 0.3 * frame
+            bone.keyframe_insert("location", frame=frame)
+            bone.keyframe_insert("rotation_euler", frame=frame)
+    wanted = seen(rig, bone_of.values(), [1, 2, 3])
+    export_rig(tmp_path / "rig.bvh", rig, ExportOptions())
+    assert (tmp_path / "rig.bvh").read_text().count("CHANNELS 6") == 2
+    read_back(tmp_path / "rig.bvh")
+    (read,) = bpy.data.objects
+    np.testing.assert_allclose(seen(read, bone_of.values(), [1, 2, 3]), wanted, atol=1e-3)
+
+
 def test_two_people_have_a_rig_each(tmp_path):
     source = rig_source(save_rig(tmp_path / "rig.glb"))
     other = walk(2.0)

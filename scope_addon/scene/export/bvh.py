@@ -4,8 +4,10 @@
 
 Every joint's axes are those of the model at rest, so offsets are differences of rest joints and
 rotations are SMPL's. The root's channels are its position and rotation in the y-up world; its
-OFFSET is zero because readers disagree on whether position channels are added to it. Blender's own
-exporter writes z up, which other tools display lying down.
+OFFSET is zero because readers disagree on whether position channels are added to it. A joint that
+moves relative to its parent, such as the pelvis under a bone on the ground, has position channels
+too, which replace its OFFSET. Blender's own exporter writes z up, which other tools display lying
+down.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from ...kinematics.axes import R_WORLD_MODEL
 UNITS_PER_METRE = {"cm": 100.0, "m": 1.0}
 # The axes of the file are those of glTF and SMPL: y up, the model faces +z.
 R_FILE_WORLD = R_WORLD_MODEL.T
+# how far a joint may be from its place at its parent without position channels
+_IN_PLACE_M = 5e-4
 
 
 @dataclass(frozen=True)
@@ -55,11 +59,18 @@ def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
         if parent >= 0:
             children[parent].append(i)
     order: list[int] = []
+    places = _places_at_parents(pose)
+    apart = np.linalg.norm(places - _offsets(pose), axis=-1).max(axis=0)
+    has_position = (apart > scale * _IN_PLACE_M) | (np.array(pose.parents) < 0)
     lines = ["HIERARCHY"]
     for root in (i for i, parent in enumerate(pose.parents) if parent < 0):
         order += _subtree(children, root)
-        lines += _joint_lines(children, pose, root, depth=0)
-    values = _channel_values(pose, order)
+        lines += _joint_lines(children, pose, has_position, root, depth=0)
+    angles = _angles_at_parents(pose)
+    columns = [
+        part[:, i] for i in order for part in ((places, angles) if has_position[i] else (angles,))
+    ]
+    values = np.concatenate(columns, axis=1)
     lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {1.0 / pose.rate:.9f}"]
     lines += [" ".join(f"{v:.6f}" for v in row) for row in values.tolist()]
     return "\n".join(lines) + "\n"
@@ -81,19 +92,23 @@ def _subtree(children: list[list[int]], i: int) -> list[int]:
     return [i, *(j for child in children[i] for j in _subtree(children, child))]
 
 
-def _joint_lines(children: list[list[int]], pose: SampledPose, i: int, depth: int) -> list[str]:
+def _joint_lines(
+    children: list[list[int]],
+    pose: SampledPose,
+    has_position: NDArray[np.bool_],
+    i: int,
+    depth: int,
+) -> list[str]:
     """Return the lines of a joint and its descendants."""
     pad = "\t" * depth
-    parent = pose.parents[i]
-    offset = np.zeros(3) if parent < 0 else R_FILE_WORLD @ (pose.heads[i] - pose.heads[parent])
-    position = "6 Xposition Yposition Zposition" if parent < 0 else "3"
-    lines = [f"{pad}{'ROOT' if parent < 0 else 'JOINT'} {pose.names[i]}", f"{pad}{{"]
+    position = "6 Xposition Yposition Zposition" if has_position[i] else "3"
+    lines = [f"{pad}{'ROOT' if pose.parents[i] < 0 else 'JOINT'} {pose.names[i]}", f"{pad}{{"]
     lines += [
-        f"{pad}\tOFFSET {_triple(offset)}",
+        f"{pad}\tOFFSET {_triple(_offsets(pose)[i])}",
         f"{pad}\tCHANNELS {position} Zrotation Yrotation Xrotation",
     ]
     for child in children[i]:
-        lines += _joint_lines(children, pose, child, depth + 1)
+        lines += _joint_lines(children, pose, has_position, child, depth + 1)
     if not children[i]:
         end = R_FILE_WORLD @ (pose.tails[i] - pose.heads[i])
         lines += [f"{pad}\tEnd Site", f"{pad}\t{{", f"{pad}\t\tOFFSET {_triple(end)}", f"{pad}\t}}"]
@@ -104,22 +119,35 @@ def _triple(v: NDArray[np.float64]) -> str:
     return f"{v[0]:.6f} {v[1]:.6f} {v[2]:.6f}"
 
 
-def _channel_values(pose: SampledPose, order: list[int]) -> NDArray[np.float64]:
-    """Return (T, channels) in the order of the hierarchy, lengths in the unit of ``pose``, angles
-    in degrees.
+def _offsets(pose: SampledPose) -> NDArray[np.float64]:
+    """Return where each joint is at rest (N, 3), relative to its parent, in the file's axes; zero
+    for roots.
     """
-    turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
     parents = np.array(pose.parents)
+    offsets: NDArray[np.float64] = (pose.heads - pose.heads[parents]) @ R_FILE_WORLD.T
+    return np.where(parents[:, None] < 0, 0.0, offsets)
+
+
+def _places_at_parents(pose: SampledPose) -> NDArray[np.float64]:
+    """Return where each joint is (T, N, 3), in its parent's axes; of roots, in the file's."""
+    parents = np.array(pose.parents)
+    joints = pose.joints @ R_FILE_WORLD.T
+    turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
+    places = joints.copy()
+    child = parents >= 0
+    apart = joints[:, child] - joints[:, parents[child]]
+    places[:, child] = np.einsum("tnji,tnj->tni", turned[:, parents[child]], apart)
+    return places
+
+
+def _angles_at_parents(pose: SampledPose) -> NDArray[np.float64]:
+    """Return the angles (T, N, 3) z, y and x of each joint relative to its parent, degrees."""
+    parents = np.array(pose.parents)
+    turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
     local = turned.copy()
     child = parents >= 0
     local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
-    angles = euler_zyx_degrees(local)
-    positions = pose.joints @ R_FILE_WORLD.T
-    columns = [
-        part[:, i] for i in order for part in ((angles,) if child[i] else (positions, angles))
-    ]
-    values: NDArray[np.float64] = np.concatenate(columns, axis=1)
-    return values
+    return euler_zyx_degrees(local)
 
 
 def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
