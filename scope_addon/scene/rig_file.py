@@ -18,6 +18,7 @@ from ..errors import UsageError
 from ..retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ..retarget.guess import from_humanoid
 from ..retarget.rig_source import RigSource, files_beside_gltf
+from .actions import fcurves_of, shape_key_path
 from .datablocks import NewDatablocks
 from .export import formats
 from .export.export_states import temporary_scene
@@ -233,9 +234,21 @@ def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
 
 
 def _remove_animation(obj: bpy.types.Object) -> None:
-    """Remove action and NLA; drivers are kept."""
-    if obj.animation_data is None:
-        return
-    obj.animation_data.action = None
-    for track in list(obj.animation_data.nla_tracks):
-        obj.animation_data.nla_tracks.remove(track)
+    """Remove the actions and NLA of an object, its data and its shape keys, of which those that
+    moved go back to 0; drivers are kept.
+    """
+    keys = getattr(obj.data, "shape_keys", None)
+    for datablock in filter(None, (obj, obj.data, keys)):
+        animation = datablock.animation_data
+        if animation is None:
+            continue
+        strips = [strip for track in animation.nla_tracks for strip in track.strips]
+        played = {animation.action, *(strip.action for strip in strips)} - {None}
+        animation.action = None
+        for track in list(animation.nla_tracks):
+            animation.nla_tracks.remove(track)
+        if datablock == keys:
+            moved = {curve.data_path for action in played for curve in fcurves_of(action)}
+            for block in keys.key_blocks:
+                if shape_key_path(block.name) in moved:
+                    block.value = 0.0

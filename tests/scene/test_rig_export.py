@@ -14,6 +14,7 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import BoneMap, save_bone_map
 from scope.scope_addon.retarget.rig_source import rig_source
+from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import NEW_SCENE
 from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.export.export import ExportOptions
@@ -50,6 +51,11 @@ def save_rig(path, scheme="mixamo", armatures=1, animated=False):
             rig.pose.bones[0].keyframe_insert("location", frame=3)
             track = rig.animation_data.nla_tracks.new()
             track.strips.new("old", 1, rig.animation_data.action)
+            skin.shape_key_add(name="Basis")
+            old = skin.shape_key_add(name="old")
+            for frame, value in ((1, 0.0), (9, 1.0)):
+                old.value = value
+                old.keyframe_insert("value", frame=frame)
     stone = bpy.data.objects.new("Stone", bpy.data.meshes.new("Stone"))
     bpy.context.scene.collection.objects.link(stone)
     writers = {
@@ -125,6 +131,9 @@ def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
         assert len(skins) == 1
         assert "Stone" not in bpy.data.objects
         assert worst_arm(rigs[0], names_of("mixamo"), 0) < 1.0, path
+        for keys in bpy.data.shape_keys:
+            assert keys.key_blocks["old"].value == 0.0
+            assert not any(actions.read_keys(curve)[:, 1].any() for curve in actions.fcurves(keys))
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
