@@ -53,6 +53,9 @@ SENTENCES = {
     "first one's",
     "decoding_stopped": "decoding {footage} stopped after {decoded} of about {total} frames; the "
     "file may be damaged or incomplete",
+    "frames_lacking": "{footage} lacks frames {times:times}, for up to {longest_s:.1f} s: parts of "
+    "the file may be damaged or missing, or nothing moved while a screen was recorded; the motion "
+    "there is a guess",
     "growing_file": "{footage} grew while it was read; capture it again once it is written "
     "completely",
     "missing_images": "{footage}: {missing} numbers between {first} and {last} have no image; the "
@@ -170,6 +173,8 @@ SENTENCES = {
     "at rest; add bones for them to the map",
     "odd_bones": "these bones of '{rig}' {reason:phrase}: {bones:names}; check the bone map",
     "face_not_retargeted": "the face was not retargeted: {reason}",
+    "driven_keys": "drivers move these shape keys of '{mesh}', so they do not show the "
+    "expressions: {keys:names}; remove the drivers",
     "blocked_bones": "these bones of '{rig}' cannot follow the motion: {bones:names}; mute the "
     "constraints or drivers that control them, such as IK, or put the bones that control them "
     "into the list",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..kinematics.face import EXPRESSIONS
+from ..notices import Notice, notice
 from ..retarget.expression_map import ExpressionMap, guess_expression_map
 from ..retarget.face_controls import (
     RestBone,
@@ -142,6 +143,26 @@ def retarget_expressions(
             retire(former, name)
             action.name = f"{face.name}_{name}"  # which an earlier retargeting had until now
     return [action for _, action, _ in written]
+
+
+def driven_keys(
+    faces: Iterable[bpy.types.Object], expression_map: ExpressionMap | None = None
+) -> list[Notice]:
+    """Return warnings about mapped shape keys that do not show their keyframes, because drivers
+    move them.
+
+    :param expression_map: None for a guess, as `retarget_expressions` makes it.
+    """
+    warnings = []
+    for face in faces:
+        keys = face.data.shape_keys
+        drivers = keys.animation_data.drivers if keys.animation_data else ()
+        driven = {driver.data_path for driver in drivers if not driver.mute}
+        mapped = expression_map or guess_expression_map(key_names([face]))
+        blocked = [key for key in mapped.keys if shape_key_path(key) in driven]
+        if blocked:
+            warnings.append(notice("driven_keys", mesh=face.name, keys=blocked))
+    return warnings
 
 
 def _write(

@@ -23,6 +23,7 @@ from .export.export import ExportOptions, export
 from .export.export_states import temporary_scene
 from .face_retarget import (
     captured_expressions,
+    driven_keys,
     faces_of,
     guess_face_bones,
     only_bones_move,
@@ -123,7 +124,7 @@ def _retarget_face(
         if given is not None:
             raise
         return [notice("face_not_retargeted", reason=str(error))]
-    return []
+    return driven_keys(faces, given)
 
 
 def export_rig(path: Path, rig: bpy.types.Object, options: ExportOptions) -> list[Path]:

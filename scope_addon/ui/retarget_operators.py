@@ -30,6 +30,7 @@ from .retarget_maps import (
 )
 
 if TYPE_CHECKING:
+    from ..notices import Notice
     from ..retarget.expression_map import ExpressionMap
     from ..scene.rig_retarget import RetargetOptions, RetargetResult
 
@@ -323,6 +324,7 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         """
         from ..scene.face_retarget import (
             captured_expressions,
+            driven_keys,
             retarget_expressions,
             retarget_face_bones,
         )
@@ -336,17 +338,20 @@ class SCOPE_OT_retarget_face(_FaceOperator):
                 f"the face of '{source.name}' was not captured; capture again with Face"
             )
         chosen = listed_or_guessed(settings)
+        warnings: list[Notice] = []
         if bones_move(settings.face):
             action = retarget_face_bones(captured, settings.face, chosen, source.name)
         else:
             (action,) = retarget_expressions(captured, [settings.face], chosen, source.name)
+            warnings = driven_keys([settings.face], chosen)
         if not len(settings.face_pairs):
             fill_expressions(settings, chosen)
-        return rpt_(
+        message = rpt_(
             "'{mesh}' is now animated by the action '{action}'",
             mesh=settings.face.name,
             action=action.name,
         )
+        return self.report_all(message, warnings)
 
 
 class SCOPE_OT_save_expression_map(_FaceOperator, SaveMapOperator):

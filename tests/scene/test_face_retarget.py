@@ -20,6 +20,7 @@ from scope.scope_addon.scene.export import formats
 from scope.scope_addon.scene.face_retarget import (
     CapturedExpressions,
     captured_expressions,
+    driven_keys,
     faces_of,
     retarget_expressions,
 )
@@ -158,6 +159,20 @@ def test_a_mesh_without_known_names_is_refused(captured):
     with pytest.raises(UsageError, match="'Head' is mapped to an expression; name them as"):
         retarget_expressions(captured, [face])
     assert face.data.shape_keys.animation_data is None
+
+
+def test_keys_that_drivers_move_are_reported(captured):
+    """Animated values of driven keys have no effect."""
+    faces = [face_mesh(["jawOpen", "eyeBlink_L", "width"]), face_mesh(["A"])]
+    for key in ("jawOpen", "width"):
+        faces[0].data.shape_keys.key_blocks[key].driver_add("value")
+    retarget_expressions(captured, faces)
+    (warning,) = driven_keys(faces)
+    assert str(warning).endswith(
+        "'Head', so they do not show the expressions: 'jawOpen'; remove the drivers"
+    )
+    faces[0].data.shape_keys.animation_data.drivers[0].mute = True
+    assert driven_keys(faces) == []
 
 
 def test_what_fails_changes_nothing(captured, monkeypatch):

@@ -61,6 +61,12 @@ def test_retargeting_guesses_what_is_not_listed(settings):
     assert settings.face.data.shape_keys.animation_data.action is not None
 
 
+def test_a_key_that_a_driver_moves_is_reported(settings, capfd):
+    settings.face.data.shape_keys.key_blocks["viseme_aa"].driver_add("value")
+    bpy.ops.scope.retarget_face()
+    assert "do not show the expressions: 'viseme_aa'" in capfd.readouterr().out
+
+
 def test_a_face_without_known_keys_is_an_error(settings):
     settings.face = face_mesh(["Key 1"])
     with pytest.raises(RuntimeError, match="no shape key"):
