@@ -192,6 +192,7 @@ def observe(
             tracks, left_out = observed.tracks(most_people(options.people), options.chosen, speed)
     if not tracks:
         raise _no_person_error(video, options, len(observed.timestamps))
+    footage.warnings.extend(video.gap_notices(observed.timestamps))
     footage.warnings.extend(_warnings_about_people(video, tracks, left_out))
     if footage.zoom is not None:
         tracks = [track.steadied(footage.camera, footage.zoom.factors) for track in tracks]

@@ -17,7 +17,7 @@ import queue
 import re
 import stat
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import cast
 
 import cv2
+import numpy as np
 
 from ...arrays import Uint8Array
 from ...errors import VideoError, unreadable
@@ -52,6 +53,9 @@ _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _VARYING = Fraction(2, 100)  # of the rate, by which the average differs where it varies
 _ONE_MISSING = 0.5  # frames, from which at least one is missing, or too many
 _SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
+# A step from one frame to the next that is no uneven rate but a gap: by both.
+_GAP_S = 0.5
+_GAP_FRAMES = 10
 # Of a frame; a fifth of what videos of calls and surveillance have at their lowest quality.
 _LEAST_BYTES = 100
 _PIECE_BYTES = 1 << 20
@@ -164,6 +168,27 @@ class Video:
         :param start_s: within the range; it must have no frame rate of its own.
         """
         return iter(replace(self, wanted=replace(self.wanted, start_s=start_s), _is_part=True))
+
+    def gap_notices(self, times_s: Sequence[float]) -> list[Notice]:
+        """Say where frames are lacking inside the range, as where a part of a file is damaged; of
+        the pictures of a sequence, their numbers tell.
+
+        :param times_s: of all frames that an iteration has yielded.
+        """
+        if self._sequence is not None:
+            return []
+        begins_s = np.array([self.wanted.start_s, *times_s])
+        lengths_s = np.diff(begins_s)
+        is_gap = lengths_s > max(_GAP_S, _GAP_FRAMES / float(self.fps))
+        if not is_gap.any():
+            return []
+        found = notice(
+            "frames_lacking",
+            footage=self.path.name,
+            times=begins_s[:-1][is_gap].tolist(),
+            longest_s=float(lengths_s.max()),
+        )
+        return [found]
 
     def close(self) -> None:
         """Stop the decoding threads of this video; a running iteration ends."""

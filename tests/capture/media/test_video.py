@@ -115,6 +115,23 @@ def test_a_variable_rate_keeps_presentation_times(tmp_path):
     assert [warning.code for warning in video.warnings] == ["variable_frame_rate"]
 
 
+@pytest.mark.parametrize(
+    ("fps", "steps", "gaps"),
+    [
+        (25, [(2, 40), (1, 1500), (6, 40)], ([0.08], 1.5)),
+        (25, [(2, 40), (1, 480), (6, 40)], None),  # shorter than half a second
+        (5, [(2, 200), (1, 1800), (6, 200)], None),  # less than ten frames
+    ],
+)
+def test_frames_that_are_lacking_inside_are_said(tmp_path, fps, steps, gaps):
+    """A damaged part of a file was left out without a word."""
+    path = write_video(tmp_path / "a.mp4", ramp(9), fps)
+    with_time_table(path, 1000, steps)
+    with open_video(path) as video:
+        found = video.gap_notices([f.timestamp_s for f in video])
+    assert [(n.values["times"], n.values["longest_s"]) for n in found] == ([gaps] if gaps else [])
+
+
 def test_as_many_frames_are_expected_as_a_slightly_varying_rate_gives(tmp_path):
     """Mostly 30 per second, and some at half the distance."""
     path = write_video(tmp_path / "a.mp4", ramp(10) * 10)
