@@ -105,6 +105,14 @@ def at_one_rate(
     return times_s, rows
 
 
+def _is_seen(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return (S,) whether the person was seen at times, not between a frame with the person and one
+    without, nor where frames are missing.
+    """
+    seen = np.interp(times_s, motion.timestamps, motion.valid.astype(float))
+    return (seen > 1.0 - 1e-6) & ~_in_gap(motion, times_s)
+
+
 def _in_gap(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return (S,) whether frames are missing at times: those around are far apart."""
     own_s = motion.timestamps
@@ -165,11 +173,9 @@ def write_c3d(path: Path, motion: Motion, body: Body, start_s: float) -> None:
     if deviations is None:
         deviations = np.full((len(motion), len(body.joint_names)), np.nan)
     columns = [*markers.reshape(len(motion), -1).T, *np.asarray(deviations, float)[:, joints].T]
-    times_s, rows = at_one_rate(motion, [*columns, motion.valid.astype(float)])
-    places, residuals, is_seen = np.split(rows, [3 * len(names), rows.shape[1] - 1], axis=1)
-    # A moment between a frame with the person and one without has none.
-    is_known = (is_seen > 1.0 - 1e-6) & ~_in_gap(motion, times_s)[:, None]
-    residuals_mm = np.where(is_known, 1000.0 * residuals, -1.0)
+    times_s, rows = at_one_rate(motion, columns)
+    places, residuals = np.split(rows, [3 * len(names)], axis=1)
+    residuals_mm = np.where(_is_seen(motion, times_s)[:, None], 1000.0 * residuals, -1.0)
     parts = [body.joint_names[joint].replace("_", " ") for joint in joints]
     points_mm = 1000.0 * places.reshape(len(rows), len(names), 3)
     rate = motion.mocap_framerate
@@ -211,17 +217,22 @@ def world_markers(motion: Motion, body: Body) -> tuple[list[str], NDArray[np.flo
 def write_angles(path: Path, motion: Motion, body: Body) -> None:
     """Write the joint angles of a motion, as a .csv file or, with another suffix, as a .mot file.
 
+    A .csv file has blanks where the person was not seen; a .mot file cannot have any.
+
     :param body: that the motion was fitted with.
     :raises OutputError: the file cannot be written.
     """
     angles = joint_angles(motion, body)
     times_s, rows = at_one_rate(motion, list(angles.values()))
     names = ["time", *angles]
-    separator = "," if path.suffix.lower() == ".csv" else "\t"
+    is_table = path.suffix.lower() == ".csv"
+    separator = "," if is_table else "\t"
     lines = [separator.join(names)]
-    for time_s, row in zip(times_s, rows.tolist(), strict=True):
-        lines.append(separator.join([f"{time_s:.6f}", *(f"{value:.6f}" for value in row)]))
-    if separator == "\t":
+    is_written = _is_seen(motion, times_s) | (not is_table)
+    for time_s, row, written in zip(times_s, rows.tolist(), is_written, strict=True):
+        cells = [f"{value:.6f}" if written else "" for value in row]
+        lines.append(separator.join([f"{time_s:.6f}", *cells]))
+    if not is_table:
         lines[:0] = [
             display_text(path.stem),
             "version=1",

@@ -139,3 +139,10 @@ def test_the_files_hold_the_angles_at_one_rate(tmp_path, posed, whole_body):
     values = np.array(of_csv[1:], float)
     np.testing.assert_allclose(values[:, 0], motion.timestamps, atol=1e-6)
     np.testing.assert_allclose(values[:, 1:], np.array([*expected.values()]).T, atol=1e-5)
+
+
+def test_a_table_has_blanks_where_the_person_was_not_seen(tmp_path, posed, whole_body):
+    motion = replace(posed({}), valid=np.array([True, False, True]))
+    write_angles(tmp_path / "a.csv", motion, whole_body)
+    rows = list(csv.reader((tmp_path / "a.csv").read_text().splitlines()))
+    assert [row.count("") for row in rows[1:]] == [0, len(rows[0]) - 1, 0]
