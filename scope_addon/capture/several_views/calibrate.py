@@ -261,13 +261,15 @@ def same_people(
     :return: of each person, (V,) numbers; None: not found there.
     """
     V = len(people)
+    first = matches[0].place if matches[0] is not None else CameraPlace.first()
     found: list[list[int | None]] = [[k] + [None] * (V - 1) for k in range(len(people[0]))]
     for v in range(1, V):
         match = matches[v]
         if match is None:
             continue
+        cameras = first, match.place
         distances = np.array(
-            [[apart(one, other, match.place) for other in people[v]] for one in people[0]]
+            [[apart(one, other, cameras) for other in people[v]] for one in people[0]]
         ).reshape(len(people[0]), len(people[v]))
         distances[0, :] = np.inf
         distances[:, match.number] = np.inf
@@ -280,52 +282,60 @@ def same_people(
     return found
 
 
-def apart(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
+def apart(one: SeenPerson, other: SeenPerson, cameras: tuple[CameraPlace, CameraPlace]) -> float:
     """Return the median distance from the rays of two people's keypoints, taken for one person, in
     standard deviations; infinity where both are never seen together.
+
+    :param cameras: the first one, whose focal length may be adjusted, and the other one.
     """
-    at, points = _common_points(one, other, place)
-    cameras = CameraPlace.first(), place
+    at, points = _common_points(one, other, cameras)
     off = [_distance(each, camera, points) for each, camera in zip(at, cameras, strict=True)]
     both = (at[0].confidence > 0) & (at[1].confidence > 0)
     return float(np.median(np.maximum(*off)[both])) if both.any() else np.inf
 
 
-def contradicts(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> bool:
+def contradicts(
+    one: SeenPerson, other: SeenPerson, cameras: tuple[CameraPlace, CameraPlace]
+) -> bool:
     """Return whether one person, as the first and another camera see them, speaks against that
     camera's place: rays pass each other, or the body is turned otherwise.
 
     Cameras of equal height that were exchanged have rays that meet, in a wrong place.
     """
+    place = cameras[1]
     turned = first_place(one, other, _shared_times(one, other, place), place)
     if turned is None:
         return False
     angle = float(np.linalg.norm(log(turned.R_camera_first @ place.R_camera_first.T)))
-    return angle > MOST_TURNED or apart(one, other, place) > MOST_APART
+    return angle > MOST_TURNED or apart(one, other, cameras) > MOST_APART
 
 
-def relative_distance(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
+def relative_distance(
+    one: SeenPerson, other: SeenPerson, cameras: tuple[CameraPlace, CameraPlace]
+) -> float:
     """Return how far a person is from the first camera by both cameras' rays, divided by how far
     by the usual size of people.
     """
-    at, points = _common_points(one, other, place)
+    at, points = _common_points(one, other, cameras)
     both = (at[0].confidence > 0) & (at[1].confidence > 0)
     if not both.any():
         return 1.0
-    return float(np.median(points[both][:, 2]) / np.median(at[0].root[:, 2]))
+    usual = np.exp(cameras[0].log_focal) * np.median(at[0].root[:, 2])
+    return float(np.median(points[both][:, 2]) / usual)
 
 
 def _common_points(
-    one: SeenPerson, other: SeenPerson, place: CameraPlace
+    one: SeenPerson, other: SeenPerson, cameras: tuple[CameraPlace, CameraPlace]
 ) -> tuple[tuple[SeenPerson, SeenPerson], Float64Array]:
     """Return a person at times at which the first and another camera see them, as both do, and the
     keypoints (N, n, 3) by the rays of both, first camera's axes.
     """
+    place = cameras[1]
     times = _shared_times(one, other, place)
     at = one.at(times), other.at(place.own_times(times))
     confidence = np.array([each.confidence for each in at])
     rays = np.array([each.rays for each in at])
-    return at, triangulate(rays, confidence, [CameraPlace.first(), place])
+    return at, triangulate(rays, confidence, cameras)
 
 
 def _distance(person: SeenPerson, camera: CameraPlace, points: Float64Array) -> Float64Array:

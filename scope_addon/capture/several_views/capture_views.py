@@ -288,18 +288,20 @@ def _doubts_about_file(
     """
     doubts = []
     first = views[0].people[0]
+    first_camera = matches[0].place if matches[0] is not None else CameraPlace.first()
     for v in range(1, len(views)):
         match = matches[v]
         if given[v].T_camera_first is None or match is None:
             continue
         person = views[v].people[match.number]
-        size = relative_distance(first, person, match.place)
+        cameras = first_camera, match.place
+        size = relative_distance(first, person, cameras)
         if not 1.0 / MOST_RELATIVE_DISTANCE < abs(size) < MOST_RELATIVE_DISTANCE:
             raise UsageError(
                 f"{options.calibration} makes people {size:.3g} times as large as people are; its "
                 "translations must be in metres"
             )
-        if contradicts(first, person, match.place):
+        if contradicts(first, person, cameras):
             name = display_text(Path(str(options.calibration)).name)
             doubts.append(
                 notice(

@@ -11,6 +11,8 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.several_views import bundle
 from scope.scope_addon.capture.several_views.bundle import CameraPlace, Given, adjust
 from scope.scope_addon.capture.several_views.calibrate import (
+    Clock,
+    Match,
     calibrate,
     contradicting_spans,
     contradicts,
@@ -87,7 +89,8 @@ def seen(place, points, rate, noise=0.001, lean_deg=8.0, seed=1, own=None):
     root = inside[:, 6:8].mean(axis=1)
     lean = rotations.exp(np.array([np.radians(lean_deg), 0.0, 0.0]))
     lifted = (inside - root[:, None]) @ lean.T
-    far = root * rng.normal(1.0, 0.02, (len(own), 1))
+    # As far as somebody of this size is by the assumed focal length.
+    far = root * rng.normal(1.0, 0.02, (len(own), 1)) / np.exp(place.log_focal)
     everything = np.ones(rays.shape[:2])
     return SeenPerson(own, np.ones(len(own), bool), rays, everything, lifted, far)
 
@@ -240,19 +243,30 @@ def test_what_is_given_of_a_camera_stays_and_the_rest_is_found():
     assert angle_deg(place.R_camera_first, truth.R_camera_first) < 1.0
 
 
-def test_given_places_are_compared_with_the_people():
+@pytest.mark.parametrize("log_focal", [0.0, 0.25])
+def test_given_places_are_compared_with_the_people(log_focal):
     points = moving_points()
+    camera = replace(CameraPlace.first(), log_focal=log_focal)
     truth = beside(80.0)
-    first = seen(CameraPlace.first(), points, 30.0)
+    first = seen(camera, points, 30.0)
     second = seen(truth, points, 30.0, seed=2)
-    assert not contradicts(first, second, truth)
-    assert relative_distance(first, second, truth) == pytest.approx(1.0, abs=0.1)
-    assert contradicts(first, second, beside(-80.0))
+    assert not contradicts(first, second, (camera, truth))
+    assert relative_distance(first, second, (camera, truth)) == pytest.approx(1.0, abs=0.1)
+    assert contradicts(first, second, (camera, beside(-80.0)))
     turn = rotations.exp(np.radians([2.0, 0.0, 0.0]))
     moved = CameraPlace(turn @ truth.R_camera_first, turn @ truth.t_camera_first)
-    assert contradicts(first, second, moved)
+    assert contradicts(first, second, (camera, moved))
     millimetres = replace(truth, t_camera_first=1000.0 * truth.t_camera_first)
-    assert relative_distance(first, second, millimetres) == pytest.approx(1000.0, rel=0.1)
+    size = relative_distance(first, second, (camera, millimetres))
+    assert size == pytest.approx(1000.0, rel=0.1)
+
+
+def test_people_are_recognized_with_the_focal_length_that_was_found_of_the_first_camera():
+    left, right = moving_points(0), moving_points(3, (0.9, 0.0, 4.5))
+    places = [replace(CameraPlace.first(), log_focal=0.25), replace(beside(70.0), log_focal=0.25)]
+    people = [[seen(place, each, 30.0) for each in (left, right)] for place in places]
+    matches = [Match(place, 0.0, 0, Clock.GIVEN) for place in places]
+    assert same_people(people, matches) == [[0, 0], [1, 1]]
 
 
 def test_people_are_recognized_by_where_they_are():
