@@ -98,7 +98,7 @@ def calibrate(
     bundle = adjust(
         [people[v][match.number] for v, match in used],
         [match.place for _, match in used],
-        _times(first, _ALL_FRAMES),
+        _times_of_all(first, [(people[v][match.number], match.place) for v, match in used[1:]]),
         [given[v].without_clock if match.clock == Clock.MOTION else given[v] for v, match in used],
         mean_lengths,
     )
@@ -251,6 +251,21 @@ def _shared_times(
     """Return times of the first camera at which both see the person."""
     both = first.seen & second.at(clock.own_times(first.times)).seen
     return _times(replace(first, seen=both), most)
+
+
+def _times_of_all(
+    first: SeenPerson, others: Sequence[tuple[SeenPerson, CameraPlace]]
+) -> Float64Array:
+    """Return times of the first camera at which others see the person, too. Each of these cameras
+    has its share of them, however long the first one films.
+    """
+    is_chosen = np.zeros(len(first.times), bool)
+    for other, place in others:
+        left = replace(first, seen=first.seen & ~is_chosen)
+        own = _shared_times(left, other, place, _ALL_FRAMES // len(others))
+        is_chosen |= np.isin(first.times, own)
+    times: Float64Array = first.times[is_chosen]
+    return times
 
 
 def same_people(

@@ -13,6 +13,7 @@ from scope.scope_addon.capture.several_views.bundle import CameraPlace, Given, a
 from scope.scope_addon.capture.several_views.calibrate import (
     Clock,
     Match,
+    _times_of_all,
     calibrate,
     contradicting_spans,
     contradicts,
@@ -278,6 +279,16 @@ def test_people_are_recognized_by_where_they_are():
     found = calibrate(people, [Given(), Given()], mean_lengths())
     assert [match.number for match in found] == [0, 1]
     assert same_people(people, found) == [[0, 1], [1, 0]]
+
+
+def test_every_camera_has_its_share_of_the_times_that_all_are_adjusted_to():
+    points = moving_points()
+    first = seen(CameraPlace.first(), points, 30.0, own=np.arange(600) / 10.0)
+    long = seen(beside(60.0), points, 30.0, own=np.arange(600) / 10.0)
+    short = seen(beside(-60.0), points, 30.0, own=20.0 + np.arange(80) / 10.0)
+    times = _times_of_all(first, [(long, beside(60.0)), (short, beside(-60.0))])
+    assert len(times) <= 150
+    assert np.sum((times >= 20.0) & (times < 28.0)) >= 75
 
 
 def test_somebody_else_is_nobody_in_the_other_camera():
