@@ -127,19 +127,19 @@ def test_other_proportions_are_refused(path):
         path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*576 x 576.*same camera mode", 576, 576
     )
     refused(path, KNOWN | {"size": [1920, 1080]}, "1920 x 1080.*1080 x 1920.*rotated", 1080, 1920)
-    refused(
-        path,
-        {"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]},
-        'principal point.*"size"',
-        576,
-        576,
-    )
+
+
+@pytest.mark.parametrize("size", [(576, 576), (1280, 720), (3840, 2160), (1920, 1440)])
+def test_a_lens_without_a_size_has_to_suit_that_of_the_footage(path, size):
+    lens = {"intrinsics": [[1400, 0, 960], [0, 1400, 540], [0, 0, 1]]}
+    assert camera(path, lens, 1920, 1080).intrinsics[0, 0] == 1400
+    refused(path, lens, r'principal point \(960, 540\).*"size"', *size)
 
 
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"intrinsics": np.transpose(K).tolist()}, "transposed"),
+        ({"intrinsics": np.transpose(K).tolist()}, "must be"),
         ({"intrinsics": [[1000, 0, 500], [0, 1100, 300], [0, 0, 0]]}, "must be"),
         ({"intrinsics": [[1000, 0, 500], [3, 1100, 300], [0, 0, 1]]}, "must be"),
         ({"intrinsics": [[1000, 40, 500], [0, 1100, 300], [0, 0, 1]]}, "skew"),
