@@ -134,8 +134,8 @@ def _as_json_has_it(value: Any) -> Any:
 def _of_easymocap(path: Path) -> Tables:
     """Return the cameras of intri.yml, with their places where there is an extri.yml beside it.
 
-    Matrices K_NAME and dist_NAME, numbers H_NAME and W_NAME; R_NAME, a rotation vector, or
-    Rot_NAME, a matrix, and T_NAME, in metres.
+    Matrices K_NAME, and dist_NAME or D_NAME, numbers H_NAME and W_NAME; R_NAME, a rotation vector,
+    or Rot_NAME, a matrix, and T_NAME, in metres.
     """
     values: dict[str, Any] = {}
     for name in _EASYMOCAP:
@@ -157,7 +157,7 @@ def _of_easymocap(path: Path) -> Tables:
         if kind != "K" or not name:
             continue
         table: dict[str, Any] = {_MATRIX: matrix.tolist()}
-        if (dist := values.get(f"dist_{name}")) is not None:
+        if (dist := values.get(f"dist_{name}", values.get(f"D_{name}"))) is not None:
             table["distortions"] = dist.ravel().tolist()
         if f"W_{name}" in values and f"H_{name}" in values:
             table["size"] = [float(values[f"W_{name}"][0]), float(values[f"H_{name}"][0])]

@@ -107,9 +107,11 @@ def test_freemocap_is_in_millimetres(tmp_path):
     assert read_calibration(second).size == (720, 1280)
 
 
-@pytest.mark.parametrize("given", ["intri.yml", "extri.yml"])
-def test_easymocap(tmp_path, given):
-    (tmp_path / "intri.yml").write_text(INTRI)
+@pytest.mark.parametrize(
+    ("given", "dist"), [("intri.yml", "dist_"), ("extri.yml", "dist_"), ("intri.yml", "D_")]
+)
+def test_easymocap(tmp_path, given, dist):
+    (tmp_path / "intri.yml").write_text(INTRI.replace("dist_", dist))
     (tmp_path / "extri.yml").write_text(EXTRI)
     (second, T_second), (first, T_first) = placed_cameras(tmp_path / given, ["02", "01"])
     for T, x in ((T_first, 0.1), (T_second, -0.1)):
