@@ -499,16 +499,6 @@ def blender_camera_matrix(world_from_camera: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(world_from_camera) @ camera_from_blendcam
 
 
-def camera_pose(world_from_blendcam: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convert the pose of a Blender camera object to that of the OpenCV camera with the same view.
-
-    :param world_from_blendcam: (..., 4, 4) Blender camera to world.
-    :return: (..., 4, 4) OpenCV camera to world.
-    """
-    # Half a turn about x is its own inverse.
-    return blender_camera_matrix(world_from_blendcam)
-
-
 def blender_brown_distortion(dist: NDArray[np.float64]) -> tuple[float, float, float, float, float]:
     """Convert OpenCV's (k1, k2, p1, p2, k3) to the coefficients k1, k2, k3, p1, p2 of Blender's
     Brown model.

@@ -24,11 +24,12 @@ import numpy as np
 
 from ..arrays import Float64Array
 from ..errors import UsageError
-from ..scene.camera import camera_pose
+from ..scene.camera import blender_camera_matrix
 from ..scene.timing import current_frame_kept
 from ..scene.visibility import evaluated
 
 _SAME_LENS = 1e-3  # of a focal length that does not change, relative
+_IMAGE_RATE = 30.0  # which captures assume for images
 _MAX_SCALE = 1e-3  # by which an object's axes may be longer or shorter than 1
 
 
@@ -64,6 +65,7 @@ def scene_camera_path(scene: bpy.types.Scene) -> Path:
 def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]:
     """Return the content of the file: lens, times and poses."""
     render = scene.render
+    first, rate = _footage_frames(scene, camera)
     times_s = []
     poses = []
     lenses = []
@@ -75,7 +77,7 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
             seen = camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
             lenses.append(_intrinsics(scene, seen))
             poses.append(_pose(scene, seen, frame))
-            times_s.append(_time_s(scene, camera, frame))
+            times_s.append((frame - first) / rate)
     if lenses:
         focal = np.array(lenses)[:, 0, 0]
         if np.ptp(focal) > _SAME_LENS * focal.max():
@@ -106,16 +108,34 @@ def _tracked_clips(
     ]
 
 
-def _time_s(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> float:
-    """Return the time in the footage that a frame of the scene shows.
+def _footage_frames(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[int, float]:
+    """Return the scene's frame that shows the beginning of the footage, and how many of the next
+    ones show a second of it.
 
-    A tracked clip plays frame by frame, whatever the scene's rate is.
+    A tracked clip plays frame by frame, whatever the scene's rate is. Images have no rate, and are
+    the frames of the footage.
+
+    :raises UsageError: images were tracked, and Blender cannot read the footage's rate.
     """
     for clip in _tracked_clips(scene, camera):
-        if clip is not None and clip.fps > 0.0:
-            return float((frame - clip.frame_start) / clip.fps)
+        if clip is not None:
+            return clip.frame_start - clip.frame_offset, clip.fps or _footage_rate(scene)
     render = scene.render
-    return float((frame - scene.scope.start_frame) * render.fps_base / render.fps)
+    return scene.scope.start_frame, render.fps / render.fps_base
+
+
+def _footage_rate(scene: bpy.types.Scene) -> float:
+    """Return the frame rate with which the footage is captured."""
+    footage = bpy.path.abspath(scene.scope.footage)
+    clip = bpy.data.movieclips.load(footage)
+    rate = float(clip.fps) if clip.source == "MOVIE" else _IMAGE_RATE
+    bpy.data.movieclips.remove(clip)
+    if not rate:
+        raise UsageError(
+            f"Blender cannot read the frame rate of {footage}, so the times of the images in which "
+            "the camera was tracked are unknown; capture these images"
+        )
+    return rate
 
 
 def _distortion(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[float]:
@@ -202,6 +222,7 @@ def _pose(scene: bpy.types.Scene, camera: bpy.types.Object, frame: int) -> Float
             f"the camera {camera.name!r}, or a parent of it, is scaled or sheared in frame {frame}"
             "; apply its scale"
         )
-    pose = camera_pose(matrix)
+    # Half a turn about x is its own inverse, so this also leads from Blender's axes to OpenCV's.
+    pose = blender_camera_matrix(matrix)
     pose[:3, 3] *= scene.unit_settings.scale_length
     return pose

@@ -163,15 +163,35 @@ def test_a_camera_that_cannot_have_filmed_it_is_refused(camera, change, says):
         bpy.ops.scope.capture()
 
 
-def test_a_tracked_clip_tells_the_times_whatever_the_scenes_rate_is(camera, monkeypatch):
-    clip = SimpleNamespace(frame_start=3, fps=30.0)
-    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [clip])
+@pytest.mark.parametrize(
+    ("clip", "expected"),
+    [
+        ({"fps": 25.0, "frame_offset": 0}, (3, 25.0)),
+        ({"fps": 25.0, "frame_offset": 30}, (-27, 25.0)),
+        ({"fps": 0.0, "frame_offset": 2}, (1, 30.0)),  # images, and so is the footage
+        (None, (5, 24.0)),
+    ],
+)
+def test_a_tracked_clip_tells_the_times_whatever_the_scenes_rate_is(
+    camera, monkeypatch, clip, expected
+):
+    clips = [SimpleNamespace(frame_start=3, **clip)] if clip else []
+    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: clips)
     scene = bpy.context.scene
-    scene.render.fps = 24
-    assert scene_camera._time_s(scene, camera, 33) == pytest.approx(1.0)
-    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [])
-    first = scene.scope.start_frame
-    assert scene_camera._time_s(scene, camera, first + 48) == pytest.approx(2.0)
+    scene.scope.start_frame = 5
+    before = len(bpy.data.movieclips)
+    assert scene_camera._footage_frames(scene, camera) == expected
+    assert len(bpy.data.movieclips) == before
+
+
+def test_images_that_were_tracked_are_the_frames_of_a_video(camera, monkeypatch):
+    images = SimpleNamespace(frame_start=3, frame_offset=0, fps=0.0)
+    monkeypatch.setattr(scene_camera, "_tracked_clips", lambda *_: [images])
+    scene = bpy.context.scene
+    scene.scope.footage = str(SAMPLE)
+    rate = bpy.data.movieclips.load(str(SAMPLE)).fps
+    assert rate != scene.render.fps
+    assert scene_camera._footage_frames(scene, camera) == (3, pytest.approx(rate))
 
 
 def test_the_distortion_of_a_tracked_clip_is_that_of_the_footage(camera, monkeypatch):
