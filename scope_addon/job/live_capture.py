@@ -171,15 +171,14 @@ class _Recorder:
     def send(self, pose: LivePose, latency_ms: float) -> None:
         """Keep a pose if one is asked for."""
         if self.recording is None and self._is_due(pose) and self._people is not None:
+            first = pose.index, pose.timestamp_s
+            if self._footage is not None and self._footage.origin is not None:
+                first = self._footage.origin
             # A file keeps its times, so that its pictures and the poses belong together.
+            origin = None if self._source.ends else first
             self.recording = PeopleRecording(
-                self._paths,
-                self._body,
-                self._source,
-                from_zero=not self._source.ends,
-                keep=self._keep,
+                self._paths, self._body, self._source, origin=origin, keep=self._keep
             )
-            self.recording.origin = self._footage.origin if self._footage is not None else None
             self.recording.begin(*self._people)
         if self.recording is not None:
             self.recording.send(pose, latency_ms)

@@ -57,6 +57,7 @@ class About:
     :param fingerprint: of that body, see `fingerprint`.
     :param source: name of the camera, stream or file.
     :param fps: frames per second of the source, as a fraction.
+    :param speed: how many times as fast as it plays everything happened.
     :param size: width and height of its images, pixels.
     :param origin: the frame number and time that become 0 in the motions; None: they stay.
     :param people: number of people who were followed.
@@ -68,9 +69,10 @@ class About:
     source: str
     fps: str
     size: tuple[int, int]
+    speed: float
     origin: tuple[int, float] | None
     people: int
-    footage: str = ""
+    footage: str
 
 
 def fingerprint(body: Body) -> int:
@@ -197,6 +199,7 @@ class Journal:
         row["timestamp_s"] = pose.timestamp_s
         row["person"] = pose.person
         row["is_settled"] = pose.is_settled
+        row["is_seen"] = pose.presence is Presence.SEEN
         row["intrinsics"] = camera.intrinsics
         row["dist"] = camera.dist
         row["focal_deviation"] = camera.focal_deviation
@@ -274,7 +277,7 @@ def _unsound_entries(values: dict[str, Any]) -> list[str]:
     for name, is_sound in _IS_SOUND.items():
         if name in values and not is_sound(values[name]):
             unsound.append(f"a damaged {name}")
-        elif name not in values and name != "footage":  # which the first recordings had not
+        elif name not in values:
             unsound.append(f"no {name}")
     unknown = sorted(set(values) - set(_IS_SOUND))
     unsound.extend(f"an unknown {in_one_line(name)}" for name in unknown)
@@ -318,6 +321,7 @@ _IS_SOUND: dict[str, Callable[[Any], bool]] = {
     "source": _is_text,
     "fps": _is_rate,
     "size": _is_size,
+    "speed": lambda value: isinstance(value, float) and 0.0 < value < 1e6,
     "origin": _is_origin,
     "people": lambda value: isinstance(value, int) and 0 < value <= MAX_PEOPLE,
     "footage": _is_text,
@@ -400,7 +404,7 @@ def _record_type(body: Body) -> np.dtype[Any]:
         "focal_deviation": (),
     }
     numbers = [(name, "<f8", shape) for name, shape in shapes.items()]
-    others = [("index", "<i8"), ("person", "<i4"), ("is_settled", "?")]
+    others = [("index", "<i8"), ("person", "<i4"), ("is_settled", "?"), ("is_seen", "?")]
     return np.dtype([*numbers, *others, ("camera", f"S{_SOURCE_BYTES}")])
 
 
@@ -411,7 +415,7 @@ def _unpacked(row: np.void) -> Record:
     pose = LivePose(
         index=int(row["index"]),
         timestamp_s=float(row["timestamp_s"]),
-        presence=Presence.SEEN,
+        presence=Presence.SEEN if row["is_seen"] else Presence.LOST,
         is_settled=bool(row["is_settled"]),
         person=int(row["person"]),
         **arrays,

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A live capture as motion files, one for each person, that begin together.
 
-The rows are the source's frames, from the first to the last in which the person was seen. Frames
-that were dropped, and those in which the person was not seen, are filled in and not valid, as in an
-offline capture. The motion is the one that was given live, without its delay. Its world changes a
-little in the first seconds, so that `world_from_camera` does, too; the shape is the final one.
+The rows are the frames that were processed, from the first to the last in which the person was
+seen. Those in which the person was not seen are filled in and not valid, as in an offline capture;
+dropped ones have no rows. After an interruption of the source, another scene begins. The motion is
+the one that was given live, without its delay. Its world changes a little in the first seconds, so
+that `world_from_camera` does, too; the shape is the final one.
 
 Smoothing has delayed the poses: they are interpolated at the times of their source's frames, and
 converted to the final shape.
@@ -26,11 +27,12 @@ from ...solver.rotations import exp, log
 from ..capture.camera.intrinsics import Camera
 from ..capture.camera.line_segments import Lines
 from ..capture.fitting.frame_sequence import FittedTrack
+from ..capture.media.frame_readers import MEASURED_WITHIN, nearest_fps
 from ..capture.perception.landmark_network import KEYPOINT_COUNT
 from ..capture.tracking.track import Track
 from ..capture.world.assemble import Shot, assemble_motion
 from ..capture.world.camera_path import CameraPath
-from ..capture.world.placement import RawMotion, place_track
+from ..capture.world.placement import MAX_STEP_S, RawMotion, place_track
 from ..errors import NoPersonError, OutputError, UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..motion import Motion
@@ -55,7 +57,11 @@ class Recorded(Protocol):
 
     @property
     def fps(self) -> Fraction:
-        """Its frames per second."""
+        """Its frames per second, nominal."""
+
+    @property
+    def speed(self) -> float:
+        """How many times as fast as it plays everything happened."""
 
 
 class WithCamera(Protocol):
@@ -74,6 +80,8 @@ class Recording:
         self._body = body
         self._source = source
         self._poses: list[LivePose] = []
+        # number and time of each frame since the first in which the person was not seen
+        self._unseen: dict[int, float] = {}
         self._session: WithCamera | None = None
         self._size = (1, 1)
 
@@ -83,9 +91,11 @@ class Recording:
         self._size = size
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
-        """Keep a pose in which the person is seen."""
+        """Keep a pose in which the person is seen, and the time of others."""
         if pose.presence is Presence.SEEN:
             self._poses.append(pose)
+        elif self._poses:
+            self._unseen[pose.index] = pose.timestamp_s
 
     def result(self, origin: tuple[int, float] | None = None) -> Motion:
         """Return the motion to write.
@@ -126,36 +136,63 @@ class Recording:
         :param camera: as estimated at the end.
         """
         poses = in_last_shape(at_frames(self._poses, DELAY_S), self._body)
-        rows = np.array([pose.index for pose in poses])
-        rows -= rows[0]
-        T = int(rows[-1]) + 1
-        nearest = np.maximum(np.searchsorted(rows, np.arange(T), side="right") - 1, 0)
+        seen = {pose.index: pose.timestamp_s for pose in poses}
+        unseen = {k: time_s for k, time_s in self._unseen.items() if k < poses[-1].index}
+        frames, times = np.array(sorted((seen | unseen).items())).T
+        rows = np.searchsorted(frames, list(seen))
+        T = len(frames)
+        nearest = np.searchsorted(rows, np.arange(T), side="right") - 1
         T_world_frame = _stacked(poses, "T_world_camera")[nearest]
         T_first_frame = np.linalg.inv(T_world_frame[0]) @ T_world_frame
         path = CameraPath(T_first_frame[:, :3, :3], T_first_frame[:, :3, 3])
         given, raw = (self._fitted(poses, rows, nearest, prefix) for prefix in ("", "raw_"))
-        track = self._track(poses, rows, T)
+        track = self._track(poses, rows, frames.astype(int), times)
         placed = place_track(self._body, track, given, smoothing=False, path=path)
         contact = np.zeros((T, len(poses[0].contact)))
         contact[rows] = _stacked(poses, "contact")
         shot = Shot(
-            self._body, camera, path, Lines.none(), self._source.fps, self._size, self._source.name
+            self._body,
+            camera,
+            path,
+            Lines.none(),
+            self._fps(track),
+            self._size,
+            self._source.name,
+            speed=self._source.speed,
         )
         raw_motion = RawMotion.of(track, raw, path)
-        return assemble_motion(
+        motion = assemble_motion(
             shot, track, self._body, raw_motion, placed, contact, T_world_frame[0]
         )
+        return replace(motion, scene_starts=np.flatnonzero(np.diff(times) > MAX_STEP_S) + 1)
 
-    def _track(self, poses: list[LivePose], rows: NDArray[np.intp], T: int) -> Track:
-        first = poses[0].index
-        times = np.array([pose.timestamp_s for pose in poses])
+    def _fps(self, track: Track) -> Fraction:
+        """Return the source's frame rate: by the times of its frames where these contradict it, as
+        those of many cameras do in the dark.
+        """
+        said = self._source.fps
+        if len(track) < 2:
+            return said
+        measured = float(np.median(np.diff(track.frames) / np.diff(track.times)))
+        if abs(measured - said) < MEASURED_WITHIN * measured:
+            return said
+        return nearest_fps(measured) or said
+
+    def _track(
+        self,
+        poses: list[LivePose],
+        rows: NDArray[np.intp],
+        frames: NDArray[np.int64],
+        times: NDArray[np.float64],
+    ) -> Track:
+        T = len(frames)
         keypoints = np.zeros((T, KEYPOINT_COUNT, 3), np.float32)
         keypoints[rows] = _stacked(poses, "keypoints")
         seen = np.zeros(T, bool)
         seen[rows] = True
         return Track(
-            frames=first + np.arange(T),
-            times=np.interp(np.arange(T), rows, times),
+            frames=frames,
+            times=times,
             seen=seen,
             keypoints_px=keypoints[..., :2],
             confidence=keypoints[..., 2],
@@ -296,8 +333,7 @@ class PeopleRecording:
     """Keeps every pose.
 
     :param paths: a file for each person.
-    :param from_zero: whether frame numbers and times begin with 0, rather than with those of the
-        source.
+    :param origin: the frame number and time that become 0; None: they are those of the source.
     :param keep: None: in memory alone.
     """
 
@@ -307,51 +343,49 @@ class PeopleRecording:
         body: Body,
         source: Recorded,
         *,
-        from_zero: bool = False,
+        origin: tuple[int, float] | None = None,
         keep: Keep | None = None,
     ) -> None:
         self._recordings = [Recording(path, body, source) for path in paths]
         self._targets = {path: Target(path) for path in paths}
         self._body = body
         self._source = source
-        self._from_zero = from_zero
+        self.origin = origin
         self._keep = keep
         self._journal: Journal | None = None
         self._size = (1, 1)
-        # the frame number and time that become 0, if not the first ones
-        self.origin: tuple[int, float] | None = None
-        self._is_over = False
+        self.is_over = False  # whether pictures of another size have ended it
 
     def begin(self, people: LivePeople, size: tuple[int, int]) -> None:
         """Note where the poses come from; once there are some, those of pictures of another size
         are left out.
         """
-        self._is_over = any(recording.first is not None for recording in self._recordings)
-        if self._is_over:
+        self.is_over = any(recording.first is not None for recording in self._recordings)
+        if self.is_over:
             return
         self._size = size
         for recording, session in zip(self._recordings, people.sessions, strict=True):
             recording.begin(session, size)
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
-        """Keep a pose in which the person is seen."""
-        if self._is_over:
+        """Keep a pose in which the person is seen, and the time of others."""
+        if self.is_over:
             return
         recording = self._recordings[pose.person]
         recording.send(pose, latency_ms)
-        if pose.presence is Presence.SEEN and self._keep is not None and recording.camera:
-            self._journal = self._journal or self._new_journal(self._keep, pose)
+        if recording.first is not None and self._keep is not None and recording.camera:
+            self._journal = self._journal or self._new_journal(self._keep)
             self._journal.add(pose, recording.camera)
 
-    def _new_journal(self, keep: Keep, first: LivePose) -> Journal:
-        origin = self.origin or (first.index, first.timestamp_s)
+    def _new_journal(self, keep: Keep) -> Journal:
         about = About(
             keep.body,
             fingerprint(self._body),
             self._source.name,
             str(self._source.fps),
             self._size,
-            origin if self._from_zero else None,
+            self._source.speed,
+            self.origin,
             len(self._recordings),
             keep.footage(),
         )
@@ -366,13 +400,7 @@ class PeopleRecording:
         if self._journal is not None:
             self._journal.close()
         seen = [recording for recording in self._recordings if recording.first is not None]
-        origin = self.origin or min(
-            (recording.first for recording in seen if recording.first), default=None
-        )
-        motions = {
-            each.path: each.result(origin if self._from_zero else None)
-            for each in seen or self._recordings[:1]
-        }
+        motions = {each.path: each.result(self.origin) for each in seen or self._recordings[:1]}
         elsewhere = self._saved(motions)
         if self._journal is not None:
             self._journal.remove()  # which may have been what has filled the disk
@@ -440,6 +468,7 @@ class _Source:
 
     name: str
     fps: Fraction
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -466,9 +495,8 @@ def unfinished_recording(
     records = read_records(journal, about, body)
     if not records:
         raise NoPersonError(f"{journal} ends before its first pose, so nothing can be finished")
-    source = _Source(about.source, Fraction(about.fps))
-    found = PeopleRecording(paths(about.people), body, source, from_zero=about.origin is not None)
-    found.origin = about.origin
+    source = _Source(about.source, Fraction(about.fps), about.speed)
+    found = PeopleRecording(paths(about.people), body, source, origin=about.origin)
     for recording in found._recordings:
         recording.begin(_LastCamera(records[-1][1]), about.size)
     for pose, _ in records:

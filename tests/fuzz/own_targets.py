@@ -234,7 +234,7 @@ def recordings(folder: Path) -> list[bytes]:
     from ..live.test_vmc import pose_of
 
     body = load_body("scope")
-    about = About("scope", fingerprint(body), "fake", "30", (64, 48), (3, 0.5), 1)
+    about = About("scope", fingerprint(body), "fake", "30", (64, 48), 1.0, (3, 0.5), 1, "")
     journal = Journal(folder / "seed.recording", about, body, print)
     for k in range(3):
         pose = replace(pose_of(body), index=k, timestamp_s=k / 30)

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that smoothing has delayed, at the times of their frames."""
+"""Poses that smoothing has delayed, at the times of their frames, and the rows of a recording."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.kinematics.axes import world_from_level_camera
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.scope_addon.live.pose import LivePose, Presence
-from scope.scope_addon.live.recording import at_frames, in_last_shape
+from scope.scope_addon.live.recording import Recording, at_frames, in_last_shape
 from scope.solver import rotations
 
 
@@ -67,3 +73,39 @@ def test_soles_stay_at_their_height_in_the_last_shape(body):
     for name in ("root_cam", "raw_root_cam"):
         before = height(given, np.zeros(body.P), getattr(given, name))
         assert height(poses[0], tall, getattr(poses[0], name)) == pytest.approx(before, abs=1e-6)
+
+
+def recorded(body, frames, fps=30, unseen=()):
+    """A motion of frames, numbers and times, of a source that says it has ``fps``."""
+    source = SimpleNamespace(name="fake", fps=Fraction(fps), speed=1.0)
+    recording = Recording(Path("a.npz"), body, source)
+    camera = Camera(pinhole(640, 480, 600.0), np.zeros(5), "given")
+    recording.begin(SimpleNamespace(camera=camera), (640, 480))
+    for index, time_s in frames:
+        pose = pose_given(body, index, time_s, 0.06)
+        presence = Presence.LOST if index in unseen else Presence.SEEN
+        recording.send(replace(pose, presence=presence), 0.0)
+    return recording.result()
+
+
+def test_only_frames_in_which_nobody_was_seen_are_not_valid(body):
+    """Every second frame of a fast camera was processed."""
+    frames = [(2 * k, 2 * k / 60) for k in range(30)]
+    motion = recorded(body, frames, 60, unseen=(0, 20, 22))
+    assert list(motion.frames) == list(range(2, 2 * len(motion) + 2, 2))
+    assert list(motion.frames[~motion.valid]) == [20, 22]
+    np.testing.assert_allclose(motion.timestamps, motion.frames / 60)
+
+
+@pytest.mark.parametrize(("rate", "kept"), [(15.1, 15.1), (29.4, 30.0), (60.3, 60.0)])
+def test_the_frame_rate_is_that_of_the_frames_that_came(body, rate, kept):
+    """In the dark, many cameras deliver half of what they say."""
+    motion = recorded(body, [(2 * k, 2 * k / rate) for k in range(20)])
+    assert motion.mocap_framerate == pytest.approx(kept)
+
+
+def test_after_an_interruption_another_scene_begins(body):
+    frames = [(k, k / 30 + (2.0 if k >= 15 else 0.0)) for k in range(30)]
+    motion = recorded(body, frames)
+    assert motion.valid.all()
+    assert list(motion.frames[motion.scene_starts]) == [15]

@@ -177,9 +177,9 @@ def test_both_are_seen_in_one_world(beside):
 
 def test_the_recordings_begin_together(beside, body, tmp_path):
     people, steps, size = beside
-    source = SimpleNamespace(name="two", fps=30)
+    source = SimpleNamespace(name="two", fps=30, speed=1.0)
     paths = [tmp_path / "a.npz", tmp_path / "b.npz"]
-    recording = PeopleRecording(paths, body, source, from_zero=True)
+    recording = PeopleRecording(paths, body, source, origin=(0, 0.0))
     recording.begin(people, size)
     for k, poses in enumerate(steps):
         for pose in poses[: 1 if k < 4 else 2]:  # the second one comes later
@@ -193,7 +193,9 @@ def test_the_recordings_begin_together(beside, body, tmp_path):
 def test_who_was_never_seen_has_no_file(beside, body, tmp_path):
     people, steps, size = beside
     recording = PeopleRecording(
-        [tmp_path / "a.npz", tmp_path / "b.npz"], body, SimpleNamespace(name="two", fps=30)
+        [tmp_path / "a.npz", tmp_path / "b.npz"],
+        body,
+        SimpleNamespace(name="two", fps=30, speed=1.0),
     )
     recording.begin(people, size)
     for poses in steps:

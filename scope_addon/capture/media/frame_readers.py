@@ -49,6 +49,7 @@ _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_
 DEFAULT_FPS = Fraction(30)  # where footage has no rate; the most common one
 _STANDARD_RATES = [Fraction(n) for n in (24, 25, 30, 48, 50, 60, 120, 240)]
 _STANDARD_RATES += [Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120, 240)]
+MEASURED_WITHIN = 0.03  # of the rate that was meant
 
 
 def _size(width: float, height: float, aspect: float) -> tuple[int, int]:
@@ -432,8 +433,6 @@ def usual_fps(path: Path) -> Fraction | None:
     """Return the frame rate that most frames of a video have, from the times of its packets, which
     are not decoded; None if they have none.
 
-    A standard rate counts as such within 3 %, because containers round times to milliseconds.
-
     :raises VideoError: PyAV is not installed, or there is no video in the file.
     """
     failure, container = open_with_pyav(path)
@@ -450,11 +449,18 @@ def usual_fps(path: Path) -> Fraction | None:
     steps_s = steps_s[steps_s > 1e-4]
     if not len(steps_s):
         return None
-    rate = Fraction(float(1 / np.median(steps_s)))
-    standard = min(_STANDARD_RATES, key=lambda each: abs(each - rate))
-    if abs(standard - rate) < Fraction(3, 100) * rate:
+    return nearest_fps(float(1 / np.median(steps_s)))
+
+
+def nearest_fps(measured: float) -> Fraction | None:
+    """Return the frame rate that a measured one stands for; None if it is none.
+
+    Containers round times to milliseconds, so a standard rate counts as such within 3 %.
+    """
+    standard = min(_STANDARD_RATES, key=lambda rate: abs(rate - measured))
+    if abs(standard - measured) < MEASURED_WITHIN * measured:
         return standard
-    return exact_fps(round(float(rate), 2))
+    return exact_fps(round(measured, 2))
 
 
 def estimate_fps(reader: PyavReader) -> Fraction:

@@ -14,6 +14,7 @@ from scope.scope_addon.job.live_capture import _Recorder, capture_live
 from scope.scope_addon.job.live_process import LiveProcess, parse_pose
 from scope.scope_addon.job.process import WorkerFailedError
 from scope.scope_addon.job.request import MOTION, RECORD, Commands, LiveRequest
+from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
 
@@ -91,9 +92,10 @@ def test_a_recording_begins_when_it_is_asked_for(folder, body):
     recorder.send(pose_of(body), 0.0)
     assert recorder.recording is None
     commands.receive(RECORD)
-    for time_s in (1.0, 1.5):
-        recorder.send(replace(pose_of(body), timestamp_s=time_s), 0.0)
+    for presence, time_s in ((Presence.LOST, 0.4), (Presence.SEEN, 1.0), (Presence.SEEN, 1.5)):
+        recorder.send(replace(pose_of(body, presence=presence), timestamp_s=time_s), 0.0)
     assert recorder.recording.seconds == 0.5
+    assert recorder.recording.origin == (3, 0.4)  # as Blender plays its scene from then on
 
 
 def test_a_recording_with_footage_begins_with_its_first_picture(folder, body):
