@@ -108,7 +108,9 @@ class LiveSession:
         self._gradual: GradualCalibration | None = None
         self._pending: Future[Calibration] | None = None
         self._seen: deque[_Seen] = deque()
-        self._first_s = self._last_seen_s = self._last_s = -np.inf
+        # from which time is counted, later by pauses
+        self._first_s = -np.inf
+        self._last_seen_s = self._last_s = -np.inf
         self._calibrations = 0
         self._next_follow_s = np.inf
         self._last: LivePose | None = None
@@ -116,11 +118,13 @@ class LiveSession:
     def step(self, frame: Frame, observation: Observation | None) -> LivePose:
         """Return the pose in the next frame, in which the person was observed, or not."""
         observation = None if observation is None else self._left_right(observation)
-        # the computer slept, or the source was interrupted
-        if frame.timestamp_s - self._last_s > FLOOR_MEMORY_S:
-            self._first_s += frame.timestamp_s - self._last_s
+        step_s = frame.timestamp_s - self._last_s
+        # Time counts in which the person was seen: not while nobody was there, the computer slept,
+        # or the source was interrupted.
+        if observation is None or step_s > FLOOR_MEMORY_S:
+            self._first_s += step_s
         fitted = self._fit_person(frame, observation) if observation is not None else None
-        self._settle(frame.timestamp_s)
+        self._settle(frame.timestamp_s, may_estimate=fitted is not None)
         self._last_s = frame.timestamp_s
         if observation is None or fitted is None:
             self._last = self._without_person(frame)
@@ -182,7 +186,7 @@ class LiveSession:
         support = self._feet.support(self._current.T_world_camera, self._fit.soles(observation))
         return support if support is None or pause_s < HOLD_S else support.after_a_pause()
 
-    def _settle(self, time_s: float) -> None:
+    def _settle(self, time_s: float, *, may_estimate: bool) -> None:
         """Start estimates that are due, take those that are done, and approach the newest one."""
         if (
             self._fit is None
@@ -194,7 +198,7 @@ class LiveSession:
         if self._pending is not None and self._pending.done():
             self._target = self._pending.result()
             self._pending = None
-        if self._pending is None:
+        if self._pending is None and may_estimate:
             self._start_estimate(time_s)
         step_s = (
             float(np.clip(time_s - self._last_s, 0.0, HOLD_S)) if np.isfinite(self._last_s) else 0.0

@@ -3,6 +3,7 @@
 capture.
 """
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import islice
 from types import SimpleNamespace
@@ -110,3 +111,12 @@ def test_without_a_person_the_pose_is_held_and_then_lost(live):
         assert not pose.contact.any()
     assert np.array_equal(rest[0].rotations, rest[-1].rotations)
     assert rest[-1].presence is Presence.LOST
+
+
+def test_time_in_which_nobody_is_seen_does_not_count(live, frames):
+    """The estimates of a moment would be final after it."""
+    session = live[0].sessions[0]
+    empty = frames[-1]
+    for k in range(1, 11):
+        later = replace(empty, timestamp_s=empty.timestamp_s + k / 2)
+        assert not session.step(later, None).is_settled
