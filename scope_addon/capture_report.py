@@ -54,9 +54,7 @@ class Report:
 
         :param videos: all of the capture but the first.
         """
-        if not videos:
-            return []
-        further = zip(self.views[1:], videos, strict=True)
+        further = zip(self.views[1:], videos, strict=False)  # a worker may say fewer or more
         return [Path(video) for about, video in further if about["is_used"]]
 
     @classmethod

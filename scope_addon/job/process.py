@@ -76,7 +76,8 @@ def _is_report(value: object) -> bool:
     people = value.get("per_person", [])
     if not isinstance(warnings, list) or not isinstance(rates, dict):
         return False
-    if not isinstance(people, list) or not all(isinstance(each, dict) for each in people):
+    views = value.get("views", [])
+    if not _are_records(people) or not _are_records(views):
         return False
     heights = [person["height_m"] for person in people if "height_m" in person]
     sigmas = [person.get("height_sigma_m") for person in people]
@@ -86,7 +87,12 @@ def _is_report(value: object) -> bool:
         all(map(_is_figure, [*rates.values(), *heights, *known_sigmas]))
         and all(isinstance(text, str) for text in warnings)
         and all(is_text(text) and is_utf8(text) for text in texts)
+        and all(type(view.get("is_used")) is bool for view in views)
     )
+
+
+def _are_records(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(each, dict) for each in value)
 
 
 def _is_figure(value: object) -> bool:

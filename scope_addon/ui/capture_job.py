@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import bpy
 import numpy as np
@@ -134,14 +135,23 @@ class CaptureJob:
         ):
             return  # its files are moved once they are closed
         self._worker.wait(0.0)
+        key = self._key if self._is_as_requested() else uuid4().hex  # which no request has
         self._captured = self._cache.keep(
-            self._worker.job_folder, self._key, self._result["motions"], self._result["report"]
+            self._worker.job_folder, key, self._result["motions"], self._result["report"]
         )
         self.progress.update(BUILDING, 0, 0)
         save_stage_times(self._cache.root, self._kind, self.progress.seconds, self.progress.frames)
         limit = preferences()
         self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
         self._worker.close()
+
+    def _is_as_requested(self) -> bool:
+        """Return whether the footage and all files are as they were when the key was made: the
+        worker has read them later.
+        """
+        with suppress(OSError):
+            return self._request.key(code_version(ROOT)) == self._key
+        return False
 
     def _show_preview(self, message: dict[str, Any]) -> None:
         assert self._worker is not None

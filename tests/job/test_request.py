@@ -118,6 +118,7 @@ def test_what_is_no_message_is_ignored(text):
         (RESULT, {"report": {"fps": 3}}),
         (RESULT, {"report": {"fps": {"total": float("nan")}}}),
         (RESULT, {"report": {"per_person": 7}}),
+        (RESULT, {"report": {"views": [{}]}}),
         (RESULT, {"report": {"per_person": [{"height_m": None}]}}),
         (RESULT, {"report": {"per_person": [{"height_m": 1.7, "height_sigma_m": ""}]}}),
         (RESULT, {"report": {"execution": "\ud800"}}),

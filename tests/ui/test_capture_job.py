@@ -251,6 +251,19 @@ def test_changed_options_need_another_capture(fake_worker, footage):
         bpy.ops.scope.capture()
 
 
+def test_a_result_of_what_changed_after_its_key_was_made_is_not_found_again(fake_worker, footage):
+    content = footage.read_bytes()
+    status = footage.stat()
+    fake_worker(f"open({str(footage)!r}, 'ab').write(b'x')\nfinish()")
+    bpy.context.scene.scope.footage = str(footage)
+    assert bpy.ops.scope.capture() == {"FINISHED"}
+    footage.write_bytes(content)
+    os.utime(footage, ns=(status.st_atime_ns, status.st_mtime_ns))
+    fake_worker("send('error', message='asked again')")
+    with pytest.raises(RuntimeError, match="Asked again"):
+        bpy.ops.scope.capture()
+
+
 def test_the_operator_builds_what_the_interface_builds(fake_worker, footage, standing):
     fake_worker(FINISH)
     bpy.context.scene.scope.footage = str(footage)
