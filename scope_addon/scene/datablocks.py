@@ -86,6 +86,11 @@ def shape_keys_of(armature: bpy.types.Object) -> list[bpy.types.Key]:
     return list(dict.fromkeys(mesh.shape_keys for mesh in meshes if mesh.shape_keys))
 
 
+def is_deformed_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
+    """Return whether a modifier of an object deforms it with an armature."""
+    return any(m.type == "ARMATURE" and m.object == rig for m in obj.modifiers)
+
+
 def enter_object_mode(view_layer: bpy.types.ViewLayer | None) -> None:
     """Leave the mode of a view layer's active object, such as Edit Mode, if there is one: neither
     can such an object be removed, nor another one be selected or edited.

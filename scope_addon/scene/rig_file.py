@@ -19,7 +19,7 @@ from ..retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ..retarget.guess import from_humanoid
 from ..retarget.rig_source import RigSource, files_beside_gltf
 from .actions import fcurves_of, shape_key_path
-from .datablocks import NewDatablocks
+from .datablocks import NewDatablocks, is_deformed_by
 from .export import formats
 from .export.export_states import temporary_scene
 from .rig_probe import at_rest, probe
@@ -226,7 +226,7 @@ def _choose(path: Path, rigs: list[bpy.types.Object], name: str) -> bpy.types.Ob
 
 
 def _moved_by(obj: bpy.types.Object, rig: bpy.types.Object) -> bool:
-    if any(m.type == "ARMATURE" and m.object == rig for m in obj.modifiers):
+    if is_deformed_by(obj, rig):
         return True
     while obj is not None and obj != rig:
         obj = obj.parent

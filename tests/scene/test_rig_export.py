@@ -29,9 +29,11 @@ from .exported import read_back
 from .made_rigs import ARMS, FRAMES, build_rig, captured, seen, truth
 
 
-def save_rig(path, scheme="mixamo", armatures=1, animated=False):
+def save_rig(path, scheme="mixamo", armatures=1, animated=False, hung=True):
     """Write a file of rigs, each with its mesh, and an unrelated object; the session is empty
     afterwards.
+
+    :param hung: whether the mesh is a child of its armature.
     """
     for k in range(armatures):
         rig, bone_of = build_rig(scheme, seed=k)
@@ -43,7 +45,7 @@ def save_rig(path, scheme="mixamo", armatures=1, animated=False):
         bpy.context.scene.collection.objects.link(skin)
         for i, name in enumerate(bone_of.values()):
             skin.vertex_groups.new(name=name).add([i], 1.0, "REPLACE")
-        skin.parent = rig
+        skin.parent = rig if hung else None
         skin.modifiers.new("Armature", "ARMATURE").object = rig
         rig.data.pose_position = "REST"  # as it may well have been saved
         if animated:
@@ -190,6 +192,22 @@ def test_two_people_have_a_rig_each(tmp_path):
     places = [seen(rig, [names_of("mixamo")["pelvis"]], [30])[0, 0, 0] for rig in rigs]
     assert len(rigs) == 2
     assert abs(places[0] - places[1]) > 1.5
+
+
+def test_each_of_two_people_has_the_mesh_of_their_own_rig_in_a_file(tmp_path):
+    """The mesh is not below its armature, only deformed by it."""
+    path = save_rig(tmp_path / "rig.blend", hung=False)
+    options = ExportOptions(separate=True)
+    motions = [motion_of(walk(0.2))] * 2
+    written, _ = export_on_rig(
+        motions, BODY, [tmp_path / "out.glb"], rig_source(path), OPTIONS, export_options=options
+    )
+    assert len(written) == 2
+    for each in written:
+        (rig,) = read(each)
+        assert [o for o in bpy.data.objects if o.type == "MESH" and o.find_armature()] == [
+            o for o in bpy.data.objects if o.name.startswith("Skin")
+        ]
 
 
 def test_several_armatures_need_a_name(tmp_path):

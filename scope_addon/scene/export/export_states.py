@@ -17,6 +17,7 @@ from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
 from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
+from ..datablocks import is_deformed_by
 from ..visibility import world_matrix
 
 
@@ -321,7 +322,6 @@ def one_person(
     """Provide collections with the objects of one person inside the block: those of ``collections``
     without others'.
     """
-    others = {obj for other in rigs if other != rig for obj in (other, *other.children_recursive)}
     parts = []
     try:
         for collection in collections:
@@ -330,8 +330,19 @@ def one_person(
             for key, value in collection.items():
                 part[key] = value
             for obj in collection.all_objects:
-                if obj not in others:
+                owners = _rigs_of(obj, rigs)
+                if rig in owners or not owners:
                     part.objects.link(obj)
         yield parts
     finally:
         bpy.data.batch_remove(parts)
+
+
+def _rigs_of(obj: bpy.types.Object, rigs: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Return those of the rigs that deform an object, or else the one that it is or hangs from."""
+    deforming = [rig for rig in rigs if is_deformed_by(obj, rig)]
+    if deforming:
+        return deforming
+    while obj is not None and obj not in rigs:
+        obj = obj.parent
+    return [obj] if obj is not None else []
