@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -112,9 +113,11 @@ def load_body(which: str | Path = "scope", betas: int = MAX_BETAS) -> Body:
 
     :param betas: the most shape coefficients to keep of a user's model; the leading ones are kept.
     :raises ModelFileError: the file is missing, not a body, or contradicts itself.
-    :raises InvalidValueError: `which` is neither a name nor a path.
+    :raises InvalidValueError: `which` is neither a name nor a path, or `betas` no number of them.
     """
     path = as_path(which, "which, the name or file of a body,")
+    if not isinstance(betas, Integral) or betas < 0:
+        raise InvalidValueError(f"betas must be a whole number of at least 0, but is {betas!r}.")
     if str(which) in BUILT_IN:
         return _built_in(str(which))
     # unlike Path.is_file also of names that are too long for the system

@@ -403,6 +403,13 @@ def smpl_body(arrays: Mapping[str, NDArray[Any]], path: Path, betas: int = MAX_B
     if name == "smpl" and posedirs[-1:] == (STAR_CORRECTIVES,):
         name = "star"
     v_template = arrays["v_template"].astype(np.float64)
+    vertices_by_joints = (len(v_template), len(parents))
+    if not arrays["weights"].shape == arrays["J_regressor"].shape[::-1] == vertices_by_joints:
+        raise ModelFileError(
+            f"{path}: of {vertices_by_joints[0]} vertices and {vertices_by_joints[1]} joints, "
+            f"weights must have shape {vertices_by_joints} and J_regressor its transpose, but they "
+            f"have {arrays['weights'].shape} and {arrays['J_regressor'].shape}; download it again"
+        )
     shapedirs = _shapedirs(arrays.get("shapedirs"), len(v_template), name, betas)
     regressor = arrays["J_regressor"].astype(np.float64)
     skin_joints, skin_weights = reduce_weights(arrays["weights"], path)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scope.solver import body_file
 from scope.solver.body_file import BUILT_IN, load_body, read_arrays
-from scope.solver.errors import ModelFileError, ScopeWarning
+from scope.solver.errors import InvalidValueError, ModelFileError, ScopeWarning
 
 from ..untrusted.conftest import make_tables
 
@@ -96,6 +96,19 @@ def test_a_model_without_surprises_is_loaded_without_a_word(tmp_path, recwarn):
     np.savez(tmp_path / "SMPL_FEMALE.npz", **make_tables("smpl", betas=20), gender="female")
     assert load_body(tmp_path / "SMPL_FEMALE.npz", betas=20).P == 20
     assert not recwarn.list
+
+
+def test_a_model_whose_arrays_contradict_each_other_is_refused(tmp_path):
+    path = tmp_path / "model.npz"
+    tables = make_tables("smpl", betas=2)
+    for name in ("J_regressor", "weights"):
+        np.savez(path, **{**tables, name: tables[name].T})
+        with pytest.raises(ModelFileError, match="J_regressor its transpose"):
+            load_body(path)
+    np.savez(path, **tables)
+    for betas in (-1, 1.5):
+        with pytest.raises(InvalidValueError, match="betas must be a whole number"):
+            load_body(path, betas)
 
 
 def test_a_pickle_is_not_opened_but_the_way_to_read_it_is_told(tmp_path):
