@@ -33,6 +33,7 @@ from .validation import (
     warn_of_deviations,
     warn_of_distance,
     warn_of_floor,
+    warn_of_percentages,
     warn_of_pixels,
     warn_of_points,
 )
@@ -44,8 +45,9 @@ LARGEST = 1e30
 # coordinates, a pixel at a focal length of 1000, and of 3D keypoints in metres.
 SIGMA_2D = 1e-3
 SIGMA_3D = 1e-2
-# in normalized image coordinates, of any detector or marker: a hundredth of a pixel
+# in normalized image coordinates, of any detector or marker: a hundredth of a pixel, and 300
 _LEAST_SIGMA_2D = 1e-5
+_MOST_SIGMA_2D = 0.3
 
 
 @kernel
@@ -219,7 +221,8 @@ class Measurements:
         if m.sigma_px is not None:
             sigma_px = _sigmas(m.sigma_px, n, "sigma_px of 2D keypoints")
             least = _LEAST_SIGMA_2D * K[0, 0]
-            warn_of_deviations(sigma_px, least, np.inf, "sigma_px of 2D keypoints", "pixels")
+            most = _MOST_SIGMA_2D * K[0, 0]
+            warn_of_deviations(sigma_px, least, most, "sigma_px of 2D keypoints", "pixels")
             out[:, 2] *= SIGMA_2D**2 * K[0, 0] * K[1, 1] / sigma_px**2
         return indices, out
 
@@ -290,7 +293,8 @@ class Measurements:
                 seen = self.keypoints3d.points if self.keypoints3d is not None else np.zeros((0, 3))
                 normal = np.asarray(self.floor.normal, dtype=float)
                 offset = as_number(self.floor.offset, "Offset of the floor")
-                warn_of_floor(normal, offset, np.asarray(seen, dtype=float))
+                has_camera = self.intrinsics is not None
+                warn_of_floor(normal, offset, np.asarray(seen, dtype=float), has_camera)
         return tables
 
 
@@ -372,6 +376,7 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     warn_of_distance(stand, "Points of foot contacts lie")
     weight = as_array(m.probability, (n,), "Probability of foot contacts")
     check_not_negative(weight, "Probability of foot contacts")
+    warn_of_percentages(weight, "Probability of foot contacts")
     return _usable_rows(foot_contact.pack(indices, stand, weight))
 
 
@@ -394,6 +399,7 @@ def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     below = as_array(below, (len(indices),), "Weights below the floor")
     check_not_negative(below, "Weights below the floor")
     check_not_negative(contact, "Contact with the floor")
+    warn_of_percentages(contact, "Contact with the floor")
     name = "Offset of the floor"
     offset = as_array(m.offset, planes, name) if planes else np.asarray(as_number(m.offset, name))
     lengths = np.linalg.norm(normal, axis=-1)

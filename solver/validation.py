@@ -38,6 +38,7 @@ _MOST_CONFIDENT = 10.0  # on average: confidences are shares of one, or a few ti
 _NORMALIZED = 2.0
 _FARTHEST_NEIGHBOUR_M = 1.0  # from a person's pelvis to the nearest other point
 _STEEPEST = 0.5  # y of a floor's normal, of at most 1: more only if the camera is upside down
+_AHEAD = 0.9  # z of a floor's normal: more only if the camera looks up by 64 degrees
 _BELOW_M = 0.3
 _SHORTEST_PX = 10.0  # of a focal length in pixels: shorter ones belong to normalized coordinates
 _FARTHEST = 300.0  # metres from the origin to what a person touches, or to a camera
@@ -324,28 +325,60 @@ def warn_of_deviations(sigmas: Array, least: float, most: float, name: str, unit
         )
 
 
-def warn_of_floor(normal: Array, offset: float, points: Array) -> None:
+def warn_of_floor(normal: Array, offset: float, points: Array, has_camera: bool) -> None:
     """Warn of a floor that is probably upside down, has the wrong sign, or is not in metres.
 
     :param normal: (3,). :param points: (n, 3) 3D keypoints.
+    :param has_camera: without one, the axes may be any.
     """
-    if normal[1] > _STEEPEST:
+    if has_camera and (normal[1] > _STEEPEST or normal[2] > _AHEAD):
         _warn(
             ScopeWarning,
-            "The floor's normal points down, y > 0 in camera axes, but must point up; negate "
-            "normal and offset.",
+            "The floor's normal points down or away from the camera, but must point up, about "
+            "(0, -1, 0) in camera axes; negate normal and offset, or turn them to these axes.",
         )
         return
     warn_of_distance(np.array([[0.0, 0.0, offset]]), "The floor lies")
-    if len(points) >= _FEWEST_POINTS:
-        below = offset - points @ normal
-        if ((below > _BELOW_M) & (below < LARGEST_STEP)).all():
-            _warn(
-                ScopeWarning,
-                f"All 3D keypoints lie more than {_BELOW_M:g} m below the floor; its offset is "
-                "normal^T p of a point p of it, which is negative where the floor is below the "
-                "camera.",
-            )
+    below = offset - points @ normal
+    below = below[np.isfinite(below)]
+    if len(below) >= _FEWEST_POINTS and _BELOW_M < np.median(below) < LARGEST_STEP:
+        _warn(
+            ScopeWarning,
+            f"Most 3D keypoints lie more than {_BELOW_M:g} m below the floor; its normal must "
+            "point up, and its offset is normal^T p of a point p of it, which is negative where "
+            "the floor is below the camera.",
+        )
+
+
+def warn_of_start(t_camera_root: Array, in_image: bool) -> None:
+    """Warn of an initial position (3,) that is not in metres, or from which nothing is seen.
+
+    :param in_image: whether there are 2D keypoints.
+    """
+    warn_of_distance(t_camera_root[None], "t_camera_root of init lies")
+    if in_image and t_camera_root[2] <= 0.0:
+        _warn(
+            ScopeWarning,
+            "t_camera_root of init lies behind the camera, z < 0; camera axes are x right, y down, "
+            "z forward.",
+        )
+
+
+def warn_of_percentages(probabilities: Array, name: str) -> None:
+    """Warn of probabilities (n,) far above 1."""
+    if probabilities.max(initial=0.0) > _MOST_CONFIDENT:
+        _warn(ScopeWarning, f"{name} is far above 1; divide percentages by 100.")
+
+
+def warn_of_kernel(sigma: float, most: float, name: str) -> None:
+    """Warn of a robust kernel's sigma that is probably no squared residual, with `UnitsWarning`."""
+    if most < sigma < math.inf:
+        warnings.warn(
+            f"{name} is {sigma:g}, but is a squared residual, in normalized image coordinates or "
+            "metres; infinity turns the kernel off.",
+            UnitsWarning,
+            stacklevel=4,
+        )
 
 
 def warn_of_weight(weight: float, least: float, name: str) -> None:

@@ -18,7 +18,7 @@ from ..tree import BodyArrays, make_tree
 from ..validation import check_count, check_list
 from .clip import fit_clip
 from .frame_solver import fit_tree
-from .misfit import warn_of_mirrored_clip
+from .misfit import warn_of_mirrored_clip, warn_of_unlikely_shape
 
 _CHUNK = 16  # frames handed to a thread at a time: a thread changes hands in tens of microseconds
 
@@ -65,10 +65,10 @@ def fit_batch(
 
     chunks = _spread(some, range(0, len(measurements), _CHUNK), threads)
     fits = [fitted for chunk in chunks for fitted in chunk]
-    if by_default:
-        warn_of_mirrored_clip(
-            measurements, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
-        )
+    if by_default and not warn_of_mirrored_clip(
+        measurements, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
+    ):
+        warn_of_unlikely_shape([fitted.state.beta for fitted in fits], priors)
     return fits
 
 

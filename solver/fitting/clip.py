@@ -43,7 +43,7 @@ from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_switch, check_type, check_weight
 from .frame_solver import cost_by_term, fit_tree
-from .misfit import warn_of_mirrored_clip
+from .misfit import warn_of_mirrored_clip, warn_of_unlikely_shape
 
 
 def carry(priors: Priors, fitted: Fit, shape_weight: float) -> Priors:
@@ -167,10 +167,10 @@ def fit_clip(
         else:
             by_frame[k] = alone(k, state if last is None else last)
     fits = [by_frame[k] for k in range(len(states))]
-    if by_default:
-        warn_of_mirrored_clip(
-            given, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
-        )
+    if by_default and not warn_of_mirrored_clip(
+        given, fits, priors, lambda m: fit_tree(tree, m, None, priors, options)
+    ):
+        warn_of_unlikely_shape([beta], priors)
     shares = joint.cost_by_term(joint_fits) if options.report else {}
     return ClipFit(
         fits,

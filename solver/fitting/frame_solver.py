@@ -32,9 +32,9 @@ from ..residuals.external import external_residuals, raise_failure
 from ..residuals.registry import KEYPOINT3D, NAMES, SHAPE_PRIOR, column_of
 from ..state import MULTI, Fit, State, Status
 from ..tree import BodyArrays, Tree, make_tree
-from ..validation import check_type
+from ..validation import check_type, warn_of_start
 from .initialize import initial_states
-from .misfit import warn_of_mirrored_clip, warn_of_wrong_points
+from .misfit import warn_of_mirrored_clip, warn_of_unlikely_shape, warn_of_wrong_points
 
 # Cost for each measurement above which a cold start from exact 3D keypoints is repeated. Of 2,000
 # random people with deviations of 2 mm, all but six that have a twisted limb cost more; of all,
@@ -75,10 +75,14 @@ def fit(
     found = solver.fit(measurements, init)
     seen = numbered(body, measurements)
     is_told = False
-    if priors is None and not isinstance(init, State):
+    if isinstance(init, State):
+        warn_of_start(np.asarray(init.t_camera_root), seen.keypoints2d is not None)
+    elif priors is None:
         is_told = warn_of_mirrored_clip([seen], [found], solver.priors, solver.fit)
     if not is_told:
-        warn_of_wrong_points(solver.tree, seen, found)
+        is_told = warn_of_wrong_points(solver.tree, seen, found)
+    if not is_told and priors is None:
+        warn_of_unlikely_shape([found.state.beta], solver.priors)
     return found
 
 

@@ -42,6 +42,9 @@ _UPRIGHT = 0.5  # cosine of the angle between the root's vertical axis and the i
 _FACTOR = 1.5
 _FACTOR_IN_IMAGE = 1.4
 _FRAMES = 3  # of a clip that are fitted once more
+# Deviations of all shape coefficients together, beyond their expected norm: with true standard
+# deviations at most 2.3, of feet for metres and of COCO's numbers for the body's 5 and more.
+_UNLIKELY = 4.5
 
 _SILENCE = threading.Lock()  # of warnings, which are silenced for all threads
 
@@ -107,7 +110,8 @@ _FLIPPED = (
 IMAGE_REMEDIES: list[tuple[str, Change]] = [_FROM_THE_LEFT, _FROM_THE_TOP, _X_BEFORE_Y]
 _SPACE_REMEDIES: list[tuple[str, Change]] = [
     (
-        f"negate one axis, because x is right, y down and z forward, {_NAMES}",
+        f"negate one axis, because x is right, y down and z forward, {_NAMES}, or starts and ends "
+        "of directions",
         _mirrored(axis, in_place),
     )
     for axis in (0, 1)
@@ -124,17 +128,17 @@ def some_of(frames: Sequence[Any]) -> Array:
     return np.arange(0, len(frames), max(1, math.ceil(len(frames) / _FRAMES)))
 
 
-def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> None:
-    """Warn of 3D keypoints most of which the fitted body is far away from."""
+def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> bool:
+    """Warn of 3D keypoints most of which the fitted body is far away from; return whether it is."""
     seen = measurements.keypoints3d
     is_done = found.status is Status.CONVERGED or found.iterations >= _MANY_ITERATIONS
     if seen is None or not is_done:
-        return
+        return False
     points = as_numbers(seen.points, "Points of 3D keypoints")
     confidence = as_numbers(seen.confidence, "Confidence of 3D keypoints")
     usable = (np.abs(points) < LARGEST).all(axis=1) & (confidence > 0.0)
     if usable.sum() < _FEWEST_POINTS:
-        return
+        return False
     indices = np.asarray(seen.indices)[usable]
     part = tree.point_part[indices]
     shape = tree.V[indices][:, :, : tree.shape] @ found.state.beta
@@ -146,10 +150,31 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     if seen.sigma_m is not None:
         stated = float(np.median(np.asarray(seen.sigma_m, dtype=float)))
         most = min(_FAR_M, max(_FAR_M_IF_STATED, _FAR_SIGMAS * stated))
-    if most < off < LARGEST_STEP:  # beyond, another warning tells of the unit
+    is_far = most < off < LARGEST_STEP  # beyond, another warning tells of the unit
+    if is_far:
         warnings.warn(
             f"The body fits the 3D keypoints badly, by {off:.2f} m in the median; check "
-            "that each has its own point, by name or by number (joint i is M + i).",
+            "that each has its own point, by name or by number (joint i is M + i), and that the "
+            "intrinsics belong to pixels of this size.",
+            ScopeWarning,
+            stacklevel=3,
+        )
+    return is_far
+
+
+def warn_of_unlikely_shape(betas: Sequence[Array], priors: Priors) -> None:
+    """Warn of fitted shapes (P,) that nobody has, found with the default priors: most mistakes that
+    a person can be bent to at all need such a one.
+    """
+    if priors.flow is None or not len(betas):
+        return
+    deviations = float(np.median([np.linalg.norm(beta) for beta in betas]))
+    if deviations > math.sqrt(len(betas[0])) + _UNLIKELY:
+        warnings.warn(
+            f"The fitted shape is {deviations:.0f} standard deviations from the mean of people, "
+            "farther than anyone's; check that lengths are in metres, that each point has its own "
+            "name or number (joint i is M + i), that the intrinsics belong to pixels of this size, "
+            "that init, if given, is near, and that deviations are not stated too small.",
             ScopeWarning,
             stacklevel=3,
         )

@@ -18,7 +18,7 @@ from ..body import numbers_of
 from ..errors import InvalidValueError, ShapeError
 from ..fitting.clip import shape_information
 from ..fitting.frame_solver import fit_tree
-from ..fitting.misfit import some_of, warn_of_mirroring
+from ..fitting.misfit import some_of, warn_of_mirroring, warn_of_unlikely_shape
 from ..gauss_newton.optimizer import SharedPriors, make_settings, optimize
 from ..gauss_newton.terms import pack_priors
 from ..kernel import announce_compilation
@@ -176,7 +176,7 @@ def fit_motion(
     if by_default and not has_wrong_cameras:
         chosen = some_of(views)
         seen = [first_view(views[k], len(tree.point_part)) for k in chosen]
-        warn_of_mirroring(
+        is_told = warn_of_mirroring(
             [view.measurements for view in seen],
             [
                 np.asarray(view.R_camera_world) @ found.states[k].R_camera_root
@@ -186,6 +186,8 @@ def fit_motion(
             priors,
             lambda m: fit_tree(tree, m, None, priors, options),
         )
+        if not is_told and shape is None:
+            warn_of_unlikely_shape([found.beta], priors)
     return found
 
 

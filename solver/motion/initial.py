@@ -22,7 +22,9 @@ from .views import View
 
 # of a point's rays: smallest over largest eigenvalue, below which they are too nearly parallel
 _MIN_CONDITION = 1e-4
-_LARGEST_ERROR = 0.01  # of cameras that agree, in normalized image coordinates
+# of cameras that agree, in normalized image coordinates, and of some that do not in whatever axes
+_LARGEST_ERROR = 0.01
+_CONTRADICTION = 0.03
 _LEAST_SHARE = 1 / 3  # of one camera's points that must be triangulated, or that camera says more
 
 
@@ -113,9 +115,9 @@ def _add_rows(A: Array, b: Array, indices: Array, row: Array, value: Array, weig
 
 
 def warn_of_cameras(frames: Sequence[Sequence[View]], points: int) -> bool:
-    """Warn where the cameras' rays of one frame meet, as given they do not, once each camera's
-    R_camera_world is transposed, its place replaced by t_camera_world, its whole pose inverted, or
-    its pixels are mirrored or swapped; with `ScopeWarning`.
+    """Warn where the cameras' rays of one frame miss each other, with `ScopeWarning`; and of what
+    makes them meet: each camera's R_camera_world transposed, its place replaced by t_camera_world,
+    its whole pose inverted, its axes those of OpenGL, or its pixels mirrored or swapped.
 
     :param points: how many points the body has, joints included.
     :return: whether there was something to tell.
@@ -126,37 +128,52 @@ def warn_of_cameras(frames: Sequence[Sequence[View]], points: int) -> bool:
     given = _median_error(views, points)
     if not given > _LARGEST_ERROR:
         return False
-    transposed = []
-    moved = []
-    inverted = []
+    others: dict[str, list[View]] = {}
     for view in views:
-        R = np.asarray(view.R_camera_world, dtype=float)
-        t = np.asarray(view.t_camera_world, dtype=float)
-        transposed.append(replace(view, R_camera_world=R.T))
-        moved.append(replace(view, t_camera_world=-R @ t))
-        inverted.append(replace(view, R_camera_world=R.T, t_camera_world=-R.T @ t))
-    others = {
-        "transpose R_camera_world": transposed,
-        "give t_camera_world = -R_camera_world c of the camera's place c in the world": moved,
-        "give R^T and -R^T t of the poses R_world_camera and t_world_camera": inverted,
-    }
+        for remedy, (R, t) in _other_poses(*_camera_of(view)).items():
+            moved = replace(view, R_camera_world=R, t_camera_world=t)
+            others.setdefault(remedy, []).append(moved)
     for remedy, change in IMAGE_REMEDIES:
         others[remedy] = [replace(view, measurements=change(view.measurements)) for view in views]
     errors = {remedy: _median_error(changed, points) for remedy, changed in others.items()}
-    best = min(errors, key=errors.__getitem__)
-    if not errors[best] < 0.2 * given:
+    best = min(errors, key=lambda remedy: np.nan_to_num(errors[remedy], nan=np.inf))
+    if errors[best] < min(0.2 * given, 2.0 * _LARGEST_ERROR):
+        what = f"meet in other axes; {best}"
+    elif given > _CONTRADICTION:
+        what = (
+            "should meet; check each camera's R_camera_world and t_camera_world, that its "
+            "intrinsics belong to pixels of this size, and that all saw the same moment"
+        )
+    else:
         return False
     warnings.warn(
-        f"The cameras' rays to a point miss each other, but meet in other axes; {best}.",
-        ScopeWarning,
-        stacklevel=3,
+        f"The cameras' rays to a point miss each other, but {what}.", ScopeWarning, stacklevel=3
     )
     return True
 
 
+def _other_poses(R: Array, t: Array) -> dict[str, Camera]:
+    """Return what a camera's R_camera_world (3, 3) and t_camera_world (3,) should be where R and t
+    are something else, by what to do.
+    """
+    from_opengl = np.diag([1.0, -1.0, -1.0])
+    inverse = from_opengl @ R.T
+    return {
+        "transpose R_camera_world": (R.T, t),
+        "give t_camera_world = -R_camera_world c of the camera's place c in the world": (R, -R @ t),
+        "give R^T and -R^T t of the poses R_world_camera and t_world_camera": (R.T, -R.T @ t),
+        "give F R and F t, F = diag(1, -1, -1), since y is down and z forward, unlike in OpenGL": (
+            from_opengl @ R,
+            from_opengl @ t,
+        ),
+        "give F R^T and -F R^T t, F = diag(1, -1, -1), of poses R, t of cameras in OpenGL's axes, "
+        "as Blender's are": (inverse, -inverse @ t),
+    }
+
+
 def _median_error(views: Sequence[View], points: int) -> float:
     """Return the median distance of 2D keypoints from their triangulated points in normalized
-    image coordinates; infinite where these are behind a camera, or there are none.
+    image coordinates; infinite where these are behind a camera, NaN where there are none.
     """
     found = triangulated(views, points).keypoints3d
     assert found is not None
@@ -172,4 +189,4 @@ def _median_error(views: Sequence[View], points: int) -> float:
             off = np.linalg.norm(p[:, :2] / p[:, 2:] - m[:, :2], axis=1)
         errors.append(np.where(p[:, 2] > 0.0, off, np.inf)[usable])
     together = np.concatenate(errors)
-    return float(np.median(together)) if len(together) else np.inf
+    return float(np.median(together)) if len(together) else np.nan

@@ -199,9 +199,9 @@ UP = np.array([0.0, -1.0, 0.0])
 LOWEST = float((POINTS @ UP).min())
 
 
-def on_floor(normal, offset):
+def on_floor(normal, offset, points=POINTS, intrinsics=None):
     floor = Floor([0], normal, offset, [1.0])
-    seen = Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS), floor=floor)
+    seen = Measurements(intrinsics, keypoints3d=Keypoints3D(np.arange(M), points), floor=floor)
     short = Options(stages=[Stage(max_iterations=1)])
     return lambda: solver.fit(BODY, seen, priors=Priors(), options=short)
 
@@ -221,6 +221,12 @@ def joints_in_another_order():
 
 def with_pose(t):
     return fitted(Measurements(pose_priors=PosePriors([0], [np.eye(3)], [t], [1.0], [1.0])))
+
+
+def from_start(t):
+    start = State(np.eye(3), np.asarray(t), np.tile(np.eye(3), (K, 1, 1)), np.zeros(P))
+    seen = Measurements(INTRINSICS, Keypoints2D(np.arange(M), IMAGE))
+    return fitted(seen, start)
 
 
 MISTAKES = {
@@ -244,7 +250,39 @@ MISTAKES = {
     ),
     "joints numbered as keypoints": (joints_as_keypoints, ScopeWarning, "joint i is M "),
     "joints in the wrong order": (joints_in_another_order, ScopeWarning, "each has its own point"),
-    "a floor's normal down": (on_floor(-UP, -LOWEST), ScopeWarning, "must point up"),
+    "a floor's normal down": (
+        on_floor(-UP, -LOWEST, intrinsics=INTRINSICS),
+        ScopeWarning,
+        "must point up",
+    ),
+    "a floor's normal down, without a camera": (
+        on_floor(-UP, -LOWEST),
+        ScopeWarning,
+        "must point up",
+    ),
+    "a floor of a world with z up": (
+        on_floor(np.array([0.0, 0.0, 1.0]), 3.0, intrinsics=INTRINSICS),
+        ScopeWarning,
+        r"about \(0, -1, 0\) in camera axes",
+    ),
+    "percentages of contact": (
+        fitted(Measurements(foot_contacts=FootContacts([0], [[0.0, 1.0, 3.0]], [100.0]))),
+        ScopeWarning,
+        "foot contacts is far above 1",
+    ),
+    "a start in millimetres": (from_start([0.0, 0.0, 3000.0]), UnitsWarning, "init lies more"),
+    "a start behind the camera": (from_start([0.0, 0.0, -3.0]), ScopeWarning, "init lies behind"),
+    "a weight as deviation": (pixels(IMAGE, sigma_px=1e6), UnitsWarning, "no measurement has"),
+    "a robust kernel in pixels": (
+        lambda: Options(robust_keypoints2d=100.0),
+        UnitsWarning,
+        "robust_keypoints2d is 100, but is a squared residual",
+    ),
+    "weights of a stage that are deviations": (
+        lambda: Options(stages=[Stage(Weights(keypoints3d=0.02))]),
+        UnitsWarning,
+        "weights are 1/sigma",
+    ),
     "a floor's offset": (on_floor(UP, LOWEST + 5.0), ScopeWarning, "below the floor"),
     "a floor in millimetres": (on_floor(UP, 1e3 * LOWEST - 400.0), UnitsWarning, "floor lies more"),
     "contacts in millimetres": (
@@ -320,6 +358,7 @@ RIGHT = {
     "some points behind": space(POINTS - POINTS.mean(axis=0)),
     "weights of a few times one": space(POINTS, np.full(M, 5.0)),
     "a floor below": on_floor(UP, LOWEST),
+    "a floor of other axes, without a camera": on_floor(-UP, LOWEST, POINTS * [1.0, -1.0, -1.0]),
     "a pelvis at the origin": space(POINTS - POINTS[0]),
     "cameras of a stadium": with_pose([0.0, 0.0, 120.0]),
     "two turns": lambda: rotations.exp([0.0, 4.0 * np.pi, 0.0]),
@@ -347,11 +386,15 @@ def views(change, points=POINTS, indices=range(M), angles=(-0.8, 0.1, 0.9)):
     return [found, found]
 
 
+OPENGL = np.diag([1.0, -1.0, -1.0])
 CHANGES = {
     "right": (lambda R, t: (R, t), None),
     "transposed": (lambda R, t: (R.T, t), "transpose R_camera_world"),
     "inverted": (lambda R, t: (R.T, -R.T @ t), r"R\^T and -R\^T t"),
     "the place of the camera": (lambda R, t: (R, -R.T @ t), "-R_camera_world c"),
+    "OpenGL": (lambda R, t: (OPENGL @ R, OPENGL @ t), "give F R and F t"),
+    "Blender": (lambda R, t: (R.T @ OPENGL, -R.T @ t), r"give F R\^T and -F R\^T t"),
+    "no place": (lambda R, t: (R, np.zeros(3)), "should meet; check"),
 }
 
 

@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 from scope import solver
 from scope.benchmarks.solver.cold_starts import CAMERA, random_person, without_deviations
-from scope.solver import Keypoints2D, Measurements, OrientationField, ScopeWarning, View, rotations
+from scope.solver import (
+    Keypoints2D,
+    Keypoints3D,
+    Measurements,
+    OrientationField,
+    ScopeWarning,
+    View,
+    rotations,
+)
 
 WIDTH = 2.0 * CAMERA[0, 2]
 PEOPLE = 6
@@ -126,7 +134,8 @@ def test_noise_that_is_larger_than_stated_is_no_mirror():
     body, everyone = people()
     rng = np.random.default_rng(0)
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("ignore")
+        warnings.filterwarnings("error", "A body fits")
         for person in everyone:
             noise = 0.05 * rng.standard_normal((17, 3))
             seen = in_space(only_3d(person.seen), lambda p, noise=noise: p + noise)
@@ -160,6 +169,43 @@ def test_mirrored_directions_are_told():
     )
     with pytest.warns(ScopeWarning, match="negate one axis"):
         solver.fit(body, seen)
+
+
+UNLIKELY = {
+    "feet for metres": lambda p: only_3d(in_space(p.seen, lambda q: 3.28 * q)),
+    "COCO's numbers for the body's, in space": lambda p: Measurements(
+        keypoints3d=Keypoints3D(range(17), p.points)
+    ),
+    "COCO's numbers for the body's, in the image": lambda p: Measurements(
+        CAMERA, Keypoints2D(range(17), p.seen.keypoints2d.pixels)
+    ),
+    "joints' rotations in the camera": lambda p: replace(p.seen, keypoints3d=None),
+}
+
+
+@pytest.mark.parametrize(("name", "change"), UNLIKELY.items(), ids=UNLIKELY)
+def test_what_only_a_body_unlike_any_fits_is_told(name, change):
+    body, everyone = people()
+    for person in everyone[:3]:
+        seen = change(person)
+        init = None
+        if "rotations" in name:
+            turns = np.concatenate([person.state.R_camera_root[None], person.state.Omega])
+            R, _ = body.forward_kinematics(turns, np.zeros(3))
+            init = replace(person.state, Omega=R[1:])
+        with pytest.warns(ScopeWarning, match="standard deviations from the mean of people"):
+            solver.fit(body, seen, init=init)
+
+
+def test_of_clips_motions_and_batches_an_unlikely_body_is_told_as_well():
+    body, everyone = people()
+    frames = [UNLIKELY["feet for metres"](everyone[0])] * 3
+    with pytest.warns(ScopeWarning, match="from the mean of people"):
+        solver.fit_clip(body, frames)
+    with pytest.warns(ScopeWarning, match="from the mean of people"):
+        solver.fit_motion(body, frames, [0.0, 0.1, 0.2])
+    with pytest.warns(ScopeWarning, match="from the mean of people"):
+        solver.fit_batch(body, frames)
 
 
 def seen_around(person, change, pitches):
