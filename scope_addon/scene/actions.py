@@ -511,7 +511,7 @@ def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | Non
     without keys.
 
     Curves of custom properties are ignored unless there are no others: a loop leaves them longer
-    than the motion.
+    than the motion. So are strips of which the active action replaces all that moves.
     """
     datablocks = list(datablocks)
     curves = [
@@ -526,10 +526,30 @@ def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | Non
         (strip.frame_start, strip.frame_end)
         for datablock in datablocks
         for strip in nla_strips(datablock)
+        if not _is_replaced(strip, datablock)
     ]
     if not spans:
         return None
     return min(s[0] for s in spans), max(s[1] for s in spans)
+
+
+def _is_replaced(strip: bpy.types.NlaStrip, datablock: bpy.types.ID) -> bool:
+    """Return whether a datablock's active action replaces all that moves in an NLA strip."""
+    animation = datablock.animation_data
+    replaces = (
+        animation.action_blend_type == "REPLACE"
+        and animation.action_extrapolation != "NOTHING"
+        and animation.action_influence == 1.0
+    )
+    own = {(curve.data_path, curve.array_index) for curve in fcurves(datablock) if not curve.mute}
+    if strip.action is None or not replaces or not own:
+        return False
+    moving = [
+        curve
+        for curve in fcurves_in_slot(strip.action, getattr(strip, "action_slot", None))
+        if len(curve.keyframe_points) and np.ptp(read_keys(curve)[:, 1]) > 0.0
+    ]
+    return all((curve.data_path, curve.array_index) in own for curve in moving)
 
 
 def read_modifiers(curve: bpy.types.FCurve) -> list[dict[str, Any]]:

@@ -91,6 +91,18 @@ def test_frame_range_spans_all_datablocks(cube):
     assert actions.frame_range([cube.data.shape_keys]) is None
 
 
+@pytest.mark.parametrize(("moving", "last"), [("location", 31.0), ("scale", 200.0)])
+def test_a_strip_counts_where_the_active_action_does_not_replace_it(cube, moving, last):
+    ends = np.array([1.0, 200.0])
+    idle = actions.Channels(cube, bpy.data.actions.new("idle"))
+    for channel in ("location", "scale"):
+        idle.write(channel, ends, ends[:, None] * np.ones(3) * (channel == moving))
+    actions.push_to_nla(cube)
+    walk = actions.Channels(cube, bpy.data.actions.new("walk"))
+    walk.write("location", np.array([1.0, 31.0]), np.eye(3)[:2])
+    assert actions.frame_range([cube]) == (1.0, last)
+
+
 def test_cycles_come_before_the_users_own_modifiers_and_keep_them(cube):
     actions.Channels(cube, bpy.data.actions.new("a")).write(
         "location", np.arange(3.0), np.zeros((3, 3))
