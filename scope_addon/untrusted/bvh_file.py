@@ -12,6 +12,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,8 @@ _LONGEST_S = 100.0
 _LARGEST = 1e9  # of a number in the file
 _AXES = {"X": np.array([1.0, 0, 0]), "Y": np.array([0, 1.0, 0]), "Z": np.array([0, 0, 1.0])}
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
-_USUAL_RATES = [n * scale for n in (24, 30, 60, 120) for scale in (1.0, 1000 / 1001)]
+_WHOLE_RATES = [24.0, 25.0, 30.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0]
+_NTSC_RATES = [rate * 1000 / 1001 for rate in (24, 30, 60, 120)]
 _LONGEST_NAME = 200  # characters
 _MOTION = re.compile(
     r"^[ \t]*MOTION\s+Frames\s*:\s*(\S+)\s+Frame\s+Time\s*:\s*(\S+)", re.MULTILINE | re.IGNORECASE
@@ -269,7 +271,11 @@ def _rate(text: str) -> float:
     step_s = _number(iter([text]))
     if not _SHORTEST_S <= step_s <= _LONGEST_S:
         raise _DamageError(f"its frame time is {step_s:g} s")
-    rounding_s = 10.0 ** -len(text.partition(".")[2])
-    rates = [*_USUAL_RATES, max(round(1.0 / step_s), 1)]
-    usual = min(rates, key=lambda rate: abs(1.0 / rate - step_s))
-    return float(usual if abs(1.0 / usual - step_s) <= rounding_s else 1.0 / step_s)
+    digit_s = 10.0 ** int(Decimal(text).as_tuple().exponent)
+    # a time is rounded to its last digit, or cut off after it
+    for error_s in (0.5 * digit_s, digit_s):
+        for rates in (_WHOLE_RATES, _NTSC_RATES, [max(round(1.0 / step_s), 1)]):
+            nearest = min(rates, key=lambda rate: abs(1.0 / rate - step_s))
+            if abs(1.0 / nearest - step_s) <= error_s:
+                return float(nearest)
+    return 1.0 / step_s

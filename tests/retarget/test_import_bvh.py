@@ -84,6 +84,27 @@ WHOLE = bvh(TOOLS["cmu"])
 
 
 @pytest.mark.parametrize(
+    ("step", "rate"),
+    [
+        ("0.017", 60.0),
+        ("0.0167", 60.0),
+        ("0.0166", 60.0),  # cut off
+        ("0.016683", 60000 / 1001),
+        ("0.0334", 30000 / 1001),
+        ("0.03", 30.0),
+        ("0.02", 50.0),
+        ("0.008", 120.0),
+        ("5e-2", 20.0),
+        ("0.0123", 81.0),
+        ("0.012400", 1 / 0.0124),
+    ],
+)
+def test_a_rounded_frame_time_is_that_of_the_usual_rate(tmp_path, step, rate):
+    found = imported(tmp_path, WHOLE.replace("Frame Time: 0.033333", f"Frame Time: {step}"))
+    assert found.motion.mocap_framerate == pytest.approx(rate, rel=1e-6)
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("", "no MOTION"),
