@@ -10,7 +10,7 @@ Its rest pose is read as well: its bones, and the skin that each of them moves.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
@@ -19,11 +19,12 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from ...solver.rotations import log
 from ..notices import Notice, notice
 from ..retarget.bone_map import PHALANGES, check_bone_count
 from ..retarget.fingers import bone_ends
 from ..retarget.rest_pose import RestPose
-from ..retarget.skeleton import Skeleton
+from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import assign_action, used_slot
 from .character.root_object import root_object, topmost
 
@@ -33,8 +34,9 @@ SWITCHES = ("IK_FK", "neck_follow", "head_follow")
 _CARRIER_TOLERANCE = 0.02
 # change of a rotation matrix's entries; the probe changes them by more than 0.3
 _MIN_RESPONSE = 0.1
-_CHECKED_FRAMES = 5
+_MAX_CHECKED_FRAMES = 10
 _MAX_DEVIATION = np.radians(20)
+_MAX_SHIFT = 0.05  # of the root bone's head from where it should be, as a share of the rig's size
 # The part that carries each part of a limb; hips and shoulders move with the pelvis.
 _CARRIED_BY = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}
 # Of the lowest bone from the rig's origin, as a share of the rig's size.
@@ -232,24 +234,65 @@ def _check_root_moves(rig: bpy.types.Object, name: str) -> None:
 
 
 def blocked_bones(
-    rig: bpy.types.Object, names: list[str], turns: NDArray[np.float64], wanted: NDArray[np.float64]
+    rig: bpy.types.Object,
+    keys: Sequence[BoneMotion],
+    wanted: NDArray[np.float64],
+    heads: NDArray[np.float64],
 ) -> list[Notice]:
-    """Return warnings about bones that deviate from the motion although they can be rotated, such
-    as a leg with IK.
+    """Return warnings about bones that deviate from the motion although they can be moved, such as
+    a leg with IK.
 
-    :param names: of the B bones.
-    :param turns: (T, B, 3, 3) rotations of the channels.
+    :param keys: of the B bones; only the root bone has locations.
     :param wanted: (T, B, 3, 3) bone to world.
+    :param heads: (T, 3) of the root bone, metres.
     """
+    names = [key.bone for key in keys]
+    root = next(b for b, key in enumerate(keys) if key.locations is not None)
     off = np.zeros(len(names))
-    for t in np.unique(np.linspace(0, len(turns) - 1, _CHECKED_FRAMES).astype(int)):
-        for name, turn in zip(names, turns[t], strict=True):
-            rig.pose.bones[name].matrix_basis = Matrix(turn.tolist()).to_4x4()
-        seen = _rotations(_matrices(rig, names))
-        cosine = (np.einsum("bij,bij->b", seen, wanted[t]) - 1) / 2
+    shift = 0.0
+    for t in _farthest_frames(keys, heads - heads[0]):
+        for key in keys:
+            rig.pose.bones[key.bone].matrix_basis = basis_of(key, t)
+        seen = _matrices(rig, names)
+        cosine = (np.einsum("bij,bij->b", _rotations(seen), wanted[t]) - 1) / 2
         off = np.maximum(off, np.arccos(np.clip(cosine, -1, 1)))
-    blocked = [name for name, angle in zip(names, off, strict=True) if angle > _MAX_DEVIATION]
+        size = np.ptp(seen[:, :3, 3], axis=0).max()
+        shift = max(shift, np.linalg.norm(seen[root, :3, 3] - heads[t]) / size)
+    is_blocked = off > _MAX_DEVIATION
+    is_blocked[root] |= shift > _MAX_SHIFT
+    blocked = [name for name, blocks in zip(names, is_blocked, strict=True) if blocks]
     return [notice("blocked_bones", bones=blocked, rig=rig.name)] if blocked else []
+
+
+def _farthest_frames(keys: Sequence[BoneMotion], path: NDArray[np.float64]) -> list[int]:
+    """Return the frames to look at: the first one, and those in which bones turn farthest about
+    each of their axes, or the root bone is farthest in each direction; a frame may do for several.
+
+    :param path: (T, 3) of the root bone, metres.
+    """
+    turns = [log(key.rotations) for key in keys]
+    values = np.concatenate([*turns, path], axis=1)  # (T, C) radians, metres
+    candidates = np.concatenate([values.argmax(axis=0), values.argmin(axis=0)])  # (2 C,)
+    # (2 C, 2 C) what each candidate shows of every extreme; on the diagonal, its own
+    shown = np.concatenate([values[candidates], -values[candidates]], axis=1)
+    frames = [0]
+    covered = np.concatenate([values[0], -values[0]])
+    while len(frames) < _MAX_CHECKED_FRAMES:
+        missing = shown.diagonal() - covered
+        farthest = int(missing.argmax())
+        if missing[farthest] < _MAX_DEVIATION / 2:
+            break
+        frames.append(int(candidates[farthest]))
+        covered = np.maximum(covered, shown[farthest])
+    return frames
+
+
+def basis_of(key: BoneMotion, t: int) -> Matrix:
+    """Return the bone's ``matrix_basis`` of one frame."""
+    matrix = Matrix(key.rotations[t].tolist()).to_4x4()
+    if key.locations is not None:
+        matrix.translation = key.locations[t].tolist()
+    return matrix
 
 
 def _matrices(rig: bpy.types.Object, names: list[str]) -> NDArray[np.float64]:

@@ -214,12 +214,12 @@ def retarget(
             apart = apart_at_cuts(source, clip, rate)
             motion = _placed(places, apart, skeleton, place, pose, root, options)
             turns = basis(skeleton, motion.rotations)
-            warnings = map_notices(rig, bone_map)
-            warnings += blocked_bones(rig, skeleton.names, turns, motion.rotations)
             keys = [BoneMotion(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(
                 keys[root], locations=root_locations(rig, place, skeleton, root, motion.heads)
             )
+            warnings = map_notices(rig, bone_map)
+            warnings += blocked_bones(rig, keys, motion.rotations, motion.heads)
             keys += ik_keys(rig, keys)
         former = rig.animation_data.action if rig.animation_data else None
         action = write_action(rig, keys, frames, source.name)

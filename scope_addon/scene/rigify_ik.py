@@ -19,6 +19,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..retarget.skeleton import BoneMotion
+from .rig_probe import basis_of
 
 # Limb, middle bone, end and, of legs, toe.
 _LIMBS = (("thigh", "shin", "foot", "toe"), ("upper_arm", "forearm", "hand", ""))
@@ -57,7 +58,7 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneMotion]) -> list[BoneMotion]:
             rig.pose.bones[name].matrix_basis = Matrix()
     for t in _shown_at_the_mouse(count):
         for key in keys:
-            rig.pose.bones[key.bone].matrix_basis = _basis(key, t)
+            rig.pose.bones[key.bone].matrix_basis = basis_of(key, t)
         bpy.context.view_layer.update()
         for limb in limbs:  # first, because the parents of the other controls follow it
             _match(rig, limb.ik[2], limb.fk[2], bases)
@@ -69,14 +70,6 @@ def ik_keys(rig: bpy.types.Object, keys: list[BoneMotion]) -> list[BoneMotion]:
     found = [_keys_of(bone, matrices) for bone, matrices in bases.items()]
     still = [bone for limb in limbs for bone in limb.at_rest]
     return found + [_keys_of(bone, [Matrix()] * count) for bone in still]
-
-
-def _basis(key: BoneMotion, t: int) -> Matrix:
-    """Return the bone's ``matrix_basis`` of one frame."""
-    matrix = Matrix(key.rotations[t].tolist()).to_4x4()
-    if key.locations is not None:
-        matrix.translation = key.locations[t].tolist()
-    return matrix
 
 
 def _shown_at_the_mouse(count: int) -> Iterator[int]:
