@@ -106,7 +106,8 @@ class Observed:
     def tracks(
         self, most: int, chosen: ChosenPerson | None = None, speed: float = 1.0
     ) -> tuple[list[Track], list[ChosenPerson]]:
-        """Return the tracks of at most ``most`` people, and where others are, who are left out.
+        """Return the tracks of at most ``most`` people, and where others are, who are left out
+        though nobody was chosen.
 
         :param chosen: who comes first; None: the most prominent one.
         :param speed: how many times as fast as it plays the footage was recorded, so that the gaps
@@ -122,7 +123,8 @@ class Observed:
         if chosen is not None and people:
             people.insert(0, people.pop(find_chosen(chosen, people, self.timestamps)))
         tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]
-        return tracks, [place_of(person, self.timestamps) for person in people[most:]]
+        others = people[most:] if chosen is None else []
+        return tracks, [place_of(person, self.timestamps) for person in others]
 
     def continues(self, before: Observed) -> bool:
         """Return whether the frames that this window shares with the one before are the same images

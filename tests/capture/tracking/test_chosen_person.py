@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera.background_record import BackgroundRecord
+from scope.scope_addon.capture.frame_observer import Observed
 from scope.scope_addon.capture.options import parse_person
 from scope.scope_addon.capture.tracking.chosen_person import (
     ChosenPerson,
@@ -45,11 +47,29 @@ def test_who_moves_is_preferred_to_a_larger_spectator() -> None:
 
 def test_a_place_chooses_whoever_is_there_then() -> None:
     people = [[person(200.0)], [person(600.0, rows=range(30, 90))], [person(900.0)]]
-    assert find_chosen(ChosenPerson(890.0, 310.0, 1.0), people, TIMES) == 2
-    assert find_chosen(ChosenPerson(600.0, 300.0, 1.0), people, TIMES) == 1
-    assert find_chosen(ChosenPerson(210.0, 290.0, None), people, TIMES) == 0
-    for k, each in enumerate(people):
-        assert find_chosen(place_of(each, TIMES), people, TIMES) == k
+    assert find_chosen(ChosenPerson(890.0, 310.0, 1.0), people, [], TIMES) is people[2]
+    assert find_chosen(ChosenPerson(600.0, 300.0, 1.0), people, [], TIMES) is people[1]
+    assert find_chosen(ChosenPerson(210.0, 290.0, None), people, [], TIMES) is people[0]
+    for each in people:
+        assert find_chosen(place_of(each, TIMES), people, [], TIMES) is each
+
+
+def test_who_may_be_a_mistake_is_chosen_where_nobody_else_is() -> None:
+    people = [[person(200.0)]]
+    doubtful = [[person(210.0)], [person(600.0)]]
+    assert find_chosen(ChosenPerson(212.0, 300.0, 1.0), people, doubtful, TIMES) is people[0]
+    assert find_chosen(ChosenPerson(600.0, 300.0, 1.0), people, doubtful, TIMES) is doubtful[1]
+
+
+def test_who_has_chosen_a_person_is_not_told_to_choose_one() -> None:
+    turns = np.tile(np.eye(3), (90, 1, 1))
+    background = BackgroundRecord(np.array(TIMES), turns, np.ones(90, bool), [])
+    people = {k: person(x) for k, x in enumerate((200.0, 600.0))}
+    observed = Observed(list(range(90)), TIMES, [], people, background)
+    assert [each.x for each in observed.tracks(1)[1]] == [600.0]
+    ((track,), others) = observed.tracks(1, ChosenPerson(600.0, 300.0, 1.0))
+    assert track.keypoints_px[0, :, 0].mean() == pytest.approx(600.0, abs=30.0)
+    assert others == []
 
 
 def test_a_place_without_a_person_is_refused_and_says_where_people_are() -> None:
