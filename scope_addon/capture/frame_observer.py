@@ -119,9 +119,10 @@ class Observed:
         times = with_scene_gaps(times_s, cuts_s, SCENE_GAP_S * speed)
         seen = [tracklet for tracklet in self.tracklets.values() if tracklet.rows]
         in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
-        people = people_of(times.tolist(), in_order)
+        people, doubtful = people_of(times.tolist(), in_order)
         if chosen is not None and people:
-            people.insert(0, people.pop(find_chosen(chosen, people, self.timestamps)))
+            first = find_chosen(chosen, people, doubtful, self.timestamps)
+            people = [first, *(person for person in people if person is not first)]
         tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]
         others = people[most:] if chosen is None else []
         return tracks, [place_of(person, self.timestamps) for person in others]

@@ -23,5 +23,7 @@ class FollowedPeople:
         self._times.append(time_s)
 
     def tracks(self, most: int) -> list[Track]:
-        people = people_of(self._times, list(self._tracklets.values()))[:most]
-        return [make_track(range(len(self._times)), self._times, person) for person in people]
+        people = people_of(self._times, list(self._tracklets.values()))[0]
+        return [
+            make_track(range(len(self._times)), self._times, person) for person in people[:most]
+        ]

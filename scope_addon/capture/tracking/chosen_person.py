@@ -34,11 +34,15 @@ class ChosenPerson:
 
 
 def find_chosen(
-    chosen: ChosenPerson, people: Sequence[list[Tracklet]], times_s: Sequence[float]
-) -> int:
-    """Return which of the people is the chosen one.
+    chosen: ChosenPerson,
+    people: Sequence[list[Tracklet]],
+    doubtful: Sequence[list[Tracklet]],
+    times_s: Sequence[float],
+) -> list[Tracklet]:
+    """Return the one of the people who is the chosen one.
 
     :param people: the tracklets of each.
+    :param doubtful: of those who are chosen only where none of the people is.
     :param times_s: of the clip's frames.
     :raises UsageError: nobody is near that place then; the message says where people are.
     """
@@ -46,7 +50,7 @@ def find_chosen(
     place = np.array([chosen.x, chosen.y])
     distances = []
     others = []
-    for person in people:
+    for person in (*people, *doubtful):
         tracklet, k = _nearest_frame(person, times_s, time_s)
         if abs(times_s[tracklet.rows[k]] - time_s) > MAX_DELAY_S:
             distances.append(np.inf)
@@ -56,11 +60,13 @@ def find_chosen(
         distances.append(float(distance / tracklet.sides_px[k]))
         x, y = tracklet.centers_px[k]
         others.append(f"{x:.0f},{y:.0f}")
-    nearest = int(np.argmin(distances))
+    nearest = int(np.argmin(distances[: len(people)]))
+    if distances[nearest] > MAX_DISTANCE:
+        nearest = int(np.argmin(distances))
     if distances[nearest] > MAX_DISTANCE:
         seen = f"people are then at {' and '.join(others)}" if others else "nobody was seen then"
         raise UsageError(f"--person {chosen}: nobody was found there at {time_s:.2f} s; {seen}")
-    return nearest
+    return [*people, *doubtful][nearest]
 
 
 def place_of(person: Sequence[Tracklet], times_s: Sequence[float]) -> ChosenPerson:

@@ -192,13 +192,12 @@ def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
     return End(time, centers[0], velocity, float(np.median([tracklet.sides_px[k] for k in index])))
 
 
-# Of the frames; a person who was seen in fewer, and never followed for `CERTAIN_S`, is a mistake of
-# the detector.
-MIN_SHARE = 0.02
+# Whoever was not followed for `CERTAIN_S` and was seen in a smaller share of the frames, or is less
+# prominent compared to the most prominent person, is a mistake of the detector.
 CERTAIN_S = 3.0
+MIN_SHARE = 0.02
+MIN_PROMINENCE = 0.05
 MIN_INTERVAL_S = 0.3  # the same for the longest time without interruption
-MIN_PROMINENCE = 0.05  # of the most prominent person's, of whose frames only so many seconds count
-_MAX_COUNTED_S = CERTAIN_S / MIN_SHARE
 # Speed of hands and feet, in sides of the region per second, from which somebody counts as moving
 # throughout: half that of walking. People who sit or stand and watch have less than 0.05.
 ACTIVE = 0.2
@@ -211,29 +210,33 @@ MAX_MERGER_S = 0.38
 MIN_REAPPEARANCE_S = 0.1
 
 
-def people_of(times: Sequence[float], tracklets: Sequence[Tracklet]) -> list[list[Tracklet]]:
-    """Return the tracklets of each person of a clip, the most prominent one first.
-
-    The list is empty if nobody was seen in enough frames to be plausible.
+def people_of(
+    times: Sequence[float], tracklets: Sequence[Tracklet]
+) -> tuple[list[list[Tracklet]], list[list[Tracklet]]]:
+    """Return the tracklets of each person of a clip, the most prominent one first; and of those who
+    may be mistakes of the detector.
 
     :param times: seconds of each frame of the clip, with a long gap at a cut.
     :param tracklets: in the order in which they begin; they are truncated.
     """
     if not tracklets:
-        return []
+        return [], []
     for tracklet in tracklets:
         tracklet.truncate(frames_before_flicker(tracklet, times))
         tracklet.truncate(frames_before_merger(tracklet, tracklets, times))
-    people = [[tracklets[k] for k in chain] for chain in link(tracklets, times)]
-    counted = _plausible(people, times)
+    found = [[tracklets[k] for k in chain] for chain in link(tracklets, times)]
+    counted = _plausible(found, times)
     prominence = [_prominence(person, times) for person in counted]
+    least = MIN_PROMINENCE * max(prominence, default=0.0)
+    certain = _frames_in(CERTAIN_S, times)
     order = sorted(range(len(counted)), key=lambda k: prominence[k], reverse=True)
-    if not order:
-        return []
-    seen = _seen_frames(counted[order[0]])
-    share = min(1.0, _frames_in(_MAX_COUNTED_S, times) / seen)
-    least = MIN_PROMINENCE * share * prominence[order[0]]
-    return [counted[k] for k in order if prominence[k] >= least]
+    people = [
+        counted[k]
+        for k in order
+        if prominence[k] >= least or _followed_frames(counted[k], times) >= certain
+    ]
+    doubtful = [person for person in found if not any(person is each for each in people)]
+    return people, doubtful
 
 
 def _plausible(people: list[list[Tracklet]], times: Sequence[float]) -> list[list[Tracklet]]:
@@ -250,13 +253,29 @@ def _plausible(people: list[list[Tracklet]], times: Sequence[float]) -> list[lis
         person
         for person in people
         if _seen_frames(person) >= MIN_SHARE * len(times)
-        or max(len(t.rows) for t in person) >= certain
+        or _followed_frames(person, times) >= certain
     ]
     longest = [max(times[t.rows[-1]] - times[t.rows[0]] for t in person) for person in frequent]
     least = min(MIN_INTERVAL_S, 0.5 * (times[-1] - times[0]))
     if max(longest, default=0.0) < least and np.median(np.diff(times)) >= MIN_INTERVAL_S:
         least = 0.0
     return [person for person, s in zip(frequent, longest, strict=True) if s >= least]
+
+
+def _followed_frames(person: list[Tracklet], times: Sequence[float]) -> int:
+    """Return in how many frames a person was seen at most, without gaps of over `LONG_GAP_S`:
+    somebody may be hidden for a moment.
+    """
+    most = 0
+    frames = 0
+    end_s = -np.inf
+    for tracklet in person:
+        if times[tracklet.rows[0]] - end_s > LONG_GAP_S:
+            frames = 0
+        frames += len(tracklet.rows)
+        most = max(most, frames)
+        end_s = times[tracklet.rows[-1]]
+    return most
 
 
 def _seen_frames(person: list[Tracklet]) -> int:

@@ -42,7 +42,7 @@ def first_x(people: list[list[Tracklet]]) -> float:
 def test_who_moves_is_preferred_to_a_larger_spectator() -> None:
     spectator = person(900.0, side=240.0)
     dancer = person(200.0, side=200.0, swing=0.15)
-    assert first_x(people_of(TIMES, [spectator, dancer])) == 200.0
+    assert first_x(people_of(TIMES, [spectator, dancer])[0]) == 200.0
 
 
 def test_a_place_chooses_whoever_is_there_then() -> None:
@@ -77,7 +77,7 @@ def test_a_place_without_a_person_is_refused_and_says_where_people_are() -> None
     with pytest.raises(
         UsageError, match=r"nobody was found there at 0\.50 s; people are .*200,300"
     ):
-        find_chosen(ChosenPerson(600.0, 300.0, 0.5), people, TIMES)
+        find_chosen(ChosenPerson(600.0, 300.0, 0.5), people, [], TIMES)
 
 
 @pytest.mark.parametrize(
