@@ -132,6 +132,9 @@ SENTENCES = {
     "zoom": "{footage}: the lens zooms, but by how much is not known everywhere, because the "
     "camera also travels, or too little of the background is seen, so people may come nearer or go "
     "away wrongly; capture the parts without zoom separately, with a start and end time",
+    "path_contradicts": "{path} does not fit {footage}: its camera turns otherwise than the "
+    "background, by {degrees:.0f} degrees or more in half of the frames; it is that of another "
+    "clip, or its times are not those of the footage",
     "given_floor": "{footage}: in the world of the given camera, the feet rest at z = "
     "{height_m:.2f} m; the capture was moved so that they rest at 0, with its own camera: move it "
     "by as much, or give the person's height if the floor should be at 0",

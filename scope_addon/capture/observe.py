@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ...solver.rotations import log
 from ..arrays import Float64Array
 from ..errors import NoPersonError
+from ..footage import display_text
 from ..machine_code.kernel_count import kernel_count
 from ..notices import Notice, notice
 from ..options.capture import AUTO, LARGEST, OFF
@@ -41,6 +43,10 @@ from .tracking.hand_tracker import LARGE_HAND_PX, SMALLEST_HAND_PX, HandTracker
 from .tracking.track import Track
 from .tracking.tracker import MAX_PEOPLE, PeopleTracker
 
+# Between a given camera's rotation and that of the background, from which on the report warns; a
+# share of the largest turn, by which the background's drifts, comes on top.
+PATH_OFF_DEG = 2.0
+PATH_OFF_SHARE = 0.1
 LENGTH_TOLERANCE_S = 1.0  # by which a container may say that footage is too long
 
 # Called with each decoded frame, its people, the largest first, and the object that fits the body
@@ -260,11 +266,12 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
     camera = job.background.camera(observed.background, zoom)
     times_s = np.array(observed.timestamps)
     given = None
+    seen = motion = record.motion(job.camera, camera, image_size)
+    warnings = list(observed.warnings)
     if path is not None:
         given = path.at(times_s)
         motion = CameraMotion.given(given)
-    else:
-        motion = record.motion(job.camera, camera, image_size)
+        warnings += _doubts_about_path(job, motion, seen)
     return Footage(
         timestamps=times_s,
         camera=camera,
@@ -274,8 +281,28 @@ def _footage(job: ObservationJob, path: GivenPath | None, observed: Observed) ->
         lines=record.lines(motion, camera),
         scene_starts=observed.scene_starts,
         execution=observed.execution,
-        warnings=observed.warnings,
+        warnings=warnings,
     )
+
+
+def _doubts_about_path(
+    job: ObservationJob, given: CameraMotion, seen: CameraMotion
+) -> list[Notice]:
+    """Return a warning if the given camera turns otherwise than the background shows."""
+    if not seen.known.any() or job.options.camera_path is None:
+        return []
+    turns = np.swapaxes(given.R_first_camera, 1, 2) @ seen.R_first_camera
+    off_deg = float(np.degrees(np.median(np.linalg.norm(log(turns[seen.known]), axis=-1))))
+    if off_deg < PATH_OFF_DEG + PATH_OFF_SHARE * seen.largest_turn_deg:
+        return []
+    return [
+        notice(
+            "path_contradicts",
+            path=display_text(job.options.camera_path.name),
+            footage=display_text(Path(job.video.path).name),
+            degrees=off_deg,
+        )
+    ]
 
 
 def _warnings_about_people(

@@ -4,14 +4,16 @@
 import json
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera.background_record import CameraMotion
 from scope.scope_addon.capture.camera.given_path import read_camera_path
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.media.video import Video
 from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.observe import _given_path
+from scope.scope_addon.capture.observe import _doubts_about_path, _given_path
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.errors import UsageError
 from scope.solver.errors import InputError
@@ -95,6 +97,25 @@ def test_a_gap_in_the_captured_part_is_refused(tmp_path):
     path.at(np.array([0.1, 1.5]))
     with pytest.raises(InputError, match=r"has no pose from 0.36 to 1.20 s"):
         path.at(np.array([0.1, 0.8]))
+
+
+@pytest.mark.parametrize(("begins_s", "codes"), [(0.0, []), (1.0, ["path_contradicts"])])
+def test_a_path_of_another_clip_or_time_is_warned_of(begins_s, codes):
+    """The camera turns by 30 degrees, and the background by up to 3 degrees more."""
+    times_s = np.arange(20) / 10.0
+    turn = np.radians(15.0) * times_s**2 / 2.0
+    axis = np.array([0.0, 1.0, 0.0])
+    poses = np.tile(np.eye(4), (20, 1, 1))
+    poses[:, :3, :3] = exp(turn[:, None] * axis)
+    seen_at = np.radians(15.0) * (times_s + begins_s) ** 2 / 2.0 * 1.1
+    R = exp((seen_at - seen_at[0])[:, None] * axis)
+    job = SimpleNamespace(
+        options=CaptureOptions(camera_path=Path("camera.json")),
+        video=SimpleNamespace(path="a.mp4"),
+    )
+    seen = CameraMotion(R, np.ones(20, bool))
+    found = _doubts_about_path(job, CameraMotion.given(poses), seen)
+    assert [each.code for each in found] == codes
 
 
 def changed(row, pose):
