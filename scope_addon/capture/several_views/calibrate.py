@@ -37,7 +37,7 @@ _MOST_GUESSES = 4
 # Lifted bodies lean and turn by up to 15 degrees too far, and two cameras that start from such a
 # rotation can end in another minimum. So they start from several ones, turned about the person.
 _TURNS = np.radians([0.0, -20.0, 20.0])
-# Between a given rotation of a camera and that by lifted bodies.
+# Between a camera's rotation and that by lifted bodies: up to 19 degrees in pairs of real cameras.
 MOST_TURNED = np.radians(60.0)
 # Distances from rays, in standard deviations of a keypoint: of people who are the same, and of a
 # camera that contradicts the others, for at least so long.
@@ -167,6 +167,12 @@ def _best_match(
         return pair.cost * (_DUBBED if pair.clock == Clock.MOTION else 1.0)
 
     best = min(pairs, key=dearness, default=None)
+    if (
+        best is not None
+        and given[1].T_camera_first is None
+        and _turned_off(first, people[best.number], best.place) > MOST_TURNED
+    ):
+        return None  # This camera shows somebody else.
     if best is None or best.clock != Clock.MOTION:
         return best
     others = [
@@ -317,12 +323,18 @@ def contradicts(
 
     Cameras of equal height that were exchanged have rays that meet, in a wrong place.
     """
-    place = cameras[1]
+    is_turned = _turned_off(one, other, cameras[1]) > MOST_TURNED
+    return is_turned or apart(one, other, cameras) > MOST_APART
+
+
+def _turned_off(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
+    """Return the angle between a camera's rotation and that by lifted bodies, radians; 0 where both
+    hardly see the person at once.
+    """
     turned = first_place(one, other, _shared_times(one, other, place), place)
     if turned is None:
-        return False
-    angle = float(np.linalg.norm(log(turned.R_camera_first @ place.R_camera_first.T)))
-    return angle > MOST_TURNED or apart(one, other, cameras) > MOST_APART
+        return 0.0
+    return float(np.linalg.norm(log(turned.R_camera_first @ place.R_camera_first.T)))
 
 
 def relative_distance(

@@ -9,6 +9,7 @@ import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.several_views import bundle
+from scope.scope_addon.capture.several_views import calibrate as calibration
 from scope.scope_addon.capture.several_views.bundle import CameraPlace, Given, adjust
 from scope.scope_addon.capture.several_views.calibrate import (
     Clock,
@@ -279,6 +280,21 @@ def test_people_are_recognized_by_where_they_are():
     found = calibrate(people, [Given(), Given()], mean_lengths())
     assert [match.number for match in found] == [0, 1]
     assert same_people(people, found) == [[0, 1], [1, 0]]
+
+
+@pytest.mark.parametrize(("degrees", "is_placed"), [(80.0, True), (-80.0, False)])
+def test_a_camera_of_which_the_person_would_face_another_way_has_no_place(
+    monkeypatch, degrees, is_placed
+):
+    """As where it shows somebody else alone."""
+    points = moving_points()
+    first = seen(CameraPlace.first(), points, 30.0)
+    second = seen(beside(80.0), points, 30.0, seed=2)
+    adjusted = Match(beside(degrees), 1.0, 0, Clock.GIVEN)
+    monkeypatch.setattr(calibration, "_adjusted_pair", lambda *_: adjusted)
+    known = Given(offset_s=0.0)
+    found = calibrate([[first], [second]], [known, known], mean_lengths())
+    assert (found[1] is not None) == is_placed
 
 
 def test_every_camera_has_its_share_of_the_times_that_all_are_adjusted_to():
