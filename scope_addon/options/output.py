@@ -9,7 +9,6 @@ from .record import Argument, Choice, Option, Place, Property, Section
 
 SHAPES = (
     Choice("keyed", "Shape Keys", "The body's shape as shape keys with one keyframe each", 0),
-    Choice("per_frame", "Shape Keys per Frame", "The same, with a keyframe on every frame", 1),
     Choice(
         "baked",
         "In the Mesh",
@@ -71,8 +70,7 @@ OUTPUT_OPTIONS = (
         choices=SHAPES,
         argument=Argument(
             "--shape-keys",
-            help="shape keys keyed once, keyed per_frame, or baked into the mesh for engines that "
-            "clamp morph targets",
+            help="shape keys, or baked into the mesh for engines that clamp morph targets",
         ),
     ),
     Option(

@@ -59,7 +59,7 @@ class BuildOptions:
     set_frame_range: bool = True
     active_camera: bool = False  # make the capture's camera the scene's active camera
     start_frame: float = 0.0  # the scene frame of timestamp 0
-    shape: str = "keyed"  # "keyed": one key. "per_frame": a key per pose. "baked": into the mesh
+    shape: str = "keyed"  # "keyed": shape keys. "baked": into the mesh
     with_camera: bool = True
     with_markers: bool = True  # at the review spans, on the timeline
     # Of the motion's further cameras, in their order; None, or fewer: not shown.
@@ -233,9 +233,7 @@ def _build_person(
     of_keys = None
     if not baked and body.P:
         body_mesh.add_shape_keys(mesh, drawn, motion.betas)
-        of_keys = body_mesh.key_shape(
-            mesh, action, motion.betas, frames, per_frame=options.shape == "per_frame"
-        )
+        of_keys = body_mesh.key_shape(mesh, action, motion.betas, frames[0])
     if motion.face and expression_keys.add_expression_keys(mesh, drawn):
         of_keys = of_keys or Channels(mesh.data.shape_keys, action)
         expression_keys.key_expressions(

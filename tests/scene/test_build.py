@@ -26,7 +26,7 @@ def data_counts() -> dict[str, int]:
     return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
 
 
-@pytest.mark.parametrize("shape", ["keyed", "per_frame", "baked"])
+@pytest.mark.parametrize("shape", ["keyed", "baked"])
 def test_joints_and_skin_are_the_bodys(body, make_motion, truth, joints_world, blender, shape):
     motion = make_motion(body, 40)
     expected = truth(body, motion)
@@ -241,7 +241,7 @@ def test_a_motion_of_another_body_is_refused_and_nothing_is_built(body, make_mot
 
 
 def test_unknown_options_are_refused():
-    with pytest.raises(UsageError, match="keyed, per_frame, baked"):
+    with pytest.raises(UsageError, match="keyed, baked"):
         BuildOptions(shape="melted")
     with pytest.raises(UsageError, match="keep, set"):
         BuildOptions(frame_rate="guess")

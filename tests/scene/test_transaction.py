@@ -21,9 +21,8 @@ from scope.scope_addon.scene.transaction import all_or_nothing, restore_content
 
 @pytest.fixture
 def person(body, make_motion):
-    return build_scene(
-        [make_motion(body, 12)], body, None, BuildOptions(start_frame=1.0, shape="per_frame")
-    ).people[0]
+    options = BuildOptions(start_frame=1.0)
+    return build_scene([make_motion(body, 12)], body, None, options).people[0]
 
 
 def everything(person):

@@ -35,7 +35,7 @@ STORED = {
     "hands": {"OFF": 0, "ON": 1, "AUTO": 2},
     "lens": {"AUTO": 0, "FOCAL": 1, "FOV": 2, "FILE": 3, "CAMERA": 4},
     "frame_rate": {"AUTO": 0, "SET": 1, "KEEP": 2, "RESAMPLE": 3},
-    "shape": {"KEYED": 0, "PER_FRAME": 1, "BAKED": 2},
+    "shape": {"KEYED": 0, "BAKED": 2},
     "provider": {"AUTO": 0, "CPU": 1, "CUDA": 2, "TENSORRT": 3, "DIRECTML": 4, "COREML": 5},
 }
 # of paths; they store nothing themselves

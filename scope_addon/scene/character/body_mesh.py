@@ -22,7 +22,7 @@ from ...kinematics.axes import R_WORLD_MODEL
 from ..actions import Channels, shape_key_path
 
 SLIDER_LIMIT = 10.0  # the limit of Blender's sliders
-MODES = ("keyed", "per_frame", "baked")
+MODES = ("keyed", "baked")
 
 
 def build_mesh(
@@ -161,21 +161,17 @@ def key_shape(
     mesh: bpy.types.Object,
     action: bpy.types.Action,
     betas: NDArray[np.floating[Any]],
-    frames: NDArray[np.float64],
-    per_frame: bool = False,
+    frame: float,
 ) -> Channels:
-    """Key the shape coefficients, and return the channels of the mesh's shape keys.
+    """Key the shape coefficients at a scene frame, and return the channels of the mesh's shape
+    keys.
 
     :param betas: (P,) the fitted shape.
-    :param frames: (T,) scene frames.
-    :param per_frame: key every frame instead of the first one only.
     """
     channels = Channels(mesh.data.shape_keys, action)
-    at = frames if per_frame else frames[:1]
     for p, beta in enumerate(betas):
-        channels.write(
-            shape_key_path(shape_key_name(p)), at, np.full(len(at), beta), "CONSTANT", group="Shape"
-        )
+        path = shape_key_path(shape_key_name(p))
+        channels.write(path, np.array([frame]), np.array([beta]), "CONSTANT", group="Shape")
     return channels
 
 
