@@ -4,7 +4,7 @@
 A frame begins another scene if it, and the frame after it, differ from the frame before by far more
 than successive frames differ before and after. A flash lasts one frame, and a camera that pans
 quickly changes every frame: neither is a cut. Frames of nearly one colour are a gap in the footage,
-not a scene.
+not a scene: the frame after them is compared with the one before them.
 """
 
 from __future__ import annotations
@@ -45,9 +45,13 @@ class SceneCuts:
         self._before = now
         if before is None:
             return False
+        if now.std() < MIN_CONTRAST:
+            if before.std() >= MIN_CONTRAST:
+                self._before = before  # with which the scene after the gap is compared
+            return False
         change = _difference(before, now)
         usual = float(np.median(self._differences)) if self._differences else 0.0
-        has_contrast = min(before.std(), now.std()) >= MIN_CONTRAST
+        has_contrast = before.std() >= MIN_CONTRAST
         if self._upcoming is not None:
             if (
                 change >= MIN_DIFFERENCE

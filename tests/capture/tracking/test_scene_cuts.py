@@ -39,6 +39,13 @@ def test_each_scene_begins_with_a_cut() -> None:
     assert cuts([scene(k // 10) for k in range(11)]) == [10.0]  # in the last frame
 
 
+@pytest.mark.parametrize("grey", [0, 255])
+def test_a_scene_after_a_gap_begins_with_a_cut(grey: int) -> None:
+    """Scenes are often parted by black or white."""
+    gap = [np.full((H, W, 3), grey, np.uint8)] * 5
+    assert cuts([*gap, *[scene(0)] * 10, *gap, *[scene(1)] * 10]) == [20.0]
+
+
 @pytest.mark.parametrize(
     "frames",
     [
