@@ -166,9 +166,9 @@ def write_usd(path: Path, camera: bool = False) -> None:
             convert_world_material=False,
             root_prim_path="/root",
         )
-    if path.suffix != ".usdc" or not path.is_file():
-        return
-    if not is_whole_crate(path) or not all(has_content(path, layer) for layer in layers):
+    if path.is_file() and not (
+        is_whole_crate(path) and all(has_content(path, layer) for layer in layers)
+    ):
         raise _incomplete(path)
 
 
