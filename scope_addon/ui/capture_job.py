@@ -47,7 +47,7 @@ from .reporting import add_warning
 from .scene_camera import scene_camera_path
 
 _ENDING_S = 5.0  # after which a worker that has sent its result is killed
-_AUTOMATIC = "AUTO"  # the setting of the frame rate that depends on what the scene contains
+AUTOMATIC = "AUTO"  # the setting of the frame rate that depends on what the scene contains
 _MAX_SPANS = 12  # buttons of one warning in the panel
 
 
@@ -66,7 +66,7 @@ class CaptureJob:
         self._scene_uid = scene.session_uid
         self._selection = Selection(scene)
         self._options = build_options(scene)
-        self._is_automatic = scene.scope.frame_rate == _AUTOMATIC
+        self._is_automatic = scene.scope.frame_rate == AUTOMATIC
         self._request = capture_request(scene)
         self._kind = kind_of(self._request.values)
         self.progress = JobProgress(earlier=load_stage_times(self._cache.root, self._kind))
@@ -350,7 +350,7 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
     """Make the options of building the scene from its settings."""
     settings = scene.scope
     frame_rate = settings.frame_rate.lower()
-    if settings.frame_rate == _AUTOMATIC:
+    if settings.frame_rate == AUTOMATIC:
         frame_rate = _automatic_frame_rate(scene)
     return BuildOptions(
         name=settings.take.strip(),

@@ -18,7 +18,7 @@ from ..errors import UsageError
 from ..scene.datablocks import found
 from . import preview_picture, warm_up
 from .captures import shown_capture, unit_text
-from .export_operators import unused_path, write_captures
+from .export_operators import unused_path, write_at_own_rate, write_captures
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
 from .job_operator import JobOperator, clear_status_bar
 from .live_properties import state as live_state
@@ -396,7 +396,8 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         """Write the files of the clip that was captured last, if there shall be any; return why
         that failed, or an empty text.
         """
-        from .capture_job import window_shows
+        from .capture_job import AUTOMATIC, build_options, window_shows
+        from .frame_rate_operators import differs
 
         settings = scene.scope
         kind = settings.queue_format
@@ -412,7 +413,10 @@ class SCOPE_OT_capture_queue(CapturingOperator):
                 )
             with window_shows(scene):
                 path = unused_path(Path(folder), capture, kind)
-                write_captures(path, kind, [capture])
+                if settings.frame_rate == AUTOMATIC and differs(scene):
+                    write_at_own_rate(path, kind, capture, build_options(scene))
+                else:
+                    write_captures(path, kind, [capture])
         except (ScopeError, OSError) as error:
             self.report({"WARNING"}, sentence(error))
             return sentence(error)

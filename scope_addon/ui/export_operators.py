@@ -25,6 +25,7 @@ from .file_field import SavingOperator, output_file
 from .reporting import refuse, rpt_, tip_, warning_text
 
 if TYPE_CHECKING:
+    from ..scene.build import BuildOptions
     from ..scene.export.export import ExportOptions
 
 FORMATS = (
@@ -265,6 +266,28 @@ def write_captures(
     if kind in _OF_MOTION:
         return _write_motions(path, captures)
     return export(path, captures, options=options)
+
+
+def write_at_own_rate(
+    path: Path, kind: str, capture: bpy.types.Collection, options: BuildOptions
+) -> list[Path]:
+    """Write a capture that nobody has edited as if it were built in a scene of the motion's frame
+    rate; return the files.
+
+    :param kind: as of `write_captures`, whose errors are raised.
+    :param options: with which it was built.
+    """
+    from ..scene.export.export import ExportOptions, export_motions
+
+    if kind in _OF_MOTION:
+        return write_captures(path, kind, [capture])
+    _check_available(kind)
+    people = people_of(capture)
+    options = replace(options, name=capture.name, frame_rate="set")
+    motions = [motion_of(person) for person in people]
+    named = ExportOptions(take=capture.name)
+    written, _ = export_motions(motions, body_of(people[0]), path, None, options, named)
+    return written
 
 
 def unused_path(folder: Path, capture: bpy.types.Collection, kind: str) -> Path:

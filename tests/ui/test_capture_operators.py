@@ -337,6 +337,25 @@ def test_clips_of_a_queue_are_written_as_files_beside_those_that_exist(
     assert len(captures_of(bpy.context.scene)) == 2
 
 
+def test_files_of_a_queue_have_the_frame_rate_of_their_clips(fake_worker, footage, tmp_path):
+    """A scene with other animation keeps its rate, as it does with the captures of clips before."""
+    scene = bpy.context.scene
+    scene.render.fps = 10
+    cube = bpy.data.objects.new("cube", None)
+    scene.collection.objects.link(cube)
+    cube.keyframe_insert("location", frame=1)
+    fake_worker("finish()")
+    choose_several([footage, Path(shutil.copy(footage, footage.with_name("a.png")))])
+    scene.scope.queue_format = "BVH"
+    scene.scope.queue_folder = str(tmp_path)
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    for name in ("a", "person"):
+        lines = (tmp_path / f"{name}.bvh").read_text().splitlines()
+        assert {"Frames: 10", "Frame Time: 0.040000000"} <= set(lines)
+    assert scene.render.fps == 10
+    assert sorted(each.name for each in captures_of(scene)) == ["a", "person"]
+
+
 def test_a_clip_whose_file_cannot_be_written_says_so_and_stays_in_the_scene(
     fake_worker, footage, tmp_path, monkeypatch
 ):
