@@ -284,7 +284,7 @@ def _poses(
     root = _first(arrays, _ROOT)
     body = _first(arrays, _BODY)
     if key is not None:
-        poses = _axis_angles(arrays[key], key, path)
+        poses = _axis_angles(arrays[key], key, path, w_last=_has_w_last(arrays[key]))
         skeleton = SKELETONS.get(poses.shape[1])
         if skeleton is None and poses.shape[1] != len(BODY_JOINTS):
             known = ", ".join(f"{3 * n} ({s.name})" for n, s in SKELETONS.items())
@@ -302,7 +302,9 @@ def _poses(
             "global_orient and "
             "body_pose; choose another file"
         )
-    parts = [_axis_angles(arrays[name], name, path) for name in (root, body)]
+    # The root, which may face any way, and hands follow the body.
+    w_last = _has_w_last(arrays[body], arrays[root])
+    parts = [_axis_angles(arrays[name], name, path, w_last=w_last) for name in (root, body)]
     if parts[0].shape[1] != 1 or parts[1].shape[1] not in _JOINTS_OF_BODY:
         raise MotionFileError(
             f"{path}: {root} must have 1 joint and {body} 21 or 23, but they have "
@@ -314,7 +316,7 @@ def _poses(
         found = _first(arrays, of_part)
         if found is None or joints[0] in names:
             continue
-        part = _part(arrays[found], found, joints, len(parts[0]), path)
+        part = _part(arrays[found], found, joints, len(parts[0]), path, w_last=w_last)
         if part is not None:
             parts.append(part)
             names += joints
@@ -327,7 +329,13 @@ def _poses(
 
 
 def _part(
-    array: NDArray[Any], name: str, joints: Sequence[str], frames: int, path: Path
+    array: NDArray[Any],
+    name: str,
+    joints: Sequence[str],
+    frames: int,
+    path: Path,
+    *,
+    w_last: bool,
 ) -> NDArray[np.float32] | None:
     """Return axis-angle vectors (T, J, 3) of hands or of a part of the face; None for what is left
     out: components of MANO's hands, which are no rotations, and a face that does not fit the body's
@@ -337,7 +345,7 @@ def _part(
         return None
     is_face = joints[0] in FACE_JOINTS
     try:
-        part = _axis_angles(array, name, path)
+        part = _axis_angles(array, name, path, w_last=w_last)
         if part.shape[1] != len(joints):
             raise MotionFileError(
                 f"{path}: {name} must have {len(joints)} "
@@ -381,9 +389,23 @@ def _moves(array: NDArray[Any]) -> bool:
     return array.dtype.kind in "fiu" and bool(np.any(array))
 
 
-def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float32]:
-    """Return axis-angle vectors (T, J, 3) of an array of them, or of rotation matrices (T, J, 3,
-    3).
+def _has_w_last(*arrays: NDArray[Any]) -> bool:
+    """Return whether quaternions (T, J, 4) have w last rather than first, by the first of the
+    arrays that holds any: a body's joints are nearer to rest than to half a turn, so w is the
+    larger one of the two.
+    """
+    for array in arrays:
+        if array.ndim == 3 and array.shape[2] == 4 and array.dtype.kind in "fiu":
+            first, *_, last = np.abs(array).sum(axis=(0, 1), dtype=float)
+            return bool(last > first)
+    return False
+
+
+def _axis_angles(
+    array: NDArray[Any], name: str, path: Path, *, w_last: bool
+) -> NDArray[np.float32]:
+    """Return axis-angle vectors (T, J, 3) of an array of them, of rotation matrices (T, J, 3, 3),
+    or of quaternions.
     """
     if array.ndim == 0 or len(array) == 0:
         raise MotionFileError(f"{path}: {name} has no frames; choose another file")
@@ -405,7 +427,10 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float
     if values.ndim == 3 and values.shape[2] == 3 and values.shape[1]:
         return values.astype(np.float32)
     if values.ndim == 3 and values.shape[2] in (4, 6) and values.shape[1]:
-        to_matrices = _from_quaternions if values.shape[2] == 4 else _from_six
+        to_matrices = _from_six
+        if values.shape[2] == 4:
+            to_matrices = _from_quaternions
+            values = np.roll(values, 1, axis=-1) if w_last else values
         return by_blocks(
             lambda block: (_logarithms(to_matrices(block, name, path), name, path),), values
         )[0]
@@ -418,11 +443,7 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float
 
 
 def _from_quaternions(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
-    """Return the matrices (T, J, 3, 3) of quaternions (T, J, 4), w first or last: joints are
-    nearer to rest than to half a turn, so w is the larger one of the two.
-    """
-    if np.abs(values[..., 3]).mean() > np.abs(values[..., 0]).mean():
-        values = np.roll(values, 1, axis=-1)
+    """Return the matrices (T, J, 3, 3) of quaternions (T, J, 4), w first."""
     length = np.linalg.norm(values, axis=-1, keepdims=True)
     if np.abs(length - 1.0).max() > _ORTHONORMAL:
         raise MotionFileError(f"{path}: {name} holds quaternions that are not of length 1")

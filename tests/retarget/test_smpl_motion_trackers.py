@@ -235,6 +235,18 @@ def test_rotations_of_every_form_are_the_same(tmp_path: Path, form: str) -> None
     np.testing.assert_allclose(exp(motion.poses.astype(float)), MATRICES, atol=1e-5)
 
 
+@pytest.mark.parametrize("shift", [0, -1])
+def test_quaternions_of_somebody_upside_down_in_the_camera_are_read_in_the_order_of_the_body(
+    tmp_path: Path, shift: int
+) -> None:
+    root = exp(np.array([[[0.1, 0.0, 3.0]]]))
+    q = quaternions(np.concatenate([np.repeat(root, T, axis=0), MATRICES[:, 1:22]], axis=1))
+    q = np.roll(q, shift, axis=-1)
+    np.savez(tmp_path / "a.npz", global_orient=q[:, :1], body_pose=q[:, 1:])
+    (motion,) = read_smpl_motions(tmp_path / "a.npz")
+    np.testing.assert_allclose(exp(motion.poses[:, :1].astype(float)), [root[0]] * T, atol=1e-5)
+
+
 @pytest.mark.parametrize("write", [as_pickle, as_joblib, as_npy])
 def test_a_file_without_a_motion_is_refused_by_what_it_holds(
     tmp_path: Path, write: Callable[[Any, Path], None]
