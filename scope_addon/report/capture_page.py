@@ -19,6 +19,7 @@ from ..capture_report import Report
 from ..footage import unicode_text
 from ..installed import machine, versions
 from ..kinematics.foot_skin import under_floor
+from ..kinematics.sequences import runs
 from ..motion import Motion
 from ..notices import REASONS, Notice, TimeText, counted
 from ..review_spans import FAR_SHARE, Span, body_confidence, body_sigma_m, find_review_spans
@@ -332,7 +333,9 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     """Return what a user may ask about a motion: name of the figure to its value with its unit."""
     seen = motion.valid
     pelvis = motion.trans.astype(float) + body.rest_joints(motion.betas.astype(float))[0]
-    path = [np.linalg.norm(np.diff(pelvis[rows, :2], axis=0), axis=1) for rows in motion.scenes]
+    steps = np.linalg.norm(np.diff(pelvis[:, :2], axis=0), axis=1)
+    is_step = seen[:-1] & seen[1:]  # where nobody was seen, the motion is filled in
+    is_step[motion.scene_starts - 1] = False
     error = motion.residual_px[motion.has_residual]
     contact = motion.foot_contact[seen] > _CONTACT
     sigma_m = body_sigma_m([motion])
@@ -342,9 +345,11 @@ def motion_figures(motion: Motion, body: Body) -> dict[str, str]:
     return {
         "Frames seen": f"{int(seen.sum())} of {len(motion)}",
         "Height": height_text(body.stature(motion.betas.astype(float)), motion.height_sigma_m),
-        "Path over the floor": f"{np.concatenate(path).sum():.2f} m",
-        "Highest speed": f"{highest_speed(pelvis[:, :2], motion.times_with_gaps):.2f} m/s",
-        "Pelvis height": f"{pelvis[:, 2].min():.2f} to {pelvis[:, 2].max():.2f} m",
+        "Path over the floor": f"{steps[is_step].sum():.2f} m",
+        "Highest speed": f"{highest_speed(pelvis[:, :2], motion.times_with_gaps, seen):.2f} m/s",
+        "Pelvis height": f"{pelvis[seen, 2].min():.2f} to {pelvis[seen, 2].max():.2f} m"
+        if seen.any()
+        else "–",
         "Reprojection error, mean": f"{error.mean():.1f} px" if len(error) else "–",
         "Reprojection error, 95th percentile": f"{np.percentile(error, 95):.1f} px"
         if len(error)
@@ -367,16 +372,22 @@ def height_text(height_m: float, sigma_m: float) -> str:
     return f"{100 * height_m:.{digits}f} ± {100 * sigma_m:.{digits}f} cm"
 
 
-def highest_speed(points: NDArray[np.float64], times: NDArray[np.float64]) -> float:
-    """Return the highest mean speed of points (T, 2) at times (T,) over half a second, or over the
-    whole of less.
+def highest_speed(
+    points: NDArray[np.float64], times: NDArray[np.float64], seen: NDArray[np.bool_]
+) -> float:
+    """Return the highest mean speed of points (T, 2) at times (T,) over half a second in which all
+    were seen (T,), or over the longest part of less.
     """
-    if len(points) < 2:
+    if not seen.any():
         return 0.0
     ends = np.searchsorted(times, times + _SPEED_WINDOW_S - 1e-6)
-    first = np.flatnonzero(ends < len(times))
+    is_whole = ends < len(times)
+    unseen = np.cumsum(~seen)
+    is_whole[is_whole] = unseen[ends[is_whole]] == (unseen - ~seen)[is_whole]
+    first = np.flatnonzero(is_whole)
     if not len(first):
-        first = np.array([0])
-        ends = np.array([len(times) - 1])
+        start, end = max(runs(seen), key=lambda run: run[1] - run[0])
+        first = np.array([start])
+        ends[start] = end - 1
     distance = np.linalg.norm(points[ends[first]] - points[first], axis=1)
     return float((distance / np.maximum(times[ends[first]] - times[first], 1e-9)).max())

@@ -105,6 +105,21 @@ def test_two_people_who_stand_on_both_sides_of_a_cut_do_not_move(body):
     assert float(figures["Highest speed"].split()[0]) < 0.5
 
 
+def test_where_nobody_was_seen_nobody_moves(body):
+    """The person leaves the picture, and comes back at another place."""
+    trans = np.zeros((60, 3))
+    trans[:, 2] = 0.9 - body.rest_joints()[0, 2]
+    trans[30:40] += np.linspace([0, 0, -2.0], [3.0, 0, -2.0], 10)
+    trans[40:, 0] = 3.0
+    valid = np.ones(60, bool)
+    valid[30:40] = False
+    motion = made_motion(body, np.zeros((60, 3 * (body.K + 1))), trans, valid=valid)
+    figures = motion_figures(motion, body)
+    assert figures["Path over the floor"] == "0.00 m"
+    assert figures["Highest speed"] == "0.00 m/s"
+    assert figures["Pelvis height"] == "0.90 to 0.90 m"
+
+
 def test_each_frame_to_review_counts_once_whatever_the_reasons(body):
     """A person floats for two seconds, at first away from where the footage shows them, then stands
     under the floor for one.
@@ -137,8 +152,10 @@ def test_the_height_with_its_deviation():
 
 
 def test_speed_of_very_short_motions():
-    assert highest_speed(np.zeros((1, 2)), np.zeros(1)) == 0.0
-    assert np.isclose(highest_speed(np.array([[0.0, 0], [0.2, 0]]), np.array([0.0, 0.1])), 2.0)
+    assert highest_speed(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool)) == 0.0
+    points = np.array([[9.0, 0], [0, 0], [0.2, 0]])
+    seen = np.array([False, True, True])
+    assert np.isclose(highest_speed(points, np.array([0.0, 0.1, 0.2]), seen), 2.0)
 
 
 def test_rows_are_spread_from_the_first_to_the_last():
