@@ -166,9 +166,6 @@ SENTENCES = {
     "image_numbers": "Blender cannot show the image sequence from {first} on, because images are "
     "missing or their numbers are too large, so the camera shows that image only; renumber the "
     "files consecutively to show all",
-    # a live capture
-    "lost_frame": "{lost} frame is missing in the footage",
-    "lost_frames": "{lost} frames are missing in the footage",
     # a rig
     "guessed_bones": "these bones of '{rig}' were guessed from its rest pose alone: {bones:names}; "
     "check the result",

@@ -5,6 +5,7 @@ for it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,8 +61,13 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
         lambda: str((footage and footage.unfinished) or ""),
     )
     recorder = _Recorder(paths, body, source, commands, footage, keep)
+
+    def say(text: str) -> None:
+        send("notice", text=text)
+        recorder.note(text)
+
     listeners = Listeners(
-        lambda text: send("notice", text=text),
+        say,
         lambda state: send("status", **_status(state, recorder)),
         recorder.begin,
         recorder.receive,
@@ -77,6 +83,7 @@ def capture_live(request: LiveRequest, job_folder: Path, send: Send, commands: C
         text = str(error) if isinstance(error, ScopeError) else system_error_message(error)
         warnings.append(notice(OTHER, text=f"{text}; the recording ends there"))
     finally:
+        warnings = [*source.warnings, *recorder.notes.values(), *warnings]
         warnings += save_footage(footage) if footage else []
     if recorder.recording is None:
         send("ended")
@@ -126,9 +133,7 @@ def save_footage(footage: Footage) -> list[Notice]:
         footage.save()
     except ScopeError as error:
         return [notice(OTHER, text=str(error))]
-    if footage.lost == 0:
-        return []
-    return [notice("lost_frame" if footage.lost == 1 else "lost_frames", lost=footage.lost)]
+    return [notice(OTHER, text=footage.missing)] if footage.missing else []
 
 
 class _Sender:
@@ -161,12 +166,24 @@ class _Recorder:
         self._commands = commands
         self._people: tuple[LivePeople, tuple[int, int]] | None = None
         self.recording: PeopleRecording | None = None
+        # what was said during the recording, the first sentence of each kind
+        self.notes: dict[str, Notice] = {}
 
     def begin(self, people: LivePeople, size: tuple[int, int]) -> None:
-        """Note where the poses come from."""
+        """Note where the poses come from. The capture ends where its recording does."""
         self._people = people, size
         if self.recording is not None:
             self.recording.begin(people, size)
+            if self.recording.is_over:
+                self._commands.stopped.set()
+
+    def note(self, text: str) -> None:
+        """Keep a sentence that is said during the recording, unless the source keeps it."""
+        if self.recording is None or text in map(str, self._source.warnings):
+            return
+        kind = re.sub("[0-9]+", "", text)
+        said = f"{text} ({self.recording.seconds:.1f} s into the recording)"
+        self.notes.setdefault(kind, notice(OTHER, text=said))
 
     def send(self, pose: LivePose, latency_ms: float) -> None:
         """Keep a pose if one is asked for."""
@@ -202,7 +219,5 @@ def _status(state: LiveProgress, recorder: _Recorder) -> dict[str, Any]:
         "presence": state.presence.value,
         "rate": round(state.rate, 1),
         "latency_ms": round(state.median_ms, 1),
-        "dropped": state.dropped,
-        "received": state.received,
         "recorded_s": round(recorder.recording.seconds, 1) if recorder.recording else 0.0,
     }

@@ -43,8 +43,6 @@ _FIELDS: Fields = {
         "presence": lambda value: value in PRESENCES,
         "rate": _is_measure,
         "latency_ms": _is_measure,
-        "dropped": is_number,
-        "received": is_number,
         "recorded_s": _is_measure,
     },
     "notice": {"text": is_text},

@@ -103,7 +103,7 @@ class NewestFrame:
         self._pace = Pace()
         self._taken_s = 0.0  # when the last one was taken
         self._damage_said_s = -np.inf
-        self.received = self.dropped = self.damaged = 0
+        self.received = self.damaged = 0
         self._thread = threading.Thread(target=self._run, name="scope-live-source", daemon=True)
 
     def __enter__(self) -> NewestFrame:
@@ -213,7 +213,6 @@ class NewestFrame:
         self._received(picture)
         with self._changed:
             is_due = self._pace.is_due(time_s)
-            self.dropped += self._newest is not None or not is_due
             self.received += 1
             self._newest = picture if is_due else self._newest
             self._next_index = index + 1

@@ -80,7 +80,7 @@ class Output(Protocol):
 class LiveProgress:
     """The state of a capture; rates per second over the last seconds, latencies in milliseconds."""
 
-    presence: Presence
+    presence: Presence  # of the first person, by whom camera and floor are estimated
     rate: float
     median_ms: float
     p95_ms: float
@@ -244,10 +244,8 @@ def _loop(
             shown_s = now_s
             median_ms, p95_ms = statistics.latency_ms()
             rate = statistics.recent_rate
-            counts = (reader.dropped, reader.received, reader.damaged)
-            # of whoever is seen best
-            presence = min((pose.presence for pose in found), key=list(Presence).index)
-            listeners.progress(LiveProgress(presence, rate, median_ms, p95_ms, *counts))
+            counts = (reader.received - statistics.poses, reader.received, reader.damaged)
+            listeners.progress(LiveProgress(found[0].presence, rate, median_ms, p95_ms, *counts))
 
 
 class Statistics:

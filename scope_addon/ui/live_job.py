@@ -23,7 +23,7 @@ from ..capture_report import Report
 from ..errors import OfflineError, UsageError, VideoError
 from ..footage import display_text
 from ..job.live_cameras import camera_source
-from ..job.live_process import PRESENCES, LiveProcess, ShownPose
+from ..job.live_process import LiveProcess, ShownPose
 from ..job.process import START_SCRIPT
 from ..job.request import MOTION, LiveRequest
 from ..live.journal import read_about
@@ -61,11 +61,10 @@ _ENDING_S = 5.0  # after which a process that has sent its recording is killed
 class LiveStatus:
     """What the panel shows."""
 
-    presence: str = ""  # as in `ShownPose`; empty before the first picture
+    # of the first person, as in `ShownPose`; empty before the first picture
+    presence: str = ""
     rate: float = 0.0  # poses per second
     latency_ms: float = 0.0
-    dropped: int = 0
-    received: int = 0
     recorded_s: float = 0.0
     notice: str = ""  # why nothing comes from the source
 
@@ -241,7 +240,7 @@ class LiveJob:
         """Read the messages."""
         for message in self._worker.poll():
             if message["event"] == "status":
-                for name in ("presence", "rate", "latency_ms", "dropped", "received", "recorded_s"):
+                for name in ("presence", "rate", "latency_ms", "recorded_s"):
                     setattr(self.status, name, message[name])
             elif message["event"] == "notice":
                 self.status.notice = display_text(message["text"])
@@ -257,8 +256,9 @@ class LiveJob:
         """Show the newest pose of each person."""
         self.poses += 1
         self._last_pose_s = time.monotonic()
-        # of whoever is seen best
-        self.status.presence = min((pose.presence for pose in poses), key=PRESENCES.index)
+        for pose in poses:
+            if pose.person == 0:
+                self.status.presence = pose.presence
         if self.status.notice and self._last_pose_s - self._notice_s > NOTICE_S:
             self.status.notice = ""
         if bpy.context.scene != scene:  # in another one nobody sees it

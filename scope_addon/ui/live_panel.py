@@ -110,7 +110,9 @@ def _draw_status(context: bpy.types.Context, layout: bpy.types.UILayout, job: Li
     draw_text(context, layout.box() if icon == "ERROR" else layout, text, icon)
     presence = job.status.presence
     if icon != "ERROR" and presence not in ("", "seen") and not job.finishing:
-        seen = iface_("Nobody is seen" if presence == "lost" else "Not seen for a moment")
+        is_alone = context.scene.scope_live.people == 1
+        lost = "Nobody is seen" if is_alone else "The first person is not seen"
+        seen = iface_(lost if presence == "lost" else "Not seen for a moment")
         draw_text(context, layout, seen, "INFO")
     if job.recording:
         draw_text(context, layout, _recorded(job), "REC")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.recording import PeopleRecording
-from scope.scope_addon.live.run import Listeners, LiveOptions, Statistics, run_live
+from scope.scope_addon.live.run import Listeners, LiveOptions, Statistics, _loop, run_live
 
 from .fake_source import FakeClock, FakeSource
 
@@ -73,6 +73,16 @@ def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):
     recording.send(pose(0, 2.0), 0.0)
     recording.send(pose(1, 2.0), 0.0)
     assert (recording.seconds, recording.camera) == (0.5, "first")
+
+
+def test_progress_shows_the_first_person_by_whom_camera_and_floor_are_estimated():
+    shown = []
+    poses = [SimpleNamespace(presence=each) for each in (Presence.LOST, Presence.SEEN)]
+    taken = [SimpleNamespace(arrived_s=0.0), None]
+    reader = SimpleNamespace(take=lambda: taken.pop(0), now=lambda: 0.1, received=3, damaged=0)
+    listeners = Listeners(progress=shown.append)
+    _loop(reader, SimpleNamespace(of=lambda _: poses), (), Statistics(), listeners)
+    assert [(each.presence, each.dropped) for each in shown] == [(Presence.LOST, 2)]
 
 
 def test_rates_are_poses_per_second_since_the_first_and_recently() -> None:

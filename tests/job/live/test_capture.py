@@ -9,7 +9,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.errors import VideoError
+from scope.scope_addon.job import live_capture
 from scope.scope_addon.job.live_capture import _Recorder, capture_live
 from scope.scope_addon.job.live_process import LiveProcess, parse_pose
 from scope.scope_addon.job.process import WorkerFailedError
@@ -17,6 +19,7 @@ from scope.scope_addon.job.request import MOTION, RECORD, Commands, LiveRequest
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.smoothing import DELAY_S
 from scope.scope_addon.motion import Motion
+from scope.scope_addon.notices import OTHER, notice
 
 from ...live.fake_source import FakeSource
 from ...live.test_vmc import pose_of
@@ -115,6 +118,46 @@ def test_a_recording_with_footage_begins_with_its_first_picture(folder, body):
     recorder.send(replace(pose_of(body), index=6), 0.0)
     assert recorder.recording.origin == (5, 0.2)
     assert added == ["first"]
+
+
+def test_what_is_said_during_a_recording_is_in_its_result_and_a_turned_phone_ends_it(
+    folder, body, monkeypatch
+):
+    source = FakeSource()
+    source.warnings.append(notice(OTHER, text="it is dark"))
+    commands = Commands()
+    camera = Camera(pinhole(640, 480, 600.0), np.zeros(5), "given")
+    people = SimpleNamespace(sessions=[SimpleNamespace(camera=camera)])
+    sent = []
+
+    def run(source, body, options, outputs, listeners, clock):
+        listeners.camera(people, (640, 480))
+        listeners.say("before")
+        commands.receive(RECORD)
+        for k in range(20):
+            outputs[0].send(replace(pose_of(body), index=k, timestamp_s=k / 30), 0.0)
+        for text in ("it is dark", "nothing came for 7 s", "nothing came for 9 s"):
+            listeners.say(text)
+        assert not clock.stopped.is_set()
+        listeners.camera(people, (480, 640))
+        assert clock.stopped.is_set()
+        return {"poses_per_second": 30.0}
+
+    monkeypatch.setattr(live_capture, "open_source", lambda *_, **__: source)
+    monkeypatch.setattr(live_capture, "run_live", run)
+    request = LiveRequest("0")
+    capture_live(request, folder, lambda event, **values: sent.append((event, values)), commands)
+    event, result = sent[-1]
+    assert event == "result"
+    assert result["report"]["warnings"] == [
+        "it is dark",
+        "nothing came for 7 s (0.6 s into the recording)",
+    ]
+
+
+def test_images_that_are_missing_in_the_kept_footage_are_said():
+    footage = SimpleNamespace(save=lambda: None, missing="take.mp4 lacks 3 frames of another size")
+    assert [str(said) for said in live_capture.save_footage(footage)] == [footage.missing]
 
 
 def test_a_stream_is_refused_without_the_network(folder):

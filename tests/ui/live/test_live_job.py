@@ -59,9 +59,9 @@ def live(tmp_path, monkeypatch, standing):
                 def wait_for(path):
                     while not os.path.exists(path):
                         time.sleep(0.01)
-                def pose(index, betas=(0.0,) * 10, person=0):
+                def pose(index, betas=(0.0,) * 10, person=0, presence="seen"):
                     turned = [math.cos(0.1 * index), math.sin(0.1 * index), 0, 0]
-                    send("pose", person=person, frame=index, presence="seen",
+                    send("pose", person=person, frame=index, presence=presence,
                          rotations=[turned] + [[1, 0, 0, 0]] * 23,
                          positions=[[0.0, 0.0, 1.0]], betas=betas)
                 def finish(people=1):
@@ -135,7 +135,7 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
     bpy.context.scene.scope_live.people = 2
     job = live("""
         assert request["live_people"] == 2
-        pose(1); pose(1, person=1); pose(1, person=2)
+        pose(1, presence="lost"); pose(1, person=1); pose(1, person=2)
         assert receive() == "record"
         pose(3)
         pose(5, person=1)
@@ -144,6 +144,7 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
     """)
     until(job, lambda: len(job._worker._newest) == 0 and all(body.armature for body in job._bodies))
     assert [body.armature.name for body in job._bodies] == ["Live", "Live 2"]
+    assert job.status.presence == "lost"  # by whom camera and floor are estimated
     assert bpy.context.view_layer.objects.active == job._bodies[0].armature
     job.record()
 
@@ -198,7 +199,8 @@ RECORDS = """
     from scope.scope_addon.temporary import hold
     path = recordings_of(Path(folder)) / (os.path.basename(folder) + SUFFIX)
     path.parent.mkdir(exist_ok=True)
-    about = dict(body="scope", fingerprint=1, source="fake", fps="30", size=[64, 48], people=1)
+    about = dict(body="scope", fingerprint=1, source="fake", fps="30", size=[64, 48], people=1,
+        speed=1.0, footage="")
     path.write_text(json.dumps(about | {{"origin": None}}) + "\\n")
     hold(lock_of(path))
     pose(1); receive(); receive()
