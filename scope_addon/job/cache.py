@@ -30,7 +30,6 @@ from ..temporary import (
 )
 
 REPORT = "report.json"
-RECORDINGS = "recordings"
 # a folder of scope_addon/machine_code/code_folders.py, less its program
 _VERSION = re.compile(r"\w+-[0-9a-f]{8}-[0-9a-f]{12}")
 # What is ours in a folder that the user chooses, and that may have others of these names.
@@ -46,6 +45,8 @@ def cache_of(job_folder: Path) -> Path | None:
 
 def recordings_of(job_folder: Path) -> Path:
     """Return the folder for the recording of a live capture while it runs."""
+    from ..live.unfinished import RECORDINGS
+
     return (cache_of(job_folder) or job_folder) / RECORDINGS
 
 
@@ -97,14 +98,13 @@ class Cache:
         return CachedCapture([folder / name for name in found["motions"]], found["report"])
 
     def recordings(self) -> list[Path]:
-        """Return the growing files of recordings here and in the user's own folder, where they are
-        written if the disk of this one is full; the newest first in each.
+        """Return the growing files of recordings here and where they are written if the disk of
+        this folder is full; the newest first in each.
         """
-        from ..live.unfinished import recordings_in
-        from ..private_folder import lasting_folder
+        from ..live.unfinished import RECORDINGS, other_places, recordings_in
 
-        folders = dict.fromkeys([self.root, lasting_folder() or self.root])
-        return [path for folder in folders for path in recordings_in(folder / RECORDINGS)]
+        own = self.root / RECORDINGS
+        return [path for folder in (own, *other_places(own)) for path in recordings_in(folder)]
 
     def unfinished_recordings(self) -> list[Path]:
         """Return those of `recordings` whose process has ended."""

@@ -33,11 +33,10 @@ from ...solver.errors import InputError
 from ..atomic_write import create_new, reason, sync_open_file
 from ..errors import OutputError, UsageError
 from ..options.live import MAX_PEOPLE
-from ..private_folder import lasting_folder
-from ..temporary import hold, release, remove, system_folder
+from ..temporary import hold, release, remove
 from ..untrusted.files import in_one_line
 from .pose import LivePose, Presence
-from .unfinished import lock_of
+from .unfinished import lock_of, other_places
 
 if TYPE_CHECKING:
     from ..capture.camera.intrinsics import Camera
@@ -93,7 +92,7 @@ class Journal:
         self._say = say
         self._records: list[Record] = []
         self._waiting: queue.SimpleQueue[Record | None] = queue.SimpleQueue()
-        self._places = [path, *(folder / path.name for folder in other_places(path))]
+        self._places = [path, *(folder / path.name for folder in other_places(path.parent))]
         self._file: IO[bytes] | None = None
         # Where the recording is, or at least its beginning; None if it is in memory alone.
         self.path: Path | None = None
@@ -198,7 +197,6 @@ class Journal:
         row["index"] = pose.index
         row["timestamp_s"] = pose.timestamp_s
         row["person"] = pose.person
-        row["is_settled"] = pose.is_settled
         row["is_seen"] = pose.presence is Presence.SEEN
         row["intrinsics"] = camera.intrinsics
         row["dist"] = camera.dist
@@ -220,15 +218,6 @@ def _write(file: IO[bytes], content: bytes) -> None:
 def _remove_held(path: Path) -> None:
     remove(path)
     release(lock_of(path))
-
-
-def other_places(path: Path) -> list[Path]:
-    """Return folders for what cannot be written to a file's own: of the user, and for temporary
-    files.
-    """
-    lasting = lasting_folder()
-    folders = [*([lasting / "recordings"] if lasting else []), system_folder()]
-    return [folder for folder in folders if folder != path.parent]
 
 
 def read_about(path: Path) -> About:
@@ -404,7 +393,7 @@ def _record_type(body: Body) -> np.dtype[Any]:
         "focal_deviation": (),
     }
     numbers = [(name, "<f8", shape) for name, shape in shapes.items()]
-    others = [("index", "<i8"), ("person", "<i4"), ("is_settled", "?"), ("is_seen", "?")]
+    others = [("index", "<i8"), ("person", "<i4"), ("is_seen", "?")]
     return np.dtype([*numbers, *others, ("camera", f"S{_SOURCE_BYTES}")])
 
 
@@ -416,7 +405,7 @@ def _unpacked(row: np.void) -> Record:
         index=int(row["index"]),
         timestamp_s=float(row["timestamp_s"]),
         presence=Presence.SEEN if row["is_seen"] else Presence.LOST,
-        is_settled=bool(row["is_settled"]),
+        is_settled=True,
         person=int(row["person"]),
         **arrays,
     )
@@ -434,7 +423,7 @@ def saved_elsewhere(path: Path, save: Callable[[Path], object]) -> Path:
     :raises OutputError: no place takes it.
     """
     problem: Exception = OutputError(f"there is no other place for {path}")
-    for folder in other_places(path):
+    for folder in other_places(path.parent):
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             other = create_new(folder / path.name)

@@ -14,9 +14,11 @@ from pathlib import Path
 
 from ..content import state_of
 from ..errors import OutputError
-from ..temporary import is_abandoned, remove
+from ..private_folder import lasting_folder
+from ..temporary import is_abandoned, remove, system_folder
 
 SUFFIX = ".recording"
+RECORDINGS = "recordings"  # the folder for them, in a cache
 
 
 def lock_of(recording: Path) -> Path:
@@ -34,15 +36,21 @@ def is_unfinished(recording: Path) -> bool:
     return recording.is_file() and is_abandoned(lock_of(recording))
 
 
+def other_places(folder: Path) -> list[Path]:
+    """Return folders for what cannot be written to one: of the user, and for temporary files."""
+    lasting = lasting_folder()
+    folders = [*([lasting / RECORDINGS] if lasting else []), system_folder()]
+    return [other for other in folders if other != folder]
+
+
 def recordings_in(folder: Path) -> list[Path]:
     """Return the recordings in a folder, the newest first."""
     times: dict[Path, float] = {}
     with suppress(OSError):
-        for path in folder.iterdir():
+        for path in folder.glob(f"*{SUFFIX}"):
             with suppress(OSError):
                 times[path] = path.stat().st_mtime
-    newest = sorted(times, key=times.__getitem__, reverse=True)
-    return [path for path in newest if path.suffix == SUFFIX]
+    return sorted(times, key=times.__getitem__, reverse=True)
 
 
 def remove_recording(recording: Path) -> None:

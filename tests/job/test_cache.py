@@ -15,6 +15,7 @@ from scope.scope_addon import temporary
 from scope.scope_addon.errors import OutputError
 from scope.scope_addon.job.cache import Cache
 from scope.scope_addon.job.unfinished import unfinished_capture
+from scope.scope_addon.live import unfinished as live_names
 
 
 @pytest.fixture
@@ -40,6 +41,16 @@ def test_kept_captures_are_found(cache):
     assert kept.motions[0].read_bytes() == b"x" * 1000
     assert kept.report == {"people": 1}
     assert list((cache.root / "jobs").iterdir()) == []
+
+
+def test_recordings_are_found_wherever_they_grow(cache, tmp_path, monkeypatch):
+    monkeypatch.setattr(live_names, "lasting_folder", lambda: tmp_path / "user")
+    monkeypatch.setattr(live_names, "system_folder", lambda: tmp_path / "tmp")
+    folders = [cache.root / "recordings", tmp_path / "user" / "recordings", tmp_path / "tmp"]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        (folder / "job-1.recording").touch()
+    assert cache.recordings() == [folder / "job-1.recording" for folder in folders]
 
 
 def test_a_damaged_capture_is_not_found(cache):

@@ -19,7 +19,7 @@ from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line import live_command
 from scope.scope_addon.errors import NoPersonError, OutputError, UsageError, VideoError
-from scope.scope_addon.live import footage_recording, journal, run
+from scope.scope_addon.live import footage_recording, journal, run, unfinished
 from scope.scope_addon.live.footage_recording import Footage
 from scope.scope_addon.live.journal import read_about, read_records
 from scope.scope_addon.live.pose import Presence
@@ -44,8 +44,8 @@ EARLIER = b"an earlier take"
 @pytest.fixture(autouse=True)
 def other_places(tmp_path, monkeypatch):
     """Keep the user's own folders out of this."""
-    monkeypatch.setattr(journal, "lasting_folder", lambda: tmp_path / "user")
-    monkeypatch.setattr(journal, "system_folder", lambda: tmp_path / "tmp")
+    monkeypatch.setattr(unfinished, "lasting_folder", lambda: tmp_path / "user")
+    monkeypatch.setattr(unfinished, "system_folder", lambda: tmp_path / "tmp")
     (tmp_path / "tmp").mkdir()
     private_folder.private_folder.cache_clear()
 
@@ -240,13 +240,13 @@ on_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits sizes of f
 FULL = """
 import resource, signal, sys
 from pathlib import Path
-from scope.scope_addon.live import journal
+from scope.scope_addon.live import journal, unfinished
 from scope.scope_addon.errors import OutputError
 from scope.scope_addon.untrusted.body_file import load_body
 from scope.tests.live.test_recording_ends import recorded
 folder = Path(sys.argv[1])
-journal.lasting_folder = lambda: Path(sys.argv[2])
-journal.system_folder = lambda: Path(sys.argv[3])
+unfinished.lasting_folder = lambda: Path(sys.argv[2])
+unfinished.system_folder = lambda: Path(sys.argv[3])
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 real = journal._record_type(load_body("scope")).itemsize
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(float(sys.argv[4]) * real), -1))
