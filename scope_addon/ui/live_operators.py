@@ -231,13 +231,10 @@ class SCOPE_OT_cancel_live(bpy.types.Operator):
 def play_scene(context: bpy.types.Context) -> None:
     """Play the scene's animation from the frame at which a recording begins, if that is wanted"""
     scene = context.scene
-    if (
-        scene.scope_live.with_scene
-        and context.screen is not None
-        and not context.screen.is_animation_playing
-    ):
+    if scene.scope_live.with_scene and context.screen is not None:
         scene.frame_set(int(scene.scope.start_frame))
-        bpy.ops.screen.animation_play()
+        if not context.screen.is_animation_playing:
+            bpy.ops.screen.animation_play()
 
 
 def stop_scene(context: bpy.types.Context) -> None:

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from scope.scope_addon.ui.capture_operators import state as capture_state
-from scope.scope_addon.ui.live_operators import end_live
+from scope.scope_addon.ui.live_operators import end_live, play_scene
 from scope.scope_addon.ui.live_panel import SCOPE_PT_live, _speed
 from scope.scope_addon.ui.live_properties import state
 
@@ -77,6 +77,15 @@ def test_record_stop_and_cancel(job):
     assert not bpy.ops.scope.stop_live.poll()
     bpy.ops.scope.cancel_live()
     assert job.done == ["record in 3 s", "stop", "cancel"]
+
+
+def test_a_scene_that_plays_already_plays_along_from_the_first_frame():
+    scene = bpy.context.scene
+    scene.scope_live.with_scene = True
+    scene.scope.start_frame = 30
+    scene.frame_set(77)
+    play_scene(SimpleNamespace(scene=scene, screen=SimpleNamespace(is_animation_playing=True)))
+    assert scene.frame_current == 30
 
 
 def test_disabling_the_extension_ends_the_process(job):
