@@ -68,12 +68,6 @@ class JsonServer:
             for client in clients:
                 client.queue(data)
 
-    @property
-    def clients(self) -> int:
-        """How many are connected."""
-        with self._lock:
-            return sum(not client.is_gone for client in self._clients)
-
     def __enter__(self) -> JsonServer:
         return self
 

@@ -119,10 +119,10 @@ def test_the_end_does_not_wait_for_a_client_that_does_not_read(body, monkeypatch
 def test_clients_that_left_are_forgotten(server, body):
     (client,), (file,) = connected(server, 1)
     file.readline()
-    assert server.clients == 1
+    assert len(server._clients) == 1
     file.close()
     client.close()
-    wait_for(lambda: server.send(pose_of(body), 0.0) or server.clients == 0)
+    wait_for(lambda: server.send(pose_of(body), 0.0) or not server._clients)
 
 
 def test_an_address_of_another_computer_is_said(body):
