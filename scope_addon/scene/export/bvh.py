@@ -59,14 +59,13 @@ def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
         if parent >= 0:
             children[parent].append(i)
     order: list[int] = []
-    places = _places_at_parents(pose)
+    places, angles = _at_parents(pose)
     apart = np.linalg.norm(places - _offsets(pose), axis=-1).max(axis=0)
     has_position = (apart > scale * _IN_PLACE_M) | (np.array(pose.parents) < 0)
     lines = ["HIERARCHY"]
     for root in (i for i, parent in enumerate(pose.parents) if parent < 0):
         order += _subtree(children, root)
         lines += _joint_lines(children, pose, has_position, root, depth=0)
-    angles = _angles_at_parents(pose)
     columns = [
         part[:, i] for i in order for part in ((places, angles) if has_position[i] else (angles,))
     ]
@@ -125,29 +124,25 @@ def _offsets(pose: SampledPose) -> NDArray[np.float64]:
     """
     parents = np.array(pose.parents)
     offsets: NDArray[np.float64] = (pose.heads - pose.heads[parents]) @ R_FILE_WORLD.T
-    return np.where(parents[:, None] < 0, 0.0, offsets)
+    offsets[parents < 0] = 0.0
+    return offsets
 
 
-def _places_at_parents(pose: SampledPose) -> NDArray[np.float64]:
-    """Return where each joint is (T, N, 3), in its parent's axes; of roots, in the file's."""
+def _at_parents(pose: SampledPose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where each joint is in its parent's axes (T, N, 3), and its angles z, y and x relative
+    to them (T, N, 3), degrees; of roots, in the file's axes.
+    """
     parents = np.array(pose.parents)
+    child = parents >= 0
     joints = pose.joints @ R_FILE_WORLD.T
     turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
-    places = joints.copy()
-    child = parents >= 0
+    R_parent_file = np.swapaxes(turned[:, parents[child]], 2, 3)
     apart = joints[:, child] - joints[:, parents[child]]
-    places[:, child] = np.einsum("tnji,tnj->tni", turned[:, parents[child]], apart)
-    return places
-
-
-def _angles_at_parents(pose: SampledPose) -> NDArray[np.float64]:
-    """Return the angles (T, N, 3) z, y and x of each joint relative to its parent, degrees."""
-    parents = np.array(pose.parents)
-    turned = R_FILE_WORLD @ pose.rotations @ R_FILE_WORLD.T
+    places = joints.copy()
+    places[:, child] = (R_parent_file @ apart[..., None])[..., 0]
     local = turned.copy()
-    child = parents >= 0
-    local[:, child] = np.swapaxes(turned[:, parents[child]], 2, 3) @ turned[:, child]
-    return euler_zyx_degrees(local)
+    local[:, child] = R_parent_file @ turned[:, child]
+    return places, euler_zyx_degrees(local)
 
 
 def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
