@@ -213,6 +213,8 @@ def retarget(
             ).pose(clip, one_floor)
             apart = apart_at_cuts(source, clip, rate)
             motion = _placed(places, apart, skeleton, place, pose, root, options)
+            if _is_carried(rig) and options.root != "in-place":
+                motion = _as_carried(motion, place, _places(rig, frames))
             turns = basis(skeleton, motion.rotations)
             keys = [BoneMotion(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(
@@ -353,9 +355,23 @@ def _with_source_transform(
     return R[:, None] @ rotations, (R @ heads[..., None])[..., 0] + position, angles
 
 
+def _as_carried(
+    motion: _PlacedMotion, place: NDArray[np.float64], places: NDArray[np.float64]
+) -> _PlacedMotion:
+    """Return the motion as it is to be keyed under parents that move the rig, so that it is in the
+    world as it was.
+
+    :param place: (4, 4) the rig's object to world when it was measured.
+    :param places: (T, 4, 4) the same at the keys' frames.
+    """
+    back = place @ np.linalg.inv(places)
+    rotations, heads, _ = _with_source_transform(back, motion.rotations, motion.heads)
+    return replace(motion, rotations=rotations, heads=heads)
+
+
 def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the transform of the captured armature to the world at scene frames (T,), (T, 4, 4);
-    (1, 4, 4) if it does not move.
+    """Return the transform of the captured armature, or of a rig ``at_rest``, to the world at scene
+    frames (T,), (T, 4, 4); (1, 4, 4) if it does not move.
 
     The trajectory of a root object is included in the motion already, but not the transform of its
     parent. The scale of the armature does not affect the rig.

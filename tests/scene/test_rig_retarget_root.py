@@ -156,6 +156,23 @@ def test_the_rig_follows_a_capture_that_is_carried(source, root, carried):
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=5e-3)
 
 
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_a_rig_whose_parent_moves_is_where_the_capture_is(source, root):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig, root=root)
+    wanted = seen(rig, bones)
+    car = bpy.data.objects.new("car", None)
+    bpy.context.scene.collection.objects.link(car)
+    if root == "object":
+        bpy.data.objects.remove(root_object(rig))
+    rig.parent = car
+    drive_around(car)
+    bpy.context.scene.frame_set(30)
+    assert run(source, rig, root=root).warnings == []
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=5e-3)
+
+
 @contextmanager
 def counted(handlers):
     """Return a list that gets one entry whenever Blender calls the handlers."""
