@@ -81,6 +81,14 @@ SENTENCES = {
     "and was left out there",
     "calibration_contradicts": "{calibration} does not fit {footage}: {person:who} is not where "
     "the other cameras see them; a camera was moved or zoomed since, or they are in another order",
+    "calibration_scale": "{calibration} makes {person:who} {factor:.2f} times as large as adults "
+    "are; unless that is so, its translations are not in metres, as after calibrating with a wrong "
+    "size of the board",
+    "sound_contradicts": "{footage}: the clock of this camera is {offset_s:.1f} s ahead of the "
+    "first one's by the motion, which was used, but {sound_s:.1f} s by the sound; either the sound "
+    "was added later, or this camera shows somebody else",
+    "only_in_view": "{footage}: people whom the first video does not show, or who were not "
+    "recognized in it, were left out: {others}",
     # the captured people
     "cuts": "{footage} cuts to another scene {times:times}: capture each scene separately, with a "
     "start and end time",

@@ -4,6 +4,7 @@
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,7 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.region import parse_crop
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.several_views import capture_views as several
-from scope.scope_addon.capture.several_views.bundle import CameraPlace
+from scope.scope_addon.capture.several_views.bundle import CameraPlace, Given
 from scope.scope_addon.capture.several_views.calibrate import Clock, Match
 from scope.scope_addon.capture.several_views.capture_views import capture_views
 from scope.scope_addon.capture.tracking.chosen_person import ChosenPerson
@@ -208,13 +209,39 @@ def test_cuts_of_further_cameras_are_told_by_the_first_ones_clock():
         view("fourth.mp4", 9.0, [0.5]),
     ]
     matches = [match(0.0), match(1.0), None, match(2.0)]
-    said = [each for each in several._about_cameras(views, matches) if each.code == "cuts"]
+    given = [Given(offset_s=0.0), Given(), Given(), Given(offset_s=-1.0, offset_sigma_s=0.01)]
+    about = several._about_cameras(views, matches, given)
+    said = [each for each in about if each.code == "cuts"]
     # 6 s play in slow motion: after 3 s, by a clock that is 1 s early and 1 % faster.
     times = [pytest.approx([2 * (3.0 - 1.0) / 1.01]), [5.0]]
     assert [(each.values["footage"], each.values["times"]) for each in said] == [
         ("second.mp4", times[0]),
         ("third.mp4", times[1]),
     ]
+    # Times are those of videos that play at half speed.
+    by_sound = notice("sound_contradicts", footage="fourth.mp4", offset_s=4.0, sound_s=-2.0)
+    assert [each for each in about if each.code == "sound_contradicts"] == [by_sound]
+
+
+def test_people_of_further_cameras_whom_the_first_one_does_not_show_are_counted():
+    views = [SimpleNamespace(name=f"{k}.mp4", people=["?"] * k) for k in (2, 3, 1, 4)]
+    places = [CameraPlace.first()] * 3 + [None]
+    everyone = [[0, 2, None, None], [1, None, 0, None]]
+    assert several._left_out(views, places, everyone) == [
+        notice("only_in_view", footage="3.mp4", others=2)
+    ]
+
+
+@pytest.mark.parametrize(("scale", "codes"), [(1.1, []), (0.5, ["calibration_scale"])])
+def test_a_calibration_with_another_scale_is_warned_of(monkeypatch, scale, codes):
+    monkeypatch.setattr(several, "relative_distance", lambda *_: scale)
+    monkeypatch.setattr(several, "contradicts", lambda *_: False)
+    views = [SimpleNamespace(name=f"{k}.mp4", people=["person"]) for k in range(3)]
+    given = [Given(T_camera_first=np.eye(4))] * 3
+    matches = [Match(CameraPlace.first(), 0.0, 0, Clock.GIVEN)] * 3
+    options = CaptureOptions(calibration=Path("calib.toml"))
+    found = several._doubts_about_file(views, given, matches, options)
+    assert [each.code for each in found] == codes
 
 
 def test_a_calibration_that_is_written_again_between_two_videos_is_not_mixed(
@@ -257,6 +284,9 @@ def test_what_is_given_of_cameras_has_to_suit_the_videos(shared, tmp_path):
     mirrored = VideoRange(view=FootageView(is_mirrored=True))
     with pytest.raises(UsageError, match="--mirror contradicts"):
         capture_views(videos, body, CaptureOptions(calibration=file, wanted=mirrored))
+    file.write_text("\n".join(cameras).replace("rotation = [0, 1, 0]", ""))
+    with pytest.raises(UsageError, match="places of cameras, but none of cam1, the first video"):
+        capture_views(videos, body, CaptureOptions(calibration=file))
     file.write_text("\n".join(cameras).replace("[0, 4, 0]", "[0, 4]"))
     with pytest.raises(InputError, match="rotation and translation of cam_4"):
         capture_views(videos, body, CaptureOptions(calibration=file))
