@@ -202,10 +202,9 @@ class Options:
         check_type(self.weights, (Weights, type(None)), "Options.weights")
         warn_of_kernel(self.robust_keypoints2d, 1.0, "Options.robust_keypoints2d")
         warn_of_kernel(self.robust_keypoints3d, 100.0, "Options.robust_keypoints3d")
-        weights = self.stages[-1].weights if self.stages else self.weights
-        if weights is not None:
-            warn_of_weight(weights.keypoints2d, 10.0, "keypoints2d of Weights")
-            warn_of_weight(weights.keypoints3d, 0.05, "keypoints3d of Weights")
+        if self.weights is not None:
+            warn_of_weight(self.weights.keypoints2d, 10.0, "Options.weights.keypoints2d")
+            warn_of_weight(self.weights.keypoints3d, 0.05, "Options.weights.keypoints3d")
         if self.stages is not None and self.weights is not None:
             raise InvalidValueError(
                 "Options.weights are those of the default stages; with Options.stages, give each "
