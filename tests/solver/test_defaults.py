@@ -278,11 +278,6 @@ MISTAKES = {
         UnitsWarning,
         "robust_keypoints2d is 100, but is a squared residual",
     ),
-    "weights of a stage that are deviations": (
-        lambda: Options(stages=[Stage(Weights(keypoints3d=0.02))]),
-        UnitsWarning,
-        "weights are 1/sigma",
-    ),
     "a floor's offset": (on_floor(UP, LOWEST + 5.0), ScopeWarning, "below the floor"),
     "a floor in millimetres": (on_floor(UP, 1e3 * LOWEST - 400.0), UnitsWarning, "floor lies more"),
     "contacts in millimetres": (
