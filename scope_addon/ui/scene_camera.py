@@ -91,7 +91,7 @@ def _content(scene: bpy.types.Scene, camera: bpy.types.Object) -> dict[str, Any]
         "dist": _distortion(scene, camera),
         "size": [render.resolution_x, render.resolution_y],
         "times_s": times_s,
-        "world_from_camera": [pose[:3].tolist() for pose in poses],
+        "world_from_camera": [pose.tolist() for pose in poses],
     }
 
 

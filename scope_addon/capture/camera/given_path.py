@@ -7,8 +7,7 @@ as in a calibration, and where it is at some times of the footage.
      "world_from_camera": [[[r, r, r, x], [r, r, r, y], [r, r, r, z], [0, 0, 0, 1]], ...]}
 
 The world is in metres, with z up; the camera's axes are OpenCV's: x right, y down, z forward. Times
-are those of the frames in the file, of which the first one is at 0. The last row of a pose may be
-left out.
+are those of the frames in the file, of which the first one is at 0.
 """
 
 from __future__ import annotations
@@ -104,19 +103,11 @@ def _times(path: Path, value: Any, count: int) -> Float64Array:
 def _poses(path: Path, value: Any) -> Float64Array:
     """Return the poses (N, 4, 4), N at least 1."""
     poses = array_of(value)
-    if (
-        poses is None
-        or poses.ndim != 3
-        or poses.shape[1:] not in ((4, 4), (3, 4))
-        or not len(poses)
-    ):
+    if poses is None or poses.ndim != 3 or poses.shape[1:] != (4, 4) or not len(poses):
         raise InputError(
             f'{path}: "world_from_camera" must be a list of matrices with four rows of four '
             f"numbers; {_FORMAT}"
         )
-    if poses.shape[1] == 3:
-        last = np.tile([[[0.0, 0.0, 0.0, 1.0]]], (len(poses), 1, 1))
-        poses = np.concatenate([poses, last], axis=1)
     _refuse(path, ~np.isfinite(poses).all(axis=(1, 2)), "has a value that is not a finite number")
     _refuse(path, (poses[:, 3] != [0, 0, 0, 1]).any(axis=1), "must have the last row 0, 0, 0, 1")
     R = poses[:, :3, :3]
