@@ -32,8 +32,9 @@ _FORMATS = (
     "avi,h264,hevc,m4v,ogg,asf,"
     "nut"
 )
-# whose pieces are fetched, and not sent while they are filmed
+# whose pieces come whole, long after they were filmed
 _PLAYLISTS = ("hls", "dash")
+_NO_TIMESTAMPS = 0x80  # FFmpeg's AVFMT_NOTIMESTAMPS, of formats whose times it makes up
 STALLED_S = 5.0  # without data, after which a stream counts as interrupted
 # for which a stream that is joined in the middle is left out until its next key frame
 KEY_FRAME_S = 10.0
@@ -73,7 +74,7 @@ class StreamSource:
                 stream.codec_context.thread_count = 1
             if stream.average_rate and 1 <= stream.average_rate <= 240:
                 self.fps = Fraction(stream.average_rate)
-            is_fetched = container.format.name in _PLAYLISTS or container.size > 0
+            is_fetched = _is_fetched(container)
             playback = Playback(clock)
             last_s = -np.inf
             try:
@@ -84,6 +85,7 @@ class StreamSource:
                         continue
                     image_rgb = self._image(frame, float(stream.sample_aspect_ratio or 1))
                     due_s = clock.now()
+                    # what is sent while it is filmed comes when it is to be shown
                     if is_fetched and frame.time is not None:
                         if not 0.0 <= frame.time - last_s <= LEAP_S:  # another programme begins
                             playback = Playback(clock)
@@ -172,6 +174,12 @@ class StreamSource:
         """
         check_size(Path(self.name), frame.width, frame.height)
         return upright(Path(self.name), rgb(frame), aspect, *orientation(frame))
+
+
+def _is_fetched(container: InputContainer) -> bool:
+    """Return whether a stream comes as fast as it can be read, like a file, and has times."""
+    has_times = not container.format.flags & _NO_TIMESTAMPS
+    return has_times and (container.format.name in _PLAYLISTS or container.size > 0)
 
 
 def _reason(error: Exception) -> str:
