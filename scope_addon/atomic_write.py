@@ -168,7 +168,13 @@ def write_result(path: Path, content: str | bytes) -> None:
         raise OutputError(f"cannot write {path}: {reason(error)}") from error
 
 
-def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool = False) -> None:
+def write_npz(
+    path: Path,
+    arrays: Mapping[str, NDArray[Any]],
+    compressed: bool = False,
+    *,
+    replaces_links: bool = False,
+) -> None:
     """Write arrays as an ``.npz``, complete or not at all: the same bytes as numpy's ``savez``.
 
     They are packed in memory one by one, because a zip file that the disk refuses prints a
@@ -176,6 +182,7 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool =
 
     :param arrays: by their names, (...) each.
     :param compressed: as ``savez_compressed`` does.
+    :param replaces_links: as `complete_file` does, for names that nobody but this program gives.
     :raises OSError: the file cannot be written.
     :raises OutputError: ``path`` exists and is not a regular file.
     """
@@ -185,7 +192,8 @@ def write_npz(path: Path, arrays: Mapping[str, NDArray[Any]], compressed: bool =
 
     packed = _MovedFile()
     method = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
+    written = complete_file(path) if replaces_links else atomic_path(path)
+    with written as temporary, temporary.open("wb") as file:
         with zipfile.ZipFile(packed, "w", method) as archive:
             for name, array in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:

@@ -52,7 +52,8 @@ class KeptFolder:
 
         :param write_file: takes the folder, and returns the file that it has written there.
         """
-        if not self.is_open:
+        # A link of that name leads where nobody has asked to write.
+        if not self.is_open or self.path.is_symlink():
             return
         try:
             self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -119,7 +120,8 @@ class KeptEstimates:
         # The name sorts by time, and is no other process's.
         path = folder / f"{time.time_ns():020d}-{os.getpid()}.npz"
         keys = np.frombuffer(b"".join(self._new), np.uint8).reshape(-1, _KEY_BYTES)
-        write_npz(path, {"keys": keys, "values": np.stack(list(self._new.values()))})
+        values = np.stack(list(self._new.values()))
+        write_npz(path, {"keys": keys, "values": values}, replaces_links=True)
         return path
 
     def _read_keys(self, path: Path) -> None:

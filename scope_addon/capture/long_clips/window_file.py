@@ -74,7 +74,8 @@ def save_window(folder: Path, observed: Observed) -> Path:
     path = folder / window_name(observed.window.number)
     arrays: Arrays = {}
     text = json.dumps(_as_json(observed, arrays))
-    write_npz(path, arrays | {_JSON: np.frombuffer(text.encode(), np.uint8)})
+    arrays[_JSON] = np.frombuffer(text.encode(), np.uint8)
+    write_npz(path, arrays, replaces_links=True)
     return path
 
 

@@ -6,6 +6,7 @@ costs only time.
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -89,6 +90,14 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path):
     (tmp_path / "file").write_text("")
     keep(tmp_path / "file")
     assert (tmp_path / "file").read_text("utf-8") == ""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
+def test_nothing_is_kept_where_a_link_in_the_place_of_the_folder_leads(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "mine")
+    keep(tmp_path / "link")
+    assert list((tmp_path / "mine").iterdir()) == []
 
 
 def test_no_more_than_so_much_is_kept(tmp_path, monkeypatch):

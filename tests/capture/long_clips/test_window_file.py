@@ -6,6 +6,7 @@ nothing.
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -24,6 +25,7 @@ from scope.scope_addon.capture.long_clips.window_file import (
     known_reference,
     load_window,
     save_window,
+    window_name,
 )
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.face_record import RECORD
@@ -189,6 +191,16 @@ def test_numbers_that_do_not_fit_make_a_file_worthless(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
+@pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
+def test_what_a_link_of_a_windows_name_leads_to_stays(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.npz"
+    mine.write_bytes(b"mine")
+    (tmp_path / window_name(WINDOW.number)).symlink_to(mine)
+    save_window(tmp_path, record())
+    assert mine.read_bytes() == b"mine"
+    assert load_window(tmp_path, WINDOW) is not None
+
+
 def test_a_full_disk_is_an_error_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
