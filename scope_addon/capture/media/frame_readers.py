@@ -238,6 +238,7 @@ class PyavReader:
     ``rate``: frames per second, 0 if the container does not say; ``average_rate``: the same over
     the whole file, which differs where the frame rate varies; ``recorded_rate``: at which a phone
     says that it recorded slow motion, 0 if it does not; ``frame_count`` according to the container;
+    ``is_counted``: whether the container counts frames, so that ``average_rate`` is true;
     ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut
     without re-encoding holds more frames than it shows. ``is_mirrored``, ``clockwise_deg``: whether
     the last frame that was read had to be mirrored, and by how much it was rotated then.
@@ -269,6 +270,7 @@ class PyavReader:
         self.average_rate = float(self._stream.average_rate or self.rate)
         self.recorded_rate = _recorded_rate(container)
         duration_s = (container.duration or 0) / 1e6
+        self.is_counted = self._stream.frames > 0
         self.frame_count = float(self._stream.frames or round(duration_s * self.rate))
         if self._stream.duration and self._stream.time_base:
             self.shown_s: float | None = float(self._stream.duration * self._stream.time_base)
@@ -331,23 +333,23 @@ class PyavReader:
         return self._time(frame), upright(self._path, image, self._aspect, *shown)
 
     def skip_to(
-        self, seconds: float, fps: Fraction, may_seek: bool = True
+        self, seconds: float, fps: Fraction, is_even: bool = True
     ) -> tuple[int, float | None]:
         """Skip to the first frame at or after a time, which has to be called before the first frame
         is read.
 
         :param fps: rate by which a time is converted to an index.
-        :param may_seek: whether to seek where that saves decoding. The index then follows from the
-            time, so that it is right at a constant frame rate only; else all frames are decoded.
+        :param is_even: whether the index follows from the time; else packets are counted.
         :return: index of the frame that is read next, or the number of frames if the video ends
             before; and the time of the frame before, None if it was not decoded.
         """
-        if may_seek and seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
+        if seconds > _MIN_SEEK_S and self._seek(seconds - _MIN_SEEK_S / 2):
             frame = next(self._decoded, None)
             time = None if frame is None else self._time(frame)
             if frame is not None and time is not None and time < seconds:
                 frames = itertools.chain([frame], self._decoded)
-                return self._skip(frames, round(time * fps), seconds, fps)
+                index = round(time * fps) if is_even else _frames_before(self._path, frame.pts)
+                return self._skip(frames, index, seconds, fps)
             self._seek(0.0)
         return self._skip(self._decoded, 0, seconds, fps)
 
@@ -401,6 +403,25 @@ def count_frames(path: Path) -> int:
         return 0
 
 
+def _frames_before(path: Path, pts: int) -> int:
+    """Return how many frames of a video file are shown before a time, without decoding them.
+
+    :param pts: the time in units of the stream.
+    """
+    failure, container = open_with_pyav(path)
+    count = 0
+    if container is None:
+        return count
+    with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
+        stream = film_of(path, container)
+        first = stream.start_time or 0
+        for packet in container.demux(stream):
+            if packet.dts is not None and packet.dts >= pts:
+                break
+            count += packet.pts is not None and first <= packet.pts < pts
+    return count
+
+
 def exact_fps(fps: float) -> Fraction | None:
     """Convert a float frame rate to the rational that it stands for; None if it is not a rate (0,
     NaN, 90000).
@@ -429,15 +450,16 @@ def _recorded_rate(container: InputContainer) -> float:
     return rate if 0.0 < rate <= _MAX_RATE else 0.0
 
 
-def usual_fps(path: Path) -> Fraction | None:
-    """Return the frame rate that most frames of a video have, from the times of its packets, which
-    are not decoded; None if they have none.
+def packet_rates(path: Path, stated_fps: Fraction) -> tuple[Fraction, Fraction]:
+    """Return the frame rate that most frames of a video have, and the average one, from the times
+    of its first packets, which are not decoded.
 
+    :param stated_fps: rate where they have no times.
     :raises VideoError: PyAV is not installed, or there is no video in the file.
     """
     failure, container = open_with_pyav(path)
     if container is None:
-        return None
+        return stated_fps, stated_fps
     times_s: list[float] = []
     with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
         for packet in container.demux(film_of(path, container)):
@@ -448,8 +470,10 @@ def usual_fps(path: Path) -> Fraction | None:
     steps_s = np.diff(np.sort(times_s))
     steps_s = steps_s[steps_s > 1e-4]
     if not len(steps_s):
-        return None
-    return nearest_fps(float(1 / np.median(steps_s)))
+        return stated_fps, stated_fps
+    usual = nearest_fps(float(1 / np.median(steps_s)))
+    average = exact_fps(float(1 / np.mean(steps_s)))
+    return usual or stated_fps, average or stated_fps
 
 
 def nearest_fps(measured: float) -> Fraction | None:
@@ -461,15 +485,3 @@ def nearest_fps(measured: float) -> Fraction | None:
     if abs(standard - measured) < MEASURED_WITHIN * measured:
         return standard
     return exact_fps(round(measured, 2))
-
-
-def estimate_fps(reader: PyavReader) -> Fraction:
-    """Estimate the rate from the timestamps of the next 30 frames, for a container that does not
-    report it.
-    """
-    times: list[float] = []
-    while len(times) < 30 and (decoded := reader.read()) is not None:
-        times.append(decoded[0] or 0.0)
-    steps = np.diff(times)
-    steps = steps[steps > 0]
-    return (exact_fps(round(1 / float(np.median(steps)), 2)) if len(steps) else None) or DEFAULT_FPS

@@ -123,7 +123,7 @@ class SequenceReader:
         self._next += 1
         return time, picture.rgb
 
-    def skip_to(self, seconds: float, fps: Fraction, may_seek: bool = True) -> tuple[int, None]:
+    def skip_to(self, seconds: float, fps: Fraction, is_even: bool = True) -> tuple[int, None]:
         """Skip to the first picture at or after a time, and return its index, which is exact."""
         while (
             self._next < len(self._sequence.paths)

@@ -35,10 +35,9 @@ from .frame_readers import (
     DEFAULT_FPS,
     PyavReader,
     count_frames,
-    estimate_fps,
     exact_fps,
     next_time,
-    usual_fps,
+    packet_rates,
 )
 from .image_sequence import PictureSequence, SequenceReader, find_sequence
 from .quicktime import focal_35mm
@@ -89,6 +88,7 @@ class Video:
     _still: Uint8Array | None = field(default=None, repr=False)
     _is_even: bool = field(default=True, repr=False)  # a frame's time tells its number
     _is_part: bool = field(default=False, repr=False)  # see `frames_from`
+    _is_counted: bool = field(default=False, repr=False)  # by the container
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
@@ -314,12 +314,16 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
                 f"{path} can be opened, but none of its frames can be decoded; "
                 "convert it to H.264 .mp4"
             )
-        fps = exact_fps(reader.rate) or estimate_fps(reader)
-        measured_fps = average_fps = exact_fps(reader.average_rate) or fps
-        varies = abs(average_fps - fps) > _VARYING * fps
-        if varies:
-            fps = usual_fps(path) or fps
-        else:
+        stated_fps = exact_fps(reader.rate)
+        fps = stated_fps or DEFAULT_FPS
+        average_fps = exact_fps(reader.average_rate) if reader.is_counted else None
+        if stated_fps is None or average_fps is None or _varies(average_fps, fps):
+            usual_fps, packets_fps = packet_rates(path, fps)
+            average_fps = average_fps or packets_fps
+            if stated_fps is None or _varies(average_fps, fps):
+                fps = usual_fps
+        measured_fps = average_fps
+        if not _varies(average_fps, fps):
             average_fps = fps
         # Frames that an even rate would have and the file has not, or the reverse: a phone leaves
         # some out, also where its rate counts as constant.
@@ -333,10 +337,11 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     wanted = requested.at_rate(fps)
     video = Video(path, width, height, fps, frame_count, focal_35mm(path), wanted=wanted)
     video._average_fps = average_fps
-    video._is_even = missing_frames < _ONE_MISSING
+    video._is_counted = reader.is_counted
+    video._is_even = reader.is_counted and missing_frames < _ONE_MISSING
     if recorded_speed > _SLOW_MOTION:
         video.recorded_speed = recorded_speed
-    if abs(average_fps - fps) > _VARYING * fps:
+    if _varies(average_fps, fps):
         video.warnings.append(
             notice(
                 "variable_frame_rate",
@@ -368,6 +373,10 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
 
 
 class _Decoder:
+def _varies(average_fps: Fraction, fps: Fraction) -> bool:
+    return abs(average_fps - fps) > _VARYING * fps
+
+
     """Decodes a video in its own thread into a bounded queue, so that decoding and inference
     overlap.
     """
@@ -427,8 +436,8 @@ class _Decoder:
         resized = False
         if video.wanted.start_s > 0:
             # Indices have to be those of the whole footage, whichever part is chosen.
-            may_seek = video._is_even or video._is_part
-            index, time = reader.skip_to(video.wanted.start_s, video.source_fps, may_seek)
+            is_even = video._is_even or video._is_part
+            index, time = reader.skip_to(video.wanted.start_s, video.source_fps, is_even)
         while not self._stop.is_set() and (decoded := reader.read()) is not None:
             time = next_time(time, decoded[0], float(1 / video.source_fps))
             image = video.wanted.view.show(decoded[1])

@@ -132,6 +132,16 @@ def test_frames_that_are_lacking_inside_are_said(tmp_path, fps, steps, gaps):
     assert [(n.values["times"], n.values["longest_s"]) for n in found] == ([gaps] if gaps else [])
 
 
+def test_a_variable_rate_is_noticed_where_the_container_does_not_count_frames(tmp_path):
+    """Indices from 20 s on followed from the rate that the container states."""
+    shown_s = [*range(20), *np.arange(20, 40, 0.5)]
+    path = write_times(tmp_path / "a.mkv", np.multiply(shown_s, 1000))
+    with open_video(path, VideoRange(start_s=30)) as video:
+        first = next(iter(video))
+    assert [warning.code for warning in video.warnings] == ["variable_frame_rate"]
+    assert (video.fps, first.index, first.timestamp_s) == (2, 40, 30.0)
+
+
 def test_as_many_frames_are_expected_as_a_slightly_varying_rate_gives(tmp_path):
     """Mostly 30 per second, and some at half the distance."""
     path = write_video(tmp_path / "a.mp4", ramp(10) * 10)
