@@ -52,6 +52,7 @@ _LISTS = (b"ffconcat", b"#EXTM3U", b"<?xml", b"<MPD", b"v=0", b"[playlist]")
 _VARYING = Fraction(2, 100)  # of the rate, by which the average differs where it varies
 _ONE_MISSING = 0.5  # frames, from which at least one is missing, or too many
 _SLOW_MOTION = 1.5  # recorded rate over that at which it plays; less is rounding, or a film's 24
+_LOST_S = 1.0  # at the end of a video whose container counts the frames
 # A step from one frame to the next that is no uneven rate but a gap: by both.
 _GAP_S = 0.5
 _GAP_FRAMES = 10
@@ -87,8 +88,8 @@ class Video:
     _sequence: PictureSequence | None = field(default=None, repr=False)
     _still: Uint8Array | None = field(default=None, repr=False)
     _is_even: bool = field(default=True, repr=False)  # a frame's time tells its number
-    _is_part: bool = field(default=False, repr=False)  # see `frames_from`
     _is_counted: bool = field(default=False, repr=False)  # by the container
+    _is_part: bool = field(default=False, repr=False)  # see `frames_from`
     _bytes: int | None = field(default=None, repr=False)  # of the file when it was opened
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
@@ -372,11 +373,11 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
     return video
 
 
-class _Decoder:
 def _varies(average_fps: Fraction, fps: Fraction) -> bool:
     return abs(average_fps - fps) > _VARYING * fps
 
 
+class _Decoder:
     """Decodes a video in its own thread into a bounded queue, so that decoding and inference
     overlap.
     """
@@ -490,6 +491,8 @@ def _varies(average_fps: Fraction, fps: Fraction) -> bool:
         # rate.
         missing = video.frame_count - index
         last = min(float((video.frame_count - 1) / video.average_fps), video.wanted.end_s)
+        if video._is_counted and last - time > _LOST_S:
+            return missing > 1
         return missing > max(1, video.frame_count // 50) and time < 0.95 * last
 
     def _has_grown(self) -> bool:

@@ -344,6 +344,20 @@ def test_a_truncated_video_gives_its_frames_and_a_warning(tmp_path, capfd):
     assert capfd.readouterr().err == ""
 
 
+def test_seconds_that_are_lost_at_the_end_of_a_long_video_are_said(tmp_path):
+    """They are less than a twentieth of the video."""
+    path = write_video(tmp_path / "a.mp4", ramp(1) * 80, fps=2)
+    with av.open(str(path)) as container:
+        lost_at = [packet.pos for packet in container.demux(video=0) if packet.size][-3]
+    data = bytearray(path.read_bytes())
+    end = data.find(b"moov") - 4
+    data[lost_at:end] = bytes(end - lost_at)
+    path.write_bytes(data)
+    with open_video(path) as video:
+        assert len(list(video)) == 77
+    assert [warning.code for warning in video.warnings] == ["decoding_stopped"]
+
+
 def test_footage_whose_disk_fails_meanwhile_is_no_shorter_video(tmp_path, monkeypatch):
     """A capture of a part would be done, and skipped by the next batch. FFmpeg says the same of
     damaged data.
