@@ -221,8 +221,8 @@ def live_replies(_: Path) -> list[bytes]:
         "presence": "seen",
         "rate": 29.5,
         "latency_ms": 60.0,
+        "recorded_s": 2.5,
     }
-    status |= {"dropped": 3, "received": 90, "recorded_s": 2.5}
     return _lines([pose, status, {"event": "notice", "text": "interrupted"}, {"event": "ended"}])
 
 
