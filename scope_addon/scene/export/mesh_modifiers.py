@@ -88,17 +88,21 @@ def _modified_mesh(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.M
     for modifier in [m for m in copy.modifiers if m.type == "ARMATURE"]:
         copy.modifiers.remove(modifier)
     blocks = _keys_at_zero(copy.data)
-    mesh = _evaluated_mesh(copy)
+    graph = bpy.context.evaluated_depsgraph_get()
+    mesh = bpy.data.meshes.new_from_object(
+        copy.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
+    )
     try:
         corners = _corners(mesh)
         places = []
         for block in blocks[1:]:
             block.value = 1.0
-            keyed = _evaluated_mesh(copy)
+            evaluated = copy.evaluated_get(bpy.context.evaluated_depsgraph_get())
             block.value = 0.0
+            keyed = evaluated.to_mesh()
             same = np.array_equal(_corners(keyed), corners)
             places.append(_vertices(keyed))
-            bpy.data.meshes.remove(keyed)
+            evaluated.to_mesh_clear()
             if not same:
                 bpy.data.meshes.remove(mesh)
                 return None
@@ -140,23 +144,15 @@ def _add_keys(
     bpy.data.objects.remove(obj)
 
 
-def _evaluated_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
-    """Return a new mesh as an object's modifiers make it."""
-    graph = bpy.context.evaluated_depsgraph_get()
-    return bpy.data.meshes.new_from_object(
-        obj.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
-    )
-
-
 def _vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
     """Return the vertices (V, 3) of a mesh."""
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
+    mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
     return vertices
 
 
 def _corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
     """Return the vertex at each corner of the faces."""
     corners = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
+    mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
     return corners
