@@ -47,10 +47,13 @@ class PictureSequence:
         slots = picture_slots(numbers)
         places = numbered_places(numbers)
         missing = places[-1] + 1 - len(paths)
+        leaves_gaps = missing > 0 and slots == places
+        if not missing:  # but the numbers may be in constant steps
+            missing = numbers[-1] + 1 - numbers[0] - len(paths)
         if missing <= 0:
             return cls(paths, slots, [])
         warning = notice(
-            "missing_images" if slots == places else "consecutive_images",
+            "missing_images" if leaves_gaps else "consecutive_images",
             footage=name,
             missing=missing,
             first=numbers[0],
