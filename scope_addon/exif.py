@@ -17,7 +17,10 @@ from .footage_view import AS_IN_FILE, FootageView
 
 PNG = b"\x89PNG\r\n\x1a\n"  # begins the file
 TIFF = (b"II*\0", b"MM\0*")  # one of these does; a TIFF of more than 4 GB would begin otherwise
-# Tag numbers of TIFF 6.0.
+# Tag numbers of TIFF 6.0; directories have them in increasing order.
+_KIND = 0x00FE
+_IS_REDUCED = 1
+_MAX_DIRECTORIES = 10_000
 _WIDTH = 0x0100
 _HEIGHT = 0x0101
 _BITS = 0x0102
@@ -77,7 +80,11 @@ def picture_view(path: Path) -> FootageView:
 
 
 def animation_length(data: bytes) -> int:
-    """Count the frames of an animated PNG or WebP; 1 for every other picture."""
+    """Count the frames of an animated PNG or WebP, or the pages of a TIFF; 1 for every other
+    picture.
+    """
+    if data.startswith(TIFF):
+        return max(1, _tiff_pages(data))
     if data.startswith(PNG):
         control = next((content for name, content, _ in png_chunks(data) if name == b"acTL"), b"")
         return max(1, int.from_bytes(control[:4], "big"))
@@ -109,6 +116,24 @@ def tiff_size(data: bytes) -> tuple[int, int, int]:
     except struct.error:
         found[_BITS] = _DEEPEST
     return found[_WIDTH], found[_HEIGHT], found[_BITS]
+
+
+def _tiff_pages(data: bytes) -> int:
+    """Count the images of a TIFF, without those that are another one at a lower resolution."""
+    endian = "<" if data[:1] == b"I" else ">"
+    directories: set[int] = set()
+    pages = 0
+    try:
+        at = struct.unpack_from(endian + "I", data, 4)[0]
+        while at and at not in directories and len(directories) < _MAX_DIRECTORIES:
+            directories.add(at)
+            entries, first_tag = struct.unpack_from(endian + "HH", data, at)
+            kind = struct.unpack_from(endian + "I", data, at + 10)[0] if first_tag == _KIND else 0
+            pages += not kind & _IS_REDUCED
+            at = struct.unpack_from(endian + "I", data, at + 2 + 12 * entries)[0]
+    except struct.error:
+        pass
+    return pages
 
 
 def _find_tiff(data: bytes) -> bytes:

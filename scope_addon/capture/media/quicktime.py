@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The focal length that phones write into their .mov and .mp4 files.
+"""The focal length that phones write into their .mov and .mp4 files, and the length of an image
+sequence in .avif and .heic.
 
 QuickTime metadata: a ``meta`` box, of the movie (``moov``) or of a track (``trak``), holds ``keys``
 (names) and ``ilst`` (values, numbered like the names). Damaged or unknown metadata counts as
@@ -43,6 +44,18 @@ def focal_35mm(path: Path) -> float | None:
     except (OSError, struct.error, ValueError):
         pass
     return None
+
+
+def sequence_length(path: Path) -> int:
+    """Count the images of the first track of a file; 0 if it has none."""
+    try:
+        with path.open("rb") as file:
+            box = _find_moov(file)
+    except (OSError, struct.error):
+        return 0
+    for wanted in (b"trak", b"mdia", b"minf", b"stbl", b"stsz"):
+        box = next((payload for name, payload in _boxes(box) if name == wanted), b"")
+    return int.from_bytes(box[8:12], "big")
 
 
 def _find_moov(file: BinaryIO) -> bytes:

@@ -24,6 +24,7 @@ from ...untrusted.files import check_regular
 from .frame_readers import decode_items
 from .guards import check_depth, check_size, too_large, utf8_name
 from .heif import assemble, read_layout
+from .quicktime import sequence_length
 
 _JPEG_STREAMS = (".mjpeg", ".mjpg")  # begin like a JPEG, but are videos
 _HEIF_BRANDS = {b"mif1", b"heic", b"heix", b"heim", b"heis", b"avif"}  # of ISO 23008-12 and of AVIF
@@ -132,7 +133,8 @@ def _read_heif(path: Path, data: bytes) -> Picture | None:
     if whole is None:
         return None
     check_size(path, whole.shape[1], whole.shape[0])
-    return Picture(whole, read_exif(layout.exif).focal_35mm)
+    length = max(1, sequence_length(path))
+    return Picture(whole, read_exif(layout.exif).focal_35mm, length)
 
 
 def _as_rgb8(image: NDArray[Any]) -> Uint8Array:

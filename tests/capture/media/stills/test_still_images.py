@@ -25,7 +25,7 @@ def png(image: np.ndarray) -> bytes:
     return cv2.imencode(".png", image)[1].tobytes()
 
 
-def avif(path: Path, image_rgb: np.ndarray) -> Path:
+def avif(path: Path, image_rgb: np.ndarray, count: int = 1) -> Path:
     av = package("av")
     need_encoder("libsvtav1")
     with av.open(str(path), "w", format="avif") as container:
@@ -33,11 +33,9 @@ def avif(path: Path, image_rgb: np.ndarray) -> Path:
         stream.width = image_rgb.shape[1]
         stream.height = image_rgb.shape[0]
         stream.pix_fmt = "yuv420p"
-        for packet in [
-            *stream.encode(av.VideoFrame.from_ndarray(image_rgb, "rgb24")),
-            *stream.encode(),
-        ]:
-            container.mux(packet)
+        for _ in range(count):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image_rgb, "rgb24")))
+        container.mux(stream.encode())
     return path
 
 
@@ -118,3 +116,18 @@ def test_an_animation_gives_a_warning(tmp_path: Path, name: str) -> None:
         (frame,) = video
         assert abs(int(frame.image_rgb.mean()) - 90) < 4
         assert f"{name} is an animation of 3 images" in str(video.warnings[0])
+
+
+def test_an_animated_avif_gives_a_warning(tmp_path: Path) -> None:
+    with open_video(avif(tmp_path / "a.avif", GREY, count=3)) as video:
+        assert len(list(video)) == 1
+    assert [each.values["images"] for each in video.warnings] == [3]
+
+
+def test_further_pages_of_a_tiff_give_a_warning(tmp_path: Path) -> None:
+    cv2.imwritemulti(str(tmp_path / "a.tif"), [GREY] * 3)
+    with open_video(tmp_path / "a.tif") as video:
+        assert [each.values["images"] for each in video.warnings] == [3]
+    cv2.imwrite(str(tmp_path / "a.tif"), GREY)
+    with open_video(tmp_path / "a.tif") as video:
+        assert not video.warnings
