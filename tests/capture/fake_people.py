@@ -99,9 +99,7 @@ class FakeDetector:
         self.calls = 0
         self.close_calls = 0
 
-    def detect(
-        self, image: np.ndarray, threshold: float = 0.5, closely: bool = False
-    ) -> list[Detection]:
+    def detect(self, image: np.ndarray, closely: bool = False) -> list[Detection]:
         self.calls += 1
         self.close_calls += closely
         found = []

@@ -29,8 +29,8 @@ _FRAMES = re.compile(r"(\d{1,4})([:;])(\d\d)([:;])(\d\d)([:;])(\d{2,3})", re.A)
 _SEPARATORS = (":::", "::;", ";;;")  # some editors write drop-frame timecode like the last
 _DROP_RATES = (30, 60)
 _NEAR_NOMINAL = Fraction(1, 100)  # relative tolerance: phones report a rate averaged over the file
-# Relative tolerance of 29.97 against 30000/1001; 30 differs ten times as much.
 _RATE = re.compile(r"\d{1,9}(\.\d{1,9})?(/\d{1,9})?", re.A)
+# Relative tolerance of 29.97 against 30000/1001; 30 differs ten times as much.
 _SAME_RATE = Fraction(1, 10_000)
 
 

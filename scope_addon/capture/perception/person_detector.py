@@ -119,19 +119,17 @@ class PersonDetector:
         self._session = open_session(network_path("pose_detection"), threads, execution)
         self._anchors = make_anchors()
 
-    def detect(
-        self, image_rgb: Uint8Array, threshold: float = SCORE_THRESHOLD, closely: bool = False
-    ) -> list[Detection]:
+    def detect(self, image_rgb: Uint8Array, closely: bool = False) -> list[Detection]:
         """Detect all people in an (H, W, 3) uint8 RGB image, best first.
 
         Searches the whole image. If that finds nobody with a high score, or with ``closely``, the
         search continues in overlapping squares of an oblong image, which show people larger.
         """
-        found = self._detect_in(image_rgb, threshold, (0, 0))
+        found = self._detect_in(image_rgb, SCORE_THRESHOLD, (0, 0))
         if closely or not found or found[0].score < _SURE_SCORE:
             for left, top, side in squares(*image_rgb.shape[:2]):
                 found += self._detect_in(
-                    image_rgb[top : top + side, left : left + side], threshold, (left, top)
+                    image_rgb[top : top + side, left : left + side], SCORE_THRESHOLD, (left, top)
                 )
             found = unique(found)
         return found

@@ -229,12 +229,9 @@ class BoxDetector:
         self._normalization = self._format.normalization.with_description(self._description)
         self._boxes(self._graph.trial_outputs)  # so that a missing class is reported now
 
-    def detect(
-        self, image_rgb: Uint8Array, threshold: float | None = None, closely: bool = False
-    ) -> list[Detection]:
+    def detect(self, image_rgb: Uint8Array, closely: bool = False) -> list[Detection]:
         """Detect all people in an (H, W, 3) uint8 RGB image, best first.
 
-        :param threshold: least score; None for that of the JSON, or 0.4.
         :param closely: unused, see `PersonDetector.detect`.
         :raises ModelFileError: the network fails.
         """
@@ -247,7 +244,7 @@ class BoxDetector:
             stretched=self._format.stretched,
         )
         boxes = self._boxes(self._graph.run(fitted.picture_rgb, self._normalization))
-        kept = suppress(boxes, threshold or self._description.score_threshold or SCORE_THRESHOLD)
+        kept = suppress(boxes, self._description.score_threshold or SCORE_THRESHOLD)
         corners = fitted.to_image(kept.corners.reshape(-1, 2, 2)).reshape(-1, 4)
         return [box_detection(float(s), box) for s, box in zip(kept.scores, corners, strict=True)]
 
