@@ -12,7 +12,7 @@ from __future__ import annotations
 import ctypes
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -23,6 +23,8 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]
 from numba.core import cgutils as _cgutils
 from numba.core.errors import NumbaError
 from numba.extending import intrinsic as _intrinsic
+from numba.extending import overload as _overload
+from numba.extending import register_jitable
 
 from ..errors import InvalidValueError, ShapeError
 from ..kernel import inlined_kernel
@@ -35,7 +37,8 @@ MAX_EXTERNAL = 16  # external residuals; each has a column of the weights
 INDEXES = ("points", "parts", "joints")
 
 intrinsic: Any = _intrinsic  # its first parameter is the compiler's, which type checkers do not see
-cgutils: Any = _cgutils  # untyped
+overload: Any = _overload  # untyped, as the next
+cgutils: Any = _cgutils
 # What a residual from outside is given, as int64: sizes, and of arrays their addresses.
 SIZES = ("rows", "parts", "points", "W")
 VALUES = (*SIZES, "ints", "floats", *Tree._fields, *Pose._fields, *Blocks._fields)
@@ -91,43 +94,7 @@ class Registered:
         accumulate = given if hasattr(given, "signatures") else inlined_kernel(given)
 
         def entry(values, weight):  # type: ignore[no-untyped-def]
-            at = carray(values, (COUNT,))
-            rows = at[0]
-            n = at[1]
-            points = at[2]
-            W = at[3]
-            t = at[_TREE:]
-            p = at[_POSE:]
-            b = at[_BLOCKS:]
-            tree = Tree(
-                carray(_pointer(t[0]), (n,), np.int64),
-                carray(_pointer(t[1]), (n, 3, W), np.float64),
-                carray(_pointer(t[2]), (n, 3), np.float64),
-                carray(_pointer(t[3]), (points,), np.int64),
-                carray(_pointer(t[4]), (points, 3), np.float64),
-                carray(_pointer(t[5]), (points, 3, W), np.float64),
-                t[6],
-                t[7],
-                t[8],
-            )
-            pose = Pose(
-                carray(_pointer(p[0]), (n, 3, 3), np.float64),
-                carray(_pointer(p[1]), (n, 3, 3), np.float64),
-                carray(_pointer(p[2]), (n, 3), np.float64),
-                carray(_pointer(p[3]), (n, 3, W), np.float64),
-                carray(_pointer(p[4]), (W,), np.float64),
-                carray(_pointer(p[5]), (1,), np.float64),
-            )
-            blocks = Blocks(
-                carray(_pointer(b[0]), (n, 6, SHAPE + W), np.float64),
-                carray(_pointer(b[1]), (n, 3, SHAPE + W), np.float64),
-                carray(_pointer(b[2]), (n, 3, 3), np.float64),
-                carray(_pointer(b[3]), (W, W), np.float64),
-                carray(_pointer(b[4]), (W,), np.float64),
-                carray(_pointer(b[5]), (1,), np.int64),
-            )
-            table = carray(_pointer(at[4]), (rows, ints), np.int64)
-            numbers = carray(_pointer(at[5]), (rows, floats), np.float64)
+            tree, table, numbers, pose, blocks = _arrays(carray(values, (COUNT,)), ints, floats)
             return accumulate(tree, table, numbers, weight, pose, blocks)
 
         try:
@@ -154,8 +121,7 @@ class Registered:
                 return math.nan  # the fit is lost, and ends the sooner
             try:
                 assert function is not None
-                values = _view(address, COUNT, whole=True).tolist()
-                values = dict(zip(VALUES, values, strict=True))
+                values = carray(ctypes.c_void_p(address), (COUNT,), np.int64)
                 return accumulate_function(function, ints, floats, weight, values)
             # It cannot pass through machine code: `raise_failure` does it. So too what interrupts:
             # out of here, ctypes would drop it and return any number for the cost.
@@ -206,14 +172,68 @@ def pack_external(tables: list[tuple[Registered, Array, Array]], first_column: i
     return External(calls, ints, np.concatenate([floats.ravel() for _, _, floats in tables]))
 
 
-@intrinsic
-def _pointer(typingctx, address):  # type: ignore[no-untyped-def]
+def _pointer(address: int) -> ctypes.c_void_p:
     """Return an address as a pointer."""
+    return ctypes.c_void_p(int(address))
 
+
+@intrinsic
+def _as_pointer(typingctx, address):  # type: ignore[no-untyped-def]
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], cgutils.voidptr_t)
 
     return types.voidptr(types.int64), generate
+
+
+@overload(_pointer)
+def _pointer_in_kernels(address):  # type: ignore[no-untyped-def]
+    return lambda address: _as_pointer(address)
+
+
+@register_jitable
+def _arrays(values: Array, ints: int, floats: int) -> tuple[Tree, Array, Array, Pose, Blocks]:
+    """Return the body, a residual's rows of so many whole and other numbers, the pose and the
+    blocks, which are the solver's own memory; in kernels and in Python.
+
+    :param values: (COUNT,) as `VALUES` lists them.
+    """
+    rows = values[0]
+    n = values[1]
+    points = values[2]
+    W = values[3]
+    t = values[_TREE:]
+    p = values[_POSE:]
+    b = values[_BLOCKS:]
+    tree = Tree(
+        carray(_pointer(t[0]), (n,), np.int64),
+        carray(_pointer(t[1]), (n, 3, W), np.float64),
+        carray(_pointer(t[2]), (n, 3), np.float64),
+        carray(_pointer(t[3]), (points,), np.int64),
+        carray(_pointer(t[4]), (points, 3), np.float64),
+        carray(_pointer(t[5]), (points, 3, W), np.float64),
+        t[6],
+        t[7],
+        t[8],
+    )
+    pose = Pose(
+        carray(_pointer(p[0]), (n, 3, 3), np.float64),
+        carray(_pointer(p[1]), (n, 3, 3), np.float64),
+        carray(_pointer(p[2]), (n, 3), np.float64),
+        carray(_pointer(p[3]), (n, 3, W), np.float64),
+        carray(_pointer(p[4]), (W,), np.float64),
+        carray(_pointer(p[5]), (1,), np.float64),
+    )
+    blocks = Blocks(
+        carray(_pointer(b[0]), (n, 6, SHAPE + W), np.float64),
+        carray(_pointer(b[1]), (n, 3, SHAPE + W), np.float64),
+        carray(_pointer(b[2]), (n, 3, 3), np.float64),
+        carray(_pointer(b[3]), (W, W), np.float64),
+        carray(_pointer(b[4]), (W,), np.float64),
+        carray(_pointer(b[5]), (1,), np.int64),
+    )
+    table = carray(_pointer(values[4]), (rows, ints), np.int64)
+    numbers = carray(_pointer(values[5]), (rows, floats), np.float64)
+    return tree, table, numbers, pose, blocks
 
 
 @intrinsic
@@ -301,45 +321,29 @@ def accumulate_function(
     columns_of_ints: int,
     columns_of_floats: int,
     weight: float,
-    values: Mapping[str, int],
+    values: Array,
 ) -> float:
     """Add every row's JᵀJ and Jᵀr to the blocks and return the cost, 1/2 weight |r|^2.
 
-    :param values: sizes and addresses by their names in `VALUES`.
+    :param values: (COUNT,) as `VALUES` lists them.
     :raises ShapeError: the function does not return numbers (n,).
     :raises InvalidValueError: they are not finite.
     """
-    rows = values["rows"]
-    n = values["parts"]
-    W = values["W"]
-    P = values["shape"]
-    ints = _view(values["ints"], rows, columns_of_ints, whole=True)
-    floats = _view(values["floats"], rows, columns_of_floats)
-    up = _view(values["parents"], n, whole=True)
-    rotation = _view(values["R"], n, 3, 3)
-    position = _view(values["t"], n, 3)
-    state = _view(values["Omega"], n, 3, 3)
-    by_shape = _view(values["D"], n, 3, W)
-    shape = _view(values["beta"], W)
-    blocks_A = _view(values["A"], n, 6, SHAPE + W)
-    blocks_Hu = _view(values["H_u"], n, 3, SHAPE + W)
-    blocks_Huu = _view(values["H_uu"], n, 3, 3)
-    blocks_C = _view(values["C"], W, W)
-    blocks_c = _view(values["c"], W)
-    crossed = _view(values["cross"], 1, whole=True)
+    tree, ints, floats, pose, blocks = _arrays(values, columns_of_ints, columns_of_floats)
+    P = int(tree.shape)
     cost = 0.0
     s = math.sqrt(weight)
-    for k in range(rows if weight > 0.0 else 0):
+    for k in range(len(ints) if weight > 0.0 else 0):
         i = int(ints[k, 0])
-        parent = np.eye(3) if up[i] < 0 else rotation[up[i]].copy()
+        parent = tree.parents[i]
         part = Part(
-            rotation[i].copy(),
-            position[i].copy(),
-            by_shape[i, :, :P].copy(),
-            state[i].copy(),
-            parent,
-            position[0].copy(),
-            shape[:P].copy(),
+            pose.R[i].copy(),
+            pose.t[i].copy(),
+            pose.D[i, :, :P].copy(),
+            pose.Omega[i].copy(),
+            np.eye(3) if parent < 0 else pose.R[parent].copy(),
+            pose.t[0].copy(),
+            pose.beta[:P].copy(),
         )
         row = ints[k].copy(), floats[k].copy()
 
@@ -348,16 +352,16 @@ def accumulate_function(
 
         r, J_x, J_u, J_beta = (s * a for a in differentiate(residual, part))
         cost += 0.5 * float(r @ r)
-        for block, J in ((blocks_A[i], J_x), (blocks_Hu[i], J_u)):
+        for block, J in ((blocks.A[i], J_x), (blocks.H_u[i], J_u)):
             block[:, GRADIENT] += J.T @ r
             block[:, SHAPE : SHAPE + P] += J.T @ J_beta
-        blocks_A[i, :, :6] += J_x.T @ J_x
-        blocks_Hu[i, :, :6] += J_u.T @ J_x
-        blocks_Huu[i] += J_u.T @ J_u
-        blocks_C[:P, :P] += np.triu(J_beta.T @ J_beta)
-        blocks_c[:P] += J_beta.T @ r
+        blocks.A[i, :, :6] += J_x.T @ J_x
+        blocks.H_u[i, :, :6] += J_u.T @ J_x
+        blocks.H_uu[i] += J_u.T @ J_u
+        blocks.C[:P, :P] += np.triu(J_beta.T @ J_beta)
+        blocks.c[:P] += J_beta.T @ r
         if J_u.any() and (J_x.any() or J_beta.any()):
-            crossed[0] = 1
+            blocks.cross[0] = 1
     return cost
 
 
@@ -375,13 +379,3 @@ def _numbers(value: Any, n: int | None) -> Array:
     if not np.isfinite(r).all():
         raise InvalidValueError(f"it must return finite numbers, but returned {r.tolist()}")
     return r
-
-
-def _view(address: int, *shape: int, whole: bool = False) -> Array:
-    """Return the kernels' own memory as an array."""
-    size = math.prod(shape)
-    if size == 0:
-        return np.zeros(shape)
-    kind = ctypes.c_int64 if whole else ctypes.c_double
-    memory: Any = (kind * size).from_address(address)
-    return np.frombuffer(memory, dtype=np.int64 if whole else np.float64).reshape(shape)
