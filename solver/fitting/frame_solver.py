@@ -60,7 +60,7 @@ def fit(
     :param body: a `Body`, or any tree with the arrays of `BodyArrays`.
     :param measurements: of one frame, in camera axes: x right, y down, z forward.
     :param init: where to start, camera frame, metres, in one stage; without it, as
-        `initial_states` finds, in several. Where 2D keypoints alone are given, that is from twelve
+        `initial_states` finds, in several. Where 2D keypoints alone are given, that is from 24
         headings, of which the fit of the lowest cost is kept; "multi" does so always. Where 3D
         keypoints of millimetres leave a large cost, the default stages run once more, with less
         exact points at first.

