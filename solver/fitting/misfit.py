@@ -168,7 +168,7 @@ def warn_of_unlikely_shape(betas: Sequence[Array], priors: Priors) -> None:
     """
     if priors.flow is None or not len(betas):
         return
-    deviations = float(np.median([np.linalg.norm(beta) for beta in betas]))
+    deviations = sorted(float(np.linalg.norm(beta)) for beta in betas)[len(betas) // 2]
     if deviations > math.sqrt(len(betas[0])) + _UNLIKELY:
         warnings.warn(
             f"The fitted shape is {deviations:.0f} standard deviations from the mean of people, "
