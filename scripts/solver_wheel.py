@@ -80,7 +80,7 @@ solver.fit(body, everything, init=first.state)
 solver.linearize(body, everything, first.state)
 solver.gauss_newton_step(body, everything, first.state)
 clip = solver.fit_clip(body, [image, everything], temporal=solver.Temporal(), focal=True)
-views = [[solver.View(image), solver.View(image, np.eye(3), [0.1, 0.0, 0.0])]] * 6
+views = [[solver.View(image), solver.View(image, np.eye(3), [0.0, 0.0, 0.001])]] * 6
 stands = solver.StandingPoints([coco[15]], np.ones((6, 1)))
 solver.fit_motion(body, views, np.arange(6) / 30.0, stands=stands, covariance=True)
 solver.fit_motion(body, [everything] * 6, np.arange(6) / 30.0, window=0.1, overlap=0.05)
