@@ -22,9 +22,10 @@ from .captures import people_of, shown_capture
 from .comparison import cameras_of
 from .declared_properties import with_options
 from .file_field import SavingOperator, output_file
-from .reporting import refuse, rpt_, tip_, warning_text
+from .reporting import refuse, rpt_, tip_
 
 if TYPE_CHECKING:
+    from ..notices import Notice
     from ..scene.build import BuildOptions
     from ..scene.export.export import ExportOptions
 
@@ -188,18 +189,21 @@ class SCOPE_OT_export(SavingOperator):
         """
         path = output_file(self.filepath, self.suffix())
         _check_available(self.format)
+        warnings: list[Notice] = []
+        options = self._options(warnings)
         if self.which == "RIG":
-            written = self._write_rig(context.scene, path)
+            written = self._write_rig(context.scene, path, options)
         else:
-            captures = self._captures(context)
-            written = write_captures(path, self.format, captures, self._options())
-        return rpt_(
+            written = write_captures(path, self.format, self._captures(context), options)
+        message = rpt_(
             "Wrote {files} in {folder}",
             files=", ".join(p.name for p in written),
             folder=written[0].parent,
         )
+        return self.report_all(message, warnings)
 
-    def _options(self) -> ExportOptions:
+    def _options(self, warnings: list[Notice]) -> ExportOptions:
+        """Return the options of the export, which adds what it warns of to ``warnings``."""
         from ..scene.export.export import ExportOptions
 
         return ExportOptions(
@@ -207,7 +211,7 @@ class SCOPE_OT_export(SavingOperator):
             shape=self.shape.lower(),
             separate=self.separate,
             bvh_unit=self.bvh_unit.lower(),
-            warn=lambda notice: self.report({"WARNING"}, warning_text(notice, rpt_)),
+            warn=warnings.append,
         )
 
     def _captures(self, context: bpy.types.Context) -> list[bpy.types.Collection]:
@@ -227,7 +231,7 @@ class SCOPE_OT_export(SavingOperator):
                 )
         return collections
 
-    def _write_rig(self, scene: bpy.types.Scene, path: Path) -> list[Path]:
+    def _write_rig(self, scene: bpy.types.Scene, path: Path, options: ExportOptions) -> list[Path]:
         """Write the chosen rig; return the files.
 
         :raises UsageError: no rig is chosen, or the format has none.
@@ -245,7 +249,7 @@ class SCOPE_OT_export(SavingOperator):
                 "no rig is chosen under Retarget; choose a rig there and press Retarget first"
             )
         take = _take_of(rig, captures_of(scene))
-        return export_rig(path, rig, replace(self._options(), take=take))
+        return export_rig(path, rig, replace(options, take=take))
 
 
 def write_captures(

@@ -104,7 +104,7 @@ class ReportingOperator(bpy.types.Operator):
         """
         self.report({"INFO"}, display_text(message))
         for warning in warnings:
-            self.report({"WARNING"}, warning_text(warning))
+            self.report({"WARNING"}, warning_text(warning, rpt_))
         return ""
 
 

@@ -20,7 +20,7 @@ from scope.solver.body_file import load_body
 
 from ..edit.walking import motion_of, walk
 from ..made_motion import made_views
-from ..scene.made_rigs import captured
+from ..scene.made_rigs import build_rig, captured
 
 
 @pytest.fixture
@@ -64,6 +64,20 @@ def test_a_file_whose_name_is_not_utf8_is_written_and_reported(tmp_path, capfd):
     assert bpy.ops.scope.export(filepath=str(tmp_path / name), format="NPZ") == {"FINISHED"}
     assert (tmp_path / name).is_file()
     assert "Wrote l\ufffdufer.npz" in capfd.readouterr().out
+
+
+def test_what_a_file_cannot_show_is_reported_last(tmp_path, capfd):
+    """Blender's status bar shows the last report alone."""
+    captured(motion_of(walk(0.1)))
+    rig, _ = build_rig("mixamo")
+    bpy.ops.mesh.primitive_cube_add()
+    skin = bpy.context.object
+    skin.modifiers.new("Lattice", "LATTICE")
+    skin.modifiers.new("Armature", "ARMATURE").object = skin.parent = rig
+    bpy.context.scene.scope_retarget.rig = rig
+    bpy.ops.scope.export(filepath=str(tmp_path / "a.fbx"), format="FBX", which="RIG")
+    printed = capfd.readouterr().out
+    assert printed.index("Info: Wrote a.fbx") < printed.index("Warning: a.fbx does not show 'Cube'")
 
 
 @pytest.mark.parametrize("which", [0, 1])
