@@ -357,7 +357,8 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
         frame_rate=frame_rate,
         set_frame_range=settings.set_frame_range,
         start_frame=float(settings.start_frame),
-        shape=settings.shape.lower(),
+        # empty in a .blend file that has a value which is offered no more
+        shape=settings.shape.lower() or "keyed",
         with_camera=settings.with_camera,
         with_markers=settings.with_markers,
     )
