@@ -30,8 +30,9 @@ _LONGEST_S = 100.0
 _LARGEST = 1e9  # of a number in the file
 _AXES = {"X": np.array([1.0, 0, 0]), "Y": np.array([0, 1.0, 0]), "Z": np.array([0, 0, 1.0])}
 _CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
-_WHOLE_RATES = [24.0, 25.0, 30.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0]
+_WHOLE_RATES = [24.0, 25.0, 30.0, 50.0, 60.0, 90.0, 100.0, 120.0, 125.0, 240.0, 250.0]
 _NTSC_RATES = [rate * 1000 / 1001 for rate in (24, 30, 60, 120)]
+_BELOW_ONE = 1.0 - 1e-9  # of a last digit that is cut off, never a whole one
 _LONGEST_NAME = 200  # characters
 _MOTION = re.compile(
     r"^[ \t]*MOTION\s+Frames\s*:\s*(\S+)\s+Frame\s+Time\s*:\s*(\S+)", re.MULTILINE | re.IGNORECASE
@@ -273,9 +274,11 @@ def _rate(text: str) -> float:
         raise _DamageError(f"its frame time is {step_s:g} s")
     digit_s = 10.0 ** int(Decimal(text).as_tuple().exponent)
     # a time is rounded to its last digit, or cut off after it
-    for error_s in (0.5 * digit_s, digit_s):
-        for rates in (_WHOLE_RATES, _NTSC_RATES, [max(round(1.0 / step_s), 1)]):
-            nearest = min(rates, key=lambda rate: abs(1.0 / rate - step_s))
-            if abs(1.0 / nearest - step_s) <= error_s:
-                return float(nearest)
-    return 1.0 / step_s
+    for least_s, most_s in ((-0.5 * digit_s, 0.5 * digit_s), (0.0, _BELOW_ONE * digit_s)):
+        for rates in (_WHOLE_RATES, _NTSC_RATES):
+            usual = [rate for rate in rates if least_s <= 1.0 / rate - step_s <= most_s]
+            if usual:
+                return min(usual, key=lambda rate: abs(1.0 / rate - step_s))
+    whole = float(max(round(1.0 / step_s), 1))
+    is_whole = -0.5 * digit_s <= 1.0 / whole - step_s <= _BELOW_ONE * digit_s
+    return whole if is_whole else 1.0 / step_s
