@@ -46,6 +46,10 @@ from .unfinished import Target, lock_of
 
 _SAME_TIME_S = 1e-3
 _SAME_SHAPE = 0.01
+# Over which the frame rate is measured, about 1 to 10 s: the images of a network camera come
+# unevenly, and several at once, so that times of neighbours say little.
+_FEWEST_RATE_ROWS = 30
+_MOST_RATE_ROWS = 300
 
 
 class Recorded(Protocol):
@@ -171,9 +175,15 @@ class Recording:
         those of many cameras do in the dark.
         """
         said = self._source.fps
-        if len(track) < 2:
+        scenes = np.cumsum(np.diff(track.times, prepend=track.times[0]) > MAX_STEP_S)
+        longest = np.bincount(scenes).max()
+        rows = int(np.clip(longest // 2, _FEWEST_RATE_ROWS, _MOST_RATE_ROWS))
+        is_in_one_scene = scenes[rows:] == scenes[:-rows]
+        if not is_in_one_scene.any():
             return said
-        measured = float(np.median(np.diff(track.frames) / np.diff(track.times)))
+        passed_frames = track.frames[rows:] - track.frames[:-rows]
+        passed_s = track.times[rows:] - track.times[:-rows]
+        measured = float(np.median((passed_frames / passed_s)[is_in_one_scene]))
         if abs(measured - said) < MEASURED_WITHIN * measured:
             return said
         return nearest_fps(measured) or said

@@ -22,7 +22,7 @@ def pose_given(body, index, time_s, delay_s, betas=None):
     """A body that turns by 2 rad/s and moves by 1 m/s, as it was ``delay_s`` before its frame."""
     then = time_s - delay_s
     R = np.tile(np.eye(3), (body.K + 1, 1, 1))
-    R[0] = rotations.exp([0.0, 0.0, 2.0 * then])
+    R[0] = rotations.exp([0.0, 0.0, 2.0 * then % (2.0 * np.pi)])
     nothing = np.zeros((body.K + 1, 3))
     betas = np.zeros(body.P) if betas is None else betas
     T = world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.0)
@@ -100,8 +100,25 @@ def test_only_frames_in_which_nobody_was_seen_are_not_valid(body):
 @pytest.mark.parametrize(("rate", "kept"), [(15.1, 15.1), (29.4, 30.0), (60.3, 60.0)])
 def test_the_frame_rate_is_that_of_the_frames_that_came(body, rate, kept):
     """In the dark, many cameras deliver half of what they say."""
-    motion = recorded(body, [(2 * k, 2 * k / rate) for k in range(20)])
+    motion = recorded(body, [(2 * k, 2 * k / rate) for k in range(45)])
     assert motion.mocap_framerate == pytest.approx(kept)
+
+
+@pytest.mark.parametrize("burst", [4, 7])
+@pytest.mark.parametrize("interrupted_s", [0.0, 2.0])
+def test_frames_that_come_in_bursts_do_not_raise_the_frame_rate(body, burst, interrupted_s):
+    """As those of network cameras do: most of them right after the one before."""
+    frames = []
+    for k in range(300):
+        time_s = k // burst * burst / 30 + k % burst * 0.002
+        frames.append((k, time_s + (interrupted_s if k >= 84 else 0.0)))
+    assert recorded(body, frames).mocap_framerate == 30
+    assert recorded(body, frames, 60).mocap_framerate == 30
+
+
+def test_a_short_recording_has_the_frame_rate_that_its_source_says(body):
+    motion = recorded(body, [(k, k // 4 * 4 / 30 + k % 4 * 0.002) for k in range(20)], 25)
+    assert motion.mocap_framerate == 25
 
 
 def test_after_an_interruption_another_scene_begins(body):
