@@ -92,7 +92,7 @@ def prepare(video: Path, body: Body, end_s: float = float("inf")) -> PreparedTra
             for number, observation in tracker.step(frame.image_rgb, time_s=frame.timestamp_s):
                 tracklets[number].add(len(times), observation)
             times.append(frame.timestamp_s)
-    people = people_of(times, list(tracklets.values()))
+    people, _ = people_of(times, list(tracklets.values()))
     if not people:
         raise NoPersonError(
             f"no person was found in {video}: the benchmark needs the clips of ../shared"

@@ -56,7 +56,7 @@ def replay(frames: int, people: int) -> dict[str, float]:
             tracklet.add(k, moved(seen[k % len(seen)], p * APART_PX))
     peaks["tracking"] = peak_mib()
     times = [k / fps for k in range(frames)]
-    found = people_of(times, tracklets)[:people]
+    found = people_of(times, tracklets)[0][:people]
     tracks = [make_track(range(frames), times, person) for person in found]
     del found, tracklets, tracklet, tracker
     return_freed_memory()
