@@ -209,8 +209,8 @@ def searched() -> Iterator[float]:
         before = popup()
         key("F3")
         yield from until(lambda empty=before: popup() != empty, 20, "the search")
-        # its field takes letters a moment after it is drawn in Blender 5.2
-        yield 1.5
+        key("BackSpace")  # Blender 5.2 loses the first key
+        yield 0.5
         before = popup()
         subprocess.Popen(["xdotool", "type", "--delay", "60", words])
         yield from until(lambda empty=before: popup() != empty, 20, "what is found")
