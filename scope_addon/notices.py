@@ -188,6 +188,8 @@ SENTENCES = {
     "into the list",
     "modifiers_left_out": "{file} does not show '{mesh}' as its modifiers do: {modifiers:names}; "
     "apply or remove these, and export again",
+    "shape_keys_left_out": "{file} lacks these shape keys of '{mesh}', with which its modifiers "
+    "make other faces: {keys:names}; remove such modifiers, or change the keys, and export again",
     # an imported motion
     "other_gender": "the motion is of a {gender} body, but '{body}' is {body_gender}",
     "other_body": "the poses were applied as they are to Scope's own body, whose rest pose and "

@@ -5,7 +5,8 @@ out the shape keys.
 Each mesh is replaced by what its modifiers make of it at rest, as if all came before the Armature
 modifier, which remains; and each shape key by what they make of the mesh with that key. So a file
 holds what the viewport shows, except for a modifier that follows the motion itself, such as a
-lattice, and one under which a shape key has other faces than the mesh, such as a decimation.
+lattice, and a shape key with which they make other faces than without it, such as a decimation, or
+a mirror that merges the halves of a mouth only while it is closed.
 """
 
 from __future__ import annotations
@@ -48,22 +49,23 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
     notices: list[Notice] = []
     with in_position(scene.objects, "REST"):
         for obj, modifiers in shown.items():
-            mesh = _modified_mesh(scene, obj)
-            if mesh is not None:
-                modified[obj] = mesh
-            missing = [m.name for m in modifiers if mesh is None or m.type in _MOVING]
-            if missing:
-                values = {"file": file_name, "mesh": obj.name, "modifiers": missing}
-                notices.append(notice("modifiers_left_out", **values))
+            modified[obj], keys_left_out = _modified_mesh(scene, obj)
+            values = {"file": file_name, "mesh": obj.name}
+            if moving := [m.name for m in modifiers if m.type in _MOVING]:
+                notices.append(notice("modifiers_left_out", **values, modifiers=moving))
+            if keys_left_out:
+                notices.append(notice("shape_keys_left_out", **values, keys=keys_left_out))
     try:
         for modifier, _, _ in hidden:
             modifier.show_viewport = modifier.show_render = False
-        values = actions.shape_key_values(scene, animated, frames)
+        shown_values = actions.shape_key_values(scene, animated, frames)
         with replaced_meshes(modified):
             for obj, mesh in modified.items():
-                if shaped.get(obj) in animated:
-                    keys = mesh.shape_keys
-                    actions_made.append(actions.key_shape_keys(keys, frames, values[shaped[obj]]))
+                if mesh.shape_keys is not None and shaped[obj] in animated:
+                    names = shaped[obj].key_blocks.keys()[1:]
+                    columns = [names.index(name) for name in mesh.shape_keys.key_blocks.keys()[1:]]
+                    kept = shown_values[shaped[obj]][:, columns]
+                    actions_made.append(actions.key_shape_keys(mesh.shape_keys, frames, kept))
             bpy.context.view_layer.update()
             yield notices
     finally:
@@ -77,9 +79,11 @@ def _shown_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [m for m in obj.modifiers if m.show_viewport and m.type != "ARMATURE"]
 
 
-def _modified_mesh(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Mesh | None:
-    """Return what the modifiers of an object make of its mesh, with its shape keys; None where a
-    key would have other faces.
+def _modified_mesh(
+    scene: bpy.types.Scene, obj: bpy.types.Object
+) -> tuple[bpy.types.Mesh, list[str]]:
+    """Return what the modifiers of an object make of its mesh, with its shape keys, and the names
+    of those that it lacks, because with them the modifiers make other faces.
     """
     copy = obj.copy()
     copy.data = obj.data.copy()
@@ -92,25 +96,24 @@ def _modified_mesh(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.M
     mesh = bpy.data.meshes.new_from_object(
         copy.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
     )
+    places: dict[str, NDArray[np.float32]] = {}
     try:
         corners = _corners(mesh)
-        places = []
         for block in blocks[1:]:
             block.value = 1.0
             evaluated = copy.evaluated_get(bpy.context.evaluated_depsgraph_get())
             block.value = 0.0
             keyed = evaluated.to_mesh()
-            same = np.array_equal(_corners(keyed), corners)
-            places.append(_vertices(keyed))
+            has_same_vertices = len(keyed.vertices) == len(mesh.vertices)
+            if has_same_vertices and np.array_equal(_corners(keyed), corners):
+                places[block.name] = _vertices(keyed)
             evaluated.to_mesh_clear()
-            if not same:
-                bpy.data.meshes.remove(mesh)
-                return None
+        left_out = [block.name for block in blocks[1:] if block.name not in places]
     finally:
         bpy.data.batch_remove([copy, copy.data])
-    if blocks:
+    if places:
         _add_keys(mesh, obj.data.shape_keys, places)
-    return mesh
+    return mesh, left_out
 
 
 def _keys_at_zero(mesh: bpy.types.Mesh) -> list[bpy.types.ShapeKey]:
@@ -127,15 +130,17 @@ def _keys_at_zero(mesh: bpy.types.Mesh) -> list[bpy.types.ShapeKey]:
 
 
 def _add_keys(
-    mesh: bpy.types.Mesh, source: bpy.types.Key, places: list[NDArray[np.float32]]
+    mesh: bpy.types.Mesh, source: bpy.types.Key, places: dict[str, NDArray[np.float32]]
 ) -> None:
-    """Give a mesh shape keys with the names, ranges and values of another one's.
+    """Give a mesh a basis, and shape keys with the names, ranges and values of another one's.
 
-    :param places: (V, 3) of each key but the basis.
+    :param places: (V, 3) of each key but the basis, by its name.
     """
     obj = bpy.data.objects.new(mesh.name, mesh)
-    for block, vertices in zip(source.key_blocks, [_vertices(mesh), *places], strict=True):
-        key = obj.shape_key_add(name=block.name, from_mix=False)
+    basis = source.key_blocks[0].name
+    for name, vertices in {basis: _vertices(mesh), **places}.items():
+        block = source.key_blocks[name]
+        key = obj.shape_key_add(name=name, from_mix=False)
         key.data.foreach_set("co", vertices.ravel())
         key.slider_min = block.slider_min
         key.slider_max = block.slider_max

@@ -44,36 +44,78 @@ def corners(obj, frame):
     return np.array([evaluated.matrix_world @ v.co for v in evaluated.to_mesh().vertices])
 
 
+def export(path, rig):
+    """Export a rig; return the warnings."""
+    warnings = []
+    export_rig(path, rig, ExportOptions(warn=warnings.append))
+    return [str(warning) for warning in warnings]
+
+
+def assert_shows(path, shown):
+    """Check that the mesh in a file has these vertices at the first and the last frame; return
+    it.
+    """
+    first = round(read_back(path, RATE))
+    (read,) = (obj for obj in bpy.data.objects if obj.type == "MESH")
+    for vertices, frame in zip(shown, (1, LAST), strict=True):
+        found = corners(read, first + frame - (0 if path.suffix == ".usdc" else 1))
+        apart = np.linalg.norm(found[:, None] - vertices, axis=2)
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-4
+    return read.data
+
+
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
 def test_modifiers_and_the_shape_keys_under_them_are_in_the_file(tmp_path, suffix):
     rig, skin = half_a_face("MIRROR", "SUBSURF")
     shown = [corners(skin, frame) for frame in (1, LAST)]
     counts = [len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "actions")]
-    warnings = []
-    export_rig(tmp_path / f"rig{suffix}", rig, ExportOptions(warn=warnings.append))
-    assert warnings == []
+    assert export(tmp_path / f"rig{suffix}", rig) == []
     assert [len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "actions")] == counts
     assert (skin.data.name, skin.data.shape_keys.key_blocks.keys()) == ("Cube", ["Basis", "mouth"])
     assert all(m.show_viewport and m.show_render for m in skin.modifiers)
-    first = round(read_back(tmp_path / f"rig{suffix}", RATE))
-    (read,) = (obj for obj in bpy.data.objects if obj.type == "MESH")
-    for vertices, frame in zip(shown, (1, LAST), strict=True):
-        found = corners(read, first + frame - (0 if suffix == ".usdc" else 1))
-        apart = np.linalg.norm(found[:, None] - vertices, axis=2)
-        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-4
+    assert_shows(tmp_path / f"rig{suffix}", shown)
 
 
-@pytest.mark.parametrize("kind", ["DECIMATE", "LATTICE"])
-def test_what_a_file_cannot_show_of_a_modifier_is_said(tmp_path, kind):
-    """A decimation by 0.9 keeps other edges under the shape key; a lattice moves by itself."""
-    rig, skin = half_a_face("SUBSURF", kind)
-    if kind == "DECIMATE":
-        skin.modifiers[kind.title()].ratio = 0.9
-    warnings = []
-    export_rig(tmp_path / "rig.fbx", rig, ExportOptions(warn=warnings.append))
-    (warning,) = warnings
-    assert str(warning).startswith("rig.fbx does not show 'Cube' as its modifiers do: ")
-    assert "'Subsurf'" not in str(warning) if kind == "LATTICE" else "'Decimate'" in str(warning)
-    read_back(tmp_path / "rig.fbx", RATE)
-    (read,) = (obj for obj in bpy.data.objects if obj.type == "MESH")
-    assert "mouth" in read.data.shape_keys.key_blocks
+def test_a_modifier_that_moves_by_itself_is_said(tmp_path):
+    rig, skin = half_a_face("SUBSURF", "LATTICE")
+    shown = [corners(skin, frame) for frame in (1, LAST)]
+    (warning,) = export(tmp_path / "rig.fbx", rig)
+    assert warning.startswith("rig.fbx does not show 'Cube' as its modifiers do: 'Lattice'; ")
+    assert "mouth" in assert_shows(tmp_path / "rig.fbx", shown).shape_keys.key_blocks
+
+
+@pytest.mark.parametrize("has_other_key", [False, True])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx"])
+def test_a_shape_key_with_which_modifiers_make_other_faces_is_left_out(
+    tmp_path, suffix, has_other_key
+):
+    """The mirror merges a corner at its plane, which the key moves away."""
+    rig, skin = half_a_face("MIRROR")
+    blocks = skin.data.shape_keys.key_blocks
+    if has_other_key:
+        brow = skin.shape_key_add(name="brow", from_mix=False)
+        brow.data[7].co.z += 0.5
+        for frame, value in ((1, 1.0), (LAST, 0.5)):
+            brow.value = value
+            brow.keyframe_insert("value", frame=frame)
+    for block in blocks:
+        block.data[0].co.x = 0.1 if block.name == "mouth" else 0.0
+    blocks["mouth"].mute = True
+    shown = [corners(skin, frame) for frame in (1, LAST)]
+    (warning,) = export(tmp_path / f"rig{suffix}", rig)
+    assert warning.startswith(f"rig{suffix} lacks these shape keys of 'Cube', with which ")
+    assert ": 'mouth'; " in warning
+    keys = assert_shows(tmp_path / f"rig{suffix}", shown).shape_keys
+    kept = keys.key_blocks.keys()[1:] if keys is not None else []
+    assert kept == (["brow"] if has_other_key else [])
+
+
+def test_a_decimated_mesh_is_written_without_a_shape_key_that_changes_its_edges(tmp_path):
+    """A decimation by 0.9 keeps other edges under the shape key."""
+    rig, skin = half_a_face("SUBSURF", "DECIMATE")
+    skin.modifiers["Decimate"].ratio = 0.9
+    skin.data.shape_keys.key_blocks["mouth"].mute = True
+    shown = [corners(skin, frame) for frame in (1, LAST)]
+    (warning,) = export(tmp_path / "rig.fbx", rig)
+    assert ": 'mouth'; " in warning
+    assert assert_shows(tmp_path / "rig.fbx", shown).shape_keys is None
