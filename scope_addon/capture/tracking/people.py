@@ -192,8 +192,9 @@ def _end(tracklet: Tracklet, times: Sequence[float], first: bool) -> End:
     return End(time, centers[0], velocity, float(np.median([tracklet.sides_px[k] for k in index])))
 
 
-# Whoever was not followed for `CERTAIN_S` and was seen in a smaller share of the frames, or is less
-# prominent compared to the most prominent person, is a mistake of the detector.
+# Whoever was seen in a smaller share of the frames, or is less prominent compared to the most
+# prominent person, is a mistake of the detector. Of whoever was followed for `CERTAIN_S`, it does
+# not matter how briefly: prominence is then compared in those frames in which each was seen.
 CERTAIN_S = 3.0
 MIN_SHARE = 0.02
 MIN_PROMINENCE = 0.05
@@ -227,14 +228,15 @@ def people_of(
     found = [[tracklets[k] for k in chain] for chain in link(tracklets, times)]
     counted = _plausible(found, times)
     prominence = [_prominence(person, times) for person in counted]
-    least = MIN_PROMINENCE * max(prominence, default=0.0)
-    certain = _frames_in(CERTAIN_S, times)
     order = sorted(range(len(counted)), key=lambda k: prominence[k], reverse=True)
-    people = [
-        counted[k]
-        for k in order
-        if prominence[k] >= least or _followed_frames(counted[k], times) >= certain
-    ]
+    certain = _frames_in(CERTAIN_S, times)
+    people = []
+    for k in order:
+        share = prominence[k] / prominence[order[0]]
+        if _followed_frames(counted[k], times) >= certain:
+            share *= _seen_frames(counted[order[0]]) / _seen_frames(counted[k])
+        if share > MIN_PROMINENCE:
+            people.append(counted[k])
     doubtful = [person for person in found if not any(person is each for each in people)]
     return people, doubtful
 

@@ -335,24 +335,27 @@ def test_who_passes_through_a_long_clip_is_a_person_and_a_flicker_is_none() -> N
 
 
 @pytest.mark.parametrize(
-    ("clip_s", "rows", "is_person"),
+    ("clip_s", "rows", "side", "is_person"),
     [
-        (600, [range(1000, 1020)], True),
-        (60, [range(100, 120)], True),
-        (60, [range(100, 110)], False),
-        (600, [range(1000, 1010), range(1013, 1023)], True),  # hidden for a moment
+        (600, [range(1000, 1020)], 100.0, True),
+        (60, [range(100, 120)], 100.0, True),
+        (60, [range(100, 120)], 200.0, True),
+        (60, [range(100, 110)], 100.0, False),
+        (600, [range(1000, 1010), range(1013, 1023)], 100.0, True),  # hidden for a moment
+        (20, [range(40, 56)], 10.0, False),  # on a poster
+        (600, [range(3000)], 10.0, False),
     ],
 )
 def test_who_is_seen_for_three_seconds_beside_the_main_person_is_kept(
-    clip_s: int, rows: list[range], is_person: bool
+    clip_s: int, rows: list[range], side: float, is_person: bool
 ) -> None:
-    """Half as large; however long the clip is."""
+    """However long the clip is, but not who is tiny beside the main person's side of 200."""
     rate = 5
     times = (np.arange(clip_s * rate) / rate).tolist()
     main = seen_at([300.0] * len(times))
     passes = [seen_at([700.0] * len(part), part[0]) for part in rows]
     for part in passes:
-        part.sides_px = [100.0] * len(part.rows)
+        part.sides_px = [side] * len(part.rows)
     people, doubtful = people_of(times, [main, *passes])
     assert people == ([[main], passes] if is_person else [[main]])
     assert doubtful == ([] if is_person else [passes])
