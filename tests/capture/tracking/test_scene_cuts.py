@@ -39,11 +39,31 @@ def test_each_scene_begins_with_a_cut() -> None:
     assert cuts([scene(k // 10) for k in range(11)]) == [10.0]  # in the last frame
 
 
+def brightened(picture: np.ndarray, factor: float) -> np.ndarray:
+    return np.clip(picture * factor, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 5])
 @pytest.mark.parametrize("grey", [0, 255])
-def test_a_scene_after_a_gap_begins_with_a_cut(grey: int) -> None:
+def test_a_scene_after_a_gap_begins_with_a_cut(grey: int, frames: int) -> None:
     """Scenes are often parted by black or white."""
-    gap = [np.full((H, W, 3), grey, np.uint8)] * 5
-    assert cuts([*gap, *[scene(0)] * 10, *gap, *[scene(1)] * 10]) == [20.0]
+    gap = [np.full((H, W, 3), grey, np.uint8)] * frames
+    begin = 2 * frames + 10
+    assert cuts([*gap, *[scene(0)] * 10, *gap, *[scene(1)] * 10]) == [begin]
+    fade = [brightened(scene(1), k / 20) for k in range(1, 21)]
+    (cut,) = cuts([*gap, *[scene(0)] * 10, *gap, *fade])
+    assert begin <= cut < begin + 5
+
+
+@pytest.mark.parametrize(
+    "factors",
+    [np.linspace(1.5, 1.0, 21), np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 4)],
+    ids=["a camera sets its exposure", "a fade", "a quick fade"],
+)
+def test_the_same_scene_in_another_light_after_a_gap_is_not_a_cut(factors: np.ndarray) -> None:
+    gap = [np.zeros((H, W, 3), np.uint8)] * 15
+    back = [brightened(scene(0), factor) for factor in factors]
+    assert cuts([*[scene(0)] * 10, *gap, *back, *[scene(0)] * 10]) == []
 
 
 @pytest.mark.parametrize(
