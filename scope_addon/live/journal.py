@@ -33,10 +33,11 @@ from ...solver.errors import InputError
 from ..atomic_write import create_new, reason, sync_open_file
 from ..errors import OutputError, UsageError
 from ..options.live import MAX_PEOPLE
+from ..private_folder import is_private
 from ..temporary import hold, release, remove
 from ..untrusted.files import in_one_line
 from .pose import LivePose, Presence
-from .unfinished import lock_of, other_places
+from .unfinished import lock_of, other_places, temporary_place
 
 if TYPE_CHECKING:
     from ..capture.camera.intrinsics import Camera
@@ -170,7 +171,7 @@ class Journal:
         while self._places and self._file is None:
             wanted = self._places.pop(0)
             try:
-                wanted.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                _make_place(wanted.parent)
                 path = create_new(wanted)
             except OSError as error:
                 refused = refused or error
@@ -213,6 +214,16 @@ def _write(file: IO[bytes], content: bytes) -> None:
     """
     if file.write(content) < len(content):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _make_place(folder: Path) -> None:
+    """Make a folder for a recording, if it does not exist.
+
+    :raises OSError: it cannot be made, or is the temporary one and someone else has made it.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if folder == temporary_place() and not is_private(folder):
+        raise PermissionError(errno.EACCES, f"{folder} is not this user's own")
 
 
 def _remove_held(path: Path) -> None:
@@ -425,7 +436,7 @@ def saved_elsewhere(path: Path, save: Callable[[Path], object]) -> Path:
     problem: Exception = OutputError(f"there is no other place for {path}")
     for folder in other_places(path.parent):
         try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _make_place(folder)
             other = create_new(folder / path.name)
         except OSError as error:
             problem = error

@@ -39,8 +39,16 @@ def is_unfinished(recording: Path) -> bool:
 def other_places(folder: Path) -> list[Path]:
     """Return folders for what cannot be written to one: of the user, and for temporary files."""
     lasting = lasting_folder()
-    folders = [*([lasting / RECORDINGS] if lasting else []), system_folder()]
+    folders = [*([lasting / RECORDINGS] if lasting else []), temporary_place()]
     return [other for other in folders if other != folder]
+
+
+def temporary_place() -> Path:
+    """Return the user's folder for recordings in the system's temporary one, which may have very
+    many files of others. It need not exist, or may be someone else's.
+    """
+    user = f"-{os.geteuid()}" if hasattr(os, "geteuid") else ""
+    return system_folder() / f"scope-{RECORDINGS}{user}"
 
 
 def recordings_in(folder: Path) -> list[Path]:

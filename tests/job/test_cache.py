@@ -46,11 +46,15 @@ def test_kept_captures_are_found(cache):
 def test_recordings_are_found_wherever_they_grow(cache, tmp_path, monkeypatch):
     monkeypatch.setattr(live_names, "lasting_folder", lambda: tmp_path / "user")
     monkeypatch.setattr(live_names, "system_folder", lambda: tmp_path / "tmp")
-    folders = [cache.root / "recordings", tmp_path / "user" / "recordings", tmp_path / "tmp"]
+    own = [cache.root / "recordings", tmp_path / "user" / "recordings"]
+    folders = [*own, live_names.temporary_place()]
     for folder in folders:
         folder.mkdir(parents=True)
         (folder / "job-1.recording").touch()
     assert cache.recordings() == [folder / "job-1.recording" for folder in folders]
+    # Files of others in the temporary folder, of which there may be very many, are not even listed.
+    (tmp_path / "tmp" / "job-2.recording").touch()
+    assert len(cache.recordings()) == len(folders)
 
 
 def test_a_damaged_capture_is_not_found(cache):

@@ -333,6 +333,33 @@ def test_where_a_recording_grows_is_said_if_its_place_refuses_from_the_beginning
     assert said[0].startswith(f"the recording is kept in {other} while it runs: {refused}")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps the user's folders from others")
+@pytest.mark.parametrize("is_link", [False, True])
+def test_a_temporary_folder_that_is_private_alone_takes_a_recording(
+    tmp_path, body, monkeypatch, is_link
+):
+    """Whoever may write to it could replace the recording."""
+    said = []
+    monkeypatch.setattr(unfinished, "lasting_folder", lambda: None)
+    place = unfinished.temporary_place()
+    prepared = tmp_path / "prepared" if is_link else place
+    prepared.mkdir()
+    prepared.chmod(0o777)
+    if is_link:
+        place.symlink_to(prepared)
+    about = read_about(recorded(tmp_path / "a", body)[0]._journal.path)
+    taken = tmp_path / "no folder"
+    taken.touch()
+    growing = journal.Journal(taken / "take.recording", about, body, said.append)
+    if is_link:
+        assert said[0].startswith("the recording is in memory alone")
+        assert list(prepared.iterdir()) == []
+    else:
+        assert growing.path == place / "take.recording"
+        assert place.stat().st_mode & 0o777 == 0o700
+    growing.remove()
+
+
 def test_a_recording_in_memory_alone_is_said_to_be_that(tmp_path, body):
     """As with a name that is too long once it has the growing file's suffix."""
     said = []
