@@ -120,7 +120,7 @@ class Observed:
         seen = [tracklet for tracklet in self.tracklets.values() if tracklet.rows]
         in_order = sorted(seen, key=lambda tracklet: tracklet.rows[0])
         people, doubtful = people_of(times.tolist(), in_order)
-        if chosen is not None and people:
+        if chosen is not None and (people or doubtful):
             first = find_chosen(chosen, people, doubtful, self.timestamps)
             people = [first, *(person for person in people if person is not first)]
         tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]

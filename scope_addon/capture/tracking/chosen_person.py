@@ -60,7 +60,7 @@ def find_chosen(
         distances.append(float(distance / tracklet.sides_px[k]))
         x, y = tracklet.centers_px[k]
         others.append(f"{x:.0f},{y:.0f}")
-    nearest = int(np.argmin(distances[: len(people)]))
+    nearest = int(np.argmin(distances[: len(people)] or distances))
     if distances[nearest] > MAX_DISTANCE:
         nearest = int(np.argmin(distances))
     if distances[nearest] > MAX_DISTANCE:

@@ -61,11 +61,26 @@ def test_who_may_be_a_mistake_is_chosen_where_nobody_else_is() -> None:
     assert find_chosen(ChosenPerson(600.0, 300.0, 1.0), people, doubtful, TIMES) is doubtful[1]
 
 
+def observed_of(tracklets: list[Tracklet], times_s: list[float]) -> Observed:
+    T = len(times_s)
+    turns = np.tile(np.eye(3), (T, 1, 1))
+    background = BackgroundRecord(np.array(times_s), turns, np.ones(T, bool), [])
+    return Observed(list(range(T)), times_s, [], dict(enumerate(tracklets)), background)
+
+
+def test_a_place_finds_somebody_though_all_may_be_mistakes() -> None:
+    """Whoever is seen for a second of a minute."""
+    times_s = (np.arange(1800) / 30).tolist()
+    observed = observed_of([person(600.0, rows=range(30))], times_s)
+    assert observed.tracks(1) == ([], [])
+    (track,), _ = observed.tracks(1, ChosenPerson(600.0, 300.0, 0.5))
+    assert track.seen.sum() == 30
+    with pytest.raises(UsageError, match="people are then at 600,300"):
+        observed.tracks(1, ChosenPerson(200.0, 300.0, 0.5))
+
+
 def test_who_has_chosen_a_person_is_not_told_to_choose_one() -> None:
-    turns = np.tile(np.eye(3), (90, 1, 1))
-    background = BackgroundRecord(np.array(TIMES), turns, np.ones(90, bool), [])
-    people = {k: person(x) for k, x in enumerate((200.0, 600.0))}
-    observed = Observed(list(range(90)), TIMES, [], people, background)
+    observed = observed_of([person(200.0), person(600.0)], TIMES)
     assert [each.x for each in observed.tracks(1)[1]] == [600.0]
     ((track,), others) = observed.tracks(1, ChosenPerson(600.0, 300.0, 1.0))
     assert track.keypoints_px[0, :, 0].mean() == pytest.approx(600.0, abs=30.0)
