@@ -333,7 +333,8 @@ def clip_key(basis: str, footage: Path, rate_given: bool) -> str:
     digest = hashlib.sha256(basis.encode())
     files = [footage]
     if footage.is_dir():
-        files = videos_of_take(footage) or list(filter(Path.is_file, sorted(footage.iterdir())))
+        # Not of what file managers add while a folder is captured.
+        files = videos_of_take(footage) or pictures_in(footage)
     elif rate_given:
         files = numbered_from(footage) or files
     # The numbers of pictures are their times.

@@ -70,6 +70,24 @@ def test_a_clip_is_not_finished_if_what_it_is_made_of_changed_after_its_key_was_
     assert (entry["status"], "was changed" in entry["message"]) == ("failed", True)
 
 
+def test_a_file_manager_that_looks_at_pictures_changes_no_footage(tmp_path: Path) -> None:
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    for name in ("f_1.png", "f_2.png"):
+        (frames / name).write_text(name)
+    settings = CaptureSettings({}, (".npz",))
+    task_basis = settings.basis(program_version())
+    task = ClipTask("frames", "frames", str(frames), str(tmp_path), task_basis, settings)
+
+    def run(arguments: list[str]) -> tuple[int, str, str]:
+        for name in (".DS_Store", "Thumbs.db", "._f_1.png"):
+            (frames / name).write_text("thumbnails")
+        (tmp_path / "frames.npz").touch()
+        return 0, json.dumps({"outputs": [str(tmp_path / "frames.npz")]}), ""
+
+    assert capture_clip(task, ["scope"], run)["status"] == "done"
+
+
 @pytest.mark.parametrize(
     ("name", "options", "suffix"),
     [
