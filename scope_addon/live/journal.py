@@ -2,10 +2,12 @@
 """A recording on the disk while it runs, so that what ends a live capture does not end what was
 recorded.
 
-The file begins with a line of JSON, about the recording, and goes on with records of the same size:
-a checksum of four bytes, and a pose with its camera as numbers. It only grows, so a process that is
-killed leaves whole records and at most one that is not. A thread writes it, because a disk may let
-a capture wait. If the disk refuses, as a full one does, the file is written anew in another place.
+The file begins with a line of JSON, about the recording, and goes on with records, each a checksum
+of four bytes and its content as numbers: a pose with its camera, or only number and time of a frame
+in which the person was not seen. All are multiples of a block long, so that after a damaged one the
+next is found. The file only grows, so a process that is killed leaves whole records and at most one
+that is not. A thread writes it, because a disk may let a capture wait. If the disk refuses, as a
+full one does, the file is written anew in another place.
 
 Blender's window loads this module, so that what reads footage is imported where it is used.
 """
@@ -21,12 +23,13 @@ import re
 import threading
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...solver import Body
 from ...solver.errors import InputError
@@ -46,7 +49,21 @@ _SYNC_S = 2.0  # what a power cut can cost
 _LONGEST_LINE = 1 << 16
 _CHECKSUM_BYTES = 4
 _SOURCE_BYTES = 120
+_BLOCK_BYTES = 32
+_SEEN = b"pose"
+_UNSEEN = b"none"
+# A record's content without a pose: with its checksum, one block.
+_HEAD = np.dtype([("kind", "S4"), ("index", "<i8"), ("timestamp_s", "<f8"), ("person", "<i8")])
 Record = tuple[LivePose, "Camera"]
+
+
+@dataclass(frozen=True, slots=True)
+class _UnseenFrame:
+    """A frame in which a person was not seen."""
+
+    index: int
+    timestamp_s: float
+    person: int
 
 
 @dataclass(frozen=True)
@@ -91,8 +108,8 @@ class Journal:
         self._about = about
         self._record = _record_type(body)
         self._say = say
-        self._records: list[Record] = []
-        self._waiting: queue.SimpleQueue[Record | None] = queue.SimpleQueue()
+        self._records: list[Record | _UnseenFrame] = []
+        self._waiting: queue.SimpleQueue[Record | _UnseenFrame | None] = queue.SimpleQueue()
         self._places = [path, *(folder / path.name for folder in other_places(path.parent))]
         self._file: IO[bytes] | None = None
         # Where the recording is, or at least its beginning; None if it is in memory alone.
@@ -103,8 +120,11 @@ class Journal:
         self._thread.start()
 
     def add(self, pose: LivePose, camera: Camera) -> None:
-        """Have a pose written."""
-        self._waiting.put((pose, camera))
+        """Have a pose written, or that its person is not seen."""
+        if pose.presence is Presence.SEEN:
+            self._waiting.put((pose, camera))
+        else:
+            self._waiting.put(_UnseenFrame(pose.index, pose.timestamp_s, pose.person))
 
     def close(self) -> None:
         """Write what is waiting, and close the file."""
@@ -190,21 +210,27 @@ class Journal:
                 _remove_held(path)
         return refused
 
-    def _packed(self, record: Record) -> bytes:
-        pose, camera = record
+    def _packed(self, record: Record | _UnseenFrame) -> bytes:
+        if isinstance(record, _UnseenFrame):
+            row = np.array((_UNSEEN, record.index, record.timestamp_s, record.person), _HEAD)
+        else:
+            row = self._packed_pose(*record)
+        content = row.tobytes()
+        return zlib.crc32(content).to_bytes(_CHECKSUM_BYTES, "little") + content
+
+    def _packed_pose(self, pose: LivePose, camera: Camera) -> NDArray[np.void]:
         row = np.zeros((), self._record)
         for name in _POSE_ARRAYS:
             row[name] = getattr(pose, name)
+        row["kind"] = _SEEN
         row["index"] = pose.index
         row["timestamp_s"] = pose.timestamp_s
         row["person"] = pose.person
-        row["is_seen"] = pose.presence is Presence.SEEN
         row["intrinsics"] = camera.intrinsics
         row["dist"] = camera.dist
         row["focal_deviation"] = camera.focal_deviation
         row["camera"] = camera.source.encode()[:_SOURCE_BYTES]
-        content = row.tobytes()
-        return zlib.crc32(content).to_bytes(_CHECKSUM_BYTES, "little") + content
+        return row
 
 
 def _write(file: IO[bytes], content: bytes) -> None:
@@ -332,6 +358,8 @@ def read_records(path: Path, about: About, body: Body) -> list[Record]:
     """Read the poses and cameras of a recording, without records that are damaged.
 
     :param body: that of the recording.
+    :return: a frame in which the person is not seen has the person's pose before, and the camera of
+        the record before.
     :raises InputError: the file cannot be read.
     :raises UsageError: the body is another one.
     """
@@ -339,33 +367,58 @@ def read_records(path: Path, about: About, body: Body) -> list[Record]:
         raise UsageError(
             f"{path} was recorded with another body than {about.body} is now; put back that file"
         )
-    record = _record_type(body)
     found: list[Record] = []
-    last_s = np.full(about.people, -np.inf)
-    last_index = np.full(about.people, -1)
+    last: dict[int, Record] = {}
     try:
         with path.open("rb") as file:
             file.readline(_LONGEST_LINE)
-            while len(piece := file.read(_CHECKSUM_BYTES + record.itemsize)) > record.itemsize:
-                content = piece[_CHECKSUM_BYTES:]
-                if zlib.crc32(content) != int.from_bytes(piece[:_CHECKSUM_BYTES], "little"):
-                    continue
-                row = np.frombuffer(content, record)[0]
+            for row in _whole_rows(file, _record_type(body)):
                 person = int(row["person"])
-                is_sound = (
-                    0 <= person < about.people
-                    and row["index"] > last_index[person]
-                    and row["timestamp_s"] > last_s[person]
-                    and all(np.isfinite(row[name]).all() for name in _FLOATS)
-                )
-                if not is_sound:
+                before = last.get(person)
+                if not 0 <= person < about.people or not _is_sound_after(before, row):
                     continue
-                last_s[person] = row["timestamp_s"]
-                last_index[person] = row["index"]
-                found.append(_unpacked(row))
+                if row["kind"] == _SEEN:
+                    last[person] = _unpacked(row)
+                elif before is not None:
+                    unseen = replace(
+                        before[0],
+                        index=int(row["index"]),
+                        timestamp_s=float(row["timestamp_s"]),
+                        presence=Presence.LOST,
+                    )
+                    last[person] = unseen, found[-1][1]
+                else:  # the first pose is damaged
+                    continue
+                found.append(last[person])
     except OSError as error:
         raise InputError(f"{path} cannot be read ({reason(error)})") from error
     return found
+
+
+def _whole_rows(file: IO[bytes], pose_type: np.dtype[Any]) -> Iterator[np.void]:
+    """Yield the contents of the records in a file from where it is, without damaged ones."""
+    content_types = {_SEEN: pose_type, _UNSEEN: _HEAD}
+    while len(block := file.read(_BLOCK_BYTES)) == _BLOCK_BYTES:
+        checksum = int.from_bytes(block[:_CHECKSUM_BYTES], "little")
+        content_type = content_types.get(block[_CHECKSUM_BYTES:][: len(_SEEN)])
+        if content_type is None:
+            continue
+        next_block = file.tell()
+        content = block[_CHECKSUM_BYTES:] + file.read(content_type.itemsize - _HEAD.itemsize)
+        if len(content) == content_type.itemsize and zlib.crc32(content) == checksum:
+            yield np.frombuffer(content, content_type)[0]
+        else:
+            file.seek(next_block)
+
+
+def _is_sound_after(before: Record | None, row: np.void) -> bool:
+    """Return whether the numbers of a record are finite, and its frame is after another one."""
+    if before is not None:
+        pose = before[0]
+        if row["index"] <= pose.index or row["timestamp_s"] <= pose.timestamp_s:
+            return False
+    names = _FLOATS if row["kind"] == _SEEN else ("timestamp_s",)
+    return row["index"] >= 0 and all(np.isfinite(row[name]).all() for name in names)
 
 
 _POSE_ARRAYS = (
@@ -398,14 +451,14 @@ def _record_type(body: Body) -> np.dtype[Any]:
         "raw_root_cam": (3,),
         "keypoints": (KEYPOINT_COUNT, 3),
         "joint_confidence": (joints,),
-        "timestamp_s": (),
         "intrinsics": (3, 3),
         "dist": (5,),
         "focal_deviation": (),
     }
     numbers = [(name, "<f8", shape) for name, shape in shapes.items()]
-    others = [("index", "<i8"), ("person", "<i4"), ("is_seen", "?")]
-    return np.dtype([*numbers, *others, ("camera", f"S{_SOURCE_BYTES}")])
+    fields = [*_HEAD.descr, *numbers, ("camera", f"S{_SOURCE_BYTES}")]
+    filling = -(_CHECKSUM_BYTES + np.dtype(fields).itemsize) % _BLOCK_BYTES
+    return np.dtype([*fields, ("filling", f"V{filling}")])
 
 
 def _unpacked(row: np.void) -> Record:
@@ -415,7 +468,7 @@ def _unpacked(row: np.void) -> Record:
     pose = LivePose(
         index=int(row["index"]),
         timestamp_s=float(row["timestamp_s"]),
-        presence=Presence.SEEN if row["is_seen"] else Presence.LOST,
+        presence=Presence.SEEN,
         is_settled=True,
         person=int(row["person"]),
         **arrays,

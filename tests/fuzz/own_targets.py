@@ -229,6 +229,7 @@ def live_replies(_: Path) -> list[bytes]:
 def recordings(folder: Path) -> list[bytes]:
     from scope.scope_addon.capture.camera.intrinsics import Camera
     from scope.scope_addon.live.journal import About, Journal, fingerprint
+    from scope.scope_addon.live.pose import Presence
     from scope.scope_addon.untrusted.body_file import load_body
 
     from ..live.test_vmc import pose_of
@@ -236,8 +237,8 @@ def recordings(folder: Path) -> list[bytes]:
     body = load_body("scope")
     about = About("scope", fingerprint(body), "fake", "30", (64, 48), 1.0, (3, 0.5), 1, "")
     journal = Journal(folder / "seed.recording", about, body, print)
-    for k in range(3):
-        pose = replace(pose_of(body), index=k, timestamp_s=k / 30)
+    for k, presence in enumerate((Presence.SEEN, Presence.LOST, Presence.SEEN)):
+        pose = replace(pose_of(body, presence=presence), index=k, timestamp_s=k / 30)
         journal.add(pose, Camera(np.eye(3), np.zeros(5), "given"))
     journal.close()
     assert journal.path is not None

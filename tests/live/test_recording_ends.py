@@ -109,7 +109,8 @@ def test_a_cut_or_damaged_file_gives_what_is_whole(tmp_path, body):
     recording._journal.close()
     content = recording._journal.path.read_bytes()
     line = content.index(b"\n") + 1
-    size = (len(content) - line) // POSES
+    size = (len(content) - line - 2 * journal._BLOCK_BYTES) // (POSES - 2)
+    unseen = line + 20 * size  # where the first of two frames without the person is
     file = tmp_path / "damaged.recording"
     about = read_about(recording._journal.path)
     expected = {
@@ -118,7 +119,12 @@ def test_a_cut_or_damaged_file_gives_what_is_whole(tmp_path, body):
         content[: line + 3 * size + 7]: 3,
         content[: line + 5 * size] + bytes(2 * size): 5,  # as a power cut leaves it
         content[: line + 5 * size + 99] + b"x" + content[line + 5 * size + 100 :]: POSES - 1,
+        content[: line + 5 * size + 4] + b"x" + content[line + 5 * size + 5 :]: POSES - 1,
+        content[: line + 5 * size] + bytes(size) + content[line + 6 * size :]: POSES - 1,
+        content[: unseen + 9] + b"x" + content[unseen + 10 :]: POSES - 1,
+        content[: unseen + 5] + b"x" + content[unseen + 6 :]: POSES - 1,
         content[: line + size] + content[line : line + size]: 1,  # the same pose again
+        content[:line] + content[unseen : unseen + 64]: 0,
         content[:line]: 0,
     }
     for damaged, count in expected.items():
@@ -173,6 +179,29 @@ def test_a_first_line_without_entries_names_them_in_our_words(tmp_path):
         read_about(file)
     assert f"({', '.join(f'no {name}' for name in missing)} in its" in str(raised.value)
     assert "__init__" not in str(raised.value)
+
+
+def test_frames_in_which_nobody_is_seen_take_little_room(tmp_path, body):
+    """As those of an empty room, for hours."""
+    recording, _ = recorded(tmp_path / "a", body)
+    growing = recording._journal
+    for k in range(POSES, 3 * POSES):
+        pose = replace(pose_of(body, presence=Presence.LOST), index=2 * k, timestamp_s=k / 15)
+        recording.send(pose, 0.0)
+    last = replace(pose_of(body), index=6 * POSES, timestamp_s=3 * POSES / 15)
+    recording.send(last, 0.0)
+    growing.close()
+    pose_bytes = journal._CHECKSUM_BYTES + journal._record_type(body).itemsize
+    size = growing.path.stat().st_size
+    assert 0 < size - (POSES - 1) * pose_bytes - (2 * POSES + 2) * 32 < 1000  # the first line
+    # all that is kept of one in memory
+    assert set(growing._records[POSES:-1]) == {
+        journal._UnseenFrame(2 * k, k / 15, 0) for k in range(POSES, 3 * POSES)
+    }
+    records = read_records(growing.path, read_about(growing.path), body)
+    assert [pose.index for pose, _ in records] == list(range(0, 6 * POSES + 1, 2))
+    unseen = [pose.index for pose, _ in records if pose.presence is not Presence.SEEN]
+    assert unseen == [40, 42, *range(2 * POSES, 6 * POSES, 2)]
 
 
 def test_a_recording_with_another_body_is_not_finished(tmp_path, body):
@@ -277,7 +306,7 @@ def test_a_disk_that_fills_meanwhile_moves_the_growing_file_to_a_second_place(tm
     said = []
     recording, (path,) = recorded(tmp_path / "full", body, say=said.append)
     growing = recording._journal
-    while growing._waiting.qsize() or len(growing._records) < POSES:
+    while not is_whole(growing.path):
         pass
 
     def refuse(_):
@@ -305,7 +334,7 @@ def test_a_disk_that_takes_a_part_of_a_pose_moves_the_growing_file_too(tmp_path,
     """
     recording, _ = recorded(tmp_path / "full", body)
     growing = recording._journal
-    while growing._waiting.qsize() or len(growing._records) < POSES:
+    while not is_whole(growing.path):
         pass
     growing._file.close()
     growing._file = SimpleNamespace(write=lambda content: len(content) - 1, close=lambda: None)
