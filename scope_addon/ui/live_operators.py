@@ -232,15 +232,14 @@ def play_scene(context: bpy.types.Context) -> None:
     """Play the scene's animation from the frame at which a recording begins, if that is wanted"""
     scene = context.scene
     if scene.scope_live.with_scene and context.screen is not None:
+        # Sound that is already playing would go on where it is.
+        stop_scene(context)
         scene.frame_set(int(scene.scope.start_frame))
-        if not context.screen.is_animation_playing:
-            bpy.ops.screen.animation_play()
+        bpy.ops.screen.animation_play()
 
 
 def stop_scene(context: bpy.types.Context) -> None:
-    """Stop the animation that `play_scene` began; one that the user plays meanwhile stops as
-    well.
-    """
+    """Stop the scene's animation where it is, whoever began it, if it was to play along"""
     if (
         context.scene.scope_live.with_scene
         and context.screen is not None

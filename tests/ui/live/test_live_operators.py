@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
+from scope.scope_addon.ui import live_operators
 from scope.scope_addon.ui.capture_operators import state as capture_state
 from scope.scope_addon.ui.live_operators import end_live, play_scene
 from scope.scope_addon.ui.live_panel import SCOPE_PT_live, _speed
@@ -79,13 +80,31 @@ def test_record_stop_and_cancel(job):
     assert job.done == ["record in 3 s", "stop", "cancel"]
 
 
-def test_a_scene_that_plays_already_plays_along_from_the_first_frame():
+@pytest.mark.parametrize("is_playing", [False, True])
+def test_a_scene_plays_along_from_the_first_frame_with_its_sound(monkeypatch, is_playing):
+    """Blender does not move sound that is playing to a frame that is set meanwhile."""
     scene = bpy.context.scene
     scene.scope_live.with_scene = True
     scene.scope.start_frame = 30
     scene.frame_set(77)
-    play_scene(SimpleNamespace(scene=scene, screen=SimpleNamespace(is_animation_playing=True)))
-    assert scene.frame_current == 30
+    screen = SimpleNamespace(is_animation_playing=is_playing)
+    done = []
+
+    def play():
+        done.append(("play", scene.frame_current))
+        screen.is_animation_playing = not screen.is_animation_playing
+
+    def cancel(restore_frame):
+        done.append(("cancel", scene.frame_current, restore_frame))
+        screen.is_animation_playing = False
+
+    screen_operators = SimpleNamespace(animation_play=play, animation_cancel=cancel)
+    monkeypatch.setattr(
+        live_operators, "bpy", SimpleNamespace(ops=SimpleNamespace(screen=screen_operators))
+    )
+    play_scene(SimpleNamespace(scene=scene, screen=screen))
+    assert screen.is_animation_playing
+    assert done == [*([("cancel", 77, False)] if is_playing else []), ("play", 30)]
 
 
 def test_disabling_the_extension_ends_the_process(job):
