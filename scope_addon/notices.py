@@ -95,10 +95,11 @@ SENTENCES = {
     "left_out": "{footage} shows more people than were captured: at least {others} more, one of "
     "them at {place} (x, y in pixels, @ seconds). Capture everyone, or choose the one to be "
     "captured with Person, --person {place} on the command line",
-    # of several cameras, whose captures have no Person, and turn all videos alike
+    # of one who was chosen, or of several cameras, whose captures have no Person
     "left_out_of_views": "{footage} shows more people than were captured: at least {others} more, "
     "one of them at {place} (x, y in pixels, @ seconds). Capture everyone, --people all on the "
     "command line",
+    # of several cameras, whose captures turn all videos alike
     "turned_view": "{footage}: the person lies or stands on the head in the picture from beginning "
     "to end. If this camera was turned, turn its video with another program first, because Turn "
     "turns those of all cameras",

@@ -106,8 +106,7 @@ class Observed:
     def tracks(
         self, most: int, chosen: ChosenPerson | None = None, speed: float = 1.0
     ) -> tuple[list[Track], list[ChosenPerson]]:
-        """Return the tracks of at most ``most`` people, and where others are, who are left out
-        though nobody was chosen.
+        """Return the tracks of at most ``most`` people, and where others are, who are left out.
 
         :param chosen: who comes first; None: the most prominent one.
         :param speed: how many times as fast as it plays the footage was recorded, so that the gaps
@@ -124,8 +123,7 @@ class Observed:
             first = find_chosen(chosen, people, doubtful, self.timestamps)
             people = [first, *(person for person in people if person is not first)]
         tracks = [make_track(self.frames, times.tolist(), person) for person in people[:most]]
-        others = people[most:] if chosen is None else []
-        return tracks, [place_of(person, self.timestamps) for person in others]
+        return tracks, [place_of(person, self.timestamps) for person in people[most:]]
 
     def continues(self, before: Observed) -> bool:
         """Return whether the frames that this window shares with the one before are the same images

@@ -199,7 +199,7 @@ def observe(
     if not tracks:
         raise _no_person_error(video, options, len(observed.timestamps))
     footage.warnings.extend(video.gap_notices(observed.timestamps))
-    footage.warnings.extend(_warnings_about_people(video, tracks, left_out))
+    footage.warnings.extend(_warnings_about_people(video, options, tracks, left_out))
     if footage.zoom is not None:
         tracks = [track.steadied(footage.camera, footage.zoom.factors) for track in tracks]
     return footage, tracks
@@ -306,15 +306,14 @@ def _doubts_about_path(
 
 
 def _warnings_about_people(
-    video: Video, tracks: list[Track], left_out: list[ChosenPerson]
+    video: Video, options: CaptureOptions, tracks: list[Track], left_out: list[ChosenPerson]
 ) -> list[Notice]:
     """Say who was seen but left out, and whether the footage seems to be turned."""
     name = Path(video.path).name
     warnings = []
     if left_out:
-        warnings.append(
-            notice("left_out", footage=name, others=len(left_out), place=str(left_out[0]))
-        )
+        code = "left_out" if options.chosen is None else "left_out_of_views"
+        warnings.append(notice(code, footage=name, others=len(left_out), place=str(left_out[0])))
     turn_deg = needed_turn(tracks[0])
     if turn_deg:
         view = video.wanted.view

@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
 from scope.scope_addon.capture.frame_observer import Observed
-from scope.scope_addon.capture.options import parse_person
+from scope.scope_addon.capture.observe import _warnings_about_people
+from scope.scope_addon.capture.options import CaptureOptions, parse_person
 from scope.scope_addon.capture.tracking.chosen_person import (
     ChosenPerson,
     find_chosen,
@@ -79,12 +83,18 @@ def test_a_place_finds_somebody_though_all_may_be_mistakes() -> None:
         observed.tracks(1, ChosenPerson(200.0, 300.0, 0.5))
 
 
-def test_who_has_chosen_a_person_is_not_told_to_choose_one() -> None:
-    observed = observed_of([person(200.0), person(600.0)], TIMES)
-    assert [each.x for each in observed.tracks(1)[1]] == [600.0]
-    ((track,), others) = observed.tracks(1, ChosenPerson(600.0, 300.0, 1.0))
-    assert track.keypoints_px[0, :, 0].mean() == pytest.approx(600.0, abs=30.0)
-    assert others == []
+def test_who_has_chosen_a_person_is_told_of_others_but_not_to_choose_one(tmp_path: Path) -> None:
+    observed = observed_of([person(200.0), person(600.0), person(900.0)], TIMES)
+    video = SimpleNamespace(path=tmp_path / "walk.mp4", wanted=CaptureOptions().wanted)
+    chosen = ChosenPerson(600.0, 300.0, 1.0)
+    said = {}
+    for options in (CaptureOptions(people=2), CaptureOptions(people=2, chosen=chosen)):
+        tracks, others = observed.tracks(2, options.chosen)
+        assert len(others) == 1
+        warning, *_ = _warnings_about_people(video, options, tracks, others)  # type: ignore[arg-type]
+        said[options.chosen] = warning.code
+    assert tracks[0].keypoints_px[0, :, 0].mean() == pytest.approx(600.0, abs=30.0)
+    assert said == {None: "left_out", chosen: "left_out_of_views"}
 
 
 def test_a_place_without_a_person_is_refused_and_says_where_people_are() -> None:
