@@ -360,6 +360,7 @@ class _RigState:
                 if switch in bone:
                     bone[switch] = 1.0
         rig.update_tag()
+        bpy.context.view_layer.update()  # or its place is read as below the root object
 
     def restore(self) -> None:
         """Restore everything except the switches."""

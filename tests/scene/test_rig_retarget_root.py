@@ -301,6 +301,7 @@ def test_a_root_object_keeps_the_parent_that_the_user_gives_it(source, hung):
     turn = Matrix.Rotation(1.1, 3, "Z").to_quaternion()
     place = stage.matrix_world = Matrix.LocRotScale((3.0, -1.0, 0.5), turn, None)
     root_object(source if hung == "capture" else rig).parent = stage
+    bpy.context.view_layer.update()
     wanted = before
     if hung == "capture":
         wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation)
