@@ -312,8 +312,14 @@ def _warnings_about_people(
     name = Path(video.path).name
     warnings = []
     if left_out:
-        code = "left_out" if options.chosen is None else "left_out_of_views"
-        warnings.append(notice(code, footage=name, others=len(left_out), place=str(left_out[0])))
+        warnings.append(
+            notice(
+                "left_out" if options.chosen is None else "left_out_of_views",
+                footage=name,
+                others=len(left_out),
+                place=str(left_out[0]),
+            )
+        )
     turn_deg = needed_turn(tracks[0])
     if turn_deg:
         view = video.wanted.view
