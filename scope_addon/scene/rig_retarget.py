@@ -60,6 +60,8 @@ _EXPECTED = ("head", "left_shoulder", "left_elbow", "right_shoulder", "right_elb
 # Largest difference from the identity of the rotations of fingers that were not captured, which
 # single precision leaves.
 _AT_REST = 1e-5
+# share of a rig's volume below which a frame counts as one that does not show the rig
+_HIDDEN_VOLUME = 1e-12
 
 
 @dataclass(frozen=True)
@@ -195,6 +197,7 @@ def retarget(
     places = _places(source, frames)
     leave_tweak_mode(rig)
     with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
+        back_above = _back_above_root_object(rig, frames)
         with at_rest(rig):
             skeleton = probe(rig, bone_map.parts)
             place = np.array(rig.matrix_world, float)
@@ -213,8 +216,9 @@ def retarget(
             ).pose(clip, one_floor)
             apart = apart_at_cuts(source, clip, rate)
             motion = _placed(places, apart, skeleton, place, pose, root, options)
-            if _is_carried(rig) and options.root != "in-place":
-                motion = _as_carried(motion, place, _places(rig, frames))
+            if options.root != "in-place":
+                motion = _moved_back(motion, _below(motion.trajectory, back_above))
+                motion = _moved_back(motion, _back(place, _places(rig, frames)))
             turns = basis(skeleton, motion.rotations)
             keys = [BoneMotion(name, turns[:, b]) for b, name in enumerate(skeleton.names)]
             keys[root] = replace(
@@ -355,18 +359,57 @@ def _with_source_transform(
     return R[:, None] @ rotations, (R @ heads[..., None])[..., 0] + position, angles
 
 
-def _as_carried(
-    motion: _PlacedMotion, place: NDArray[np.float64], places: NDArray[np.float64]
-) -> _PlacedMotion:
-    """Return the motion as it is to be keyed under parents that move the rig, so that it is in the
-    world as it was.
+def _back_above_root_object(
+    rig: bpy.types.Object, frames: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return `_back` of the parents above the rig's root object, from which ``at_rest`` detaches
+    it.
+    """
+    empty = root_object(rig)
+    if empty is None:
+        return np.eye(4)[None]
+    return _back(np.array(parent_transform(empty), float), _places(rig, frames))
+
+
+def _back(place: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the transforms, (T, 4, 4) or (1, 4, 4), that undo how parents move a rig; the identity
+    where they scale it to nothing.
 
     :param place: (4, 4) the rig's object to world when it was measured.
-    :param places: (T, 4, 4) the same at the keys' frames.
+    :param places: (T, 4, 4) the same at the keys' frames; (1, 4, 4) if it does not move.
     """
-    back = place @ np.linalg.inv(places)
-    rotations, heads, _ = _with_source_transform(back, motion.rotations, motion.heads)
-    return replace(motion, rotations=rotations, heads=heads)
+    back = np.tile(np.eye(4), (len(places), 1, 1))
+    shown = np.abs(np.linalg.det(places)) > _HIDDEN_VOLUME * abs(np.linalg.det(place))
+    back[shown] = place @ np.linalg.inv(places[shown])
+    return back
+
+
+def _below(
+    trajectory: tuple[NDArray[np.float64], NDArray[np.float64]] | None, back: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return what has the effect of ``back`` where it is applied below a root object that follows
+    the trajectory instead of above it.
+
+    :param back: (T, 4, 4) or (1, 4, 4).
+    """
+    if trajectory is None:
+        return back
+    positions, angles = trajectory
+    root = np.tile(np.eye(4), (len(angles), 1, 1))
+    root[:, :3, :3] = about_z(angles)
+    root[:, :3, 3] = positions
+    return np.linalg.inv(root) @ back @ root
+
+
+def _moved_back(motion: _PlacedMotion, back: NDArray[np.float64]) -> _PlacedMotion:
+    """Return the motion as it is to be keyed under parents that move the rig, so that the root bone
+    is where it was in the world, and every bone turned as it was.
+
+    :param back: (T, 4, 4) or (1, 4, 4), from `_back`; it may scale.
+    """
+    R = np.array([Matrix(each.tolist()).decompose()[1].to_matrix() for each in back])
+    heads = (back[:, :3, :3] @ motion.heads[..., None])[..., 0] + back[:, :3, 3]
+    return replace(motion, rotations=R[:, None] @ motion.rotations, heads=heads)
 
 
 def _places(source: bpy.types.Object, frames: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -173,6 +173,38 @@ def test_a_rig_whose_parent_moves_is_where_the_capture_is(source, root):
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=5e-3)
 
 
+@pytest.mark.parametrize("root", ["bone", "object"])
+def test_a_rig_whose_root_object_is_on_what_moves_is_where_the_capture_is(source, root):
+    rig, bone_of = build_rig("unreal")
+    bones = list(bone_of.values())
+    run(source, rig, root="object")
+    wanted = seen(rig, bones)
+    ferry = bpy.data.objects.new("ferry", None)
+    bpy.context.scene.collection.objects.link(ferry)
+    root_object(rig).parent = ferry
+    drive_around(ferry)
+    bpy.context.scene.frame_set(30)
+    assert run(source, rig, root=root).warnings == []
+    np.testing.assert_allclose(seen(rig, bones), wanted, atol=5e-3)
+
+
+def test_a_rig_that_its_parent_scales_from_nothing_is_where_the_capture_is(source):
+    """In frame 1 there is nothing that could be."""
+    rig, bone_of = build_rig("unreal")
+    run(source, rig)
+    pelvis = [bone_of["pelvis"]]
+    wanted = seen(rig, pelvis)
+    bubble = bpy.data.objects.new("bubble", None)
+    bpy.context.scene.collection.objects.link(bubble)
+    rig.parent = bubble
+    for frame, size in ((1, 0.0), (40, 1.0)):
+        bubble.scale = (size,) * 3
+        bubble.keyframe_insert("scale", frame=frame)
+    bpy.context.scene.frame_set(45)
+    assert run(source, rig).warnings == []
+    np.testing.assert_allclose(seen(rig, pelvis)[1:], wanted[1:], atol=5e-3)
+
+
 @contextmanager
 def counted(handlers):
     """Return a list that gets one entry whenever Blender calls the handlers."""
