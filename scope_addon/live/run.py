@@ -146,7 +146,7 @@ def run_live(
         try:
             _loop(
                 reader,
-                _Poses(source, body, options, tracker, executor, listeners),
+                _Poses(source, body, options, tracker, executor, listeners, clock),
                 outputs,
                 statistics,
                 listeners,
@@ -181,6 +181,7 @@ class _Poses:
         tracker: PeopleTracker,
         executor: ThreadPoolExecutor,
         listeners: Listeners,
+        clock: Clock,
     ) -> None:
         self._source = source
         self._body = body
@@ -188,6 +189,7 @@ class _Poses:
         self._tracker = tracker
         self._executor = executor
         self._listeners = listeners
+        self._clock = clock
         self._size: tuple[int, int] | None = None
         self._people: LivePeople | None = None
 
@@ -195,12 +197,7 @@ class _Poses:
         """Return the poses in a picture."""
         height, width = picture.image_rgb.shape[:2]
         if self._people is None or self._size != (width, height):
-            if self._people is not None:
-                self._listeners.say(
-                    f"{self._source.name} now delivers images of another shape ({width} × "
-                    f"{height}): body, lens and"
-                    " floor are estimated again, and a recording ends with the image before"
-                )
+            is_first = self._people is None
             options = self._options
             camera = choose_camera(
                 width,
@@ -221,8 +218,23 @@ class _Poses:
                 count=options.people,
                 executor=self._executor,
             )
-            self._listeners.camera(self._people, self._size)
+            self._listeners.camera(self._people, self._size)  # which may end the capture
+            if not is_first:
+                self._say_another_shape(width, height)
         return self._people.step(Frame(picture.index, picture.timestamp_s, picture.image_rgb))
+
+    def _say_another_shape(self, width: int, height: int) -> None:
+        if self._clock.stopped.is_set():
+            consequence = "the capture ends with the image before"
+        else:
+            consequence = (
+                "body, lens and floor are estimated again, and a recording ends with the image "
+                "before"
+            )
+        self._listeners.say(
+            f"{self._source.name} now delivers images of another shape ({width} × {height}): "
+            f"{consequence}"
+        )
 
 
 def _loop(

@@ -43,6 +43,29 @@ def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
     assert said[0].startswith(
         "fake now delivers images of another shape (96 × 160): body, lens and floor are"
     )
+    assert said[0].endswith("estimated again, and a recording ends with the image before")
+
+
+@pytest.mark.usefixtures("networks")
+def test_pictures_of_another_shape_that_end_the_capture_are_said_to(body):
+    """As in Blender while it records: nothing is estimated again."""
+    said = []
+    clock = FakeClock()
+
+    def begin(people, size):
+        if size == (96, 160):
+            clock.stopped.set()
+
+    given = threading.Semaphore(1)
+    source = FakeSource(
+        [0.0, 0.1], ends=True, images=[WIDE, TALL], before=lambda _: given.acquire()
+    )
+    send = SimpleNamespace(send=lambda *_: given.release())
+    run_live(source, body, LiveOptions(), [send], Listeners(said.append, camera=begin), clock)
+    assert said == [
+        "fake now delivers images of another shape (96 × 160): the capture ends with the image "
+        "before"
+    ]
 
 
 @pytest.mark.usefixtures("networks")
