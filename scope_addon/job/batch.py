@@ -22,7 +22,7 @@ from typing import Any
 from ...solver.errors import InputError
 from ..atomic_write import complete_file, resolve_link
 from ..errors import NO_PERSON, OutputError, UsageError
-from ..footage import FOOTAGE_SUFFIXES, display_text, json_text, unicode_text
+from ..footage import FOOTAGE_SUFFIXES, display_text, is_url, json_text, unicode_text
 from ..temporary import remove
 from .clip_runner import LocalRunner, Runner
 from .clip_task import (
@@ -84,6 +84,11 @@ class Batch:
         self._basis = self.settings.basis(program_version())
         self._next_report = 0.0
         self._reported: set[str] = set()  # clips of this run that the written report contains
+        self._keys: dict[str, str] = {}  # of clips whose key is known, by name
+        # Entries of results of the same names from the report's folder, which only the clips that
+        # they are of may replace; workers compare the keys, since the footage is not here.
+        self._kept: dict[str, Entry] = {}
+        self._former_folder = ""  # of which they are
 
     def clips(self, recursive: bool, views: bool = False) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
@@ -152,14 +157,14 @@ class Batch:
         runner = runner or LocalRunner(self._program, jobs)
         previous = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
         if again:
-            previous = {}
+            previous = dict(self._kept)
         entries: dict[str, Entry] = {}
         try:
             # The tasks are made within the try, because a signal can arrive as soon as the first
             # clip has begun.
             for finished in runner.outcomes(self._tasks(clips, previous, again)):
                 for name, entry in finished.items():
-                    entries[name] = entry
+                    entries[name] = entry | self._what_remains(name, entry)
                     _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
                 if finished:
                     self._write_report(_in_order(entries, clips), previous, runner, last=False)
@@ -178,11 +183,29 @@ class Batch:
         """Yield the task of each clip."""
         for name, path in clips.items():
             file = path.relative_to(self.folder).as_posix()
-            entry = previous.get(name)
+            entry = None if again else previous.get(name)
             known = entry if entry and self._is_finished(name, entry) else None
             yield ClipTask(
-                name, file, str(path), str(self.out), self._basis, self.settings, known, again=again
+                name,
+                file,
+                str(path),
+                str(self.out),
+                self._basis,
+                self.settings,
+                known,
+                key=self._keys.get(name, ""),
+                again=again,
+                only_key=self._kept.get(name, {}).get("key", ""),
             )
+
+    def _what_remains(self, name: str, entry: Entry) -> Entry:
+        """Return what the report keeps of another folder's results of a clip's name, which the clip
+        did not replace: its next run has to know their key.
+
+        :param entry: the clip's own.
+        """
+        kept = self._kept.get(name, {}) if entry["status"] == "failed" else {}
+        return {field: kept[field] for field in ("key", "outputs", "content") if field in kept}
 
     def _is_finished(self, name: str, entry: Entry) -> bool:
         """Return whether an entry of the previous report is of a finished clip whose files are
@@ -206,7 +229,8 @@ class Batch:
     def _previous_entries(self, clips: dict[str, Path], folder: str) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or
         damaged. Of a report of another folder, only entries of clips that are here, too, as after
-        the folder was renamed.
+        the folder was renamed. Where the footage is at a URL, they are kept for the workers to
+        compare.
 
         :param folder: of the footage, as the report has it.
         :raises OutputError: what has its name is no file, so that no report could be written.
@@ -229,9 +253,14 @@ class Batch:
         if is_same:
             return entries
         shared = {name: e for name, e in entries.items() if name in clips and e.get("outputs")}
+        if is_url(folder):
+            self._kept = {n: e for n, e in shared.items() if isinstance(e.get("key"), str)}
+            self._former_folder = report["folder"]
+            return shared
         for name, entry in shared.items():
             with suppress(OSError):  # what cannot be read replaces nothing
                 key = clip_key(self._basis, clips[name], RATE in self.settings.options)
+                self._keys[name] = key
                 if entry.get("key") != key:
                     raise UsageError(
                         f"'{display_text(name)}' of {folder} would replace the result of the same "
@@ -263,6 +292,9 @@ class Batch:
             "exit_status": status,
             **runner.report(),
         }
+        open_names = {n for n in self._kept if entries.get(n, {}).get("status") not in FINISHED}
+        if open_names:  # until they are compared, so that another run compares them
+            report["folder"] = self._former_folder
         try:
             # A link of that name leads where nobody has asked to write.
             with complete_file(self.report_file) as temporary:

@@ -174,6 +174,46 @@ def test_results_of_another_folder_are_kept(folder, tmp_path):
     assert [entry["name"] for entry in batch(other, out).run(1)["files"]] == ["f"]
 
 
+class StoreRunner(LocalRunner):
+    """Captures footage of a store, which the batch has the names of."""
+
+    def __init__(self, store, url):
+        super().__init__([sys.executable, "-c", PROGRAM], 1)
+        self.store = store
+        self.url = url
+
+    def outcomes(self, tasks):
+        return super().outcomes(
+            task._replace(footage=str(self.store / task.file)) for task in tasks
+        )
+
+    def report(self):
+        return {"folder": self.url}
+
+
+def test_a_folder_of_a_store_continues_after_it_was_renamed_and_keeps_results_of_another(tmp_path):
+    out = tmp_path / "out"
+    names = tmp_path / "names"
+    store = tmp_path / "store"
+    for each in (names, store):
+        each.mkdir()
+        (each / "a.mp4").touch()
+
+    def run(url, text, again=False):
+        (store / "a.mp4").write_text(text)
+        runner = StoreRunner(store, f"memory://{url}")
+        (entry,) = batch(names, out).run(1, again=again, runner=runner)["files"]
+        assert (out / "a.npz").read_text() == "result of day"
+        return entry["status"]
+
+    assert run("day", "day") == "done"
+    assert run("renamed", "day") == "skipped"
+    for again in (False, True, False):
+        assert run("other", "another day", again) == "failed"
+    assert run("renamed", "day") == "done"
+    assert run("moved", "day", again=True) == "done"
+
+
 NAMES = b"caf\xe8.mp4", b"caf\xe9.mp4", "caf\ufffd.mp4".encode(), b"a.mp4"
 
 
