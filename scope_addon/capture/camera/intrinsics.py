@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Float64Array, FloatArray, round_number
 from ...errors import UsageError
+from ...footage import display_text
 from ...footage_view import AS_IN_FILE, FootageView
 from .calibration import Calibration, read_calibration
 from .given_path import read_camera_path
@@ -175,9 +176,10 @@ def _lens_of_file(
     if calibration is not None:
         if not isinstance(calibration, Calibration):
             calibration = read_calibration(Path(calibration))
-        return calibration, f"calibration {calibration.path.name}"
+        return calibration, f"calibration {display_text(calibration.path.name)}"
     if camera_path is not None:
-        return read_camera_path(camera_path).calibration, f"camera path {camera_path.name}"
+        name = display_text(camera_path.name)
+        return read_camera_path(camera_path).calibration, f"camera path {name}"
     return None
 
 

@@ -2,6 +2,8 @@
 """The file with the path of a camera that another program has solved."""
 
 import json
+import os
+import sys
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,8 +40,8 @@ def content(**changes):
     return LENS | values | changes
 
 
-def written(tmp_path, **changes):
-    path = tmp_path / "camera.json"
+def written(tmp_path, name="camera.json", **changes):
+    path = tmp_path / name
     path.write_text(json.dumps(content(**changes)))
     return path
 
@@ -79,6 +81,17 @@ def test_the_lens_is_that_of_the_file(tmp_path):
     np.testing.assert_allclose(camera.intrinsics[0], [1500, 0, 960])
     with pytest.raises(UsageError, match=r"--fov and --camera-path contradict each other"):
         choose_camera(1920, 1080, camera_path=path, fov_deg=50)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.parametrize("kind", ["calibration", "camera path"])
+def test_the_lens_names_its_file_as_people_may_see_it(tmp_path, kind):
+    """Blender refuses a report with text that is not UTF-8."""
+    path = written(tmp_path, os.fsdecode(b"lens\xff.json"))
+    if kind == "calibration":
+        path.write_text(json.dumps(LENS))
+    camera = choose_camera(1280, 720, **{kind.replace(" ", "_"): path})
+    assert camera.source == f"{kind} lens\N{REPLACEMENT CHARACTER}.json"
 
 
 @pytest.mark.parametrize("times_s", [[2.5], [-0.5]])
