@@ -37,6 +37,7 @@ from ..scene.datablocks import captures_of, check_local, found, holds
 from ..scene.packed_motion import pack_motion
 from ..scene.stored_values import FrameSpan, in_scene
 from ..scene.timing import current_frame_kept
+from ..scene.window_scene import window_shows
 from ..untrusted.body_file import load_body
 from . import preview_picture
 from .captures import hide_others, show_again
@@ -374,22 +375,6 @@ def store_motions(result: BuildResult, contents: Sequence[bytes], body: str) -> 
 def _automatic_frame_rate(scene: bpy.types.Scene) -> str:
     """Return the policy of the rate, with which another animation keeps its speed."""
     return "keep" if is_animated(scene) else "set"
-
-
-@contextmanager
-def window_shows(scene: bpy.types.Scene) -> Iterator[None]:
-    """Show the scene in the window while it is built: the user may have switched to another one."""
-    if bpy.context.scene == scene:
-        yield
-        return
-    window = bpy.context.window or bpy.context.window_manager.windows[0]
-    with bpy.context.temp_override(window=window):
-        previous = window.scene
-        window.scene = scene
-        try:
-            yield
-        finally:
-            window.scene = previous
 
 
 def show_result(

@@ -396,7 +396,8 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         """Write the files of the clip that was captured last, if there shall be any; return why
         that failed, or an empty text.
         """
-        from .capture_job import AUTOMATIC, build_options, window_shows
+        from ..scene.window_scene import window_shows
+        from .capture_job import AUTOMATIC, build_options
         from .frame_rate_operators import differs
 
         settings = scene.scope

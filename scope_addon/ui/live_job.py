@@ -36,6 +36,7 @@ from ..scene.live_body import LiveBody
 from ..scene.live_rig import LiveRig
 from ..scene.rig_retarget import usable_guess
 from ..scene.visibility import SceneBefore, hide, select_only
+from ..scene.window_scene import window_shows
 from ..temporary import remove
 from ..untrusted.body_file import load_body
 from .capture_job import (
@@ -44,7 +45,6 @@ from .capture_job import (
     build_options,
     chosen_values,
     selection_kept,
-    window_shows,
 )
 from .live_properties import with_login
 from .preferences import cache, python_command

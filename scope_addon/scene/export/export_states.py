@@ -19,6 +19,7 @@ from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
 from ..datablocks import is_deformed_by
 from ..visibility import world_matrix
+from ..window_scene import window_shows
 
 
 @contextmanager
@@ -26,18 +27,12 @@ def temporary_scene(name: str) -> Iterator[bpy.types.Scene]:
     """Provide an empty scene that is the window's active scene inside the block, and remove it
     afterwards.
     """
-    # Edit Mode and the exporters work on a window's scene. Timers have no window, so the first one
-    # is used.
-    window = bpy.context.window or bpy.context.window_manager.windows[0]
-    with bpy.context.temp_override(window=window):
-        before = window.scene
-        scene = bpy.data.scenes.new(name)
-        try:
-            window.scene = scene
+    scene = bpy.data.scenes.new(name)
+    try:
+        with window_shows(scene):
             yield scene
-        finally:
-            window.scene = before
-            bpy.data.scenes.remove(scene)
+    finally:
+        bpy.data.scenes.remove(scene)
 
 
 @contextmanager
