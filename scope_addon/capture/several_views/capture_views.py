@@ -121,7 +121,7 @@ def capture_views(
             bone_lengths(_rest_keypoints(body, options)),
             lambda: progress(PLACING, 0, 0),
         )
-        doubts = _doubts_about_file(views, given, matches, options)
+        doubts = _doubts_about_file(views, given, matches, body, options)
         places = [None if match is None else match.place for match in matches]
         first = views[0]
         first_place = places[0] or CameraPlace.first()
@@ -287,6 +287,7 @@ def _doubts_about_file(
     views: Sequence[_View],
     given: Sequence[Given],
     matches: Sequence[Match | None],
+    body: Body,
     options: CaptureOptions,
 ) -> list[Notice]:
     """Compare given places of cameras with the people whom they show; return warnings.
@@ -306,7 +307,8 @@ def _doubts_about_file(
         person = views[v].people[match.number]
         cameras = first_camera, match.place
         size = relative_distance(first, person, cameras)
-        if not 1.0 / MOST_RELATIVE_DISTANCE < abs(size) < MOST_RELATIVE_DISTANCE:
+        off = size / _given_scale(body, options)
+        if not 1.0 / MOST_RELATIVE_DISTANCE < abs(off) < MOST_RELATIVE_DISTANCE:
             raise UsageError(
                 f"{options.calibration} makes people {size:.3g} times as large as people are; its "
                 "translations must be in metres"
@@ -320,7 +322,7 @@ def _doubts_about_file(
                     person=who,
                 )
             )
-        elif not 1.0 / LIKELY_RELATIVE_DISTANCE < size < LIKELY_RELATIVE_DISTANCE:
+        elif not 1.0 / LIKELY_RELATIVE_DISTANCE < off < LIKELY_RELATIVE_DISTANCE:
             scales.append(size)
     if scales:
         factor = float(np.median(scales))
@@ -408,14 +410,16 @@ def _with_possible_advice(warning: Notice) -> Notice:
 def _rest_keypoints(body: Body, options: CaptureOptions) -> Float64Array:
     """Return the keypoints (n, 3) of the mean body at rest, or of one of the given stature."""
     with_offsets = with_keypoint_offsets(body)
-    scale = 1.0
-    if options.heights_m:
-        scale = options.heights_m[0] / body.stature()
     at = with_offsets.keypoint_set("blazepose")
     indices = [at[KEYPOINT_NAMES[k]] for k in KEYPOINTS]
     identity = np.tile(np.eye(3), (body.K + 1, 1, 1))
     rest: Float64Array = with_offsets.keypoints(identity, body.rest_joints(), which=indices)
-    return scale * rest
+    return _given_scale(body, options) * rest
+
+
+def _given_scale(body: Body, options: CaptureOptions) -> float:
+    """Return the stature given of the first person, divided by the mean body's; 1 if none is."""
+    return options.heights_m[0] / body.stature() if options.heights_m else 1.0
 
 
 def _people_in_views(

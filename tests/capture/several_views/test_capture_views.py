@@ -232,15 +232,23 @@ def test_people_of_further_cameras_whom_the_first_one_does_not_show_are_counted(
     ]
 
 
-@pytest.mark.parametrize(("scale", "codes"), [(1.1, []), (0.5, ["calibration_scale"])])
-def test_a_calibration_with_another_scale_is_warned_of(monkeypatch, scale, codes):
+@pytest.mark.parametrize(
+    ("scale", "heights_m", "codes"),
+    [
+        (1.1, (), []),
+        (0.6, (), ["calibration_scale"]),
+        (0.6, (1.1,), []),  # a child's
+        (1.0, (1.1,), ["calibration_scale"]),
+    ],
+)
+def test_a_calibration_with_another_scale_is_warned_of(monkeypatch, scale, heights_m, codes):
     monkeypatch.setattr(several, "relative_distance", lambda *_: scale)
     monkeypatch.setattr(several, "contradicts", lambda *_: False)
     views = [SimpleNamespace(name=f"{k}.mp4", people=["person"]) for k in range(3)]
     given = [Given(T_camera_first=np.eye(4))] * 3
     matches = [Match(CameraPlace.first(), 0.0, 0, Clock.GIVEN)] * 3
-    options = CaptureOptions(calibration=Path("calib.toml"))
-    found = several._doubts_about_file(views, given, matches, options)
+    options = CaptureOptions(calibration=Path("calib.toml"), heights_m=heights_m)
+    found = several._doubts_about_file(views, given, matches, load_body("scope"), options)
     assert [each.code for each in found] == codes
 
 
