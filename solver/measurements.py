@@ -290,11 +290,15 @@ class Measurements:
         if self.floor is not None:
             tables["floor"] = _floor_rows(self.floor, points)
             if not _has_axis(self.floor.normal, 1):
-                seen = self.keypoints3d.points if self.keypoints3d is not None else np.zeros((0, 3))
+                seen = np.zeros((0, 3))
+                if self.keypoints3d is not None:
+                    seen = np.asarray(self.keypoints3d.points, dtype=float)
+                    confidence = self.keypoints3d.confidence
+                    seen = seen[as_confidence(confidence, len(seen), "3D keypoints") > 0.0]
                 normal = np.asarray(self.floor.normal, dtype=float)
                 offset = as_number(self.floor.offset, "Offset of the floor")
                 has_camera = self.intrinsics is not None
-                warn_of_floor(normal, offset, np.asarray(seen, dtype=float), has_camera)
+                warn_of_floor(normal, offset, seen, has_camera)
         return tables
 
 

@@ -199,9 +199,10 @@ UP = np.array([0.0, -1.0, 0.0])
 LOWEST = float((POINTS @ UP).min())
 
 
-def on_floor(normal, offset, points=POINTS, intrinsics=None):
+def on_floor(normal, offset, points=POINTS, intrinsics=None, confidence=1.0):
     floor = Floor([0], normal, offset, [1.0])
-    seen = Measurements(intrinsics, keypoints3d=Keypoints3D(np.arange(M), points), floor=floor)
+    points = Keypoints3D(np.arange(M), points, confidence)
+    seen = Measurements(intrinsics, keypoints3d=points, floor=floor)
     short = Options(stages=[Stage(max_iterations=1)])
     return lambda: solver.fit(BODY, seen, priors=Priors(), options=short)
 
@@ -353,6 +354,12 @@ RIGHT = {
     "some points behind": space(POINTS - POINTS.mean(axis=0)),
     "weights of a few times one": space(POINTS, np.full(M, 5.0)),
     "a floor below": on_floor(UP, LOWEST),
+    "points below a floor that are left out": on_floor(
+        UP,
+        LOWEST,
+        np.where(np.arange(M)[:, None] < 2, POINTS, POINTS - 5.0 * UP),
+        confidence=np.where(np.arange(M) < 2, 1.0, 0.0),
+    ),
     "a floor of other axes, without a camera": on_floor(-UP, LOWEST, POINTS * [1.0, -1.0, -1.0]),
     "a pelvis at the origin": space(POINTS - POINTS[0]),
     "cameras of a stadium": with_pose([0.0, 0.0, 120.0]),
