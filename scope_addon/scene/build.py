@@ -6,7 +6,8 @@ each person; and removing a capture with everything that was made for it, and no
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -352,6 +353,23 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
         used = [block for block in used if block not in unused]
         bpy.data.batch_remove(unused)
     remove_unused_ring()
+
+
+@contextmanager
+def names_free(collection: bpy.types.Collection) -> Iterator[None]:
+    """Give a capture other names inside the block, so that a second one built there gets the same
+    names without Blender's numbers.
+    """
+    own = parts_of(collection)
+    blocks = [collection, *own, *_data_of(own), *motion_texts(own)]
+    names = [(block, block.name) for block in blocks if block.library is None]
+    try:
+        for block, name in names:
+            block.name = f"former {name}"
+        yield
+    finally:
+        for block, name in names:
+            block.name = name
 
 
 def _keep_in_scenes(obj: bpy.types.Object, collections: Sequence[bpy.types.Collection]) -> None:

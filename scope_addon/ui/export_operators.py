@@ -281,6 +281,7 @@ def write_at_own_rate(
     :param kind: as of `write_captures`, whose errors are raised.
     :param options: with which it was built.
     """
+    from ..scene.build import names_free
     from ..scene.export.export import ExportOptions, export_motions
 
     if kind in _OF_MOTION:
@@ -290,7 +291,8 @@ def write_at_own_rate(
     options = replace(options, name=capture.name, frame_rate="set")
     motions = [motion_of(person) for person in people]
     named = ExportOptions(take=capture.name)
-    written, _ = export_motions(motions, body_of(people[0]), path, None, options, named)
+    with names_free(capture):
+        written, _ = export_motions(motions, body_of(people[0]), path, None, options, named)
     return written
 
 

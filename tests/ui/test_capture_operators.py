@@ -26,6 +26,8 @@ from scope.scope_addon.ui.capture_operators import (
 from scope.scope_addon.ui.job_operator import JobOperator
 from scope.scope_addon.ui.view_operators import show_new_capture
 
+from ..scene.exported import glb_json
+
 
 def window_with_sidebar(category="Scope", width=200):
     """Return what the operator reads of a window whose 3D viewport has its sidebar at x 800 to
@@ -354,6 +356,27 @@ def test_files_of_a_queue_have_the_frame_rate_of_their_clips(fake_worker, footag
         assert {"Frames: 10", "Frame Time: 0.040000000"} <= set(lines)
     assert scene.render.fps == 10
     assert sorted(each.name for each in captures_of(scene)) == ["a", "person"]
+
+
+def test_files_of_a_queue_have_the_names_of_their_captures(fake_worker, footage, tmp_path):
+    """At the clip's frame rate, it is built once more while the capture has them."""
+    scene = bpy.context.scene
+    scene.render.fps = 10
+    cube = bpy.data.objects.new("cube", None)
+    scene.collection.objects.link(cube)
+    cube.keyframe_insert("location", frame=1)
+    fake_worker("finish()")
+    choose_several([footage, Path(shutil.copy(footage, footage.with_name("a.png")))])
+    scene.scope.queue_format = "GLB"
+    scene.scope.queue_folder = str(tmp_path)
+    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    for capture in captures_of(scene):
+        name = capture.name
+        names = {obj.name for obj in capture.all_objects}
+        assert names == {name, f"{name}_body", f"{name}_camera"}
+        nodes = {node["name"] for node in glb_json(tmp_path / f"{name}.glb")["nodes"]}
+        assert nodes >= {name, f"{name}_body"}
+    assert sorted(capture.name for capture in captures_of(scene)) == ["a", "person"]
 
 
 def test_a_clip_whose_file_cannot_be_written_says_so_and_stays_in_the_scene(
