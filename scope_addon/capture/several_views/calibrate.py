@@ -162,17 +162,15 @@ def _best_match(
         order = np.argsort(costs, kind="stable")[:_MOST_GUESSES]
         guesses = [guesses[k] for k in order if costs[k] < _ROUGHLY * min(costs)]
     pairs = [pair for guess in guesses if (pair := tried(guess, _PAIR_FRAMES, _TURNS)) is not None]
+    if given[1].T_camera_first is None:
+        # Whom a place would turn too far is somebody else.
+        turned = [_turned_off(first, people[pair.number], pair.place) or 0.0 for pair in pairs]
+        pairs = [pair for pair, off in zip(pairs, turned, strict=True) if off <= MOST_TURNED]
 
     def dearness(pair: Match) -> float:
         return pair.cost * (_DUBBED if pair.clock == Clock.MOTION else 1.0)
 
     best = min(pairs, key=dearness, default=None)
-    if (
-        best is not None
-        and given[1].T_camera_first is None
-        and _turned_off(first, people[best.number], best.place) > MOST_TURNED
-    ):
-        return None  # This camera shows somebody else.
     if best is None or best.clock != Clock.MOTION:
         return best
     others = [
@@ -321,19 +319,20 @@ def contradicts(
     """Return whether one person, as the first and another camera see them, speaks against that
     camera's place: rays pass each other, or the body is turned otherwise.
 
-    Cameras of equal height that were exchanged have rays that meet, in a wrong place.
+    Cameras of equal height that were exchanged have rays that meet, in a wrong place. Where both
+    hardly see the person at once, nothing speaks against it.
     """
-    is_turned = _turned_off(one, other, cameras[1]) > MOST_TURNED
-    return is_turned or apart(one, other, cameras) > MOST_APART
+    off = _turned_off(one, other, cameras[1])
+    return off is not None and (off > MOST_TURNED or apart(one, other, cameras) > MOST_APART)
 
 
-def _turned_off(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float:
-    """Return the angle between a camera's rotation and that by lifted bodies, radians; 0 where both
-    hardly see the person at once.
+def _turned_off(one: SeenPerson, other: SeenPerson, place: CameraPlace) -> float | None:
+    """Return the angle between a camera's rotation and that by lifted bodies, radians; None where
+    both hardly see the person at once.
     """
     turned = first_place(one, other, _shared_times(one, other, place), place)
     if turned is None:
-        return 0.0
+        return None
     return float(np.linalg.norm(log(turned.R_camera_first @ place.R_camera_first.T)))
 
 

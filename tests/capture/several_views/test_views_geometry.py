@@ -297,6 +297,31 @@ def test_a_camera_of_which_the_person_would_face_another_way_has_no_place(
     assert (found[1] is not None) == is_placed
 
 
+def test_who_would_face_another_way_makes_room_for_somebody_who_fits(monkeypatch):
+    points = moving_points()
+    first = seen(CameraPlace.first(), points, 30.0)
+    second = [seen(beside(80.0), points, 30.0, seed=seed) for seed in (2, 3)]
+    degrees = [-80.0, 80.0]
+
+    def adjusted(first, second, guess, *_):
+        cost = 1.0 + 0.2 * guess.number
+        return Match(beside(degrees[guess.number]), cost, guess.number, Clock.GIVEN)
+
+    monkeypatch.setattr(calibration, "_adjusted_pair", adjusted)
+    known = Given(offset_s=0.0)
+    found = calibrate([[first], second], [known, known], mean_lengths())
+    assert found[1].number == 1
+
+
+def test_a_person_whom_two_cameras_never_show_at_once_contradicts_no_place():
+    points = moving_points()
+    first = seen(CameraPlace.first(), points, 30.0)
+    second = seen(beside(80.0), points, 30.0, seed=2)
+    cameras = CameraPlace.first(), replace(beside(80.0), offset_s=1000.0)
+    assert not contradicts(first, second, cameras)
+    assert contradicts(first, second, (CameraPlace.first(), beside(-80.0)))
+
+
 def test_every_camera_has_its_share_of_the_times_that_all_are_adjusted_to():
     points = moving_points()
     first = seen(CameraPlace.first(), points, 30.0, own=np.arange(600) / 10.0)
