@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, cast
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...arrays import Uint8Array
+from ...arrays import Float64Array, Uint8Array
 from ...errors import VideoError
 from ...footage import MAX_PIXELS
 from .deinterlace import FIELD_CODECS, deinterlaced
@@ -43,6 +44,7 @@ _MIN_SEEK_S = 20.0  # start from which seeking is tried
 _RECORDED_RATE = "com.android.capture.fps"
 _MAX_RATE = 10_000.0
 _TIMED_PACKETS = 2000  # from whose times the usual frame rate is estimated
+_FIELD = 0.75  # of the time between frames; a packet that is nearer is a second field
 _DAMAGED_PACKETS = 4096  # in a row, after which no more are tried
 # Degrees clockwise by which an image has to be rotated to be upright.
 _ROTATIONS = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
@@ -240,8 +242,10 @@ class PyavReader:
     says that it recorded slow motion, 0 if it does not; ``frame_count`` according to the container;
     ``is_counted``: whether the container counts frames, so that ``average_rate`` is true;
     ``shown_s``: for how many seconds it is shown, None if unknown. A video that was cut
-    without re-encoding holds more frames than it shows. ``is_mirrored``, ``clockwise_deg``: whether
-    the last frame that was read had to be mirrored, and by how much it was rotated then.
+    without re-encoding holds more frames than it shows. ``may_have_field_packets``: whether a
+    packet may be one of the two fields of a frame, as in AVCHD. ``is_mirrored``,
+    ``clockwise_deg``: whether the last frame that was read had to be mirrored, and by how much it
+    was rotated then.
 
     :raises VideoError: PyAV is not installed or cannot open the file, or its images are too large
         or too long (see `guards`).
@@ -262,6 +266,7 @@ class PyavReader:
         self._decoded = self._decode()
         self._frames = self._whole(self._decoded)
         self._start = self._stream.start_time or 0  # in units of the stream
+        self.may_have_field_packets = False
         self.is_mirrored = False
         self.clockwise_deg = 0
         # Width of a pixel over its height.
@@ -300,7 +305,12 @@ class PyavReader:
                 packet = next(packets, None)
                 if packet is None:
                     return
-                yield from packet.decode()
+                for frame in packet.decode():
+                    self.may_have_field_packets |= (
+                        frame.interlaced_frame
+                        and self._stream.codec_context.name not in FIELD_CODECS
+                    )
+                    yield frame
                 damaged = 0
             except EOFError:  # the decoder has given its last frame
                 return
@@ -348,7 +358,10 @@ class PyavReader:
             time = None if frame is None else self._time(frame)
             if frame is not None and time is not None and time < seconds:
                 frames = itertools.chain([frame], self._decoded)
-                index = round(time * fps) if is_even else _frames_before(self._path, frame.pts)
+                index = round(time * fps)
+                if not is_even:
+                    stated_fps = exact_fps(self.rate) if self.may_have_field_packets else None
+                    index = _frames_before(self._path, cast(int, frame.pts), stated_fps)
                 return self._skip(frames, index, seconds, fps)
             self._seek(0.0)
         return self._skip(self._decoded, 0, seconds, fps)
@@ -403,23 +416,44 @@ def count_frames(path: Path) -> int:
         return 0
 
 
-def _frames_before(path: Path, pts: int) -> int:
+def _frames_before(path: Path, pts: int, interlaced_fps: Fraction | None) -> int:
     """Return how many frames of a video file are shown before a time, without decoding them.
 
     :param pts: the time in units of the stream.
+    :param interlaced_fps: see `_frame_times`.
     """
     failure, container = open_with_pyav(path)
-    count = 0
     if container is None:
-        return count
+        return 0
+    times: list[int] = []
+    base = 0.0
     with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
         stream = film_of(path, container)
         first = stream.start_time or 0
+        base = float(stream.time_base or 0)
         for packet in container.demux(stream):
             if packet.dts is not None and packet.dts >= pts:
                 break
-            count += packet.pts is not None and first <= packet.pts < pts
-    return count
+            if packet.pts is not None and first <= packet.pts < pts:
+                times.append(packet.pts)
+    return len(_frame_times(np.multiply(times, base), interlaced_fps))
+
+
+def _frame_times(times_s: ArrayLike, interlaced_fps: Fraction | None) -> Float64Array:
+    """Return the times of frames (n,) in order, from those of packets, in seconds.
+
+    In AVCHD, the two fields of an interlaced frame may be packets of their own, half a frame apart.
+
+    :param interlaced_fps: stated rate of interlaced frames; None if they are not interlaced.
+    """
+    ordered_s = np.sort(np.asarray(times_s, dtype=np.float64))
+    if interlaced_fps is None:
+        return ordered_s
+    frames_s: list[float] = []
+    for time_s in ordered_s:
+        if not frames_s or time_s - frames_s[-1] > _FIELD * float(1 / interlaced_fps):
+            frames_s.append(time_s)
+    return np.array(frames_s)
 
 
 def exact_fps(fps: float) -> Fraction | None:
@@ -450,11 +484,14 @@ def _recorded_rate(container: InputContainer) -> float:
     return rate if 0.0 < rate <= _MAX_RATE else 0.0
 
 
-def packet_rates(path: Path, stated_fps: Fraction) -> tuple[Fraction, Fraction]:
+def packet_rates(
+    path: Path, stated_fps: Fraction, may_have_field_packets: bool = False
+) -> tuple[Fraction, Fraction]:
     """Return the frame rate that most frames of a video have, and the average one, from the times
     of its first packets, which are not decoded.
 
     :param stated_fps: rate where they have no times.
+    :param may_have_field_packets: see `PyavReader`.
     :raises VideoError: PyAV is not installed, or there is no video in the file.
     """
     failure, container = open_with_pyav(path)
@@ -467,7 +504,7 @@ def packet_rates(path: Path, stated_fps: Fraction) -> tuple[Fraction, Fraction]:
                 times_s.append(float(packet.pts * packet.time_base))
             if len(times_s) == _TIMED_PACKETS:
                 break
-    steps_s = np.diff(np.sort(times_s))
+    steps_s = np.diff(_frame_times(times_s, stated_fps if may_have_field_packets else None))
     steps_s = steps_s[steps_s > 1e-4]
     if not len(steps_s):
         return stated_fps, stated_fps

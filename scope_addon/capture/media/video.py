@@ -319,7 +319,7 @@ def _open_moving(path: Path, requested: FootageRange) -> Video:
         fps = stated_fps or DEFAULT_FPS
         average_fps = exact_fps(reader.average_rate) if reader.is_counted else None
         if stated_fps is None or average_fps is None or _varies(average_fps, fps):
-            usual_fps, packets_fps = packet_rates(path, fps)
+            usual_fps, packets_fps = packet_rates(path, fps, reader.may_have_field_packets)
             average_fps = average_fps or packets_fps
             if stated_fps is None or _varies(average_fps, fps):
                 fps = usual_fps

@@ -14,8 +14,13 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media import guards
-from scope.scope_addon.capture.media.frame_readers import PyavReader, exact_fps, upright
+from scope.scope_addon.capture.media import frame_readers, guards
+from scope.scope_addon.capture.media.frame_readers import (
+    PyavReader,
+    exact_fps,
+    packet_rates,
+    upright,
+)
 from scope.scope_addon.errors import VideoError
 
 from .made_video import with_time_table, write_video
@@ -131,6 +136,44 @@ def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):
     with closing(PyavReader(path)) as reader:
         images = [image for _, image in iter(reader.read, None)]
     assert len(images) == 60
+
+
+@pytest.mark.parametrize("packets_per_s", [25, 50])
+def test_packets_of_fields_are_no_frames(tmp_path, packets_per_s):
+    """Camcorders write AVCHD so, with 25 frames per second; no encoder here does."""
+    path = tmp_path / "a.mkv"
+    images = [np.full((32, 48, 3), k, np.uint8) for k in range(2 * packets_per_s)]
+    write_video(path, images, packets_per_s)
+    stated_fps = Fraction(25)
+    assert packet_rates(path, stated_fps, may_have_field_packets=True) == (25, 25)
+    assert packet_rates(path, stated_fps) == (packets_per_s, packets_per_s)
+    one_second = 1000  # in units of the stream
+    assert frame_readers._frames_before(path, one_second, stated_fps) == 25
+    assert frame_readers._frames_before(path, one_second, None) == packets_per_s
+
+
+def test_fields_and_frames_may_alternate():
+    packets_s = [0.0, 0.02, 0.04, 0.08, 0.1, 0.12]
+    times_s = frame_readers._frame_times(packets_s, Fraction(25))
+    assert times_s.tolist() == [0.0, 0.04, 0.08, 0.12]
+
+
+@pytest.mark.parametrize("is_interlaced", [False, True])
+def test_frames_that_are_interlaced_may_have_packets_of_fields(tmp_path, is_interlaced):
+    path = tmp_path / "a.ts"
+    options = {"x264-params": "interlaced=1"} if is_interlaced else {}
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options=options)
+        stream.width = 64
+        stream.height = 64
+        stream.pix_fmt = "yuv420p"
+        for k in range(5):
+            image = np.full((64, 64, 3), 10 * k, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+    with closing(PyavReader(path)) as reader:
+        reader.read()
+        assert reader.may_have_field_packets == is_interlaced
 
 
 @pytest.mark.parametrize(
