@@ -209,8 +209,6 @@ def searched() -> Iterator[float]:
         before = popup()
         key("F3")
         yield from until(lambda empty=before: popup() != empty, 20, "the search")
-        key("BackSpace")  # Blender 5.2 loses the first key
-        yield 0.5
         before = popup()
         subprocess.Popen(["xdotool", "type", "--delay", "60", words])
         yield from until(lambda empty=before: popup() != empty, 20, "what is found")
