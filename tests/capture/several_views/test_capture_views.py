@@ -50,6 +50,7 @@ def true_place(first, second):
     return R, b.mean(0) - R @ a.mean(0)
 
 
+@pytest.mark.slow
 def test_two_cameras_halve_the_error_of_one(shared):
     folder = shared / "data" / "pose2sim"
     body = load_body("scope")
