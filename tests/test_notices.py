@@ -87,7 +87,8 @@ def test_a_sentence_is_written_in_the_language_of_the_translation() -> None:
 
 
 @pytest.mark.parametrize(
-    "made", [CUTS, notice(OTHER, text="it is dark"), notice("guessed_bones", rig="Rex", bones=["a"])]
+    "made",
+    [CUTS, notice(OTHER, text="it is dark"), notice("guessed_bones", rig="Rex", bones=["a"])],
 )
 def test_a_notice_is_read_from_json_as_it_was_written(made: Notice) -> None:
     report = json.loads(json.dumps(Report(warnings=[made]).as_json()))
