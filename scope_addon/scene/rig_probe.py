@@ -27,6 +27,7 @@ from ..retarget.rest_pose import RestPose
 from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import assign_action, used_slot
 from .character.root_object import root_object, topmost
+from .datablocks import is_deformed_by
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
 SWITCHES = ("IK_FK", "neck_follow", "head_follow")
@@ -425,7 +426,7 @@ def _owners(
     vertices = mesh.data.vertices
     if mesh.parent == rig and mesh.parent_type == "BONE":
         return np.full(len(vertices), row.get(mesh.parent_bone, -1), int)
-    if not any(m.type == "ARMATURE" and m.object == rig for m in mesh.modifiers):
+    if not is_deformed_by(mesh, rig):
         return None
     bone_of = [row.get(group.name, -1) for group in mesh.vertex_groups]
     owners = np.full(len(vertices), -1, int)

@@ -124,6 +124,13 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root)
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
 
 
+def added_empty(name):
+    """Add an empty to the scene."""
+    empty = bpy.data.objects.new(name, None)
+    bpy.context.scene.collection.objects.link(empty)
+    return empty
+
+
 def drive_around(obj):
     """Key an object's place and heading."""
     for frame, angle in ((1, 0.5), (60, 4.0)):
@@ -142,8 +149,7 @@ def test_the_rig_follows_a_capture_that_is_carried(source, root, carried):
     before = seen(rig, bones)
     car = source
     if carried != "itself":
-        car = bpy.data.objects.new("car", None)
-        bpy.context.scene.collection.objects.link(car)
+        car = added_empty("car")
         source.parent = car
     drive_around(car)
     places = rigs_matrices(car, FRAMES)
@@ -162,8 +168,7 @@ def test_a_rig_whose_parent_moves_is_where_the_capture_is(source, root):
     bones = list(bone_of.values())
     run(source, rig, root=root)
     wanted = seen(rig, bones)
-    car = bpy.data.objects.new("car", None)
-    bpy.context.scene.collection.objects.link(car)
+    car = added_empty("car")
     if root == "object":
         bpy.data.objects.remove(root_object(rig))
     rig.parent = car
@@ -179,8 +184,7 @@ def test_a_rig_whose_root_object_is_on_what_moves_is_where_the_capture_is(source
     bones = list(bone_of.values())
     run(source, rig, root="object")
     wanted = seen(rig, bones)
-    ferry = bpy.data.objects.new("ferry", None)
-    bpy.context.scene.collection.objects.link(ferry)
+    ferry = added_empty("ferry")
     root_object(rig).parent = ferry
     drive_around(ferry)
     bpy.context.scene.frame_set(30)
@@ -194,8 +198,7 @@ def test_a_rig_that_its_parent_scales_from_nothing_is_where_the_capture_is(sourc
     run(source, rig)
     pelvis = [bone_of["pelvis"]]
     wanted = seen(rig, pelvis)
-    bubble = bpy.data.objects.new("bubble", None)
-    bpy.context.scene.collection.objects.link(bubble)
+    bubble = added_empty("bubble")
     rig.parent = bubble
     for frame, size in ((1, 0.0), (40, 1.0)):
         bubble.scale = (size,) * 3
@@ -231,8 +234,7 @@ def test_a_hidden_capture_that_is_carried_is_not_evaluated_again_for_each_key(so
 
 def test_a_capture_whose_parent_has_lost_its_keys_is_not_followed_from_key_to_key(source):
     rig, _ = build_rig("unreal")
-    car = bpy.data.objects.new("car", None)
-    bpy.context.scene.collection.objects.link(car)
+    car = added_empty("car")
     source.parent = car
     drive_around(car)
     car.animation_data.action = None
@@ -300,8 +302,7 @@ def test_several_captures_on_one_rig_keep_an_action_each(source):
 def test_the_parent_of_a_rig_moves_along(source):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
-    holder = bpy.data.objects.new("Holder", None)
-    bpy.context.scene.collection.objects.link(holder)
+    holder = added_empty("Holder")
     holder.location = (1.0, 0.0, 0.0)
     rig.parent = holder
     run(source, rig)
@@ -328,8 +329,7 @@ def test_a_root_object_keeps_the_parent_that_the_user_gives_it(source, hung):
     run(source, rig, root="object")
     before = seen(rig, bones)
     move_root_motion_to_object(source, BODY, RATE, in_place=False, heading=True)
-    stage = bpy.data.objects.new("Stage", None)
-    bpy.context.scene.collection.objects.link(stage)
+    stage = added_empty("Stage")
     turn = Matrix.Rotation(1.1, 3, "Z").to_quaternion()
     place = stage.matrix_world = Matrix.LocRotScale((3.0, -1.0, 0.5), turn, None)
     root_object(source if hung == "capture" else rig).parent = stage

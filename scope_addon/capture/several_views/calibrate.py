@@ -272,6 +272,13 @@ def _times_of_all(
     return times
 
 
+def adjusted_first_place(matches: Sequence[Match | None]) -> CameraPlace:
+    """Return the first camera's place, whose focal length may have been adjusted with those of
+    others.
+    """
+    return matches[0].place if matches[0] is not None else CameraPlace.first()
+
+
 def same_people(
     people: Sequence[Sequence[SeenPerson]], matches: Sequence[Match | None]
 ) -> list[list[int | None]]:
@@ -280,7 +287,7 @@ def same_people(
     :return: of each person, (V,) numbers; None: not found there.
     """
     V = len(people)
-    first = matches[0].place if matches[0] is not None else CameraPlace.first()
+    first = adjusted_first_place(matches)
     found: list[list[int | None]] = [[k] + [None] * (V - 1) for k in range(len(people[0]))]
     for v in range(1, V):
         match = matches[v]

@@ -38,6 +38,7 @@ from .bundle import CameraPlace, Given
 from .calibrate import (
     Clock,
     Match,
+    adjusted_first_place,
     calibrate,
     contradicting_spans,
     contradicts,
@@ -124,7 +125,7 @@ def capture_views(
         doubts = _doubts_about_file(views, given, matches, body, options)
         places = [None if match is None else match.place for match in matches]
         first = views[0]
-        first_place = places[0] or CameraPlace.first()
+        first_place = adjusted_first_place(matches)
         footage = replace(
             first.footage,
             camera=with_focal_scale(first.camera, first_place),
@@ -299,7 +300,7 @@ def _doubts_about_file(
     name = display_text(Path(str(options.calibration)).name)
     who = 0 if len(views[0].people) == 1 else 1
     first = views[0].people[0]
-    first_camera = matches[0].place if matches[0] is not None else CameraPlace.first()
+    first_camera = adjusted_first_place(matches)
     for v in range(1, len(views)):
         match = matches[v]
         if given[v].T_camera_first is None or match is None:
