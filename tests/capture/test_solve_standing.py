@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A person who stands straight, or with bent knees, for one second: noisy keypoints through the
-lifting network and the solver.
+"""What the lifting network and the solver make of one second of noisy keypoints of a person who
+stands with straight or bent knees.
 """
 
 from __future__ import annotations
