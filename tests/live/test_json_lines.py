@@ -119,7 +119,7 @@ def test_the_end_does_not_wait_for_a_client_that_does_not_read(body, monkeypatch
 def test_clients_that_left_are_forgotten(server, body):
     (client,), (file,) = connected(server, 1)
     file.readline()
-    assert len(server._clients) == 1
+    wait_for(lambda: len(server._clients) == 1)
     file.close()
     client.close()
     wait_for(lambda: server.send(pose_of(body), 0.0) or not server._clients)
