@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MotionFileError, UsageError
+from ..kinematics.mirrored_limbs import other_side
 from ..untrusted.files import in_one_line
 
 REACH_S = 0.4  # Time over which a correction fades out on each side.
@@ -323,9 +324,7 @@ def _renamed(corrections: tuple[Correction, ...], exchange: Exchange) -> tuple[C
                 f"one correction of the {part.replace('_', ' ')} is only partly in the frames in "
                 "which left and right would change; remove it first, and add it again afterwards"
             )
-        side, joined, kind = each.part.partition("_")
-        other = "right" if side == "left" else "left"
-        out.append(replace(each, part=f"{other}{joined}{kind}"))
+        out.append(replace(each, part=other_side(each.part)))
     return tuple(out)
 
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
 from ..kinematics.axes import UP
-from ..kinematics.mirrored_limbs import LIMBS
+from ..kinematics.mirrored_limbs import LIMBS, other_side
 from .clip import Clip
 from .corrections import BODY, DepthFlip
 from .solve_pins import Shot, keys_of_span
@@ -101,11 +101,7 @@ def _limb(body: Body, part: str) -> tuple[int, int, int]:
 def _turned_around(clip: Clip, body: Body, centers: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the rotations (T, K+1, 3, 3) of a body that is mirrored in depth."""
     names = list(body.joint_names)
-    exchanged = {"left_": "right_", "right_": "left_"}
-    opposite = []
-    for name in names:
-        side = name[: name.find("_") + 1]
-        opposite.append(names.index(exchanged.get(side, side) + name.removeprefix(side)))
+    opposite = [names.index(other_side(name)) for name in names]
     sight = _unit(clip.root - centers)
     level = sight - (sight @ UP)[:, None] * UP
     is_level = np.linalg.norm(level, axis=1, keepdims=True) > _LEAST_HORIZONTAL

@@ -25,6 +25,13 @@ LIMBS = (
     ("left_hip", "left_knee", "left_ankle"),
     ("right_hip", "right_knee", "right_ankle"),
 )
+OTHER_SIDE = {"left": "right", "right": "left"}
+
+
+def other_side(name: str) -> str:
+    """Return the name of the same joint or part of the other side; the name itself without side."""
+    side, joined, kind = name.partition("_")
+    return f"{OTHER_SIDE.get(side, side)}{joined}{kind}"
 
 
 def bone_depths(

@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kinematics.mirrored_limbs import OTHER_SIDE, other_side
 from .bone_map import FINGERS, PHALANGES, SPINE, BoneMap
 from .bone_names import CENTRE, LIMBS, BoneName, parse_names
 from .fingers import find_fingers
@@ -21,7 +22,6 @@ from .rest_pose import RestPose, faces_backwards, rest_faults
 
 _LEG = ("hip", "knee", "ankle", "foot")
 _ARM = ("collar", "shoulder", "elbow", "wrist")
-_OTHER_SIDE = {"left": "right", "right": "left"}
 # Confidence where name and geometry agree, of a name alone, of geometry alone, and of what cannot
 # be right at rest.
 _AGREED = 1.0
@@ -83,12 +83,6 @@ def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
     if not named:
         confidence = {bone: min(each, SHAPED) for bone, each in confidence.items()}
     return BoneMap(parts, confidence)
-
-
-def other_side(part: str) -> str:
-    """Return the same part of the other side; the part itself if it has no side."""
-    side, _, kind = part.partition("_")
-    return f"{_OTHER_SIDE[side]}_{kind}" if side in _OTHER_SIDE else part
 
 
 def from_humanoid(table: Mapping[str, str], names: list[str]) -> BoneMap:
@@ -288,7 +282,7 @@ def _trunk_by_name(
 
     thighs = [limbs[part] for part in ("left_hip", "right_hip") if part in limbs]
     collars = [
-        limbs.get(f"{side}_collar", limbs.get(f"{side}_shoulder", -1)) for side in _OTHER_SIDE
+        limbs.get(f"{side}_collar", limbs.get(f"{side}_shoulder", -1)) for side in OTHER_SIDE
     ]
     arms = [bone for bone in collars if bone >= 0]
     head = next(iter(named("head")), None)
@@ -392,7 +386,7 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
     found = {rest.names[carrying[-1] if carrying else shared[-1]]: "pelvis"}
     for limb, chain in chains.items():
         side, kind = limb.split()
-        other = chains.get(f"{_OTHER_SIDE[side]} {kind}", shared)
+        other = chains.get(f"{OTHER_SIDE[side]} {kind}", shared)
         own = _distinct(rest, [bone for bone in chain if bone not in other])
         parts = _leg_parts(rest, own) if kind == "leg" else _arm_parts(rest, own)
         found |= {rest.names[bone]: f"{side}_{part}" for bone, part in parts.items()}
