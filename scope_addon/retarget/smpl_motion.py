@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.names import BODY_JOINTS
-from ...solver.rotations import log
+from ...solver.rotations import log, matrix_from_quaternion
 from ...solver.smpl_family import FACE_JOINTS, HAND_ORDER, SKELETONS, gender_of
 from ..errors import MotionFileError
 from ..kinematics.frame_blocks import by_blocks
@@ -53,13 +53,6 @@ _ALL_JOINTS = (
 )
 _ROOT = ("root_orient", "global_orient")
 _BODY = ("pose_body", "body_pose")
-_HANDS = ("pose_hand", "hand_pose")
-_LEFT_HAND = ("left_hand_pose",)
-_RIGHT_HAND = ("right_hand_pose",)
-_JAW = ("jaw_pose", "pose_jaw")
-_EYES = ("pose_eye",)
-_LEFT_EYE = ("leye_pose",)
-_RIGHT_EYE = ("reye_pose",)
 _EXPRESSION = ("expression",)
 _TRANS = ("trans_world", "trans", "transl", "smpl_trans", "translation", "pred_trans")
 _BETAS = ("betas", "beta", "smpl_betas", "shape", "pred_shape")
@@ -68,39 +61,23 @@ _FRAMES = ("frame_ids", "frame_id", "frames", "frame")
 _SCALE = ("smpl_scaling",)  # AIST++: by which smpl_trans is to be divided
 _GENDER = "gender"
 _MODEL = "body_model"
-_READ = {
-    *_ALL_JOINTS,
-    *_ROOT,
-    *_BODY,
-    *_HANDS,
-    *_LEFT_HAND,
-    *_RIGHT_HAND,
-    *_JAW,
-    *_EYES,
-    *_LEFT_EYE,
-    *_RIGHT_EYE,
-    *_EXPRESSION,
-    *_TRANS,
-    *_BETAS,
-    *_RATES,
-    *_FRAMES,
-    *_SCALE,
-}
-_READ |= {_GENDER, _MODEL}
-
 HAND_JOINTS = {
     side: tuple(f"{side}_{finger}{i}" for finger in HAND_ORDER for i in (1, 2, 3))
     for side in ("left", "right")
 }
 # Names of the arrays that may come with those of root and body, and the joints of each.
 _PARTS = (
-    (_HANDS, (*HAND_JOINTS["left"], *HAND_JOINTS["right"])),
-    (_LEFT_HAND, HAND_JOINTS["left"]),
-    (_RIGHT_HAND, HAND_JOINTS["right"]),
-    (_JAW, FACE_JOINTS[:1]),
-    (_EYES, FACE_JOINTS[1:]),
-    (_LEFT_EYE, FACE_JOINTS[1:2]),
-    (_RIGHT_EYE, FACE_JOINTS[2:]),
+    (("pose_hand", "hand_pose"), (*HAND_JOINTS["left"], *HAND_JOINTS["right"])),
+    (("left_hand_pose",), HAND_JOINTS["left"]),
+    (("right_hand_pose",), HAND_JOINTS["right"]),
+    (("jaw_pose", "pose_jaw"), FACE_JOINTS[:1]),
+    (("pose_eye",), FACE_JOINTS[1:]),
+    (("leye_pose",), FACE_JOINTS[1:2]),
+    (("reye_pose",), FACE_JOINTS[2:]),
+)
+_READ = {_GENDER, _MODEL}.union(
+    *(_ALL_JOINTS, _ROOT, _BODY, _EXPRESSION, _TRANS, _BETAS, _RATES, _FRAMES, _SCALE),
+    *(names for names, _ in _PARTS),
 )
 _JOINTS_OF_BODY = {len(BODY_JOINTS) - 1: BODY_JOINTS[1:], 23: SKELETONS[24].joint_names[1:]}
 
@@ -444,16 +421,9 @@ def _axis_angles(
 
 def _from_quaternions(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
     """Return the matrices (T, J, 3, 3) of quaternions (T, J, 4), w first."""
-    length = np.linalg.norm(values, axis=-1, keepdims=True)
-    if np.abs(length - 1.0).max() > _ORTHONORMAL:
+    if np.abs(np.linalg.norm(values, axis=-1) - 1.0).max() > _ORTHONORMAL:
         raise MotionFileError(f"{path}: {name} holds quaternions that are not of length 1")
-    w, x, y, z = np.moveaxis(values / length, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return matrix_from_quaternion(values)
 
 
 def _from_six(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
