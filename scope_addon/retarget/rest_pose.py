@@ -37,14 +37,6 @@ _MAX_SIDE_RATIO = 1.5
 _MAX_LEAN = np.radians(50)
 
 
-def _no_points() -> NDArray[np.float64]:
-    return np.empty((0, 3))
-
-
-def _no_owners() -> NDArray[np.intp]:
-    return np.empty(0, np.intp)
-
-
 @dataclass(frozen=True)
 class RestPose:
     """The B bones of a rig at rest in world axes, z up, metres; parents come before children."""
@@ -52,9 +44,12 @@ class RestPose:
     names: list[str]
     parents: NDArray[np.intp]  # (B,) indices, -1 for none
     heads: NDArray[np.float64]  # (B, 3)
-    tails: NDArray[np.float64] = field(default_factory=_no_points)  # (B, 3); empty if unknown
-    points: NDArray[np.float64] = field(default_factory=_no_points)  # (V, 3) vertices of the skin
-    owners: NDArray[np.intp] = field(default_factory=_no_owners)  # (V,) the bone that moves each
+    # (B, 3); empty if unknown
+    tails: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    # (V, 3) vertices of the skin
+    points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    # (V,) the bone that moves each of them
+    owners: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     @cached_property
     def size(self) -> float:
