@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ...solver.rotations import exp, log
+from ...solver.rotations import exp
 from ..errors import UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
-from ..kinematics.smoothing import smooth_rotations
+from ..kinematics.smoothing import interpolate_rotations, smooth_rotations
 from ..motion import Motion
 
 
@@ -70,6 +70,13 @@ def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
     return Clip(motion.timestamps, rotations, body.rest_joints(motion.betas)[0] + trans)
 
 
+def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
+    """Return at which keys (T,) two clips differ."""
+    turned = (a.rotations != b.rotations).any((1, 2, 3))
+    different: NDArray[np.bool_] = turned | (a.root != b.root).any(1)
+    return different
+
+
 def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:
     """Return the indices of the keys from ``start`` to ``end`` seconds, both inclusive.
 
@@ -81,20 +88,6 @@ def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:
             "there are no keys in the chosen frames; choose frames within the captured motion"
         )
     return found
-
-
-def interpolate_rotations(
-    a: NDArray[np.float64], b: NDArray[np.float64], share: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
-    """Interpolate along the shorter arc: ``a exp(share log(aᵀ b))``.
-
-    :param a: (..., 3, 3) rotations at share 0.
-    :param b: (..., 3, 3) rotations at share 1.
-    :param share: (...) interpolation parameter, 0 to 1.
-    :return: (..., 3, 3) rotations.
-    """
-    turn = log(np.swapaxes(a, -1, -2) @ b)
-    return a @ exp(np.asarray(share)[..., None] * turn)
 
 
 def sample(clip: Clip, times: NDArray[np.float64]) -> Clip:

@@ -26,7 +26,7 @@ from ..kinematics.smoothing import smooth_rotations
 from ..motion import Motion
 from ..scene_gaps import SCENE_GAP_S
 from ..untrusted.files import in_one_line
-from .clip import Clip, clip_from_motion
+from .clip import Clip, clip_from_motion, differ
 from .corrections import (
     Contact,
     Correction,
@@ -39,8 +39,7 @@ from .corrections import (
 )
 from .depth_flips import flipped
 from .edits import edited, moved_clip, moved_motion
-from .pose_refit import pixel_of
-from .solve_pins import Shot, lowest_skin, resolve, resting_joints
+from .solve_pins import Shot, distance_to, lowest_skin, resolve, resting_joints
 from .spans import joints_of_limbs, swap_sides
 
 _KEPT = ("poses", "trans", "poses_raw", "trans_raw", "joints_cam")
@@ -89,11 +88,8 @@ def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | Non
             T[:3, :3] @ motion.joints_cam[rows[0], BODY_JOINTS.index(pin.joint)].astype(float)
             + T[:3, 3]
         )
-    if pin.pixel is not None:
-        camera = T, motion.intrinsics_of_frames[rows[0]]
-        return float(np.linalg.norm(pixel_of(camera, place) - pin.pixel))
-    target = np.array(pin_in_world(motion, pin).position, float)
-    return float(np.linalg.norm(place - target))
+    camera = T, motion.intrinsics_of_frames[rows[0]]
+    return distance_to(pin_in_world(motion, pin), place, camera)
 
 
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:
@@ -139,13 +135,11 @@ def with_corrections(motion: Motion, body: Body, corrections: tuple[Correction, 
     for raw in (False, True):
         before = clip_from_motion(body, base, raw)
         after = _pinned(clip_from_motion(body, captured, raw), wanted, body)
-        turned = (after.rotations != before.rotations).any((1, 2, 3))
-        new = turned | (after.root != before.root).any(1)
+        new = differ(after, before)
         changed |= new
         poses, trans = ("poses_raw", "trans_raw") if raw else ("poses", "trans")
-        values[poses] = getattr(base, poses).copy()
+        values[poses] = _poses(after, getattr(base, poses))
         values[trans] = getattr(base, trans).copy()
-        values[poses][turned] = log(after.rotations[turned]).reshape(values[poses][turned].shape)
         values[trans][new] = after.root[new] - body.rest_joints(base.betas)[0]
         if not raw:
             values["joints_cam"] = base.joints_cam.copy()
@@ -226,7 +220,7 @@ def _changed_in_world(
     before = moved_clip(clip, world)
     shot = replace(shot, world_from_camera=world @ shot.world_from_camera)
     after = change(before, shot)
-    new = (after.rotations != before.rotations).any((1, 2, 3)) | (after.root != before.root).any(1)
+    new = differ(after, before)
     back = moved_clip(after.rows(new), np.linalg.inv(world))
     out = clip.copy()
     out.rotations[new] = back.rotations
@@ -282,11 +276,12 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
                     mixed[np.ix_(near, joints)] = True
     smooth = smooth_rotations(raw.rotations, times)
     finished.rotations[mixed] = smooth[mixed]
-    new_raw, new = (
-        _poses(clip, getattr(base, poses))
-        for clip, poses in ((raw, "poses_raw"), (finished, "poses"))
+    return replace(
+        base,
+        poses_raw=_poses(raw, base.poses_raw),
+        poses=_poses(finished, base.poses),
+        foot_contact=contact,
     )
-    return replace(base, poses_raw=new_raw, poses=new, foot_contact=contact)
 
 
 def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:

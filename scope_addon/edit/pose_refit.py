@@ -153,7 +153,6 @@ class PoseRefit:
         self._priors: dict[tuple[str, ...], Priors] = {}
         self._limits = joint_limits.hinges_of(self.names)
         self.ends = [name for name in _ENDS if name in self.names]
-        self.sole_names = SOLES
 
     def joint(self, name: str) -> int:
         """Return the number of a joint.

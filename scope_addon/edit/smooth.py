@@ -17,11 +17,12 @@ from ..kinematics.leg_reach import LEGS, move_ends
 from ..kinematics.smoothing import (
     ROTATION_CUTOFF_HZ,
     gaussian_smooth,
+    interpolate_rotations,
     smooth_root,
     smooth_rotations,
 )
 from ..motion import Motion
-from .clip import Clip, clip_from_motion, interpolate_rotations
+from .clip import Clip, clip_from_motion
 from .corrected_motion import before_smoothing, corrected
 
 # How far both ends are continued, per unit of strength beyond the finished motion: four standard

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.rotations import exp, log
 from ..kinematics.axes import UP
-from ..kinematics.contact_points import FOOT_PARTS
+from ..kinematics.contact_points import FOOT_PARTS, SOLES
 from ..kinematics.standing import standing_probability
 from ..scene_gaps import with_scene_gaps
 from .clip import Clip, sample
@@ -40,6 +40,7 @@ from .pose_refit import (
     PINNED_2D,
     SLACK_M,
     STANDING,
+    Camera,
     Points,
     PoseRefit,
     limb_of,
@@ -92,7 +93,7 @@ class Shot:
         """Return the time of a source frame."""
         return float(np.interp(frame, self.frames, self.times))
 
-    def camera(self, frame: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def camera(self, frame: int) -> Camera:
         """Return world_from_camera (4, 4) and the intrinsics (3, 3) of a source frame."""
         row = int(np.abs(self.frames - frame).argmin())
         return self.world_from_camera[row], self.intrinsics[row]
@@ -111,8 +112,8 @@ class _Track:
     joints: list[str]  # from the trunk outwards
     keys: list[int]
     points: list[dict[str, Points]]
-    cameras: list[tuple[NDArray[np.float64], NDArray[np.float64]] | None]
-    reach: list[float]
+    cameras: list[Camera | None]
+    reach: NDArray[np.float64]  # (H,) seconds
 
 
 def resolve(
@@ -135,7 +136,7 @@ def resolve(
     corrections = tuple(corrections)
     out = clip.copy()
     refit = PoseRefit(body, betas)
-    stands = np.zeros((len(out), len(refit.sole_names)), bool)
+    stands = np.zeros((len(out), len(SOLES)), bool)
     for contact in (c for c in corrections if isinstance(c, Contact)):
         # What rests turns while it is moved, and another part of its skin is the lowest then.
         for _ in range(1 if contact.part in FEET else _RESTING_ROUNDS):
@@ -159,9 +160,16 @@ def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, s
     """
     at = sample(clip, np.array([shot.time(pin.frame)]))
     where = at.joints(body, betas)[0, list(body.joint_names).index(pin.joint)]
+    return distance_to(pin, where, shot.camera(pin.frame))
+
+
+def distance_to(pin: Pin, place: NDArray[np.float64], camera: Camera) -> float:
+    """Return how far a place (3,), world, is from a pin: pixels of a pin in the image, metres of
+    one in space.
+    """
     if pin.pixel is not None:
-        return float(np.linalg.norm(shot.project(pin.frame, where) - pin.pixel))
-    return float(np.linalg.norm(where - pin.position))
+        return float(np.linalg.norm(pixel_of(camera, place) - pin.pixel))
+    return float(np.linalg.norm(place - np.array(pin.position)))
 
 
 class _Correction:
@@ -225,26 +233,25 @@ class _Correction:
         before = clip.rows(span)  # A copy, as every selection by indices.
         _, at, soles = self._refit.place(before.rotations, before.root)
         self._limit(index, at)
-        held = [self._held(index, int(key), at[k], soles[k]) for k, key in enumerate(span)]
+        held = [self._held(index, key, at[k], soles[k]) for k, key in enumerate(span.tolist())]
         hard = [
             h for h, points in enumerate(track.points) if any(joint in points for joint in joints)
         ]
         turn, shift = self._changes(track, hard, span, before, held)
         known = clip.times[[track.keys[h] for h in hard]]
-        reach = np.array([track.reach[h] for h in hard])
+        reach = track.reach[hard]
         rotations = before.rotations @ exp(faded(before.times, known, turn, reach))
         root = before.root + faded(before.times, known, shift, reach)
         R, at, soles = self._refit.place(rotations, root)
         rise = self._rise(track, span, self._refit.skin.heights(R, at, UP))
         pinned = {track.keys[h]: h for h in hard}
-        for k, key in enumerate(span):
-            points = _copied(held[k])
+        for k, key in enumerate(span.tolist()):
             camera = None
-            if int(key) in pinned:
-                camera = track.cameras[pinned[int(key)]]
-                for measured in track.points[pinned[int(key)]].values():
-                    _add_all(points, measured)
+            if key in pinned:
+                camera = track.cameras[pinned[key]]
+                points = _with_pins(held[k], track, pinned[key])
             else:
+                points = _copied(held[k])
                 for joint in joints:
                     self._follow(points, joint, track, at[k] + rise[k], soles[k] + rise[k])
             pose = self._refit.solve(rotations[k], root[k], tuple(track.joints), points, camera)
@@ -292,9 +299,7 @@ class _Correction:
         shifts = []
         for h in hard:
             k = int(track.keys[h] - span[0])
-            points = _copied(held[k])
-            for measured in track.points[h].values():
-                _add_all(points, measured)
+            points = _with_pins(held[k], track, h)
             pose = before.rotations[k], before.root[k]
             rotations, root = self._refit.solve(
                 *pose, tuple(track.joints), points, track.cameras[h]
@@ -316,7 +321,7 @@ class _Correction:
         # A pinned hip moves over its standing foot; other joints release the limb's own soles.
         free = () if all(joint.endswith("hip") for joint in own) else refit.soles_of(limb)
         is_foot_pinned = any(joint.endswith(("ankle", "foot")) for joint in own)
-        for k, name in enumerate(refit.sole_names):
+        for k, name in enumerate(SOLES):
             if name in free:
                 if self._stands[key, k] and not is_foot_pinned:
                     points.add(refit.number(name), soles[k], PINNED)
@@ -351,7 +356,7 @@ class _Correction:
         track = self._tracks[index]
         times = self._clip.times
         ones = np.ones(len(track.keys))
-        return float(faded(times[key : key + 1], times[track.keys], ones, np.array(track.reach))[0])
+        return float(faded(times[key : key + 1], times[track.keys], ones, track.reach)[0])
 
     def _follow(
         self,
@@ -366,7 +371,7 @@ class _Correction:
         """
         refit = self._refit
         for number in next(p[joint] for p in track.points if joint in p).numbers:
-            sole = number - refit.number(refit.sole_names[0])
+            sole = number - refit.number(SOLES[0])
             points.add(
                 number,
                 soles[sole] if 0 <= sole < len(soles) else joints[refit.joint(joint)],
@@ -390,11 +395,7 @@ class _Correction:
         return True
 
 
-def _met(
-    where: NDArray[np.float64],
-    target: NDArray[np.float64],
-    camera: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
-) -> bool:
+def _met(where: NDArray[np.float64], target: NDArray[np.float64], camera: Camera | None) -> bool:
     if len(target) == 3 or camera is None:
         return float(np.linalg.norm(where - target)) < _MET_M
     return float(np.linalg.norm(pixel_of(camera, where) - target)) < _MET_PX
@@ -404,15 +405,21 @@ def _copied(points: Points) -> Points:
     return Points(list(points.numbers), list(points.values), list(points.weights), points.floor)
 
 
-def _add_all(points: Points, more: Points) -> None:
-    for number, value, weight in zip(more.numbers, more.values, more.weights, strict=True):
-        points.add(number, value, weight)
+def _with_pins(held: Points, track: _Track, h: int) -> Points:
+    """Return what is held at a key, and what is pinned there."""
+    points = _copied(held)
+    for pinned in track.points[h].values():
+        points.numbers += pinned.numbers
+        points.values += pinned.values
+        points.weights += pinned.weights
+    return points
 
 
 def _keys_within_reach(clip: Clip, track: _Track) -> NDArray[np.intp]:
     """Return the keys that a track changes, without gaps between the first and the last."""
-    first = min(clip.times[k] - r for k, r in zip(track.keys, track.reach, strict=True))
-    last = max(clip.times[k] + r for k, r in zip(track.keys, track.reach, strict=True))
+    known = clip.times[track.keys]
+    first = (known - track.reach).min()
+    last = (known + track.reach).max()
     inside = (clip.times > first) & (clip.times < last)
     inside[track.keys] = True
     return np.flatnonzero(inside)
@@ -458,17 +465,17 @@ def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> li
         begins = 1 + np.flatnonzero(are_far_apart(times, reach))
         for part in np.split(np.arange(len(keys)), begins):
             own = {keys[k]: by_key[keys[k]] for k in part}
-            tracks.append(_pin_track(refit, own, [float(r) for r in reach[part]], shot))
+            tracks.append(_pin_track(refit, own, reach[part], shot))
     return tracks
 
 
 def _pin_track(
-    refit: PoseRefit, by_key: dict[int, list[Pin]], reach: list[float], shot: Shot
+    refit: PoseRefit, by_key: dict[int, list[Pin]], reach: NDArray[np.float64], shot: Shot
 ) -> _Track:
     """Return the track of a limb's pins.
 
     :param by_key: the pins at each key, of which there are H, in their order.
-    :param reach: H of these, seconds.
+    :param reach: (H,) of these, seconds.
     """
     joints = sorted({pin.joint for here in by_key.values() for pin in here}, key=refit.joint)
     track = _Track(joints, list(by_key), [], [], reach)
@@ -480,12 +487,10 @@ def _pin_track(
 
 
 def _measured(refit: PoseRefit, pin: Pin) -> Points:
-    points = Points()
+    number = refit.number(pin.joint)
     if pin.pixel is not None:
-        points.add(refit.number(pin.joint), np.array(pin.pixel), PINNED_2D)
-    else:
-        points.add(refit.number(pin.joint), np.array(pin.position), PINNED)
-    return points
+        return Points([number], [np.array(pin.pixel)], [PINNED_2D])
+    return Points([number], [np.array(pin.position)], [PINNED])
 
 
 def _clusters(clip: Clip, tracks: list[_Track]) -> list[list[_Track]]:
@@ -523,18 +528,16 @@ def _contact_track(
     lowest = float(where[:, 2].min()) - floor
     if abs(lowest) < _FLOOR_M:
         where[:, 2] -= lowest
-    points = Points()
-    for k, number in enumerate(refit.number(refit.sole_names[w]) for w in which):
-        points.add(number, where[k], PINNED)
+    numbers = [refit.number(SOLES[k]) for k in which]
+    points = Points(numbers, list(where), [PINNED] * len(which))
     n = len(span)
     joint = f"{contact.part}_foot"
-    return _Track(
-        [joint], [int(k) for k in span], [{joint: points}] * n, [None] * n, [_CONTACT_REACH_S] * n
-    )
+    reach = np.full(n, _CONTACT_REACH_S)
+    return _Track([joint], span.tolist(), [{joint: points}] * n, [None] * n, reach)
 
 
 def _soles_of_foot(refit: PoseRefit, side: str) -> NDArray[np.intp]:
-    return np.flatnonzero([name.startswith(f"sole/{side}") for name in refit.sole_names])
+    return np.flatnonzero([name.startswith(f"sole/{side}") for name in SOLES])
 
 
 def _resting_track(
@@ -558,7 +561,7 @@ def _resting_track(
         for by_joint, place in zip(points, places, strict=True):
             by_joint[joint] = Points([refit.number(joint)], [place], [PINNED])
     n = len(span)
-    return _Track(joints, [int(k) for k in span], points, [None] * n, [_CONTACT_REACH_S] * n)
+    return _Track(joints, span.tolist(), points, [None] * n, np.full(n, _CONTACT_REACH_S))
 
 
 def resting_joints(part: str) -> list[str]:

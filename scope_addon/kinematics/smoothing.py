@@ -81,15 +81,27 @@ def fill_rotation_gaps(
     return out
 
 
+def interpolate_rotations(
+    a: NDArray[np.float64], b: NDArray[np.float64], share: NDArray[np.float64] | float
+) -> NDArray[np.float64]:
+    """Interpolate along the shorter arc: ``a exp(share log(aᵀ b))``.
+
+    :param a: (..., 3, 3) rotations at share 0.
+    :param b: (..., 3, 3) rotations at share 1.
+    :param share: (...) interpolation parameter, 0 to 1.
+    :return: (..., 3, 3) rotations.
+    """
+    turn = log(np.swapaxes(a, -1, -2) @ b)
+    return a @ exp(np.asarray(share)[..., None] * turn)
+
+
 def interpolated_rotations(
     R: NDArray[np.float64], at: NDArray[np.float64], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return rotations (N, 3, 3) at the times ``at`` (N,), on arcs between them at others (T,)."""
     k = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(at) - 2)
     share = (times - at[k]) / (at[k + 1] - at[k])
-    steps = log(np.swapaxes(R[k], 1, 2) @ R[k + 1])
-    between: NDArray[np.float64] = R[k] @ exp(share[:, None] * steps)
-    return between
+    return interpolate_rotations(R[k], R[k + 1], share)
 
 
 def interpolated_places(

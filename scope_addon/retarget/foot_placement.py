@@ -39,7 +39,7 @@ from ..kinematics.axes import UP
 from ..kinematics.foot_skin import FootSkin, lower_floors
 from ..kinematics.leg_reach import cross, knee_turn
 from ..kinematics.standing import standing_probability
-from .skeleton import Skeleton, head_positions, rotated
+from .skeleton import Pose, Skeleton, head_positions, rotated
 
 # Thickness of the sole, and length of the heel region.
 _SOLE_M = 0.015
@@ -64,22 +64,14 @@ class Legs:
     joints: list[int]  # the body's ankles
     toed: list[int]  # the legs that have a bone for the toes
     toes: list[int]  # these bones
+    # (len(toed), 3, 3) A_b F R_b of these bones, as in ``transfer.py``
+    toes_in_t_pose: NDArray[np.float64]
     body: FootRest  # (L, 3) and (L,)
     rig: FootRest
     tips: NDArray[np.float64]  # (len(toed), 3) from the ball to the tip of the toes, metres
     lengths: NDArray[np.float64]  # (L,) of the legs, nearly stretched, metres
     # (3,) scale of positions: that on the floor twice, and the ratio of leg lengths, rig to body.
     scales: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class RigMotion:
-    """A rig's motion in the world frame, metres. Notation as in ``transfer.py``."""
-
-    turns: NDArray[np.float64]  # (T, B, 3, 3) D of each bone
-    alignment: NDArray[np.float64]  # (B, 3, 3) A_b F
-    rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world
-    heads: NDArray[np.float64]  # (T, B, 3)
 
 
 def legs_at_rest(
@@ -127,6 +119,7 @@ def legs_at_rest(
         joints=[body.joint_names.index(f"{side}_ankle") for side in sides],
         toed=toed,
         toes=toes,
+        toes_in_t_pose=alignment[toes] @ rig.rotations[toes],
         body=_stacked(source),
         rig=_stacked(feet),
         tips=np.array(tips).reshape(-1, 3),
@@ -185,21 +178,23 @@ def _stacked(feet: list[FootRest]) -> FootRest:
 def place_feet(
     rig: Skeleton,
     legs: Legs,
-    motion: RigMotion,
+    bone_turns: NDArray[np.float64],
+    pose: Pose,
     joints: NDArray[np.float64],
     times: NDArray[np.float64],
     one_floor: NDArray[np.bool_],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> None:
     """Move the rig's ankles, and with them heels and balls, to where the body's are.
 
+    :param bone_turns: (T, B, 3, 3) D of each bone, as in ``transfer.py``.
+    :param pose: the rig's motion, which changes.
     :param joints: (T, K+1, 3) of the body, metres, world frame.
     :param times: (T,) seconds.
     :param one_floor: (T,) where feet and toes are kept above the floor; see `frames_on_one_floor`.
-    :return: the changed rotations (T, B, 3, 3) and heads (T, B, 3).
     """
-    world = motion.rotations.copy()
-    heads = motion.heads.copy()
-    turns = motion.turns[:, legs.ankles]
+    world = pose.rotations
+    heads = pose.heads
+    turns = bone_turns[:, legs.ankles]
     goals = ankle_goal(
         legs.body,
         legs.rig,
@@ -211,20 +206,19 @@ def place_feet(
     if legs.toed and one_floor.any():
         balls = (goals + rotated(turns, legs.rig.ball))[one_floor][:, legs.toed]
         rested = (legs.rig.height + legs.rig.ball[:, 2])[legs.toed]
-        flat = flat_toes(motion.turns[one_floor][:, legs.toes], legs.tips, balls, rested)
-        at_rest = motion.alignment[legs.toes] @ rig.rotations[legs.toes]
-        world[np.ix_(np.flatnonzero(one_floor), np.array(legs.toes))] = flat @ at_rest
+        flat = flat_toes(bone_turns[one_floor][:, legs.toes], legs.tips, balls, rested)
+        rows = np.flatnonzero(one_floor)
+        world[np.ix_(rows, np.array(legs.toes))] = flat @ legs.toes_in_t_pose
     heads[..., 2] -= pelvis_drop(heads[:, legs.hips], goals, legs.lengths, times)[:, None]
     at = _rows(heads[:, legs.hips]), _rows(heads[:, legs.knees]), _rows(heads[:, legs.ankles])
-    left = _rows(motion.turns[:, legs.hips, :, 0])  # The axis about which the body's knees bend.
+    left = _rows(bone_turns[:, legs.hips, :, 0])  # The axis about which the body's knees bend.
     thighs = _rows(world[:, legs.hips])
     shins = _rows(world[:, legs.knees])
     solved = solve_leg(thighs, shins, at, _rows(goals), left)
     world[:, legs.hips], world[:, legs.knees] = (R.reshape(len(world), -1, 3, 3) for R in solved)
     placed = head_positions(rig, world)
     first = legs.hips[0]
-    placed += (heads[:, first] - placed[:, first])[:, None]
-    return world, placed
+    heads[:] = placed + (heads[:, first] - placed[:, first])[:, None]
 
 
 def frames_on_one_floor(

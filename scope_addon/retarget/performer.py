@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import log, shortest_turn
-from ..edit.clip import interpolate_rotations
 from ..errors import MotionFileError
 from ..kinematics.axes import R_WORLD_MODEL, UP
 from ..kinematics.frame_blocks import by_blocks
+from ..kinematics.smoothing import interpolate_rotations
 from ..notices import Notice, notice
 from ..untrusted.bvh_file import BvhMotion
 from .bone_map import REQUIRED, SIDED_PARTS, SPINE

@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
-from ..edit.clip import Clip, interpolate_rotations
+from ..edit.clip import Clip
 from ..kinematics.axes import R_WORLD_MODEL, UP
+from ..kinematics.smoothing import interpolate_rotations
 from .bone_map import FINGERS, SPINE, BoneMap
-from .foot_placement import RigMotion, legs_at_rest, place_feet
+from .foot_placement import legs_at_rest, place_feet
 from .skeleton import Pose, Skeleton, head_positions
 
 _NEXT = {"hip": "knee", "knee": "ankle", "shoulder": "elbow", "elbow": "wrist", "wrist": "hand"}
@@ -83,8 +84,8 @@ class Transfer:
         self._first, self._second, self._shares = _between(part_of, index)
         F = heading_alignment(rig, row)
         self._facing = float(np.arctan2(F[1, 0], F[0, 0]))
-        self._alignment = rest_alignment(rig, part_of, row, rest, index, F) @ F
-        self._rested = self._alignment @ rig.rotations
+        alignment = rest_alignment(rig, part_of, row, rest, index, F) @ F
+        self._rested = alignment @ rig.rotations
         legs = leg_ratio(body, betas, rig, bone_map)
         self._scales = np.array([legs if travel is None else travel] * 2 + [legs])
         self._hips = [row["left_hip"], row["right_hip"]]
@@ -95,7 +96,7 @@ class Transfer:
         rested = rest[self._source_hips, 2].mean() - vertices[:, 2].min()
         self._lift[2] = (rig.heads[self._hips, 2].mean() - rig.floor) - legs * rested
         self._legs = (
-            legs_at_rest(rig, row, self._alignment, body, (vertices, rest), self._scales)
+            legs_at_rest(rig, row, alignment, body, (vertices, rest), self._scales)
             if feet
             else None
         )
@@ -115,11 +116,11 @@ class Transfer:
         heads += (self._scales * source_hips + self._lift - heads[:, self._hips].mean(axis=1))[
             :, None
         ]
+        pose = Pose(world, heads, self._facing)
         if self._legs is not None:
-            motion = RigMotion(turns, self._alignment, world, heads)
             held = np.broadcast_to(one_floor, len(clip))
-            world, heads = place_feet(rig, self._legs, motion, joints, clip.times, held)
-        return Pose(world, heads, self._facing)
+            place_feet(rig, self._legs, turns, pose, joints, clip.times, held)
+        return pose
 
     def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return D of each bone (T, B, 3, 3) from D of each joint; spine and neck are distributed

@@ -7,8 +7,9 @@ Separate the root trajectory from a motion and combine them again.
 import numpy as np
 import pytest
 from scope.scope_addon.edit import root_motion
-from scope.scope_addon.edit.clip import interpolate_rotations, resample, sample
+from scope.scope_addon.edit.clip import resample, sample
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.kinematics.smoothing import interpolate_rotations
 from scope.solver.rotations import exp
 
 from .walking import angle, walk

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ...edit.clip import Clip, sample
+from ...edit.clip import Clip, differ, sample
 from ...edit.corrected_motion import corrections_of, floor_of, pin_in_world, shot_of, uncorrected
 from ...edit.corrections import (
     Correction,
@@ -46,7 +46,7 @@ from ..timing import cycle_span
 from ..visibility import world_matrix
 from .keys import ROTATION, channel_curves, read_clip, write_keys
 from .root_object import clip_with_root_motion, removed_root_motion, root_object
-from .uncorrected_keys import UncorrectedKeys, changed_rows, differ, keyed_values, restore
+from .uncorrected_keys import UncorrectedKeys, changed_rows, keyed_values, restore
 
 _SAME_FRAME = 2e-3
 _WHOLE = 1e-3  # frames; timestamps are rounded

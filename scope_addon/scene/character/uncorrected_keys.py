@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ...edit.clip import Clip
+from ...edit.clip import Clip, differ
 from ...errors import MotionFileError
 from ...untrusted.files import read_npz
 from ..actions import read_keys
@@ -59,7 +59,7 @@ class UncorrectedKeys:
         try:
             found = read_npz(Path("keys"), MotionFileError, "record of keys", content)
             times, before, written = (np.asarray(found[name], float) for name in _NAMES)
-            rise = float(found["rise"]) if "rise" in found else 0.0
+            rise = float(found["rise"])
         except (MotionFileError, KeyError, ValueError, TypeError):
             return none
         shapes = times.ndim == 1 and before.shape == written.shape == (len(times), curves)
@@ -136,14 +136,6 @@ def write_both(
     after = keyed_values(armature, body, keyed_frames)
     rows = differ(free, corrected)
     return changed_rows(keyed_frames, rows, before, after, start_frame(armature), rate)
-
-
-def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
-    """Return at which keys (T,) two clips differ."""
-    different: NDArray[np.bool_] = (a.rotations != b.rotations).any((1, 2, 3)) | (
-        a.root != b.root
-    ).any(1)
-    return different
 
 
 def changed_rows(
