@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .arrays import Float64Array, Uint8Array
 
@@ -58,7 +57,7 @@ class FootageView:
             cx = width - 1 - cx
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
-    def distortion(self, dist: NDArray[np.float64]) -> Float64Array:
+    def distortion(self, dist: Float64Array) -> Float64Array:
         """Return OpenCV's (5,) k1, k2, p1, p2, k3 in the shown picture, of those in the file's.
 
         Only the tangential part changes: a quarter turn takes (p1, p2) to (p2, −p1), and mirroring

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import BoolArray, Float64Array, FloatArray
 from .atomic_write import reason, write_npz
 from .errors import MotionFileError, OutputError
 from .footage_view import FootageView
@@ -44,31 +45,31 @@ class Motion:
     :raises MotionFileError: an array has the wrong shape.
     """
 
-    poses: NDArray[np.floating[Any]]  # (T, 3(K+1))
-    trans: NDArray[np.floating[Any]]  # (T, 3)
-    poses_raw: NDArray[np.floating[Any]]  # (T, 3(K+1)), before smoothing and contact
-    trans_raw: NDArray[np.floating[Any]]  # (T, 3)
-    betas: NDArray[np.floating[Any]]  # (P,)
+    poses: FloatArray  # (T, 3(K+1))
+    trans: FloatArray  # (T, 3)
+    poses_raw: FloatArray  # (T, 3(K+1)), before smoothing and contact
+    trans_raw: FloatArray  # (T, 3)
+    betas: FloatArray  # (P,)
     body_model: str
     gender: str
     mocap_framerate: float
     frames: NDArray[np.int64]  # (T,) source frame index
-    timestamps: NDArray[np.float64]  # (T,) seconds
-    valid: NDArray[np.bool_]  # (T,)
-    joints_cam: NDArray[np.floating[Any]]  # (T, K+1, 3) metres, camera frame
-    keypoints2d: NDArray[np.floating[Any]]  # (T, J, 3) pixels and confidence
+    timestamps: Float64Array  # (T,) seconds
+    valid: BoolArray  # (T,)
+    joints_cam: FloatArray  # (T, K+1, 3) metres, camera frame
+    keypoints2d: FloatArray  # (T, J, 3) pixels and confidence
     keypoints2d_names: NDArray[np.str_]  # (J,)
-    intrinsics: NDArray[np.float64]  # (3, 3)
-    dist: NDArray[np.float64]  # (5,)
-    joint_confidence: NDArray[np.floating[Any]]  # (T, K+1)
-    world_from_camera: NDArray[np.float64]  # (T, 4, 4)
-    foot_contact: NDArray[np.floating[Any]]  # (T, 4) left heel, left toe, right heel, right toe
-    residual_px: NDArray[np.floating[Any]]  # (T,)
+    intrinsics: Float64Array  # (3, 3)
+    dist: Float64Array  # (5,)
+    joint_confidence: FloatArray  # (T, K+1)
+    world_from_camera: Float64Array  # (T, 4, 4)
+    foot_contact: FloatArray  # (T, 4) left heel, left toe, right heel, right toe
+    residual_px: FloatArray  # (T,)
     image_size: NDArray[np.int64]  # (2,) width, height of the decoded, upright frame
     source: str = ""  # file name of the footage
     # (T, K+1), NaN where not known; always an array once made
-    joint_sigma_m: NDArray[np.floating[Any]] | None = None
-    joint_sigma_depth_m: NDArray[np.floating[Any]] | None = None  # (T, K+1), likewise
+    joint_sigma_m: FloatArray | None = None
+    joint_sigma_depth_m: FloatArray | None = None  # (T, K+1), likewise
     # standard deviation of the stature of `betas`; NaN where it is not known
     height_sigma_m: float = float("nan")
     uneven_ground: bool = False  # feet rest at any height, so none is under a floor
@@ -78,7 +79,7 @@ class Motion:
     footage_mirrored: bool = False
     footage_speed: float = 1.0
     # (T,) focal length of each frame over that of `intrinsics`; None: it is constant
-    zoom: NDArray[np.float64] | None = None
+    zoom: Float64Array | None = None
     # (M,) rows, from 1 on, of the frames that begin another scene than the frame before
     scene_starts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     # What the user corrected, which `poses` and `joints_cam` contain: the arrays named
@@ -115,16 +116,16 @@ class Motion:
         self.validate()
 
     @property
-    def footage_times_s(self) -> NDArray[np.float64]:
+    def footage_times_s(self) -> Float64Array:
         """(T,) seconds in the footage as it plays, which for slow motion are more than those of the
         motion.
         """
         return self.timestamps * self.footage_speed
 
     @property
-    def has_residual(self) -> NDArray[np.bool_]:
+    def has_residual(self) -> BoolArray:
         """(T,) whether this camera saw the person, so that ``residual_px`` is no mere 0."""
-        known: NDArray[np.bool_] = self.valid & (self.residual_px > 0.0)
+        known: BoolArray = self.valid & (self.residual_px > 0.0)
         return known
 
     @property
@@ -134,12 +135,12 @@ class Motion:
         return float(known.mean()) if len(known) else 0.0
 
     @property
-    def cuts_s(self) -> NDArray[np.float64]:
+    def cuts_s(self) -> Float64Array:
         """(M,) seconds: when the footage cuts to another scene."""
         return cut_times(self.timestamps, self.scene_starts)
 
     @property
-    def times_with_gaps(self) -> NDArray[np.float64]:
+    def times_with_gaps(self) -> Float64Array:
         """(T,) seconds, with gaps at scene cuts: for what is filtered over time, and for speeds."""
         return with_scene_gaps(self.timestamps, self.cuts_s)
 
@@ -150,7 +151,7 @@ class Motion:
         return [slice(*pair) for pair in pairwise(starts)]
 
     @property
-    def intrinsics_of_frames(self) -> NDArray[np.float64]:
+    def intrinsics_of_frames(self) -> Float64Array:
         """(T, 3, 3) intrinsics of each frame."""
         intrinsics = np.tile(self.intrinsics, (len(self), 1, 1))
         if self.zoom is not None:
@@ -181,7 +182,7 @@ class Motion:
         """
         of_view = {name: values[number] for name, values in self.views.items()}
         T_view_camera = of_view["view_from_camera"]
-        joints: NDArray[np.float64] = self.joints_cam @ T_view_camera[:3, :3].T
+        joints: Float64Array = self.joints_cam @ T_view_camera[:3, :3].T
         times_s = self.timestamps + of_view["view_offsets_s"]
         rate = float(of_view["view_frame_rates"])
         return replace(
@@ -204,13 +205,13 @@ class Motion:
     def __len__(self) -> int:
         return len(self.frames)
 
-    def joint_rotations(self) -> NDArray[np.float64]:
+    def joint_rotations(self) -> Float64Array:
         """Return the rotations of ``poses``, (T, K+1, 3, 3)."""
         from ..solver.rotations import exp  # Loads numba, which reading a motion does not need.
 
         return exp(self.poses.reshape(len(self), -1, 3).astype(float))
 
-    def parts_in_world(self, body: Body) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def parts_in_world(self, body: Body) -> tuple[Float64Array, Float64Array]:
         """Return the orientations (T, K+1, 3, 3) and origins (T, K+1, 3) of a body's parts, metres,
         world frame.
         """
@@ -416,7 +417,7 @@ class Motion:
             ) from error
 
 
-def _is_lens(intrinsics: NDArray[np.float64], image_size: NDArray[np.int64]) -> bool:
+def _is_lens(intrinsics: Float64Array, image_size: NDArray[np.int64]) -> bool:
     """Return whether intrinsics (..., 3, 3) and the width and height of images (..., 2) are those
     of lenses.
     """

@@ -20,9 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..solver.names import BODY_JOINTS
+from .arrays import BoolArray, Float32Array, Float64Array
 from .motion import Motion
 
 # reprojection error above which a frame should be reviewed, as a share of the image's longer side
@@ -68,7 +68,7 @@ class Span:
 
 
 def find_review_spans(
-    motion: Motion, gap_s: float = 0.0, under_floor: NDArray[np.bool_] | None = None
+    motion: Motion, gap_s: float = 0.0, under_floor: BoolArray | None = None
 ) -> list[Span]:
     """Find the spans of a motion that should be reviewed.
 
@@ -90,7 +90,7 @@ def find_review_spans(
     ]
 
 
-def body_confidence(motion: Motion) -> NDArray[np.float32] | NDArray[np.float64]:
+def body_confidence(motion: Motion) -> Float32Array | Float64Array:
     """Return the mean confidence of each frame, (T,), over the body's joints that are seen in at
     least one frame.
 
@@ -111,9 +111,7 @@ def body_sigma_m(motions: Sequence[Motion]) -> float:
     return float(np.median(known)) if len(known) else float("nan")
 
 
-def _spans(
-    mask: NDArray[np.bool_], timestamps: NDArray[np.float64], gap_s: float
-) -> list[tuple[int, int]]:
+def _spans(mask: BoolArray, timestamps: Float64Array, gap_s: float) -> list[tuple[int, int]]:
     """Return the first and last row of each run of True in ``mask``, (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(mask, int), [0]])))
     out: list[tuple[int, int]] = []
@@ -125,7 +123,7 @@ def _spans(
     return out
 
 
-def implausible(motion: Motion) -> dict[str, NDArray[np.bool_]]:
+def implausible(motion: Motion) -> dict[str, BoolArray]:
     """Return the frames (T,) of a motion that are not plausible, by the reason, a key of
     ``notices.REASONS``.
     """
@@ -140,11 +138,11 @@ def implausible(motion: Motion) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def joints_in_world(motion: Motion) -> NDArray[np.float64]:
+def joints_in_world(motion: Motion) -> Float64Array:
     """Return the body's joints (T, 22, 3) in the world, metres."""
     joints = motion.joints_cam[:, : len(BODY_JOINTS)].astype(float)
     T = motion.world_from_camera
-    turned: NDArray[np.float64] = np.einsum("tij,tkj->tki", T[:, :3, :3], joints)
+    turned: Float64Array = np.einsum("tij,tkj->tki", T[:, :3, :3], joints)
     return turned + T[:, None, :3, 3]
 
 
@@ -168,7 +166,7 @@ def has_bent_knees(motion: Motion) -> bool:
     return bool(np.percentile(straightest[stands], 98) < BENT_KNEE_DEG)
 
 
-def _swings(motion: Motion) -> NDArray[np.bool_]:
+def _swings(motion: Motion) -> BoolArray:
     times = motion.times_with_gaps
     rows = np.arange(len(motion))
     later = np.minimum(np.searchsorted(times, times + SWING_S, side="right") - 1, len(motion) - 1)
@@ -186,7 +184,7 @@ def _swings(motion: Motion) -> NDArray[np.bool_]:
     return found
 
 
-def _leans(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _leans(motion: Motion, joints: Float64Array) -> BoolArray:
     weights = np.array(list(_MASSES.values()))
     mass = np.einsum("k,tki->ti", weights, joints[:, [_AT[name] for name in _MASSES]])
     mass /= weights.sum()
@@ -204,7 +202,7 @@ def _leans(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
     return _held(motion, (nearest > LEAN_M) & stands, LEAN_S)
 
 
-def _floats(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _floats(motion: Motion, joints: Float64Array) -> BoolArray:
     if motion.uneven_ground:
         return np.zeros(len(motion), bool)
     # The ankles of people on their feet, and hands or pelvis of others.
@@ -213,18 +211,16 @@ def _floats(motion: Motion, joints: NDArray[np.float64]) -> NDArray[np.bool_]:
     return _held(motion, lowest > _ANKLE_M + FLOATING_M, FLOATING_S)
 
 
-def _distance(
-    point: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _distance(point: Float64Array, a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the distances (T,) of points (T, 2) from the segments from a to b, (T, 2)."""
     along = b - a
     share = ((point - a) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
     nearest = a + np.clip(share, 0, 1)[:, None] * along
-    distance: NDArray[np.float64] = np.linalg.norm(point - nearest, axis=1)
+    distance: Float64Array = np.linalg.norm(point - nearest, axis=1)
     return distance
 
 
-def _held(motion: Motion, mask: NDArray[np.bool_], least_s: float) -> NDArray[np.bool_]:
+def _held(motion: Motion, mask: BoolArray, least_s: float) -> BoolArray:
     """Return the runs of a mask (T,) that last long enough within a scene; frames in which the
     person was not seen do not count.
     """

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import Body
+from ..arrays import Float64Array, FloatArray, Uint8Array
 from ..capture.camera.bars import find_bars, longer_content_side
 from ..capture.camera.intrinsics import Camera, assumed_camera
 from ..capture.camera.line_segments import Segments, find_segments
@@ -45,12 +44,12 @@ class Calibration:
     """
 
     camera: Camera
-    betas: NDArray[np.floating[Any]]  # (P,)
-    up: NDArray[np.floating[Any]]  # (3,) unit, camera axes
-    camera_position: NDArray[np.floating[Any]]  # (3,) metres, world
+    betas: FloatArray  # (P,)
+    up: FloatArray  # (3,) unit, camera axes
+    camera_position: FloatArray  # (3,) metres, world
 
     @property
-    def T_world_camera(self) -> NDArray[np.float64]:
+    def T_world_camera(self) -> Float64Array:
         """The (4, 4) camera pose."""
         T = world_from_level_camera(self.up)
         T[:3, 3] = self.camera_position
@@ -126,14 +125,14 @@ class Calibrator:
         self._size = size
         self._height_m = height_m
         self._fits = FocalFits(body)
-        self._costs: list[NDArray[np.float64]] = []
+        self._costs: list[Float64Array] = []
         self._longer_px = float(max(size))
         self._by_edges = camera
         self._segments = Segments.none()
-        self._up_of_lines: NDArray[np.float64] | None = None
+        self._up_of_lines: Float64Array | None = None
         self._focal_of_lines = 1e-9  # for which that was estimated
 
-    def observe(self, image_rgb: NDArray[np.uint8], observation: Observation) -> None:
+    def observe(self, image_rgb: Uint8Array, observation: Observation) -> None:
         """Find the edges of the background in a frame (H, W, 3) in which somebody is seen."""
         people = [observation.keypoints_px]
         bars = find_bars(image_rgb)

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Uint8Array
 from ..errors import VideoError
 from ..notices import Notice
 from . import system_cameras
@@ -79,7 +78,7 @@ class CameraSource:
                     index,
                     now_s,
                     now_s,
-                    cast(NDArray[np.uint8], cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)),
+                    cast(Uint8Array, cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)),
                 )
                 index += 1
         finally:

@@ -15,12 +15,11 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import Body, Fit, Floor, FootContacts, FrameSolver, Measurements, Options, State
+from ..arrays import FloatArray, IndexArray
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_measurements import Measurer
 from ..capture.fitting.frame_sequence import LONGEST_COAST_S, is_usable
@@ -40,15 +39,15 @@ AFTER_A_PAUSE = 0.01
 class Support:
     """Places in the camera frame, metres, and the plane of the floor, normal . p = offset."""
 
-    places: NDArray[np.floating[Any]]  # (6, 3) where points rest
-    rests: NDArray[np.floating[Any]]  # (6,) probability that each of them rests there
-    on_floor: NDArray[np.floating[Any]]  # (6,) probability that it rests on the floor
-    not_below: NDArray[np.floating[Any]]  # (6,) probability that it is not below the floor
+    places: FloatArray  # (6, 3) where points rest
+    rests: FloatArray  # (6,) probability that each of them rests there
+    on_floor: FloatArray  # (6,) probability that it rests on the floor
+    not_below: FloatArray  # (6,) probability that it is not below the floor
     stands: float  # probability that the lowest sole was on the floor
-    floor_normal: NDArray[np.floating[Any]]  # (3,) unit, upwards
+    floor_normal: FloatArray  # (3,) unit, upwards
     floor_offset: float
 
-    def added_to(self, measurements: Measurements, points: NDArray[np.intp]) -> Measurements:
+    def added_to(self, measurements: Measurements, points: IndexArray) -> Measurements:
         """Return the measurements of a frame with this support.
 
         :param points: (6,) numbers of the contact points.
@@ -88,11 +87,11 @@ SAME_SHAPE = 1e-3  # difference of shape coefficients below which the contact po
 class FittedFrame:
     """The state of one frame in its camera, and how far it was measured."""
 
-    rotations: NDArray[np.floating[Any]]  # (K+1, 3, 3); row 0 R_camera_root
-    root_cam: NDArray[np.floating[Any]]  # (3,) the pelvis, metres
-    joint_confidence: NDArray[np.floating[Any]]  # (K+1,) 0..1
+    rotations: FloatArray  # (K+1, 3, 3); row 0 R_camera_root
+    root_cam: FloatArray  # (3,) the pelvis, metres
+    joint_confidence: FloatArray  # (K+1,) 0..1
     # (4, 2) where the image shows `SOLES`, normalized image coordinates
-    soles: NDArray[np.floating[Any]]
+    soles: FloatArray
 
 
 class CausalFit:
@@ -105,7 +104,7 @@ class CausalFit:
     def __init__(
         self, body: Body, observation: Observation, camera: Camera, height_m: float | None = None
     ) -> None:
-        self._shape_of_points: NDArray[np.floating[Any]] | None = None
+        self._shape_of_points: FloatArray | None = None
         prepared = prepare_track(body, single_frame_track(observation), camera, height_m=height_m)
         self._prepared = prepared
         self._camera = camera
@@ -131,7 +130,7 @@ class CausalFit:
                 self._last, state=replace(state, t_camera_root=state.t_camera_root * [1, 1, ratio])
             )
 
-    def set_shape(self, betas: NDArray[np.floating[Any]]) -> None:
+    def set_shape(self, betas: FloatArray) -> None:
         """Continue with another shape (P,)."""
         self._betas, self._priors = betas, self._prepared.priors_with_shape(betas)
         if (
@@ -150,7 +149,7 @@ class CausalFit:
         self,
         time_s: float,
         observation: Observation,
-        root_cam: NDArray[np.floating[Any]] | None = None,
+        root_cam: FloatArray | None = None,
         support: Support | None = None,
     ) -> FittedFrame | None:
         """Fit the next observation; None if it does not suffice.
@@ -182,7 +181,7 @@ class CausalFit:
             self.soles(observation),
         )
 
-    def soles(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def soles(self, observation: Observation) -> FloatArray:
         """Return where the image shows the soles (4, 2), normalized image coordinates."""
         return self._measurer.rays(
             self._camera.undistort(observation.keypoints_px[_SOLE_KEYPOINTS])
@@ -192,7 +191,7 @@ class CausalFit:
         return self._solver.fit(measurements, initial, self._priors, options)
 
     def _measure(
-        self, time_s: float, observation: Observation, root_cam: NDArray[np.floating[Any]] | None
+        self, time_s: float, observation: Observation, root_cam: FloatArray | None
     ) -> Measurements:
         """Lift the observation within the window that ends with it, and convert it to
         measurements.

@@ -30,12 +30,11 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import Body
+from ..arrays import BoolArray, Float64Array, FloatArray
 from ..capture.world.placement import VISIBLE_CONFIDENCE
 from ..capture.world.stance import floor_probability
 from ..kinematics.contact_points import (
@@ -76,10 +75,10 @@ class _Entry:
     """One frame of the window."""
 
     time_s: float
-    points: NDArray[np.floating[Any]]  # (6, 3) camera frame, metres
-    visible: NDArray[np.floating[Any]]  # (6,) 0..1
+    points: FloatArray  # (6, 3) camera frame, metres
+    visible: FloatArray  # (6,) 0..1
     # (4, 2) where the image shows the soles, normalized image coordinates
-    rays: NDArray[np.floating[Any]]
+    rays: FloatArray
 
 
 class FootHold:
@@ -87,7 +86,7 @@ class FootHold:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self._betas: NDArray[np.floating[Any]] | None = None
+        self._betas: FloatArray | None = None
         self._with_points = body
         self._visible_parts = [
             body.joint_names.index(n) for n in (*FOOT_PARTS, "left_wrist", "right_wrist")
@@ -104,20 +103,18 @@ class FootHold:
         self._elsewhere_s = np.zeros(n)  # for which the image has shown each point elsewhere
         self._rehold_delay_s = np.zeros(n)  # for which each point is not held yet
         # of the soles in the image, m/s
-        self._speed: NDArray[np.floating[Any]] = np.zeros(len(SOLES))
-        self._points_world: NDArray[np.floating[Any]] | None = None
-        self._shift: NDArray[np.float64] = np.zeros((2, 3))  # of each foot in the last frame, world
+        self._speed: FloatArray = np.zeros(len(SOLES))
+        self._points_world: FloatArray | None = None
+        self._shift: Float64Array = np.zeros((2, 3))  # of each foot in the last frame, world
         self._transition = Transition(2, TRANSITION_HZ)
-        self._probability: NDArray[np.floating[Any]] = np.zeros(n)
+        self._probability: FloatArray = np.zeros(n)
 
     @property
     def is_holding(self) -> bool:
         """Whether a foot or palm was held in the last frame."""
         return bool(self._is_held.any())
 
-    def support(
-        self, T_world_camera: NDArray[np.float64], soles: NDArray[np.floating[Any]]
-    ) -> Support | None:
+    def support(self, T_world_camera: Float64Array, soles: FloatArray) -> Support | None:
         """Return what the body stands on in the next frame; None before the first.
 
         A foot that rested can have taken a step since then, the more so the rarer the frames are.
@@ -147,11 +144,11 @@ class FootHold:
     def hold(
         self,
         time_s: float,
-        betas: NDArray[np.floating[Any]],
+        betas: FloatArray,
         frame: FittedFrame,
-        T_world_camera: NDArray[np.float64],
+        T_world_camera: Float64Array,
         is_settled: bool,
-    ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the frame's rotations (K+1, 3, 3) with its feet held, and the contact (6,).
 
         :param betas: (P,) shape.
@@ -197,7 +194,7 @@ class FootHold:
         rotations = move_ends(body, LEGS, frame.rotations[None], poses, shift)[0]
         return rotations, self._probability
 
-    def _contact(self, up: NDArray[np.float64]) -> NDArray[np.floating[Any]]:
+    def _contact(self, up: Float64Array) -> FloatArray:
         """Return the contact probability (6,) of the newest frame.
 
         :param up: (3,) unit vector, camera frame.
@@ -207,9 +204,7 @@ class FootHold:
             np.array([getattr(entry, name) for entry in self._window])
             for name in ("points", "visible", "rays")
         )
-        contact: NDArray[np.floating[Any]] = resting_probability(
-            points, up, times, np.zeros((len(times), 3))
-        )[-1]
+        contact: FloatArray = resting_probability(points, up, times, np.zeros((len(times), 3)))[-1]
         contact *= visible[-1]
         # Depth is left out: a mean one turns the motion in the image into metres.
         seen = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=2)
@@ -218,7 +213,7 @@ class FootHold:
         contact[: len(SOLES)] *= logistic(4 * (1 - self._speed / CONTACT_SPEED_M_S))
         return contact
 
-    def _release_displaced(self, T_world_camera: NDArray[np.float64], step_s: float) -> None:
+    def _release_displaced(self, T_world_camera: Float64Array, step_s: float) -> None:
         """Let go of the feet that the image has shown elsewhere for long."""
         newest = self._window[-1]
         n = len(SOLES)
@@ -239,9 +234,7 @@ class FootHold:
         self._rehold_delay_s = np.where(is_displaced, REHOLD_DELAY_S, self._rehold_delay_s - step_s)
         self._is_held = self._is_held & ~is_displaced
 
-    def _update(
-        self, points_world: NDArray[np.floating[Any]], step_s: float, drift_s: float
-    ) -> None:
+    def _update(self, points_world: FloatArray, step_s: float, drift_s: float) -> None:
         """Move the places of holds, and begin and end these."""
         contact = self._probability
         share = (1 - np.exp(-step_s / drift_s)) * (contact > END)
@@ -256,7 +249,7 @@ class FootHold:
         stays = (contact > END) | self._is_passed(points_world)
         self._is_held = (self._is_held | begins) & stays & ~far
 
-    def _is_passed(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
+    def _is_passed(self, points_world: FloatArray) -> BoolArray:
         """Return which points (6,) are of a foot that the other one swings past, and may only seem
         to move.
         """
@@ -266,7 +259,7 @@ class FootHold:
         rise = (points_world - self._anchors)[:, 2]
         return np.asarray(is_passed & (self._moving_s < PASSED_S) & (rise < RISE_M))
 
-    def _away(self, points_world: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    def _away(self, points_world: FloatArray) -> FloatArray:
         """Return by how much each foot (2, 3) is away from where it is held, world; 0 where it is
         not.
         """
@@ -275,7 +268,7 @@ class FootHold:
         return np.asarray((held * away).sum(axis=1) / np.maximum(held.sum(axis=1), 1))
 
 
-def _rise(lowest: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _rise(lowest: FloatArray) -> FloatArray:
     """Return by how much feet (2,) are raised onto the floor, if that is what they stand on,
     metres.
 
@@ -293,12 +286,12 @@ class Transition:
 
     def __init__(self, n: int, hz: float) -> None:
         self._omega = 2 * np.pi * hz
-        self._r: NDArray[np.float64] = np.zeros((n, 3))
+        self._r: Float64Array = np.zeros((n, 3))
         self._v = np.zeros((n, 3))
         self._a = np.zeros((n, 3))
 
     @property
-    def remainder(self) -> NDArray[np.float64]:
+    def remainder(self) -> Float64Array:
         """What is to be added to the present offsets (n, 3)."""
         return self._r
 
@@ -318,9 +311,9 @@ class Transition:
 
     def change(
         self,
-        where: NDArray[np.bool_],
-        old: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
-        new: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
+        where: BoolArray,
+        old: tuple[FloatArray, FloatArray],
+        new: tuple[FloatArray, FloatArray],
         step_s: float,
     ) -> None:
         """Take over the difference of two courses of the offsets as of the frame before; `advance`

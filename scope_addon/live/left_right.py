@@ -16,11 +16,10 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import FloatArray
 from ..capture.perception.observation import Observation, PendingReference
 from ..capture.tracking.left_right import (
     AS_DETECTED,
@@ -40,10 +39,10 @@ _MAX_FRAMES = 120  # that are kept for an answer
 class _Frame:
     """The readings of one frame, and what they cost."""
 
-    readings: NDArray[np.floating[Any]]  # (3, 12, 3)
+    readings: FloatArray  # (3, 12, 3)
     # (3, 3) of each reading (column) after each of the frame before (row)
-    steps: NDArray[np.floating[Any]]
-    costs: NDArray[np.floating[Any]]  # (3,) of each reading itself
+    steps: FloatArray
+    costs: FloatArray  # (3,) of each reading itself
     reference: PendingReference | None  # until its answer is added
 
     def add_reference(self, *, wait: bool) -> None:

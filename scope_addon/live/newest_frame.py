@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import ScopeError
+from ..arrays import Float64Array, Uint8Array
 from ..errors import VideoError
 from .source import Clock, Picture, Source
 from .stream import DAMAGED_S, STALLED_S
@@ -272,7 +273,7 @@ class NewestFrame:
                 "whether it is frozen"
             )
 
-    def _in_first_size(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _in_first_size(self, image: Uint8Array) -> Uint8Array:
         """Return a picture in the size of the first one, unless its shape is another one."""
         size = (image.shape[1], image.shape[0])
         wanted = self._size
@@ -281,7 +282,7 @@ class NewestFrame:
         if wanted is None or self._size == size:
             return image
         interpolation = cv2.INTER_AREA if size > wanted else cv2.INTER_LINEAR
-        return cast(NDArray[np.uint8], cv2.resize(image, wanted, interpolation=interpolation))
+        return cast(Uint8Array, cv2.resize(image, wanted, interpolation=interpolation))
 
 
 class Pace:
@@ -388,7 +389,7 @@ class Pace:
         took = self._recent(recent_s)
         return float(np.mean(took > seconds)) if len(took) >= FEWEST else 0.0
 
-    def _recent(self, recent_s: float) -> NDArray[np.float64]:
+    def _recent(self, recent_s: float) -> Float64Array:
         """Return how long the last frames took."""
         return np.array(
             [each for time_s, each in self._took if time_s >= self._took[-1][0] - recent_s]

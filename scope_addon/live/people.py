@@ -18,9 +18,9 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import Body
+from ..arrays import Float64Array
 from ..capture.camera.intrinsics import Camera
 from ..capture.media.frame import AutoExposure, Frame
 from ..capture.perception.observation import Observation
@@ -43,7 +43,7 @@ class _Newcomer:
     tracklet: int
     start: End
     last_s: float
-    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(SIZE))
+    appearance: Float64Array = field(default_factory=lambda: np.zeros(SIZE))
 
 
 @dataclass(eq=False)
@@ -55,7 +55,7 @@ class _FollowedPerson:
     session: LiveSession
     tracklet: int | None = None
     end: End | None = None
-    appearance: NDArray[np.float64] = field(default_factory=lambda: np.zeros(SIZE))
+    appearance: Float64Array = field(default_factory=lambda: np.zeros(SIZE))
 
     @property
     def last_s(self) -> float:

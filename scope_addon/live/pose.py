@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.rotations import quaternion_from_matrix
+from ..arrays import Float64Array, FloatArray
 
 
 class Presence(Enum):
@@ -38,23 +39,23 @@ class LivePose:
     timestamp_s: float  # of the source's frame
     presence: Presence
     is_settled: bool
-    betas: NDArray[np.floating[Any]]  # (P,)
-    rotations: NDArray[np.floating[Any]]
-    root_cam: NDArray[np.floating[Any]]
-    T_world_camera: NDArray[np.float64]  # (4, 4)
-    joints: NDArray[np.floating[Any]]
-    contact: NDArray[np.floating[Any]]
-    raw_rotations: NDArray[np.floating[Any]]
-    raw_root_cam: NDArray[np.floating[Any]]
-    keypoints: NDArray[np.floating[Any]]
-    joint_confidence: NDArray[np.floating[Any]]  # (K+1,)
+    betas: FloatArray  # (P,)
+    rotations: FloatArray
+    root_cam: FloatArray
+    T_world_camera: Float64Array  # (4, 4)
+    joints: FloatArray
+    contact: FloatArray
+    raw_rotations: FloatArray
+    raw_root_cam: FloatArray
+    keypoints: FloatArray
+    joint_confidence: FloatArray  # (K+1,)
     is_known: bool = True  # whether somebody was seen in this frame or before
     person: int = 0  # which of the people this is, see `LivePeople`
 
     @property
-    def R_world_root(self) -> NDArray[np.float64]:
+    def R_world_root(self) -> Float64Array:
         """Rotation (3, 3) of the pelvis."""
-        R: NDArray[np.float64] = self.T_world_camera[:3, :3] @ self.rotations[0]
+        R: Float64Array = self.T_world_camera[:3, :3] @ self.rotations[0]
         return R
 
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ...solver import Body
 from ...solver.rotations import exp, log
+from ..arrays import Float64Array, FloatArray, IndexArray
 from ..capture.camera.intrinsics import Camera
 from ..capture.camera.line_segments import Lines
 from ..capture.fitting.frame_sequence import FittedTrack
@@ -191,9 +192,9 @@ class Recording:
     def _track(
         self,
         poses: list[LivePose],
-        rows: NDArray[np.intp],
+        rows: IndexArray,
         frames: NDArray[np.int64],
-        times: NDArray[np.float64],
+        times: Float64Array,
     ) -> Track:
         T = len(frames)
         keypoints = np.zeros((T, KEYPOINT_COUNT, 3), np.float32)
@@ -211,7 +212,7 @@ class Recording:
         )
 
     def _fitted(
-        self, poses: list[LivePose], rows: NDArray[np.intp], nearest: NDArray[np.intp], prefix: str
+        self, poses: list[LivePose], rows: IndexArray, nearest: IndexArray, prefix: str
     ) -> FittedTrack:
         valid = np.zeros(len(nearest), bool)
         valid[rows] = True
@@ -247,7 +248,7 @@ def at_frames(poses: Sequence[LivePose], delay_s: float) -> list[LivePose]:
     return [_between(poses, k, int(after[k]), times[k] - given_at) for k in range(count)]
 
 
-def _between(poses: Sequence[LivePose], k: int, after: int, since: NDArray[np.float64]) -> LivePose:
+def _between(poses: Sequence[LivePose], k: int, after: int, since: Float64Array) -> LivePose:
     """Return the pose in frame ``k``, before which ``poses[after - 1]`` was given, and
     ``poses[after]`` was not.
 
@@ -298,10 +299,10 @@ def in_last_shape(poses: Sequence[LivePose], body: Body) -> list[LivePose]:
 def _raised(
     body: Body,
     pose: LivePose,
-    rotations: NDArray[np.floating[Any]],
-    root_cam: NDArray[np.floating[Any]],
-    betas: NDArray[np.floating[Any]],
-) -> NDArray[np.floating[Any]]:
+    rotations: FloatArray,
+    root_cam: FloatArray,
+    betas: FloatArray,
+) -> FloatArray:
     """Return the pelvis (3,) with which the lowest sole is as high in a shape as in the pose's own.
 
     :param rotations: (K+1, 3, 3) of the pose, or those before smoothing.
@@ -310,16 +311,14 @@ def _raised(
     """
     up = pose.T_world_camera[2, :3]
 
-    def lowest_sole(betas: NDArray[np.floating[Any]]) -> float:
+    def lowest_sole(betas: FloatArray) -> float:
         with_points = with_contact_points(body, betas)
         R, t = with_points.forward_kinematics(
             rotations, root_cam - with_points.rest_joints(betas)[0], betas
         )
         return float((contact_point_positions(with_points, R, t)[: len(SOLES)] @ up).min())
 
-    raised: NDArray[np.floating[Any]] = (
-        root_cam + (lowest_sole(pose.betas) - lowest_sole(betas)) * up
-    )
+    raised: FloatArray = root_cam + (lowest_sole(pose.betas) - lowest_sole(betas)) * up
     return raised
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver import Body, State
+from ..arrays import Float64Array, FloatArray
 from ..capture.camera.intrinsics import Camera
 from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.media.frame import Frame
@@ -164,7 +165,7 @@ class LiveSession:
                 self._seen.popleft()
         return fitted
 
-    def _root_of_feet(self, time_s: float) -> NDArray[np.floating[Any]] | None:
+    def _root_of_feet(self, time_s: float) -> FloatArray | None:
         """Return about where the pelvis is, camera frame, if feet rested on the floor in the frame
         before.
 
@@ -353,13 +354,13 @@ class LiveSession:
 
     def _joints(
         self,
-        betas: NDArray[np.floating[Any]],
-        rotations: NDArray[np.floating[Any]],
-        root: NDArray[np.floating[Any]],
-        T_world_camera: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+        betas: FloatArray,
+        rotations: FloatArray,
+        root: FloatArray,
+        T_world_camera: Float64Array,
+    ) -> Float64Array:
         """Return the (K+1, 3) joints, world."""
         body = self._body
         _, joints = body.forward_kinematics(rotations, root - body.rest_joints(betas)[0], betas)
-        world: NDArray[np.float64] = joints @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
+        world: Float64Array = joints @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
         return world

@@ -18,12 +18,11 @@ the same delay jitters twice as much, because every innovation is a jump in its 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import rotations
+from ..arrays import Float64Array, FloatArray
 
 DELAY_S = 0.06  # of every pose, whatever the frame rate: later frames separate noise from motion
 LONGEST_STEP_S = 0.5  # after a longer pause, a filter starts again
@@ -68,15 +67,15 @@ class VectorFilter:
 
     def reset(self) -> None:
         """Start again with the next value."""
-        self._values: list[NDArray[np.float64]] = []
+        self._values: list[Float64Array] = []
 
-    def __call__(self, value: NDArray[np.floating[Any]], step_s: float) -> NDArray[np.float64]:
+    def __call__(self, value: FloatArray, step_s: float) -> Float64Array:
         """Return the filtered value (...).
 
         :param value: (...), of the kind that the filter is for.
         :param step_s: seconds since the value before.
         """
-        x: NDArray[np.float64] = np.array(value, float)
+        x: Float64Array = np.array(value, float)
         if not self._values or not 0.0 < step_s <= LONGEST_STEP_S:
             self._values = [x] * self._response.stages
             self._age_s = 0.0
@@ -88,15 +87,11 @@ class VectorFilter:
             self._values[k] = x = self._between(state, x, share)
         return self._beyond(before, x, self._response.lead(self._age_s) / step_s)
 
-    def _between(
-        self, a: NDArray[np.float64], b: NDArray[np.float64], share: float
-    ) -> NDArray[np.float64]:
+    def _between(self, a: Float64Array, b: Float64Array, share: float) -> Float64Array:
         """Return what lies between a and b, at a share of the way."""
         return a + share * (b - a)
 
-    def _beyond(
-        self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float
-    ) -> NDArray[np.float64]:
+    def _beyond(self, a: Float64Array, b: Float64Array, lead: float) -> Float64Array:
         """Return what lies beyond b, by a multiple of the way from a."""
         return b + lead * (b - a)
 
@@ -104,15 +99,11 @@ class VectorFilter:
 class RotationFilter(VectorFilter):
     """Filters rotations (J, 3, 3), each for itself."""
 
-    def _between(
-        self, a: NDArray[np.float64], b: NDArray[np.float64], share: float
-    ) -> NDArray[np.float64]:
+    def _between(self, a: Float64Array, b: Float64Array, share: float) -> Float64Array:
         between = a @ rotations.exp(share * rotations.log(np.swapaxes(a, 1, 2) @ b))
         return rotations.nearest_rotation(between)  # without what rounding has added up
 
-    def _beyond(
-        self, a: NDArray[np.float64], b: NDArray[np.float64], lead: float
-    ) -> NDArray[np.float64]:
+    def _beyond(self, a: Float64Array, b: Float64Array, lead: float) -> Float64Array:
         return b @ rotations.exp(lead * rotations.log(np.swapaxes(a, 1, 2) @ b))
 
 
@@ -132,10 +123,10 @@ class PoseFilter:
 
     def __call__(
         self,
-        rotations: NDArray[np.floating[Any]],
-        root_cam: NDArray[np.floating[Any]],
+        rotations: FloatArray,
+        root_cam: FloatArray,
         time_s: float,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Float64Array, Float64Array]:
         """Return filtered rotations (K+1, 3, 3) and pelvis (3,).
 
         :param rotations: (K+1, 3, 3).

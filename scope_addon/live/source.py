@@ -13,9 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Uint8Array
 from ..capture.media.video import open_video
 from ..notices import OTHER, Notice, notice
 
@@ -33,7 +31,7 @@ class Picture:
     index: int
     timestamp_s: float
     arrived_s: float
-    image_rgb: NDArray[np.uint8]
+    image_rgb: Uint8Array
 
 
 class Source(Protocol):

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Uint8Array
 from ..capture.media.frame_readers import orientation, rgb, upright
 from ..capture.media.guards import check_size
 from ..errors import VideoError
@@ -168,7 +168,7 @@ class StreamSource:
                 "its server runs"
             ) from error
 
-    def _image(self, frame: av.VideoFrame, aspect: float) -> NDArray[np.uint8]:
+    def _image(self, frame: av.VideoFrame, aspect: float) -> Uint8Array:
         """Return the frame as it is to be shown; phones send what they film upright as rotated, and
         may mirror it.
         """

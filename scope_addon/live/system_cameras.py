@@ -25,9 +25,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Uint8Array
 from ..errors import VideoError
 from .source import Clock
 
@@ -105,7 +103,7 @@ def camera_with_modes(number: int, platform: str) -> tuple[str, list[Mode]]:
     return _name(device), _modes(device, platform)
 
 
-def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uint8]]:
+def pictures(container: InputContainer, clock: Clock) -> Iterator[Uint8Array]:
     """Yield the (H, W, 3) RGB pictures of an open camera as they come, until it gives no more."""
     import av
 
@@ -116,7 +114,7 @@ def pictures(container: InputContainer, clock: Clock) -> Iterator[NDArray[np.uin
             try:
                 for frame in opened.decode(video=0):
                     seen_s = clock.now()
-                    yield cast(NDArray[np.uint8], frame.to_ndarray(format="rgb24"))
+                    yield cast(Uint8Array, frame.to_ndarray(format="rgb24"))
                 is_open = False
             except av.error.BlockingIOError:  # avfoundation does not wait for the next picture
                 clock.sleep(_WAITING_S)

@@ -20,10 +20,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import Body
 from ...solver.rotations import quaternion_from_matrix
+from ..arrays import Float64Array, FloatArray
 from ..errors import OutputError, UsageError
 from ..kinematics.axes import R_WORLD_MODEL
 from .pose import LivePose, Presence
@@ -60,13 +60,13 @@ _CALIBRATED = 3
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def unity_position(position: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def unity_position(position: FloatArray) -> Float64Array:
     """Convert positions (..., 3) in the world, z up, to Unity's axes."""
-    model: NDArray[np.float64] = position @ R_WORLD_MODEL  # the inverse rotation, of row vectors
+    model: Float64Array = position @ R_WORLD_MODEL  # the inverse rotation, of row vectors
     return model * [-1.0, 1.0, 1.0]
 
 
-def unity_quaternion(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def unity_quaternion(R: FloatArray) -> Float64Array:
     """Convert rotations (..., 3, 3) in model axes to quaternions (..., 4) x, y, z, w in Unity's."""
     return quaternion_from_matrix(R)[..., [1, 2, 3, 0]] * [1.0, -1.0, -1.0, 1.0]
 
