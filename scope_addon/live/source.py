@@ -39,10 +39,10 @@ class Source(Protocol):
 
     name: str  # for messages and the motion file
     # whether the end of its frames is the end of the capture, rather than an interruption
-    ends: bool
-    fps: Fraction  # nominal
-    focal_35mm: float | None
-    speed: float  # how many times as fast as it plays everything happened
+    ends: bool = False
+    fps: Fraction = DEFAULT_FPS  # nominal
+    focal_35mm: float | None = None
+    speed: float = 1.0  # how many times as fast as it plays everything happened
     warnings: list[Notice]  # which grows while it is read
 
     def pictures(self, clock: Clock) -> Iterator[Picture | None]:
@@ -55,7 +55,7 @@ class Source(Protocol):
         """
 
 
-class FileSource:
+class FileSource(Source):
     """A video, played at the speed at which everything happened."""
 
     ends = True

@@ -17,7 +17,7 @@ from ..errors import VideoError
 from ..footage import display_address
 from ..notices import Notice
 from .damage import Damage
-from .source import DEFAULT_FPS, LEAP_S, Clock, Picture, Playback
+from .source import LEAP_S, Clock, Picture, Playback, Source
 
 if TYPE_CHECKING:
     import av
@@ -44,17 +44,12 @@ DAMAGED_S = 4.0
 UNREADABLE_S = KEY_FRAME_S + STALLED_S
 
 
-class StreamSource:
+class StreamSource(Source):
     """A stream from the network."""
-
-    ends = False
 
     def __init__(self, url: str) -> None:
         self._url = url
         self.name = display_address(url)
-        self.fps = DEFAULT_FPS
-        self.focal_35mm: float | None = None
-        self.speed = 1.0
         self.warnings: list[Notice] = []
 
     def pictures(self, clock: Clock) -> Iterator[Picture | None]:
