@@ -7,7 +7,7 @@ import errno
 import os
 import struct
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
@@ -18,7 +18,7 @@ from ..arrays import Uint8Array
 from ..errors import VideoError
 from ..notices import Notice
 from . import system_cameras
-from .source import DEFAULT_FPS, Clock, Picture
+from .source import DEFAULT_FPS, Clock, Picture, Source
 
 CAMERA_SIZE = (1280, 720)
 _OPEN_ERRORS = {
@@ -37,10 +37,8 @@ _CAPTURE = 1
 _OF_THIS_NODE = 1 << 31
 
 
-class CameraSource:
+class CameraSource(Source):
     """A camera of this computer, by number or device."""
-
-    ends = False
 
     def __init__(self, device: int | str) -> None:
         """Check that the device exists, where that can be seen from its name.
@@ -50,9 +48,6 @@ class CameraSource:
         self._device = device
         self.name = f"camera {device}"
         self._path = Path(f"/dev/video{device}" if isinstance(device, int) else device)
-        self.fps = DEFAULT_FPS
-        self.focal_35mm: float | None = None
-        self.speed = 1.0
         self.warnings: list[Notice] = []
         self._require_device()
 
@@ -141,18 +136,14 @@ class CameraSource:
         return "gives no frames; check that no other program uses it"
 
 
-def device_problem(path: Path, ioctl: Callable[[int, int, bytearray], Any] | None = None) -> str:
+def device_problem(path: Path) -> str:
     """Return why a device of Linux cannot be used as a camera, as the end of a sentence; empty if
     it can.
 
     It is only asked what it is, which does not switch it on.
-
-    :param ioctl: of devices; None: the system's.
     """
-    if ioctl is None:
-        import fcntl
+    import fcntl
 
-        ioctl = fcntl.ioctl
     answer = bytearray(struct.calcsize(_CAPABILITY))
     try:
         node = os.open(path, os.O_RDWR | os.O_NONBLOCK)
@@ -161,7 +152,7 @@ def device_problem(path: Path, ioctl: Callable[[int, int, bytearray], Any] | Non
             error.errno or 0, f"cannot be opened ({(error.strerror or 'unknown').lower()})"
         )
     try:
-        ioctl(node, _QUERYCAP, answer)
+        fcntl.ioctl(node, _QUERYCAP, answer)
     except OSError as error:
         gone = error.errno in (errno.ENODEV, errno.ENXIO, errno.EIO)
         return _OPEN_ERRORS[errno.ENODEV] if gone else "is not a camera; choose another device"
