@@ -103,10 +103,8 @@ class Motion:
         self.views = {
             name: np.asarray(value, _VIEW_SCHEMA[name][1]) for name, value in self.views.items()
         }
-        self.mocap_framerate, self.height_sigma_m = (
-            float(self.mocap_framerate),
-            float(self.height_sigma_m),
-        )
+        self.mocap_framerate = float(self.mocap_framerate)
+        self.height_sigma_m = float(self.height_sigma_m)
         self.uneven_ground = bool(self.uneven_ground)
         self.footage_rotation = int(self.footage_rotation) % 360
         self.footage_mirrored = bool(self.footage_mirrored)
@@ -317,7 +315,7 @@ class Motion:
     def _validate_group(
         self,
         group: dict[str, NDArray[Any]],
-        schema: dict[str, tuple[tuple[str | int, ...], type]],
+        schema: _Schema,
         sizes: dict[str, int],
         what: str,
     ) -> None:
@@ -432,49 +430,58 @@ def _is_lens(intrinsics: Float64Array, image_size: NDArray[np.int64]) -> bool:
 # Only in files with corrections. The first rows say what was corrected, the others how the changed
 # frames were before.
 CORRECTION_KEYS = (
-    *("pin_frames", "pin_joints", "pin_uv", "pin_xyz", "pin_reach"),
-    *("contact_spans", "contact_feet", "exchange_spans", "exchange_limbs", "upright"),
-    *("depth_spans", "depth_parts"),
-    *(
-        "floor_frames",
-        "floor_heights",
-        "interpolated_spans",
-        "snap_level",
-        "snap_lift",
-        "snap_heights",
-    ),
-    *(
-        "uncorrected_rows",
-        "uncorrected_poses",
-        "uncorrected_trans",
-        "uncorrected_poses_raw",
-        "uncorrected_trans_raw",
-    ),
-    *("uncorrected_joints_cam", "uncorrected_world_from_camera"),
+    "pin_frames",
+    "pin_joints",
+    "pin_uv",
+    "pin_xyz",
+    "pin_reach",
+    "contact_spans",
+    "contact_feet",
+    "exchange_spans",
+    "exchange_limbs",
+    "upright",
+    "depth_spans",
+    "depth_parts",
+    "floor_frames",
+    "floor_heights",
+    "interpolated_spans",
+    "snap_level",
+    "snap_lift",
+    "snap_heights",
+    "uncorrected_rows",
+    "uncorrected_poses",
+    "uncorrected_trans",
+    "uncorrected_poses_raw",
+    "uncorrected_trans_raw",
+    "uncorrected_joints_cam",
+    "uncorrected_world_from_camera",
 )
 # Not in files of earlier versions; NaN where nothing is known.
 SIGMA_KEYS = ("joint_sigma_m", "joint_sigma_depth_m")
+_Schema = dict[str, tuple[tuple[str | int, ...], type]]
 # Only in files of captures that looked for the face: the first are what it expresses, the others
 # where it was seen.
-FACE_KEYS = (
-    "expressions",
-    "expression_names",
-    "expression_confidence",
-    "gaze",
-    "face_points",
-    "face_landmarks",
-)
+_FACE_SCHEMA: _Schema = {
+    "expressions": (("T", "E"), np.float32),
+    "expression_names": (("E",), np.str_),
+    "expression_confidence": (("T",), np.float32),
+    "gaze": (("T", 2, 3), np.float32),
+    "face_points": (("T", "F", 2), np.float32),
+    "face_landmarks": (("F",), np.int64),
+}
+FACE_KEYS = tuple(_FACE_SCHEMA)
 # Only in files of captures with several cameras, one row for each but the first, which the other
 # keys describe.
-VIEW_KEYS = (
-    "view_sources",
-    "view_intrinsics",
-    "view_dist",
-    "view_image_sizes",
-    "view_frame_rates",
-    "view_from_camera",
-    "view_offsets_s",
-)
+_VIEW_SCHEMA: _Schema = {
+    "view_sources": (("V",), np.str_),
+    "view_intrinsics": (("V", 3, 3), np.float64),
+    "view_dist": (("V", 5), np.float64),
+    "view_image_sizes": (("V", 2), np.int64),
+    "view_frame_rates": (("V",), np.float64),
+    "view_from_camera": (("V", 4, 4), np.float64),
+    "view_offsets_s": (("V",), np.float64),
+}
+VIEW_KEYS = tuple(_VIEW_SCHEMA)
 _GROUPS = ("corrections", "face", "views")  # fields that are not keys themselves
 OPTIONAL_KEYS = {
     "source",
@@ -490,24 +497,7 @@ OPTIONAL_KEYS = {
     *FACE_KEYS,
     *VIEW_KEYS,
 }
-_FACE_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
-    "expressions": (("T", "E"), np.float32),
-    "expression_names": (("E",), np.str_),
-    "expression_confidence": (("T",), np.float32),
-    "gaze": (("T", 2, 3), np.float32),
-    "face_points": (("T", "F", 2), np.float32),
-    "face_landmarks": (("F",), np.int64),
-}
-_VIEW_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
-    "view_sources": (("V",), np.str_),
-    "view_intrinsics": (("V", 3, 3), np.float64),
-    "view_dist": (("V", 5), np.float64),
-    "view_image_sizes": (("V", 2), np.int64),
-    "view_frame_rates": (("V",), np.float64),
-    "view_from_camera": (("V", 4, 4), np.float64),
-    "view_offsets_s": (("V",), np.float64),
-}
-_SCHEMA: dict[str, tuple[tuple[str | int, ...], type]] = {
+_SCHEMA: _Schema = {
     "poses": (("T", "3K1"), np.float32),
     "trans": (("T", 3), np.float32),
     "poses_raw": (("T", "3K1"), np.float32),
