@@ -34,12 +34,12 @@ def with_scene_gaps(
     return later
 
 
-def steps_in_scenes(times: Float64Array, unknown_s: float = 0.0) -> Float64Array:
-    """Return the (T,) seconds from the frame before to each frame, without the gaps at cuts.
+def steps_in_scenes(times: Float64Array) -> Float64Array:
+    """Return the (T,) seconds from the frame before to each frame; 0 for the first frame of the
+    clip, and for the first after a cut.
 
     :param times: (T,) of a track, seconds.
-    :param unknown_s: what counts for the first frame of the clip, and for the first after a cut.
     """
-    steps_s: Float64Array = np.diff(times, prepend=times[:1] - unknown_s)
-    steps_s[steps_s > SCENE_GAP_S] = unknown_s
+    steps_s: Float64Array = np.diff(times, prepend=times[:1])
+    steps_s[steps_s > SCENE_GAP_S] = 0.0
     return steps_s
