@@ -14,7 +14,7 @@ from __future__ import annotations
 import secrets
 import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -132,21 +132,18 @@ class PreviewPage:
         while not is_over:
             is_over = self._is_over.wait(INTERVAL_S)
             with self._changed:
-                while not self._is_over.is_set() and self._newest_s() <= shown:
+                while not self._is_over.is_set() and _newest_s(self._poses.values()) <= shown:
                     self._changed.wait(1.0)
                 poses = list(self._poses.values())
             picture = self._picture_of(poses)
-            newest = max((pose.timestamp_s for pose in poses), default=-np.inf)
+            newest = _newest_s(poses)
             if picture is not None and newest > shown:
                 shown = newest
                 yield self._drawn(picture, poses)
 
-    def _newest_s(self) -> float:
-        return max((pose.timestamp_s for pose in self._poses.values()), default=-np.inf)
-
     def _picture_of(self, poses: Sequence[LivePose]) -> Picture | None:
         """Return the picture that was taken when the people had these poses."""
-        time_s = max((pose.timestamp_s for pose in poses), default=np.inf) - DELAY_S
+        time_s = _newest_s(poses) - DELAY_S
         near = [p for p in list(self._pictures) if abs(p.timestamp_s - time_s) < _KEPT_S]
         return min(near, key=lambda p: abs(p.timestamp_s - time_s), default=None)
 
@@ -180,6 +177,11 @@ class PreviewPage:
             cv2.line(image, points[parent], points[k], color, 3, cv2.LINE_AA)
         for point in points:
             cv2.circle(image, point, 3, _JOINT, -1, cv2.LINE_AA)
+
+
+def _newest_s(poses: Iterable[LivePose]) -> float:
+    """Return the time of the newest pose; -inf if there is none."""
+    return max((pose.timestamp_s for pose in poses), default=-np.inf)
 
 
 def _color(joint: str) -> tuple[int, int, int]:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,9 @@ from ..untrusted.body_file import load_body
 from .journal import About, Journal, fingerprint, read_about, read_records, saved_elsewhere
 from .people import LivePeople
 from .pose import LivePose, Presence
+from .session import LiveSession
 from .smoothing import DELAY_S
+from .source import Source
 from .unfinished import Target, lock_of
 
 _SAME_TIME_S = 1e-3
@@ -53,44 +55,20 @@ _FEWEST_RATE_ROWS = 30
 _MOST_RATE_ROWS = 300
 
 
-class Recorded(Protocol):
-    """What a recording has to know of its source."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def fps(self) -> Fraction:
-        """Its frames per second, nominal."""
-
-    @property
-    def speed(self) -> float:
-        """How many times as fast as it plays everything happened."""
-
-
-class WithCamera(Protocol):
-    """Where a recording's camera comes from, as from a `LiveSession`."""
-
-    @property
-    def camera(self) -> Camera | None:
-        """The camera as it is known now."""
-
-
 class Recording:
     """Keeps every pose, some 3 kB each."""
 
-    def __init__(self, path: Path, body: Body, source: Recorded) -> None:
+    def __init__(self, path: Path, body: Body, source: Source | _Source) -> None:
         self.path = path
         self._body = body
         self._source = source
         self._poses: list[LivePose] = []
         # number and time of each frame since the first in which the person was not seen
         self._unseen: dict[int, float] = {}
-        self._session: WithCamera | None = None
+        self._session: LiveSession | _LastCamera | None = None
         self._size = (1, 1)
 
-    def begin(self, session: WithCamera, size: tuple[int, int]) -> None:
+    def begin(self, session: LiveSession | _LastCamera, size: tuple[int, int]) -> None:
         """Note where the poses come from."""
         self._session = session
         self._size = size
@@ -350,7 +328,7 @@ class PeopleRecording:
         self,
         paths: Sequence[Path],
         body: Body,
-        source: Recorded,
+        source: Source | _Source,
         *,
         origin: tuple[int, float] | None = None,
         keep: Keep | None = None,

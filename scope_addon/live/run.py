@@ -168,71 +168,62 @@ def run_live(
     }
 
 
+@dataclass
 class _Poses:
     """Opens sessions for the size of the frames, and other ones where that changes, as after a
     reconnection.
     """
 
-    def __init__(
-        self,
-        source: Source,
-        body: Body,
-        options: LiveOptions,
-        tracker: PeopleTracker,
-        executor: ThreadPoolExecutor,
-        listeners: Listeners,
-        clock: Clock,
-    ) -> None:
-        self._source = source
-        self._body = body
-        self._options = options
-        self._tracker = tracker
-        self._executor = executor
-        self._listeners = listeners
-        self._clock = clock
-        self._size: tuple[int, int] | None = None
-        self._people: LivePeople | None = None
+    source: Source
+    body: Body
+    options: LiveOptions
+    tracker: PeopleTracker
+    executor: ThreadPoolExecutor
+    listeners: Listeners
+    clock: Clock
+    _size: tuple[int, int] | None = None
+    _people: LivePeople | None = None
 
     def of(self, picture: Picture) -> list[LivePose]:
         """Return the poses in a picture."""
         height, width = picture.image_rgb.shape[:2]
         if self._people is None or self._size != (width, height):
             is_first = self._people is None
-            options = self._options
+            options = self.options
             camera = choose_camera(
                 width,
                 height,
                 focal_mm=options.focal_mm,
                 fov_deg=options.fov_deg,
                 calibration=options.calibration,
-                metadata_focal_mm=self._source.focal_35mm,
+                metadata_focal_mm=self.source.focal_35mm,
             )
             self._size = width, height
-            self._tracker.reset()
+            self.tracker.reset()
             self._people = LivePeople(
-                self._body,
-                self._tracker,
+                self.body,
+                self.tracker,
                 camera,
                 self._size,
                 heights_m=options.heights_m,
                 count=options.people,
-                executor=self._executor,
+                executor=self.executor,
             )
-            self._listeners.camera(self._people, self._size)  # which may end the capture
+            self.listeners.camera(self._people, self._size)  # which may end the capture
             if not is_first:
                 self._say_another_shape(width, height)
         return self._people.step(Frame(picture.index, picture.timestamp_s, picture.image_rgb))
 
     def _say_another_shape(self, width: int, height: int) -> None:
-        if self._clock.stopped.is_set():
+        if self.clock.stopped.is_set():
             consequence = "the capture ends with the image before"
         else:
             consequence = (
                 "body, lens and floor are estimated again, and a recording ends with the image "
                 "before"
             )
-        self._listeners.say(
-            f"{self._source.name} now delivers images of another shape ({width} × {height}): "
+        self.listeners.say(
+            f"{self.source.name} now delivers images of another shape ({width} × {height}): "
             f"{consequence}"
         )
 

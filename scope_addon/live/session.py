@@ -19,6 +19,7 @@ from ..capture.fitting.frame_sequence import FittedTrack
 from ..capture.media.frame import Frame
 from ..capture.perception.observation import Observation
 from ..capture.tracking.track import track_of
+from ..kinematics.axes import transform_points
 from .calibration import Calibration, Calibrator, GradualCalibration
 from .causal_fit import CausalFit, FittedFrame, Support
 from .feet import FootHold
@@ -358,9 +359,8 @@ class LiveSession:
         rotations: FloatArray,
         root: FloatArray,
         T_world_camera: Float64Array,
-    ) -> Float64Array:
+    ) -> FloatArray:
         """Return the (K+1, 3) joints, world."""
         body = self._body
         _, joints = body.forward_kinematics(rotations, root - body.rest_joints(betas)[0], betas)
-        world: Float64Array = joints @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
-        return world
+        return transform_points(T_world_camera, joints)
