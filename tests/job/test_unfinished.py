@@ -65,10 +65,10 @@ def written_again(path, content):
     assert (path.stat().st_size, path.stat().st_mtime_ns) == (before.st_size, before.st_mtime_ns)
 
 
-@pytest.mark.parametrize("size", [100, 3 << 20])
 def test_other_content_of_the_same_size_and_time_is_not_continued_and_that_is_said(
-    tmp_path, footage, size
+    tmp_path, footage
 ):
+    size = 3 << 20
     footage.write_bytes(bytes(size))
     first = end(tmp_path, footage, KeyboardInterrupt())
     changed = bytearray(size)
@@ -84,7 +84,7 @@ def test_other_content_of_the_same_size_and_time_is_not_continued_and_that_is_sa
 
 
 @pytest.mark.parametrize("change", ["content", "added", "removed", "renamed", "exchanged"])
-@pytest.mark.parametrize("name", ["frames", "frames/f_####.png", "frames/f_1.png"])
+@pytest.mark.parametrize("name", ["frames", "frames/f_1.png"])
 def test_other_pictures_are_not_continued(tmp_path, change, name):
     frames = tmp_path / "frames"
     frames.mkdir()
@@ -176,15 +176,7 @@ def test_a_video_that_only_grows_stays_the_same(tmp_path, footage):
 
 
 def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
-    folders = [
-        tmp_path / FOLDER / name
-        for name in (
-            name_of(0),
-            name_of(1),
-            name_of(2),
-            name_of(3),
-        )
-    ]
+    folders = [tmp_path / FOLDER / name_of(digit) for digit in range(4)]
     for folder, age_s in zip(folders, (0, 3600, 7200, 30 * 86400), strict=True):
         folder.mkdir(parents=True)
         (folder / "0.npz").write_bytes(bytes(1000))
@@ -201,22 +193,21 @@ def test_the_lock_of_a_killed_capture_without_a_folder_is_removed_by_the_next_on
 ):
     folder = tmp_path / "caches" / FOLDER
     folder.mkdir(parents=True)
-    name = f"{'0' * 32}-{'1' * 32}"
-    (folder / f"{name}.lock").touch()
-    held = folder / f"{'2' * 32}-{'1' * 32}.lock"
+    (folder / f"{name_of(1)}.lock").touch()
+    held = folder / f"{name_of(2)}.lock"
     assert hold(held)
-    others = [folder / "mine.lock", folder / f"{'3' * 32}-{'1' * 32}.lock"]
+    others = [folder / "mine.lock", folder / f"{name_of(3)}.lock"]
     others[0].touch()
     others[1].write_text("not empty, so no lock of ours")
     with unfinished_capture(tmp_path / "caches", footage):
         assert sorted(path for path in others if path.exists()) == sorted(others)
         assert held.exists()
-        assert not (folder / f"{name}.lock").exists()
+        assert not (folder / f"{name_of(1)}.lock").exists()
     release(held)
 
 
 def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypatch):
-    folders = [tmp_path / FOLDER / name for name in map(name_of, range(3))]
+    folders = [tmp_path / FOLDER / name_of(digit) for digit in range(3)]
     for folder, age_s, inner_s in zip(
         folders, (3600, 86400, 30 * 86400), (3600, 0, 30 * 86400), strict=True
     ):
@@ -269,8 +260,3 @@ def test_clearing_the_cache_removes_it(tmp_path, footage):
     cache = Cache(tmp_path)
     assert cache.size() == cache.clear() > 0
     assert not folder.exists()
-
-
-def test_without_a_folder_for_caches_nothing_is_kept(footage):
-    with unfinished_capture(None, footage) as capture:
-        assert capture.folder is None

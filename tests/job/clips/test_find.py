@@ -30,6 +30,7 @@ def test_videos_images_and_sequences_are_found_and_results_are_not(tmp_path):
         ".hidden.mp4",
     ):
         (tmp_path / name).write_text("x")
+    (tmp_path / "e.HEIC").write_bytes(b"cannot be read")
     for folder, names in {
         "walk": [f"frame{i:03}.png" for i in range(3)],
         "photos": ["tree_1.png", "house_2.png"],
@@ -39,9 +40,9 @@ def test_videos_images_and_sequences_are_found_and_results_are_not(tmp_path):
         for name in names:
             (tmp_path / folder / name).write_text("x")
     flat = found_in(tmp_path)
-    assert list(flat) == ["a.mov", "a.mp4", "b", "walk"]
+    assert list(flat) == ["a.mov", "a.mp4", "b", "e", "walk"]
     assert flat["walk"] == tmp_path / "walk"
-    below = ["below/c", "below/deep/d", "photos/house_2", "photos/tree_1"]
+    below = ["below/c", "below/deep/d", "e", "photos/house_2", "photos/tree_1"]
     assert list(found_in(tmp_path, recursive=True)) == ["a.mov", "a.mp4", "b", *below, "walk"]
 
 
@@ -62,13 +63,6 @@ def test_numbered_pictures_are_one_clip_if_a_rate_is_given(tmp_path):
     assert len(found_in(tmp_path, recursive=True)) == len([*loose, *others, *below]) + 1
 
 
-def test_unreadable_pictures_are_clips_too(tmp_path):
-    (tmp_path / "IMG_0001.HEIC").write_bytes(b"heic")
-    (tmp_path / "IMG_0002.avif").write_bytes(b"avif")
-    found = found_in(tmp_path)
-    assert sorted(found) == ["IMG_0001", "IMG_0002"]
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows keeps its pipes in no folder")
 def test_a_pipe_is_not_a_clip_and_a_broken_link_is(tmp_path):
     os.mkfifo(tmp_path / "pipe.mp4")
@@ -77,25 +71,18 @@ def test_a_pipe_is_not_a_clip_and_a_broken_link_is(tmp_path):
     assert sorted(found) == ["gone.mp4"]
 
 
-def test_names_that_differ_only_in_case_are_the_same(tmp_path):
-    clips = tmp_path / "clips"
-    clips.mkdir()
-    for name in ("Walk.mov", "walk.mp4", "Run.mp4"):
-        (clips / name).write_text("x")
-    assert list(found_in(clips)) == ["Run", "Walk.mov", "walk.mp4"]
-
-
 def test_results_are_different_files_also_where_case_does_not_count(tmp_path):
     clips = tmp_path / "clips"
-    paths = [clips / name for name in ("Walk.mp4", "walk.mp4", "A/x.mp4", "a/x.mp4")]
+    names = ("Walk.mp4", "walk.mp4", "Run.mov", "run.mp4", "A/x.mp4", "a/x.mp4")
+    paths = [clips / name for name in names]
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("x")
-    if len(list(clips.iterdir())) < 4:
+    if len(list(clips.iterdir())) < 6:
         pytest.skip("case does not count in this folder")
     found = found_in(clips, recursive=True)
     assert sorted(found.values()) == sorted(paths)
-    assert len({name.casefold() for name in found}) == 4
+    assert len({name.casefold() for name in found}) == 6
 
 
 def test_names_are_unique_where_one_equals_another_without_suffix(tmp_path):
@@ -110,17 +97,6 @@ def test_names_are_unique_where_one_equals_another_without_suffix(tmp_path):
     assert {name: path.name for name, path in found.items()} == {
         n: n for n in [*names[:5], "b.mp4"]
     } | {"c.mp4": "c.mp4.mov"}
-
-
-def test_names_are_unique_where_one_equals_another_clips_person(tmp_path):
-    clips = tmp_path / "clips"
-    clips.mkdir()
-    for name in ("walk.mp4", "walk.person2.mp4", "run.person1.mp4"):
-        (clips / name).write_text("x")
-    short = ["run.person1", "walk", "walk.person2"]
-    assert list(found_in(clips)) == short
-    several = found_in(clips, several_people=True)
-    assert list(several) == [*short[:2], "walk.person2.mp4"]
 
 
 def test_links_to_a_folder_above_are_not_followed(tmp_path):

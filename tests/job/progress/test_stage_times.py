@@ -34,7 +34,7 @@ def test_kinds_that_were_not_captured_for_long_are_forgotten(tmp_path):
         3,
         [],
         {"kind": 3},
-        *({"kind": {"solving": time}} for time in ("x", -1, 1e999, 1e308, None, [0.1])),
+        *({"kind": {"solving": time}} for time in (-1, 1e999, None)),
     ],
 )
 def test_damaged_times_are_none(tmp_path, kinds):
