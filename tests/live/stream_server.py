@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Streams as servers give them: MPEG transport streams in pieces, and fragmented .mp4 from the
-middle on.
-
-A transport stream consists of packets of 188 bytes. Seven of them make a datagram, or an RTP packet
-(RFC 2250), which RTSP sends over its own connection if it is asked to (RFC 2326, "interleaved").
+"""Streams as servers give them: files and playlists over HTTP, and RTP packets, which RTSP sends
+over its own connection if it is asked to (RFC 2326, "interleaved").
 """
 
 import io
@@ -18,7 +15,7 @@ from threading import Thread
 
 import av
 
-DATAGRAM = 7 * 188
+DATAGRAM = 1316  # bytes of an RTP packet's content
 _WITHOUT_SCENE_CUTS = {
     "libx264": {"sc_threshold": "0"},
     "libx265": {"x265-params": "scenecut=0:log-level=none"},
@@ -88,26 +85,6 @@ def nal_units(data):
     return [[unit.rstrip(b"\0") for unit in packet.split(b"\0\0\1")[1:]] for packet in packets]
 
 
-def with_damage(data, numbers, kind="mpegts"):
-    """Return a stream whose packets of these numbers end with zeros, from their middle on."""
-    target = io.BytesIO()
-    with av.open(io.BytesIO(data)) as source, av.open(target, "w", format=kind) as container:
-        stream = container.add_stream_from_template(source.streams.video[0])
-        for k, packet in enumerate(source.demux(video=0)):
-            if packet.dts is None:
-                continue
-            if k in numbers:
-                half = packet.size // 2
-                damaged = av.Packet(bytes(packet)[:half] + bytes(packet.size - half))
-                damaged.pts = packet.pts
-                damaged.dts = packet.dts
-                damaged.time_base = packet.time_base
-                packet = damaged
-            packet.stream = stream
-            container.mux(packet)
-    return target.getvalue()
-
-
 @contextmanager
 def _running(server):
     """Run a server meanwhile."""
@@ -119,11 +96,6 @@ def _running(server):
     finally:
         server.shutdown()
         thread.join()
-
-
-def datagrams(data):
-    """Return a transport stream in pieces for the network."""
-    return [data[at : at + DATAGRAM] for at in range(0, len(data), DATAGRAM)]
 
 
 @contextmanager
@@ -141,12 +113,6 @@ def served_as_hls(folder, parts, seconds):
     playlist = "\n".join([*lines, "#EXT-X-ENDLIST", ""])
     with served(folder, "list.m3u8", playlist.encode()) as address:
         yield address
-
-
-def rtp_of_transport_stream(data):
-    """Return a transport stream as RTP packets, and its media description."""
-    packets = [_rtp(33, k, 90 * k, True, piece) for k, piece in enumerate(datagrams(data))]
-    return packets, "m=video 0 RTP/AVP 33\r\na=control:track0\r\n"
 
 
 def rtp_of_h264(data, rate=30):

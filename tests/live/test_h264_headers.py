@@ -25,7 +25,7 @@ WAYS = {
 }
 
 
-def packets_of(way, count=300):
+def packets_of(way, count=80):
     """The packets of a stream, and its extradata."""
     kind, options, pixels = WAYS[way]
     random = np.random.default_rng(0)
@@ -62,18 +62,18 @@ def test_a_complete_stream_has_no_gaps_and_losses_are_found(way):
     numbers = FrameNumbers(extradata)
     assert not any(numbers.has_gap(packet) for packet in packets)
     assert all(numbers.has_picture(packet) for packet in packets)
-    for lost in (20, 21, 22, 23, 120, 215):
+    for lost in (20, 21, 22, 23, 65):
         numbers = FrameNumbers(extradata)
         left = [(k, numbers.has_gap(packet)) for k, packet in enumerate(packets) if k != lost]
         expected = [lost + 1] if way == "in mp4" or is_built_on(packets[lost]) else []
         assert [k for k, is_gap in left if is_gap] == expected
 
 
-@pytest.mark.parametrize("way", ["high", "in mp4", "scaling lists"])
+@pytest.mark.parametrize("way", ["in mp4", "scaling lists"])
 def test_damaged_data_is_no_error(way):
     packets, extradata = packets_of(way, 30)
     random = np.random.default_rng(2)
-    for _ in range(300):
+    for _ in range(100):
         broken = []
         for data in (extradata, *packets[:3]):
             values = np.frombuffer(data[: random.integers(0, len(data) + 1)], np.uint8).copy()

@@ -78,7 +78,7 @@ def numbered(body, number):
 
 def test_the_end_gives_clients_what_is_queued(body, monkeypatch):
     monkeypatch.setattr(json_lines, "_CLOSING_S", 300)  # this computer may be busy
-    for first in range(0, 40, 2):
+    for first in range(0, 8, 2):
         with JsonServer(body, "127.0.0.1", 0) as serving:
             (client,), (file,) = connected(serving, 1)
             file.readline()
@@ -90,17 +90,17 @@ def test_the_end_gives_clients_what_is_queued(body, monkeypatch):
 
 
 def fill(serving, body):
-    """Send until nothing more fits into the system's buffers: the queue then stays full for a
-    hundred sends.
+    """Send until nothing more fits into the system's buffers: the queue then stays full for
+    thirty sends.
     """
     full = 0
     for _ in range(20_000):  # far more than the buffers hold
         serving.send(numbered(body, 1), 0.0)
         time.sleep(0.004)  # the client's thread takes what it can send
         full = full + 1 if len(serving._clients[0]._lines) == 2 else 0
-        if full > 100:
+        if full > 30:
             return
-    raise AssertionError("the queue was never full for a hundred sends")
+    raise AssertionError("the queue was never full for thirty sends")
 
 
 def test_the_end_does_not_wait_for_a_client_that_does_not_read(body, monkeypatch):

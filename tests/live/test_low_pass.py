@@ -67,8 +67,8 @@ def filtered(
 
 def test_noise_is_less() -> None:
     rng = np.random.default_rng(4)
-    times = np.arange(300) / 30
-    noisy = PLACE + 0.02 * rng.normal(size=(300, 3))
-    angles, places = filtered(0.05 * rng.normal(size=300), noisy, times)
+    times = np.arange(150) / 30
+    noisy = PLACE + 0.02 * rng.normal(size=(150, 3))
+    angles, places = filtered(0.05 * rng.normal(size=150), noisy, times)
     assert angles[60:].std() < 0.7 * 0.05
     assert places[60:].std(axis=0).max() < 0.7 * 0.02

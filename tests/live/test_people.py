@@ -27,7 +27,7 @@ from scope.scope_addon.motion import Motion
 
 from .test_vmc import pose_of
 
-FRAMES = 14
+FRAMES = 10
 GREY = np.full((8, 8, 3), 128, np.uint8)
 
 

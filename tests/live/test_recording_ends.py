@@ -87,8 +87,7 @@ def assert_same(path, other):
     assert (~motion.valid).sum() == 2
 
 
-@pytest.mark.parametrize("people", [1, 2])
-@pytest.mark.parametrize("origin", [None, (4, 0.1)])
+@pytest.mark.parametrize(("people", "origin"), [(1, None), (2, (4, 0.1))])
 def test_what_a_kill_leaves_is_finished_as_if_there_had_been_none(tmp_path, body, people, origin):
     recording, paths = recorded(tmp_path / "a", body, people, origin=origin)
     recording._journal.close()
@@ -142,10 +141,8 @@ def test_a_cut_or_damaged_file_gives_what_is_whole(tmp_path, body):
     ("entries", "said"),
     [
         ({"people": None}, "a damaged people in its first line"),
-        ({"fps": "30/0"}, "a damaged fps in its first line"),
         ({"fps": "1e999999999"}, "a damaged fps in its first line"),
         ({"size": [640]}, "a damaged size in its first line"),
-        ({"origin": []}, "a damaged origin in its first line"),
         ({"origin": [0, float("nan")]}, "a damaged origin in its first line"),
         ({"tempo": 1}, "an unknown tempo in its first line"),
     ],
@@ -165,20 +162,8 @@ def test_a_first_line_without_entries_names_them_in_our_words(tmp_path):
     """Not as Python says it, with a name of the code."""
     file = tmp_path / "damaged.recording"
     file.write_text('{"body": "scope"}\n')
-    missing = (
-        "fingerprint",
-        "source",
-        "fps",
-        "size",
-        "speed",
-        "origin",
-        "people",
-        "footage",
-    )
-    with pytest.raises(InputError) as raised:
+    with pytest.raises(InputError, match=r"\(no fingerprint, no source, .*, no footage in its"):
         read_about(file)
-    assert f"({', '.join(f'no {name}' for name in missing)} in its" in str(raised.value)
-    assert "__init__" not in str(raised.value)
 
 
 def test_frames_in_which_nobody_is_seen_take_little_room(tmp_path, body):
@@ -266,54 +251,45 @@ def test_where_a_recording_is_is_said_if_the_folder_is_gone(tmp_path, body, monk
 
 
 on_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits sizes of files as Linux does")
-FULL = """
-import resource, signal, sys
-from pathlib import Path
-from scope.scope_addon.live import journal, unfinished
-from scope.scope_addon.errors import OutputError
-from scope.scope_addon.untrusted.body_file import load_body
-from scope.tests.live.test_recording_ends import recorded
-folder = Path(sys.argv[1])
-unfinished.lasting_folder = lambda: Path(sys.argv[2])
-unfinished.system_folder = lambda: Path(sys.argv[3])
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-real = journal._record_type(load_body("scope")).itemsize
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(float(sys.argv[4]) * real), -1))
-recording, paths = recorded(folder, load_body("scope"), say=lambda text: print("said", text))
-recording._journal.close()
-print("at", recording._journal.path, flush=True)
-resource.setrlimit(resource.RLIMIT_FSIZE, (-1, -1))
-if sys.argv[5] == "save":
-    print("saved", *recording.save())
-"""
 
 
-@on_linux
-def test_a_disk_that_refuses_what_is_written_loses_no_pose(tmp_path, body):
-    """The size of files is limited, so that no place takes the recording; memory does."""
-    command = [sys.executable, "-c", FULL, *(str(tmp_path / name) for name in "abc")]
-    done = subprocess.run([*command, "20.5", "save"], capture_output=True, text=True, check=True)
-    begun = tmp_path / "a" / "take.recording"
-    assert f"said the recording begins in {begun}, goes on in memory" in done.stdout
-    assert f"at {begun}" in done.stdout
-    recording, paths = recorded(tmp_path / "truth", body)
-    recording.save()
-    assert_same(tmp_path / "a" / "take0.npz", paths[0])
-    assert not list(tmp_path.rglob("*.recording"))
+def take_nothing(_):
+    raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_a_disk_that_fills_meanwhile_moves_the_growing_file_to_a_second_place(tmp_path, body):
+def fill_disk(growing, write=take_nothing):
+    """Let the disk of a growing file refuse what is written from now on."""
+    while not is_whole(growing.path):
+        pass
+    growing._file.close()
+    growing._file = SimpleNamespace(write=write, close=lambda: None)
+
+
+def test_a_disk_that_refuses_what_is_written_loses_no_pose(tmp_path, body, monkeypatch):
+    """No other place takes the recording; memory does."""
+    said = []
+    recording, (path,) = recorded(tmp_path / "full", body, say=said.append)
+    begun = recording._journal.path
+    fill_disk(recording._journal)
+    monkeypatch.setattr(journal, "create_new", take_nothing)
+    later = replace(pose_of(body), index=2 * POSES, timestamp_s=POSES / 15)
+    recording.send(later, 0.0)
+    recording._journal.close()
+    assert said[0].startswith(f"the recording begins in {begun}, goes on in memory")
+    assert recording.save() == [path]
+    assert len(Motion.load(path)) == POSES
+    assert [file for file in tmp_path.rglob("*") if file.is_file()] == [path]
+
+
+@pytest.mark.parametrize("write", [take_nothing, lambda content: len(content) - 1])
+def test_a_disk_that_fills_meanwhile_moves_the_growing_file_to_a_second_place(
+    tmp_path, body, write
+):
+    """Also where it takes a part of a pose, and says so only at the next write."""
     said = []
     recording, (path,) = recorded(tmp_path / "full", body, say=said.append)
     growing = recording._journal
-    while not is_whole(growing.path):
-        pass
-
-    def refuse(_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    growing._file.close()
-    growing._file = SimpleNamespace(write=refuse, close=lambda: None)
+    fill_disk(growing, write)
     later = replace(pose_of(body), index=2 * POSES, timestamp_s=POSES / 15)
     recording.send(later, 0.0)
     growing.close()
@@ -328,22 +304,6 @@ def test_a_disk_that_fills_meanwhile_moves_the_growing_file_to_a_second_place(tm
     assert [file for file in tmp_path.rglob("*") if file.is_file()] == [path]
 
 
-def test_a_disk_that_takes_a_part_of_a_pose_moves_the_growing_file_too(tmp_path, body):
-    """A full disk says so only at the next write, and what is written after that could not be
-    read.
-    """
-    recording, _ = recorded(tmp_path / "full", body)
-    growing = recording._journal
-    while not is_whole(growing.path):
-        pass
-    growing._file.close()
-    growing._file = SimpleNamespace(write=lambda content: len(content) - 1, close=lambda: None)
-    recording.send(replace(pose_of(body), index=2 * POSES, timestamp_s=POSES / 15), 0.0)
-    growing.close()
-    other = tmp_path / "user" / "recordings" / "take.recording"
-    assert len(read_records(other, read_about(other), body)) == POSES + 1
-
-
 def test_where_a_recording_grows_is_said_if_its_place_refuses_from_the_beginning(
     tmp_path, body, monkeypatch
 ):
@@ -351,9 +311,7 @@ def test_where_a_recording_grows_is_said_if_its_place_refuses_from_the_beginning
     real = journal.create_new
 
     def full(path):
-        if path.parent == tmp_path / "full":
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return real(path)
+        return take_nothing(path) if path.parent == tmp_path / "full" else real(path)
 
     monkeypatch.setattr(journal, "create_new", full)
     recorded(tmp_path / "full", body, say=said.append)
@@ -497,7 +455,6 @@ ENDS = {
     "source ends": (lambda: None, 0, "wrote"),
     "source fails": (raising(VideoError("fake is gone")), 1, "fake is gone"),
     "disk full": (raising(OSError(errno.ENOSPC, "No space left on device")), 1, "No space left"),
-    "memory": (raising(MemoryError()), 1, "memory"),
     "defect": (raising(RuntimeError("a defect")), 1, "a defect"),
     "signal": (lambda: signal.raise_signal(signal.SIGTERM), 130, "stopped"),
 }

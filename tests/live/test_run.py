@@ -9,9 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scope.scope_addon.live import run
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.recording import PeopleRecording
 from scope.scope_addon.live.run import Listeners, LiveOptions, Statistics, _loop, run_live
+from scope.scope_addon.live.source import Picture
 
 from .fake_source import FakeClock, FakeSource
 
@@ -23,6 +25,7 @@ TALL = np.zeros((160, 96, 3), np.uint8)
 
 @pytest.mark.usefixtures("networks")
 def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
+    """Before them, that there are fewer cores than threads."""
     given = threading.Semaphore(1)
     said = []
     sizes = []
@@ -36,18 +39,19 @@ def test_pictures_of_another_shape_are_said_and_begin_new_estimates(body):
         given.release()
 
     listeners = Listeners(say=said.append, camera=lambda people, size: sizes.append(size))
-    run_live(source, body, LiveOptions(), [SimpleNamespace(send=send)], listeners, FakeClock())
+    options = LiveOptions(threads=5000)
+    run_live(source, body, options, [SimpleNamespace(send=send)], listeners, FakeClock())
     assert len(poses) == 3
     assert sizes == [(160, 96), (96, 160)]
-    assert len(said) == 1
-    assert said[0].startswith(
-        "fake now delivers images of another shape (96 × 160): body, lens and floor are"
+    cores, shape = said
+    assert cores.startswith("5000 threads were requested, but there are only ")
+    assert shape == (
+        "fake now delivers images of another shape (96 × 160): body, lens and floor are "
+        "estimated again, and a recording ends with the image before"
     )
-    assert said[0].endswith("estimated again, and a recording ends with the image before")
 
 
-@pytest.mark.usefixtures("networks")
-def test_pictures_of_another_shape_that_end_the_capture_are_said_to(body):
+def test_pictures_of_another_shape_that_end_the_capture_are_said_to(monkeypatch):
     """As in Blender while it records: nothing is estimated again."""
     said = []
     clock = FakeClock()
@@ -56,24 +60,16 @@ def test_pictures_of_another_shape_that_end_the_capture_are_said_to(body):
         if size == (96, 160):
             clock.stopped.set()
 
-    given = threading.Semaphore(1)
-    source = FakeSource(
-        [0.0, 0.1], ends=True, images=[WIDE, TALL], before=lambda _: given.acquire()
-    )
-    send = SimpleNamespace(send=lambda *_: given.release())
-    run_live(source, body, LiveOptions(), [send], Listeners(said.append, camera=begin), clock)
+    monkeypatch.setattr(run, "LivePeople", lambda *_, **__: SimpleNamespace(step=lambda _: []))
+    tracker = SimpleNamespace(reset=lambda: None)
+    listeners = Listeners(said.append, camera=begin)
+    poses = run._Poses(FakeSource(), None, LiveOptions(), tracker, None, listeners, clock)
+    for image in (WIDE, TALL):
+        poses.of(Picture(0, 0.0, 0.0, image))
     assert said == [
         "fake now delivers images of another shape (96 × 160): the capture ends with the image "
         "before"
     ]
-
-
-@pytest.mark.usefixtures("networks")
-def test_more_threads_than_cores_are_said(body):
-    said = []
-    source = FakeSource([0.0], ends=True, images=[WIDE])
-    run_live(source, body, LiveOptions(threads=5000), [], Listeners(say=said.append), FakeClock())
-    assert said[0].startswith("5000 threads were requested, but there are only ")
 
 
 def test_a_recording_ends_where_pictures_of_another_shape_begin(body, tmp_path):

@@ -21,6 +21,7 @@ from scope.scope_addon.live.people import LivePeople
 from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.session import CALIBRATED_S, SETTLED_S
 
+pytestmark = pytest.mark.slow  # the networks see 75 frames
 RATE = 15.0
 # frames after a foot has landed in which smoothing still shows the step: 60 ms, and the time of its
 # filters
@@ -50,7 +51,6 @@ def played(body, networks):
     return poses, np.array(focal), 2 * np.array(order), people
 
 
-@pytest.mark.slow
 def test_the_estimates_settle_when_they_are_said_to_and_stay(played):
     poses, focal, _, _ = played
     settled = np.array([pose.is_settled for pose in poses])

@@ -15,17 +15,13 @@ from scope.scope_addon.live import source as live_source
 from scope.scope_addon.live.newest_frame import NewestFrame
 from scope.scope_addon.live.open_source import is_stream, open_source
 from scope.scope_addon.live.source import LEAP_S, Clock
-from scope.scope_addon.live.stream import DAMAGED_S
 
 from .fake_source import FakeClock
 from .mjpeg_server import mjpeg_server
 from .stream_server import (
     encoded,
-    rtp_of_transport_stream,
-    rtsp_server,
     served,
     served_as_hls,
-    with_damage,
 )
 
 
@@ -182,24 +178,6 @@ def test_damaged_packets_cost_their_own_frames_only(tmp_path):
     assert [k for k, off in shown if off < 5] == [*range(11), *range(12, 30)]
 
 
-def noisy(count):
-    """Pictures of `moving` with grain, of which every packet has much to say."""
-    grain = np.random.default_rng(1).integers(0, 60, (count, 96, 160, 1))
-    return list((np.array(moving(count)) * 0.8 + grain).astype(np.uint8))
-
-
-def test_a_stream_all_of_whose_pictures_are_damaged_is_shown_after_a_while(tmp_path):
-    clock = FakeClock()
-    times = iter(np.arange(100.0, 200.0, 0.05))
-    clock.now = lambda: next(times)
-    data = with_damage(encoded(noisy(100), "mpeg4"), range(100))
-    with served(tmp_path, "a.ts", data) as address:
-        first = next(
-            picture for picture in open_source(address).pictures(clock) if picture is not None
-        )
-    assert 100.0 + DAMAGED_S <= first.timestamp_s <= 100.3 + DAMAGED_S
-
-
 def test_the_segments_of_a_playlist_are_read(tmp_path):
     parts = [encoded(moving(18)), encoded(moving(18, first=18), begins_s=0.6)]
     with served_as_hls(tmp_path, parts, 1) as address:
@@ -236,16 +214,6 @@ def test_a_playlist_does_not_open_files_of_this_computer(tmp_path):
     with served(tmp_path, "list.m3u8", "\n".join(lines).encode()) as address:
         with pytest.raises(VideoError, match="cannot be opened|was interrupted|carries no video"):
             all_pictures(address)
-
-
-def test_an_rtsp_server_is_read_over_its_own_connection():
-    with rtsp_server(*rtp_of_transport_stream(encoded(moving(36)))) as address:
-        shown = [
-            which(picture.image_rgb)
-            for picture in islice(open_source(address).pictures(FakeClock()), 20)
-        ]
-    assert [k for k, _ in shown] == list(range(20))
-    assert max(off for _, off in shown) < 10
 
 
 @pytest.mark.parametrize(
