@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
@@ -10,6 +12,7 @@ from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 
+@cache
 def someone_walking(
     frames: int, rate: float, heading: float, turn: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -40,7 +43,10 @@ def someone_walking(
         points = seen.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 4.0])))[at]
         world.append(points - points[[23, 24]].mean(axis=0))
         pixels.append(points[:, :2] / points[:, 2:] * 1100.0 + [640.0, 360.0])
-    return np.array(pixels), np.array(world)
+    walk = np.array(pixels), np.array(world)
+    for values in walk:
+        values.setflags(write=False)  # the next test gets them, too
+    return walk
 
 
 def track_without_depth(

@@ -20,11 +20,6 @@ ANKLE = KEYPOINT_NAMES.index("right_ankle")
 PX = 400.0  # per metre
 
 
-def standing(count: int, rate: float) -> Track:
-    """A person as `standing_at` the times of a constant rate."""
-    return standing_at(np.arange(count) / rate)
-
-
 def standing_at(times: np.ndarray) -> Track:
     """A person whose left wrist swings by 0.4 m, 1.5 times per second, with a detector's noise."""
     count = len(times)
@@ -53,10 +48,9 @@ def standing_at(times: np.ndarray) -> Track:
     )
 
 
-@pytest.mark.parametrize("rate", [25.0, 30.0, 60.0, 120.0])
-@pytest.mark.parametrize("frames", [1, 2])
+@pytest.mark.parametrize(("rate", "frames"), [(25.0, 2), (30.0, 1), (120.0, 2)])
 def test_a_jump_is_moved_back_onto_the_path(rate: float, frames: int) -> None:
-    track = standing(90, rate)
+    track = standing_at(np.arange(90) / rate)
     right = track.keypoints_px.copy()
     off = slice(40, 40 + frames)
     track.keypoints_px[off, ANKLE] += [0.6 * PX, 0.0]
@@ -69,10 +63,10 @@ def test_a_jump_is_moved_back_onto_the_path(rate: float, frames: int) -> None:
     assert repaired.keypoints_px.dtype == repaired.confidence.dtype == np.float32
 
 
-@pytest.mark.parametrize("rate", [6.0, 15.0, 30.0, 60.0])
+@pytest.mark.parametrize("rate", [6.0, 15.0, 60.0])
 def test_possible_motion_is_left_alone(rate: float) -> None:
     """A swing, a punch of 0.5 m to and fro in 0.25 s (some 130 m/s2), a step of 0.6 m in 0.15 s."""
-    track = standing(120, rate)
+    track = standing_at(np.arange(120) / rate)
     strike(track, 1.0)
     assert repair_keypoint_jumps(track) is track
 
@@ -117,9 +111,9 @@ def test_a_jump_is_moved_back_by_the_time_that_its_frames_have(
     np.testing.assert_allclose(repaired.keypoints_px[off, ANKLE], right[off, ANKLE], atol=0.03 * PX)
 
 
-@pytest.mark.parametrize("rate", [24.0, 30.0, 60.0, 120.0, 240.0])
+@pytest.mark.parametrize("rate", [24.0, 60.0, 240.0])
 def test_times_that_a_container_rounds_to_milliseconds_change_nothing(rate: float) -> None:
-    track = standing(90, rate)
+    track = standing_at(np.arange(90) / rate)
     track.keypoints_px[40:42, ANKLE] += [0.6 * PX, 0.0]
     track.world_landmarks[60, WRIST] += [0.0, 0.7, 0.0]
     rounded = replace(track, times=np.round(track.times, 3))
@@ -149,5 +143,5 @@ def test_gaps_and_ends() -> None:
     seen[6] = False
     assert not find_keypoint_jumps(points, seen, times).any()
     assert not find_keypoint_jumps(points[:2], seen[:2], times[:2]).any()
-    short = standing(2, 30.0)
+    short = standing_at(np.arange(2) / 30)
     assert repair_keypoint_jumps(short) is short

@@ -22,6 +22,11 @@ def tracker_of_module(networks: Path) -> PeopleTracker:
     return PeopleTracker("fast", threads=2)
 
 
+@pytest.fixture(scope="module")
+def tracker_of_many(networks: Path) -> PeopleTracker:
+    return PeopleTracker("fast", threads=2, people=12)
+
+
 @pytest.fixture
 def tracker(tracker_of_module: PeopleTracker) -> PeopleTracker:
     tracker_of_module.reset()
@@ -73,11 +78,11 @@ def test_a_person_who_walks_out_of_the_picture_is_lost(frames: Frames) -> None:
     assert 223 <= man[-1] <= 226  # behind a tree
 
 
-@pytest.mark.parametrize("clip", ["walk_side_static", "run_moving_camera", "squats_5fps"])
+@pytest.mark.parametrize("clip", ["run_moving_camera", "squats_5fps"])
 def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, clip: str) -> None:
-    seen = [tracker.step(image) for image in frames(f"clips/{clip}", stop=25)]
+    seen = [tracker.step(image) for image in frames(f"clips/{clip}", stop=12)]
     found = [observations[0][1] for observations in seen if [n for n, _ in observations] == [0]]
-    assert len(found) >= 0.98 * len(seen)
+    assert len(found) == len(seen)
     assert [o.acquired for o in found] == [True] + [False] * (len(found) - 1)
     for before, after in zip(found, found[1:], strict=False):
         assert after.region.resembles(before.region, 0.25)
@@ -89,10 +94,12 @@ def test_person_is_found_once_and_kept(tracker: PeopleTracker, frames: Frames, c
     assert sum(o.reference_landmarks is not None for o in found) <= 1 + len(found) // 8
 
 
-def test_two_people_are_tracked_and_nobody_twice(frames: Frames) -> None:
-    tracker = PeopleTracker("fast", threads=2, people=4)
-    for image in frames("clips/two_people_portrait", stop=20):
-        observations = dict(tracker.step(image))
+def test_two_people_are_tracked_and_nobody_twice(
+    tracker_of_many: PeopleTracker, frames: Frames
+) -> None:
+    tracker_of_many.reset()
+    for image in frames("clips/two_people_portrait", stop=5):
+        observations = dict(tracker_of_many.step(image))
         assert sorted(observations) == [0, 1]
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
 
@@ -122,29 +129,29 @@ def test_everybody_who_stands_close_together_in_a_photograph_is_found(
     assert off_px.max() < 30  # of shoulders that are 140 pixels wide
 
 
-@pytest.mark.parametrize("apart_px", [-70, -55, 70])
-def test_two_people_side_by_side_are_both_found(frames: Frames, apart_px: int) -> None:
+def test_two_people_side_by_side_are_both_found(
+    tracker_of_many: PeopleTracker, frames: Frames
+) -> None:
     """Of two people before black, the brighter pixel counts; shoulders touch at 50 pixels."""
-    tracker = PeopleTracker("fast", threads=2, people=12)
     left, right = (next(frames(f"people/inputs/plumb_studio_{name}")) for name in (383, 386))
-    expected_px = []
+    alone_px = []
     for image in (left, right):
-        tracker.reset()
-        ((_, alone),) = tracker.step(image)
-        expected_px.append(alone.keypoints_px)
-    shoulders_px = [keypoints_px[[11, 12]].mean(axis=0) for keypoints_px in expected_px]
-    moved = np.round(shoulders_px[0] - shoulders_px[1] + [apart_px, 0])
-    expected_px[1] = expected_px[1] + moved
-    shift = np.array([[1, 0, moved[0]], [0, 1, moved[1]]])
-    image = np.maximum(left, cv2.warpAffine(right, shift, left.shape[1::-1]))
-    tracker.reset()
-    found = [observation.keypoints_px for _, observation in tracker.step(image)]
-    assert len(found) == 2
-    for truth_px in expected_px:
-        off_px = min(
-            np.linalg.norm(truth_px - keypoints_px, axis=1).mean() for keypoints_px in found
-        )
-        assert off_px < 20  # pixels of a person with a height of about 260
+        tracker_of_many.reset()
+        ((_, alone),) = tracker_of_many.step(image)
+        alone_px.append(alone.keypoints_px)
+    shoulders_px = [keypoints_px[[11, 12]].mean(axis=0) for keypoints_px in alone_px]
+    for apart_px in (-55, 70):
+        moved = np.round(shoulders_px[0] - shoulders_px[1] + [apart_px, 0])
+        shift = np.array([[1, 0, moved[0]], [0, 1, moved[1]]])
+        image = np.maximum(left, cv2.warpAffine(right, shift, left.shape[1::-1]))
+        tracker_of_many.reset()
+        found = [observation.keypoints_px for _, observation in tracker_of_many.step(image)]
+        assert len(found) == 2
+        for truth_px in (alone_px[0], alone_px[1] + moved):
+            off_px = min(
+                np.linalg.norm(truth_px - keypoints_px, axis=1).mean() for keypoints_px in found
+            )
+            assert off_px < 20  # pixels of a person with a height of about 260
 
 
 @pytest.mark.slow
@@ -213,11 +220,11 @@ def test_masks_come_with_the_frame_for_which_they_were_requested(
 
 
 def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
-    images = list(frames("clips/run_moving_camera", stop=6))
+    images = list(frames("clips/run_moving_camera", stop=4))
     blank = np.zeros_like(images[0])
-    before = [largest(tracker, image) for image in images[:3]]
+    before = [largest(tracker, image) for image in images[:2]]
     assert [tracker.step(blank) for _ in range(3)] == [[]] * 3
-    after = [largest(tracker, image) for image in images[3:]]
+    after = [largest(tracker, image) for image in images[2:]]
     assert None not in before + after
     last = before[-1]
     first = after[0]
@@ -229,5 +236,5 @@ def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
 
 
 def test_odd_images(tracker: PeopleTracker) -> None:
-    for shape in ((1, 1), (3, 100), (17, 5)):
+    for shape in ((1, 1), (17, 5)):
         assert tracker.step(np.zeros((*shape, 3), np.uint8)) == []

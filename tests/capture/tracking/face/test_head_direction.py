@@ -6,6 +6,7 @@ its certainty.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -41,26 +42,22 @@ def seen(tmp_path_factory):
     stage = ShadedStage(body)
     network = FaceNetwork(1)
     rng = np.random.default_rng(8)
-    kept = {}
     stage.dress(draw_look(body, rng), rng)
 
+    @cache
     def estimate(turn_deg) -> FaceEstimate:
-        if turn_deg not in kept:
-            R = FRONTAL @ exp(np.radians(turn_deg))
-            stage.render(
-                (body.v_template - MIDDLE) @ R.T + [0, 0, DISTANCE_M], focal_px(DISTANCE_M), path
-            )
-            image = np.ascontiguousarray(cv2.imread(str(path))[..., ::-1])
-            first = network.estimate(image, Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0))
-            kept[turn_deg] = network.estimate(image, first.next_region)
-        return kept[turn_deg]
+        R = FRONTAL @ exp(np.radians(turn_deg))
+        stage.render(
+            (body.v_template - MIDDLE) @ R.T + [0, 0, DISTANCE_M], focal_px(DISTANCE_M), path
+        )
+        image = np.ascontiguousarray(cv2.imread(str(path))[..., ::-1])
+        first = network.estimate(image, Region((SIZE / 2, SIZE / 2), 0.8 * SIZE, 0.0))
+        return network.estimate(image, first.next_region)
 
     return estimate
 
 
-@pytest.mark.parametrize(
-    "turn_deg", [(0, 0, 0), (0, 0, 20), (0, 0, -35), (0, 35, 0), (15, -30, 10)]
-)
+@pytest.mark.parametrize("turn_deg", [(0, 0, -35), (0, 35, 0), (15, -30, 10)])
 def test_the_direction_across_a_rendered_head(seen, turn_deg):
     (found,) = across_head(record(seen(turn_deg), None)[None], camera_of(focal_px(DISTANCE_M)))
     true = (FRONTAL @ exp(np.radians(turn_deg)))[:, 0]
