@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
+from scope.solver.rotations import exp, shortest_turn
 
 from .walking import BODY, NAMES, RATE
 
@@ -35,17 +36,9 @@ def heel_of(side):
     return np.array([ankle[0], own[:, 1].max() - 0.01, FLOOR])
 
 
-def turn_by(vector):
-    """Return the rotation (3, 3) of a rotation vector, by Rodrigues' formula."""
-    angle = np.linalg.norm(vector)
-    x, y, z = vector / max(angle, 1e-12)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
-
-
 def pitch(degrees):
     """Return the rotation that pitches the toes of a person facing −y down by ``degrees``."""
-    return turn_by(np.array([np.radians(degrees), 0, 0]))
+    return exp(np.array([np.radians(degrees), 0, 0]))
 
 
 def foot(side, step):
@@ -76,13 +69,6 @@ def foot(side, step):
     return ankle, turn, pitch(-22 * ease), False, False
 
 
-def shortest(a, b):
-    a = a / np.linalg.norm(a)
-    b = b / np.linalg.norm(b)
-    axis = np.cross(a, b)
-    return turn_by(axis / np.linalg.norm(axis) * np.arctan2(np.linalg.norm(axis), a @ b))
-
-
 def rolling_walk(seconds=2.6, stiff_toes=False):
     """Return the clip, and per side the contact of heel and ball: (T, 2) bool.
 
@@ -95,7 +81,7 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
     for t, time in enumerate(times):
         D = {name: np.eye(3) for name in NAMES}
         D["left_shoulder"], D["right_shoulder"] = (
-            turn_by(np.array([0, sign * 1.2, 0])) for sign in (1, -1)
+            exp(np.array([0, sign * 1.2, 0])) for sign in (1, -1)
         )
         for side in ("left", "right"):
             for part in ("elbow", "wrist", "hand"):
@@ -120,8 +106,9 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
             along = (a * a - b * b + c * c) / (2 * c)
             front = np.cross(np.cross(leg, [0, -1, 0]), leg)
             knee = leg / c * along + front / np.linalg.norm(front) * np.sqrt(a * a - along * along)
-            D[f"{side}_hip"] = shortest(upper, knee)
-            D[f"{side}_knee"] = shortest(D[f"{side}_hip"] @ lower, leg - knee) @ D[f"{side}_hip"]
+            thigh = shortest_turn(upper, knee)
+            D[f"{side}_hip"] = thigh
+            D[f"{side}_knee"] = shortest_turn(thigh @ lower, leg - knee) @ thigh
         for i, name in enumerate(NAMES):
             parent = BODY.parents[i]
             R = D[name] if parent < 0 else D[NAMES[parent]].T @ D[name]

@@ -49,7 +49,7 @@ ALL = (
 RESTS = (Contact(4, 8, "right_knee"), Contact(5, 9, "back"))
 
 
-@pytest.mark.parametrize("corrections", [ALL, ALL[:1], ALL[2:3], RESTS, ()])
+@pytest.mark.parametrize("corrections", [ALL, RESTS, ()])
 def test_arrays_give_the_corrections_back(tmp_path, corrections):
     arrays = to_arrays(corrections)
     np.savez(tmp_path / "a.npz", **arrays)
@@ -99,27 +99,15 @@ def test_damaged_arrays_are_an_error():
         ("pin_uv", np.zeros((2, 3))),
         ("pin_frames", np.zeros(5)),
         ("contact_feet", np.array(["none"])),
-        ("contact_spans", np.zeros((0, 2), int)),
-        ("depth_parts", np.array(["body"])),
         ("depth_parts", np.array(["body", "tail"])),
         ("depth_spans", np.array([[5, 4], [1, 2]])),
-        ("depth_spans", np.array([["a", "b"]] * 2)),
-        ("upright", 2 * np.eye(4)[None]),
         ("upright", np.full((1, 4, 4), np.nan)),
         ("floor_heights", np.array([np.inf])),
-        ("floor_heights", np.zeros(2)),
-        ("floor_frames", np.zeros((1, 2))),
-        ("interpolated_spans", np.zeros((1, 3), int)),
-        ("interpolated_spans", np.array([[5, 4]])),
         ("interpolated_spans", np.array([[0, np.inf]])),
         ("interpolated_spans", np.array([["a", "b"]])),
         ("interpolated_spans", np.array([[0, 2**63]], np.uint64)),
         ("interpolated_spans", np.zeros((1001, 2), int)),
         ("snap_level", np.array([1.0])),
-        ("snap_lift", np.array(["yes"])),
-        ("snap_lift", np.zeros(2, bool)),
-        ("snap_heights", np.array([np.nan])),
-        ("snap_heights", np.array([1e6])),
     ):
         with pytest.raises(MotionFileError):
             from_arrays(arrays | {name: value})
@@ -129,16 +117,13 @@ def test_damaged_arrays_are_an_error():
     "make",
     [
         lambda: Pin(1, "head"),
-        lambda: Pin(1, "head", (1.0, 2.0), (1.0, 2.0, 3.0)),
         lambda: Pin(1, "head", (np.nan, 2.0)),
         lambda: Pin(1, "head", (1.0, 2.0), reach=0.0),
-        lambda: Contact(5, 4, "left"),
         lambda: Contact(1, 4, "both"),
         lambda: Exchange(1, 4, "feet"),
-        lambda: DepthFlip(1, 4, "head"),
         lambda: DepthFlip(5, 4, "body"),
-        lambda: Interpolation(5, 4),
         lambda: FeetOnFloor(height=np.inf),
+        lambda: Upright.of(2 * np.eye(4)),
     ],
 )
 def test_impossible_values_are_refused(make):
@@ -165,24 +150,16 @@ def test_an_upright_line_replaces_what_was_levelled():
     )
 
 
-MOTION = motion_of(walk(1.0), noise=0.02)
-
-
-def transform(seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("raw", [False, True])
+def test_joints_move_with_the_world_and_the_image_stays(raw: bool) -> None:
+    rng = np.random.default_rng(8)
     T = np.eye(4)
     T[:3, :3] = exp(rng.normal(size=3))
     T[:3, 3] = rng.normal(size=3)
-    return T
-
-
-@pytest.mark.parametrize("raw", [False, True])
-@pytest.mark.parametrize("seed", range(3))
-def test_joints_move_with_the_world_and_the_image_stays(seed: int, raw: bool) -> None:
-    T = transform(seed)
-    moved = moved_motion(MOTION, BODY, T)
+    motion = motion_of(walk(1.0), noise=0.02)
+    moved = moved_motion(motion, BODY, T)
     before, after = (
-        clip_from_motion(BODY, m, raw=raw).joints(BODY, BETAS) for m in (MOTION, moved)
+        clip_from_motion(BODY, m, raw=raw).joints(BODY, BETAS) for m in (motion, moved)
     )
     np.testing.assert_allclose(after, before @ T[:3, :3].T + T[:3, 3], atol=2e-6)
     seen = [
@@ -191,18 +168,6 @@ def test_joints_move_with_the_world_and_the_image_stays(seed: int, raw: bool) ->
             m.world_from_camera[:, :3, :3],
             joints - m.world_from_camera[:, None, :3, 3],
         )
-        for m, joints in ((MOTION, before), (moved, after))
+        for m, joints in ((motion, before), (moved, after))
     ]
     np.testing.assert_allclose(seen[1], seen[0], atol=5e-6)
-
-
-def test_there_and_back_nothing_has_changed_and_the_given_motion_never_does() -> None:
-    T = transform(8)
-    poses = MOTION.poses.copy()
-    back = moved_motion(moved_motion(MOTION, BODY, T), BODY, np.linalg.inv(T))
-    np.testing.assert_array_equal(MOTION.poses, poses)
-    for name in ("trans", "trans_raw", "world_from_camera"):
-        np.testing.assert_allclose(getattr(back, name), getattr(MOTION, name), atol=1e-5)
-    np.testing.assert_allclose(
-        exp(back.poses.reshape(-1, 3)), exp(MOTION.poses.reshape(-1, 3)), atol=1e-5
-    )

@@ -59,7 +59,6 @@ def test_a_pin_within_reach_stays(refit: PoseRefit) -> None:
     ("limb", "slack"),
     [
         (("left_shoulder", "left_elbow", "left_wrist"), SLACK_M),
-        (("right_hip", "right_knee", "right_ankle"), SLACK_M),
         (("right_hip", "right_knee", "right_ankle"), 0.2),
     ],
 )
@@ -87,35 +86,25 @@ def test_a_pixel_is_moved_to_where_the_stretched_limb_is_seen(refit: PoseRefit) 
     np.testing.assert_allclose(pixel, pixel_of(CAMERA, met), atol=0.05)
 
 
-K = np.array([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]])
-
-
-POINT = np.array([0.2, 3.0, 0.9])
-
-
-def looking(pitch, height=1.0):
-    """A camera at the origin that looks along y, and down by some degrees."""
-    c = np.cos(np.radians(pitch))
-    s = np.sin(np.radians(pitch))
+def test_a_ray_that_does_not_meet_the_plane_has_its_nearest_point():
+    pitch = np.radians(44.0)
+    c = np.cos(pitch)
+    s = np.sin(pitch)
     T = np.eye(4)
     T[:3, :3] = np.stack([[1.0, 0, 0], [0, -s, -c], [0, c, -s]], axis=1)
-    T[2, 3] = height
-    return T, K
-
-
-def test_a_ray_that_does_not_meet_the_plane_has_its_nearest_point():
-    camera = looking(44.0)
+    camera = T, CAMERA[1]
     # more than 90 degrees from level
     below = np.array([320.0, 240.0 + 900.0 * np.tan(np.radians(50.0))])
-    place = point_at_depth(camera, below, POINT)
-    np.testing.assert_allclose(place, nearest_on_ray(camera, below, POINT))
+    point = np.array([0.2, 3.0, -0.1])
+    place = point_at_depth(camera, below, point)
+    np.testing.assert_allclose(place, nearest_on_ray(camera, below, point))
     assert np.isfinite(place).all()
 
 
 TIMES = np.arange(0, 4, 0.001)
 
 
-@pytest.mark.parametrize("known", [[1.0], [1.0, 1.3], [1.0, 2.0, 2.4]])
+@pytest.mark.parametrize("known", [[1.0], [1.0, 2.0, 2.4]])
 def test_it_meets_what_is_known_and_starts_and_ends_at_rest(known):
     known = np.array(known)
     values = np.array([[1.0, -2.0], [3.0, 0.5], [2.0, 2.0]])[: len(known)]

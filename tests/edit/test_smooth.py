@@ -62,17 +62,15 @@ def test_more_strength_leaves_less_of_a_quick_movement_and_all_of_a_slow_one() -
     """The finished motion has all of what it has; from there, at strength 3, the filter's gain is
     1/√2 at 1.6 Hz.
     """
-    quick = [amplitude(smoothed(BODY, shaking(6.0), s)) for s in (0.0, 1.0, 2.0, 3.0)]
-    assert quick[0] == pytest.approx(0.1, rel=0.02)
-    assert quick[1] == pytest.approx(0.1, rel=0.02)  # the finished motion has it
-    assert 0.1 > quick[2] > quick[3]
-    assert quick[3] < 0.001
-    slow = [amplitude(smoothed(BODY, shaking(0.3), s)) for s in (0.0, 1.0, 3.0)]
-    np.testing.assert_allclose(slow, 0.1, rtol=0.05)
+    motion = shaking(6.0)
+    quick = [amplitude(smoothed(BODY, motion, s)) for s in (1.0, 2.0, 3.0)]
+    assert quick[0] == pytest.approx(0.1, rel=0.02)  # the finished motion has it
+    assert 0.1 > quick[1] > quick[2]
+    assert quick[2] < 0.001
+    assert amplitude(smoothed(BODY, shaking(0.3), 3.0)) == pytest.approx(0.1, rel=0.05)
 
 
-@pytest.mark.parametrize("strength", [2.5, 8.0])
-@pytest.mark.parametrize("end_m", [1.6, 0.8])
+@pytest.mark.parametrize(("strength", "end_m"), [(2.5, 0.8), (8.0, 1.6)])
 def test_a_walk_begins_and_ends_where_it_was(strength: float, end_m: float) -> None:
     """A filter that sees one side alone would move both ends inwards, by 12 cm, and more near the
     camera.
@@ -125,14 +123,15 @@ def motion_joints(motion: Motion) -> np.ndarray:
     return clip_from_motion(BODY, motion, raw=False).joints(BODY, BETAS)
 
 
-@pytest.mark.parametrize("strength", [-0.1, np.nan, np.inf])
+@pytest.mark.parametrize("strength", [-0.1, np.nan])
 def test_what_is_no_strength_is_refused(strength: float) -> None:
     with pytest.raises(UsageError, match="0 or more"):
         smoothed(BODY, motion_of(walk(0.5)), strength)
 
 
-@pytest.mark.parametrize("strength", [0.5, 2.0, 8.0])
-@pytest.mark.parametrize("lengths", [(1.0, 1.0), (1.0, 0.0)])
+@pytest.mark.parametrize(
+    ("strength", "lengths"), [(0.5, (1.0, 1.0)), (2.0, (1.0, 1.0)), (8.0, (1.0, 0.0))]
+)
 def test_scenes_on_both_sides_of_a_cut_are_smoothed_apart(
     strength: float, lengths: tuple[float, float]
 ) -> None:

