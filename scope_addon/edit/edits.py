@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
-from ..errors import UsageError
 from ..kinematics.axes import UP
 from ..kinematics.foot_skin import FootSkin
 from ..kinematics.smoothing import gaussian_smooth
@@ -214,10 +213,7 @@ def foot_height(
     :param betas: (P,) shape coefficients.
     :param time: seconds, on the clip's clock.
     :param foot: "left", "right" or "lower", which is the lower one of the two.
-    :raises UsageError: the foot is none of these.
     """
-    if foot not in _PARTS:
-        raise UsageError(f"the foot must be left, right or lower, not {foot!r}")
     betas = np.asarray(betas, float)
     at = sample(clip, np.array([time]))
     heights = FootSkin(body, betas).heights(*at.parts(body, betas), UP)[0]
