@@ -29,6 +29,9 @@ from scope.solver.errors import ModelFileError
 TYPES = ("yolox", "simcc")
 
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
+
 def read(folder: Path, text: str) -> Description:
     (folder / "m.json").write_text(text, "utf-8")
     return read_description(folder / "m.onnx", TYPES)
@@ -60,15 +63,11 @@ def test_an_entry_is_read(tmp_path: Path, key: str, given: object, expected: obj
     ("key", "given", "expected"),
     [
         ("type", "yolov99", "one of yolox, simcc"),
-        ("type", None, "one of yolox, simcc"),
         ("input_size", 256, "width, height"),
-        ("input_size", [192.0, 256], "width, height"),
         ("input_size", [8, 256], "16 to 4096"),
         ("mean", [1, 2], "one number or three"),
         ("mean", [True], "one number or three"),
-        ("mean", "0", "one number or three"),
         ("std", 0, "above 0"),
-        ("std", [1, -1, 1], "above 0"),
         ("channel_order", "grb", "one of rgb, bgr"),
         ("score_threshold", 1, "between 0 and 1"),
         ("decoded", 1, "true or false"),

@@ -90,19 +90,6 @@ def _answering(text: str) -> str:
             "import os, sys; os.write(1, b'ORT_ERROR: no answer')" + LISTEN,
             "sent no valid answer: a message is too long",
         ),
-        (
-            "import os, sys; os.write(1, b'\\2\\0\\0\\0[]')" + LISTEN,
-            "sent no valid answer: a message is no object",
-        ),
-        (
-            "import os, sys; os.write(1, b'\\2\\0\\0\\0{}')" + LISTEN,
-            "sent no valid answer: 'arrays'",
-        ),
-        (
-            _answering('{"arrays": [{"dtype": "f4", "shape": [1e999]}]}'),
-            "sent no valid answer: cannot convert float",
-        ),
-        (_answering('{"arrays": [{"dtype": "f4,(", "shape": [1]}]}'), "sent no valid answer: "),
         (_answering("[" * 50_000), "sent no valid answer: maximum recursion"),
     ],
 )
@@ -187,6 +174,7 @@ def test_messages_arrive_as_they_were_sent():
         (message([1]), "no object"),
         (message({}), "arrays"),
         (message({"arrays": [{"dtype": "|O", "shape": [1]}]}), "not of numbers"),
+        (message({"arrays": [{"dtype": "f4", "shape": [float("inf")]}]}), "cannot convert float"),
         (message({"arrays": [{"dtype": "<f8", "shape": [-1]}]}), "too large"),
         (message({"arrays": [{"dtype": "<f8", "shape": [1 << 40, 1 << 40]}]}), "too large"),
         (
@@ -196,6 +184,7 @@ def test_messages_arrive_as_they_were_sent():
             "too large",
         ),
         (message({"arrays": [{"dtype": "x(", "shape": [1]}]}), "x|type"),
+        (message({"arrays": [{"dtype": "f4,(", "shape": [1]}]}), "."),
         (message({"arrays": [{"dtype": "<f8", "shape": None}]}), "None"),
     ],
 )
@@ -227,10 +216,6 @@ class Session:
     [
         ([np.zeros(2)], None),
         ([[1, 2]], "it has outputs that are not arrays of numbers; export it without these"),
-        (
-            [np.array(["text"], object)],
-            "it has outputs that are not arrays of numbers; export it without these",
-        ),
         ([np.broadcast_to(np.float32(0), (1 << 26, 2))], "its outputs are larger than 256 MB"),
         (MemoryError(), "out of memory"),
         (RuntimeError("x" * 5000), "x" * 2000),
