@@ -128,8 +128,11 @@ class CornerFollower:
         if is_cut:
             self._points = self._points[:0]
             self._numbers = self._numbers[:0]
-        if self._image is not None and len(self._points):
-            self._follow(image, boxes)
+        if len(self._points):
+            assert self._image is not None
+            moved, good = follow_corners(self._image, image, self._points, boxes, MAX_RETURN_PX)
+            self._points = moved[good]
+            self._numbers = self._numbers[good]
         self._image = image
         is_short = len(self._points) < REPLENISHED_SHARE * MAX_CORNERS
         if is_shared or self._has_moved(time_s) or is_cut or not self._kept:
@@ -151,12 +154,6 @@ class CornerFollower:
         numbers = np.concatenate([numbers for _, numbers, _ in self._kept])
         points = np.concatenate([points for _, _, points in self._kept])
         return CornerTracks(rows.astype(np.int64), numbers, to_full(points).astype(np.float32))
-
-    def _follow(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
-        assert self._image is not None
-        moved, good = follow_corners(self._image, image, self._points, boxes, MAX_RETURN_PX)
-        self._points = moved[good]
-        self._numbers = self._numbers[good]
 
     def _has_moved(self, time_s: float) -> bool:
         """Return whether the picture has moved since the corners were last kept, or lost many."""

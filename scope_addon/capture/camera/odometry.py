@@ -132,14 +132,9 @@ def travel_of(
     :param times: (T,) seconds.
     :param longer_side_px: of the image.
     """
-    frames = len(times)
-    still = Odometry(R_first_camera, np.zeros((frames, 3)), np.full(frames, -1), [])
-    if not len(corners.rows):
-        return still
     sightings = Sightings.of(corners, camera, longer_side_px)
     tracker = _Tracker(sightings, R_first_camera[sightings.rows], corners.count)
-    parts = tracker.parts()
-    return _joined(parts, sightings.rows, R_first_camera, times) if parts else still
+    return _joined(tracker.parts(), sightings.rows, R_first_camera, times)
 
 
 @dataclass
@@ -257,40 +252,33 @@ class _Tracker:
         self._places[:] = np.nan
         self._is_outlier[:] = False
         self._first_ray[:] = np.nan
-        part = _Part(a, np.eye(3)[None], np.zeros((1, 3)), self._places[:0])
-        self._see(part, a)
-        first, second = part.first, b
-        self._triangulate(R, t, second)
+        self._see(a, np.eye(3), np.zeros(3))
+        self._triangulate(b, R, t)
         # The frames between the two lie between their poses; each is then placed by the map.
-        turn = log(R)
-        share = np.arange(1, b - a) / (b - a)
-        between_R = exp(share[:, None] * turn)
-        between_t = share[:, None] * t
+        share = np.arange(1, b - a)[:, None] / (b - a)
         part = _Part(
             a,
-            np.concatenate([np.eye(3)[None], between_R, R[None]]),
-            np.concatenate([np.zeros((1, 3)), between_t, t[None]]),
+            np.concatenate([np.eye(3)[None], exp(share * log(R)), R[None]]),
+            np.concatenate([np.zeros((1, 3)), share * t, t[None]]),
             self._places[:0],
         )
-        for k in range(first + 1, second):
-            placed = self._place(k, part.R[k - first], part.t[k - first])
+        for row in range(1, b - a):
+            placed = self._place(a + row, part.R[row], part.t[row])
             if placed is not None:
-                part.R[k - first], part.t[k - first] = placed
+                part.R[row], part.t[row] = placed
         self._adjust(part, fixed=1)
-        for k in range(second + 1, len(self._seen.rows)):
-            turn_k = self._R_guess[k] @ self._R_guess[k - 1].T
-            guess_R = turn_k @ part.R[-1]
+        for k in range(b + 1, len(self._seen.rows)):
+            guess_R = self._R_guess[k] @ self._R_guess[k - 1].T @ part.R[-1]
             center = -part.R[-1].T @ part.t[-1]
-            if len(part.R) > 1:
-                center = center + 0.8 * (center + part.R[-2].T @ part.t[-2])
+            center = center + 0.8 * (center + part.R[-2].T @ part.t[-2])
             placed = self._place(k, guess_R, -guess_R @ center)
             if placed is None:
                 break
             part.R = np.concatenate([part.R, placed[0][None]])
             part.t = np.concatenate([part.t, placed[1][None]])
-            self._triangulate(*placed, k)
-            self._see(part, k)
-            if (k - second) % ADJUSTED_EVERY == 0:
+            self._triangulate(k, *placed)
+            self._see(k, *placed)
+            if (k - b) % ADJUSTED_EVERY == 0:
                 self._adjust(part)
         self._adjust(part)
         return part
@@ -310,16 +298,15 @@ class _Tracker:
             part.t = np.concatenate([placed[1][None], part.t])
             part.first = k
 
-    def _see(self, part: _Part, k: int) -> None:
+    def _see(self, k: int, R: Float64Array, t: Float64Array) -> None:
         """Remember the line of sight of the corners that the frame ``k`` sees first."""
         numbers = self._seen.numbers[k]
         new = np.isnan(self._first_ray[numbers, 0])
-        R, t = part.R[k - part.first], part.t[k - part.first]
         rays = homogeneous(self._seen.rays[k][new]) @ R
         self._first_ray[numbers[new]] = rays / np.linalg.norm(rays, axis=1, keepdims=True)
         self._first_center[numbers[new]] = -R.T @ t
 
-    def _triangulate(self, R: Float64Array, t: Float64Array, k: int) -> None:
+    def _triangulate(self, k: int, R: Float64Array, t: Float64Array) -> None:
         """Place the corners that the frame ``k`` sees from far enough beside where they were first
         seen from: at the point nearest to both lines of sight.
         """
@@ -356,7 +343,9 @@ class _Tracker:
         places = self._places[numbers[known]]
         rays = self._seen.rays[k][known]
         R, t = refine_pose(places, rays, R, t, self._seen.tolerance)
-        agree = _agrees(places, rays, R, t, 2.0 * self._seen.tolerance)
+        points = places @ R.T + t
+        error = np.linalg.norm(projected(points) - rays, axis=1)
+        agree = (points[:, 2] > 0) & (error < 2.0 * self._seen.tolerance)
         if agree.sum() < MIN_MAP or agree.mean() < MIN_MAP_SHARE:
             return None
         return R, t
@@ -473,15 +462,6 @@ class Turn:
 def homogeneous(rays: Float64Array) -> Float64Array:
     """Return lines of sight (n, 2) as (n, 3) with z = 1."""
     return np.concatenate([rays, np.ones((len(rays), 1))], axis=1)
-
-
-def _agrees(
-    places: Float64Array, rays: Float64Array, R: Float64Array, t: Float64Array, tolerance: float
-) -> BoolArray:
-    points = places @ R.T + t
-    error = np.linalg.norm(projected(points) - rays, axis=1)
-    agree: BoolArray = (points[:, 2] > 0) & (error < tolerance)
-    return agree
 
 
 def _continued(before: _Part, after: _Part) -> _Part | None:

@@ -65,8 +65,6 @@ def find_zoom(
     :param camera: the lens of the first frame.
     :param longer_side_px: of the image.
     """
-    if not len(corners.rows):
-        return None
     sightings = Sightings.of(corners, camera, longer_side_px)
     links = _without_brief_travel(_links(sightings))
     travels = any(link.is_travel for link in links)
