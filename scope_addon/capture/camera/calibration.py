@@ -61,6 +61,7 @@ _NAMES = {
     "dist": ("dist", "dist_coeffs", "distortion", "distortions", "distortion_coefficients"),
     "size": ("size", "image_size"),
 }
+_OUR_NAMES = {name: ours for ours, names in _NAMES.items() for name in names}
 # Other keys that describe the lens or the picture, by words in them or as a whole.
 _LENS_KEY = re.compile(
     r".*(dist|coef|matrix|intrin|skew|fish|model|focal|resolution|size|width|height).*"
@@ -111,10 +112,7 @@ class Calibration:
                     f"middle of the footage, which has {width} x {height} pixels; add "
                     '"size": [width, height] of the images it was calibrated with'
                 )
-            known_width = float(width)
-            known_height = float(height)
-        else:
-            known_width, known_height = self.size
+        known_width, known_height = self.size or (float(width), float(height))
         if not _same_proportions((known_width, known_height), (width, height)):
             raise InputError(
                 f"{self.path} is for images of {known_width:g} x {known_height:g}, the footage has "
@@ -321,25 +319,24 @@ def _lens_of(path: Path, camera: str) -> dict[str, Any]:
     table = cameras[camera or next(iter(cameras))]
     if table.get("fisheye"):
         raise InputError(f"{path}: fisheye lenses are not supported; undistort the video first")
-    known = [name for names in _NAMES.values() for name in names]
-    return {key: value for key, value in table.items() if key in known}
+    return {key: value for key, value in table.items() if key in _OUR_NAMES}
 
 
 def _by_our_names(path: Path, data: dict[str, Any]) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    ours = {name: key for key, names in _NAMES.items() for name in names}
     for name, value in data.items():
-        if name not in ours:
+        ours = _OUR_NAMES.get(name)
+        if ours is None:
             if _LENS_KEY.fullmatch(name):
-                known = ", ".join(name for names in _NAMES.values() for name in names)
+                known = ", ".join(_OUR_NAMES)
                 raise InputError(
                     f"{path}: {name[:80]!r} is unknown; use one of {known}, or remove it"
                 )
             continue
-        if ours[name] in values:
-            twice = " and ".join(n for n in data if n in _NAMES[ours[name]])
+        if ours in values:
+            twice = " and ".join(n for n in data if n in _NAMES[ours])
             raise InputError(f"{path} gives the same value twice, as {twice}; remove one of them")
-        values[ours[name]] = value
+        values[ours] = value
     return values
 
 

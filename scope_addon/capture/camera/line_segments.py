@@ -65,10 +65,8 @@ class Segments:
     @classmethod
     def of_all(cls, parts: Sequence[Segments]) -> Segments:
         """Return the segments of several pictures of one background."""
-        ends, lengths = (
-            np.concatenate(each)
-            for each in zip(*((p.ends_px, p.lengths) for p in parts), strict=True)
-        )
+        ends = np.concatenate([part.ends_px for part in parts])
+        lengths = np.concatenate([part.lengths for part in parts])
         order = np.argsort(-lengths, kind="stable")
         return cls(ends[order], lengths[order])
 
