@@ -54,7 +54,7 @@ def assemble_motion(
     """
     betas = placed.betas
     path = shot.path
-    J0 = shot.body.rest_joints(placed.betas)[0]
+    J0 = shot.body.rest_joints(betas)[0]
     poses_raw, trans_raw = _to_world(
         T_world_camera, J0, raw.R_first_root, raw.t_first_root, raw.joints
     )

@@ -22,7 +22,7 @@ frames around are fitted together from both poses, and the cheaper one is kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -235,15 +235,6 @@ _STEPS = 8  # of a trial, after which a better pose costs less already
 _BONES = (True, False), (False, True), (True, True)
 
 
-@dataclass(frozen=True)
-class _Motion:
-    """A motion: states, and rotations (n, K+1, 3, 3) and joints (n, K+1, 3) of the parts."""
-
-    states: list[State]
-    R: Float64Array
-    joints: Float64Array
-
-
 def search_limbs(
     body: Body, window: ClipWindow, found: MotionFit, prior: MotionPrior
 ) -> list[State] | None:
@@ -252,26 +243,27 @@ def search_limbs(
     :param found: the fit of all frames of the window.
     :param prior: what couples the frames that are fitted again.
     """
-    motion = given = _Motion(list(found.states), found.R_world_part, found.t_world_part)
+    motion = found
     times = window.times
     for names in LIMBS:
         first, second, last = (body.joint_names.index(name) for name in names)
         limb = first, second, last
         for upper, lower in _BONES:
             start, end = (first, second) if upper else (second, last)
-            depths = bone_depths(motion.joints[:, start], motion.joints[:, end], window.center)
+            joints = motion.t_world_part
+            depths = bone_depths(joints[:, start], joints[:, end], window.center)
             for rows in runs_of_one_sign(depths, SHALLOW_M, DEEP_M):
                 if times[rows.stop - 1] - times[rows.start] > _LONGEST_S:
                     continue
                 other = _mirrored(body, motion, window.center, rows, limb, upper, lower)
                 if _may_be_better(window, motion.states, other, limb, _some_deep(depths, rows)):
                     motion = _better(window, motion, rows, other, prior)
-    return None if motion is given else motion.states
+    return None if motion is found else motion.states
 
 
 def _mirrored(
     body: Body,
-    motion: _Motion,
+    motion: MotionFit,
     center: Float64Array,
     rows: slice,
     limb: tuple[int, int, int],
@@ -279,9 +271,9 @@ def _mirrored(
     lower: bool,
 ) -> list[State]:
     """Return the states of all frames, with the limb mirrored in those of ``rows``."""
-    turned = mirrored_limb(
-        body.parents, motion.R[rows], motion.joints[rows], center[rows], limb, upper, lower
-    )
+    R = motion.R_world_part[rows]
+    joints = motion.t_world_part[rows]
+    turned = mirrored_limb(body.parents, R, joints, center[rows], limb, upper, lower)
     states = list(motion.states)
     for row, pair in zip(range(rows.start, rows.stop), turned, strict=True):
         Omega = np.array(states[row].Omega)
@@ -322,8 +314,8 @@ def _may_be_better(
 
 
 def _better(
-    window: ClipWindow, motion: _Motion, rows: slice, other: list[State], prior: MotionPrior
-) -> _Motion:
+    window: ClipWindow, motion: MotionFit, rows: slice, other: list[State], prior: MotionPrior
+) -> MotionFit:
     """Return the motion with the mirrored limb of ``other`` if the frames around cost less with it,
     or as it is.
     """
@@ -333,9 +325,9 @@ def _better(
     if not now.cost - then.cost > _MIN_GAIN:
         return motion
     states = list(motion.states)
-    R = motion.R.copy()
-    joints = motion.joints.copy()
+    R = motion.R_world_part.copy()
+    joints = motion.t_world_part.copy()
     states[around] = then.states
     R[around] = then.R_world_part
     joints[around] = then.t_world_part
-    return _Motion(states, R, joints)
+    return replace(motion, states=states, R_world_part=R, t_world_part=joints)

@@ -30,6 +30,7 @@ import numpy as np
 from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.sequences import runs
 from ...kinematics.smoothing import gaussian_smooth
+from ...kinematics.standing import line_of_sight
 from ...scene_gaps import steps_in_scenes
 from ..camera.odometry import Odometry
 from .placement import PlacedTrack
@@ -252,7 +253,7 @@ def scale_by_feet(placed: PlacedTrack, part: slice, up: FloatArray, path: Float6
         return 0.0
     root = placed.root[part]
     from_root = soles - root[:, None]
-    sight = root / np.maximum(np.linalg.norm(root, axis=1, keepdims=True), 1e-9)
+    sight = line_of_sight(root)
     along_sight = (from_root * sight[:, None]).sum(axis=2, keepdims=True) * sight[:, None]
     walking_m_s = walking_speed(_step_times(placed, up, part))
     shortened = SHORTENED if walking_m_s > 0.0 else SHORTENED[:1]
