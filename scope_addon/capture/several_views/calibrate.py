@@ -243,18 +243,15 @@ def _turned(place: CameraPlace, point: Float64Array, angle: float) -> CameraPlac
     return replace(place, R_camera_first=R, t_camera_first=place.of(point) - R @ point)
 
 
-def _times(person: SeenPerson, most: int) -> Float64Array:
-    """Return at most so many times at which the person is seen, evenly spread."""
-    times: Float64Array = person.times[spread(np.flatnonzero(person.seen), most)]
-    return times
-
-
 def _shared_times(
     first: SeenPerson, second: SeenPerson, clock: CameraPlace, most: int = _PAIR_FRAMES
 ) -> Float64Array:
-    """Return times of the first camera at which both see the person."""
+    """Return at most so many times of the first camera at which both see the person, evenly
+    spread.
+    """
     both = first.seen & second.at(clock.own_times(first.times)).seen
-    return _times(replace(first, seen=both), most)
+    times: Float64Array = first.times[spread(np.flatnonzero(both), most)]
+    return times
 
 
 def _times_of_all(
@@ -314,9 +311,8 @@ def apart(one: SeenPerson, other: SeenPerson, cameras: tuple[CameraPlace, Camera
 
     :param cameras: the first one, whose focal length may be adjusted, and the other one.
     """
-    at, points = _common_points(one, other, cameras)
+    at, points, both = _common_points(one, other, cameras)
     off = [_distance(each, camera, points) for each, camera in zip(at, cameras, strict=True)]
-    both = (at[0].confidence > 0) & (at[1].confidence > 0)
     return float(np.median(np.maximum(*off)[both])) if both.any() else np.inf
 
 
@@ -349,8 +345,7 @@ def relative_distance(
     """Return how far a person is from the first camera by both cameras' rays, divided by how far
     by the usual size of people.
     """
-    at, points = _common_points(one, other, cameras)
-    both = (at[0].confidence > 0) & (at[1].confidence > 0)
+    at, points, both = _common_points(one, other, cameras)
     if not both.any():
         return 1.0
     usual = np.exp(cameras[0].log_focal) * np.median(at[0].root[:, 2])
@@ -359,16 +354,25 @@ def relative_distance(
 
 def _common_points(
     one: SeenPerson, other: SeenPerson, cameras: tuple[CameraPlace, CameraPlace]
-) -> tuple[tuple[SeenPerson, SeenPerson], Float64Array]:
-    """Return a person at times at which the first and another camera see them, as both do, and the
-    keypoints (N, n, 3) by the rays of both, first camera's axes.
+) -> tuple[tuple[SeenPerson, SeenPerson], Float64Array, BoolArray]:
+    """Return a person at times at which the first and another camera see them, as both do, and
+    `_keypoints_by_rays` of both.
     """
     place = cameras[1]
     times = _shared_times(one, other, place)
     at = one.at(times), other.at(place.own_times(times))
+    return at, *_keypoints_by_rays(at, cameras)
+
+
+def _keypoints_by_rays(
+    at: Sequence[SeenPerson], cameras: Sequence[CameraPlace]
+) -> tuple[Float64Array, BoolArray]:
+    """Return the keypoints (N, n, 3) of a person whom cameras see at the same N times, first
+    camera's axes, and (N, n) whether at least two cameras see each.
+    """
     confidence = np.array([each.confidence for each in at])
     rays = np.array([each.rays for each in at])
-    return at, triangulate(rays, confidence, cameras)
+    return triangulate(rays, confidence, cameras), (confidence > 0).sum(axis=0) >= 2
 
 
 def _distance(person: SeenPerson, camera: CameraPlace, points: Float64Array) -> Float64Array:
@@ -389,21 +393,24 @@ def contradicting_spans(
     :param people: (V,) one person as each camera sees them; None: not found there.
     :param places: (V,) of the cameras.
     """
-    used = [v for v, each in enumerate(people) if each is not None and places[v] is not None]
+    used = [
+        (v, person, place)
+        for v, (person, place) in enumerate(zip(people, places, strict=True))
+        if person is not None and place is not None
+    ]
     spans: list[list[tuple[float, float]]] = [[] for _ in people]
-    first = people[0]
-    if len(used) < 2 or first is None:
+    if len(used) < 2:
         return spans
-    times = first.times
-    at = [people[v].at(places[v].own_times(times)) for v in used]  # type: ignore[union-attr]
-    cameras = [places[v] for v in used]
+    times = used[0][1].times
+    at = [person.at(place.own_times(times)) for _, person, place in used]
+    cameras = [place for *_, place in used]
     error = np.array([_error_without(at, cameras, k) for k in range(len(used))])
     if len(used) == 2:
         wrong = np.stack([np.zeros(len(times), bool), error[1] > CONTRADICTS])
     else:
         worst = error.argmax(axis=0)
         wrong = (np.arange(len(used))[:, None] == worst) & (error > CONTRADICTS)
-    for k, v in enumerate(used):
+    for k, (v, *_) in enumerate(used):
         spans[v] = _long_spans(wrong[k], times, CONTRADICTS_S)
     return spans
 
@@ -421,7 +428,7 @@ def unseen_spans(
 
 
 def _error_without(
-    at: Sequence[SeenPerson], cameras: Sequence[CameraPlace | None], k: int
+    at: Sequence[SeenPerson], cameras: Sequence[CameraPlace], k: int
 ) -> Float64Array:
     """Return the median distance (N,) of camera k's keypoints from those of the others, in standard
     deviations. Zero where too little is seen.
@@ -431,13 +438,10 @@ def _error_without(
     have other lengths than otherwise.
     """
     is_pair = len(at) == 2
-    others = list(range(len(at))) if is_pair else [v for v in range(len(at)) if v != k]
-    confidence = np.array([at[v].confidence for v in others])
-    rays = np.array([at[v].rays for v in others])
-    places = [cameras[v] for v in others]
-    points = triangulate(rays, confidence, places)  # type: ignore[arg-type]
-    known = ((confidence > 0).sum(axis=0) >= 2) & (at[k].confidence > 0)
-    distance = _distance(at[k], cameras[k], points)  # type: ignore[arg-type]
+    others = [v for v in range(len(at)) if is_pair or v != k]
+    points, known = _keypoints_by_rays([at[v] for v in others], [cameras[v] for v in others])
+    known &= at[k].confidence > 0
+    distance = _distance(at[k], cameras[k], points)
     error = np.zeros(len(distance))
     for row in np.flatnonzero(known.sum(axis=1) >= _LEAST_KNOWN):
         error[row] = np.median(distance[row, known[row]])

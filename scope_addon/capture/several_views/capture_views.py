@@ -146,11 +146,11 @@ def capture_views(
     warnings = [*_about_cameras(views, matches, given), *doubts, *notices, *report.warnings]
     warnings += _about_footage(views[1:], options, warnings)
     about = [_about_view(view, match) for view, match in zip(views, matches, strict=True)]
-    if places[0] is not None and places[0].log_focal:
+    if first_place.log_focal:
         report = replace(
             report,
             camera=f"{first.camera.source}, adjusted to the other cameras",
-            focal_deviation=round(places[0].focal_sigma, 3),
+            focal_deviation=round(first_place.focal_sigma, 3),
         )
     return Capture(motions, replace(report, views=about, warnings=warnings))
 
