@@ -74,9 +74,3 @@ def exact_lifting() -> Iterator[None]:
 def first_frame(frames: Frames) -> Callable[..., np.ndarray]:
     """``first_frame("clips/NAME", skip=0)``."""
     return lambda name, skip=0: next(frames(name, start=skip))
-
-
-@pytest.fixture(scope="session")
-def last_frame(frames: Frames) -> Callable[[str], np.ndarray]:
-    """``last_frame("clips/NAME")``."""
-    return lambda name: list(frames(name))[-1]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.lifter import WINDOW, default_lifter
+from scope.scope_addon.capture.perception.lifter import default_lifter
 from scope.solver.body_file import load_body
 
 from ..standing_views import DISTANCE_M, knee_flexion, standing_views
@@ -18,19 +18,18 @@ def body():
     return load_body("scope")
 
 
-def lifted_flexion(view, with_world):
-    """The knees' flexion of what the network makes of nine equal frames."""
-    in_front = view.points + [0.0, 0.0, DISTANCE_M]
-    rays = np.repeat((in_front[:, :2] / in_front[:, 2:])[None], WINDOW, axis=0)
-    world = np.repeat(view.points[None], WINDOW, axis=0) if with_world else None
-    lifted = default_lifter().lift(rays, np.ones((WINDOW, len(view.points))), world)
-    return knee_flexion(lifted.points[WINDOW // 2])
-
-
-def errors(body, bend_deg, with_world, betas=None):
-    views = list(standing_views(body, bend_deg, betas))
+def errors(body, bend_deg, with_world):
+    """The errors of the knees' flexion in what the network makes of each view, a still."""
+    points = np.array([view.points for view in standing_views(body, bend_deg)])
+    in_front = points + [0.0, 0.0, DISTANCE_M]
+    rays = in_front[..., :2] / in_front[..., 2:]
+    world = points if with_world else None
+    lifted = default_lifter().lift(rays, np.ones(rays.shape[:2]), world).points
     return np.array(
-        [lifted_flexion(view, with_world) - knee_flexion(view.points) for view in views]
+        [
+            knee_flexion(ours) - knee_flexion(truth)
+            for ours, truth in zip(lifted, points, strict=True)
+        ]
     )
 
 

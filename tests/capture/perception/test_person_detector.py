@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception import sessions
 from scope.scope_addon.capture.perception.person_detector import (
     Detection,
     PersonDetector,
@@ -24,10 +23,6 @@ from scope.scope_addon.capture.perception.person_detector import (
     squares,
     unique,
 )
-from scope.scope_addon.capture.perception.region import fit_in
-from scope.scope_addon.capture.perception.sessions import network_path, open_session
-from scope.scope_addon.errors import SetupError, UsageError
-from scope.solver.errors import ModelFileError
 
 from ..composites import beside, distant_view
 
@@ -66,21 +61,6 @@ def test_overlapping_boxes_become_their_weighted_mean() -> None:
     np.testing.assert_allclose(score, [0.9, 0.8])
     np.testing.assert_allclose(merged, [[0, 0.5, 10, 10.5, 4, 5], far])
     assert [a.shape for a in merge_overlapping(np.zeros(0), np.zeros((0, 12)))] == [(0,), (0, 12)]
-
-
-@pytest.mark.parametrize(("height", "width"), [(1080, 1920), (640, 360), (31, 29), (1, 500)])
-def test_letterbox_shows_the_whole_image_centred(height: int, width: int) -> None:
-    fitted = fit_in(np.full((height, width, 3), 255, np.uint8), 224, 224, border=0)
-    scale = 224 / max(height, width)
-    square = fitted.picture_rgb
-    offset = fitted.offset
-    rows = np.flatnonzero(square.any(axis=(1, 2)))
-    columns = np.flatnonzero(square.any(axis=(0, 2)))
-    np.testing.assert_allclose([columns[0], rows[0]], offset)
-    np.testing.assert_allclose(
-        [len(columns), len(rows)], np.maximum(np.array([width, height]) * scale, 1), atol=0.51
-    )
-    assert abs(offset[1] - (224 - len(rows)) / 2) <= 0.5
 
 
 def detection(score: float, shoulders: tuple[float, float], hips: tuple[float, float]) -> Detection:
@@ -142,7 +122,7 @@ def test_squares_cover_an_oblong_image() -> None:
     assert squares(900, 300) == [(0, 0, 300), (0, 300, 300), (0, 600, 300)]
 
 
-@pytest.mark.parametrize(("height", "width"), [(480, 640), (1920, 1080), (31, 29), (1, 500)])
+@pytest.mark.parametrize(("height", "width"), [(48, 64), (192, 108), (31, 29), (1, 500)])
 @pytest.mark.parametrize(("side", "step", "share"), [(1 / 3, 0.6, 0.4 / 3), (0.6, 2 / 3, 0.2)])
 def test_every_small_person_is_entirely_in_a_square(
     height: int, width: int, side: float, step: float, share: float
@@ -151,8 +131,8 @@ def test_every_small_person_is_entirely_in_a_square(
     assert min(left.min(), top.min()) == 0
     assert [(left + side).max(), (top + side).max()] == [width, height]
     person = int(share * min(height, width) - 1)  # corners of squares are whole pixels
-    for x in range(0, width - person, 7):
-        for y in range(0, height - person, 7):
+    for x in range(0, width - person, 3):
+        for y in range(0, height - person, 3):
             around = (
                 (left <= x) & (x + person <= left + side) & (top <= y) & (y + person <= top + side)
             )
@@ -169,7 +149,6 @@ def test_a_small_person_is_found_in_the_small_squares_alone(
     (small,) = detector.detect_small(distant)
     expected = (person.points_px[:2] + 0.5) / 8 - 0.5 + [400, 200]
     assert np.abs(small.points_px[:2] - expected).max() < 0.05 * person.region.side_px / 8
-    assert detector.detect_small(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
 def test_a_small_person_beside_a_larger_one_is_found_in_the_parts_alone(
@@ -188,7 +167,6 @@ def test_a_small_person_beside_a_larger_one_is_found_in_the_parts_alone(
     ]
     assert min(off) < 0.05 * person.region.side_px * scale
     assert len(off) == 2
-    assert detector.detect_in_parts(np.full((90, 160, 3), 128, np.uint8)) == []
 
 
 def test_finds_the_squatting_person(
@@ -222,15 +200,16 @@ def test_detections_follow_the_image(
 
 
 def test_finds_both_people(
-    detector: PersonDetector, last_frame: Callable[[str], np.ndarray]
+    detector: PersonDetector, first_frame: Callable[[str], np.ndarray]
 ) -> None:
-    found = detector.detect(last_frame("clips/two_people_portrait"))
+    found = detector.detect(first_frame("clips/two_people_portrait"))
     assert len(found) == 2
     assert not found[0].region.resembles(found[1].region, 0.2)
 
 
 def test_no_detections_in_a_blank_image(detector: PersonDetector) -> None:
-    assert detector.detect(np.full((90, 160, 3), 128, np.uint8)) == []
+    blank = np.full((90, 160, 3), 128, np.uint8)
+    assert detector.detect(blank) == detector.detect_in_parts(blank) == []
 
 
 @pytest.mark.parametrize("quarter_turns", [0, 1, 2, 3])
@@ -247,20 +226,6 @@ def test_a_detection_in_a_turned_picture_is_turned_back(quarter_turns: int) -> N
     np.testing.assert_array_equal(found.points_px, places[2:])
     np.testing.assert_array_equal(found.box_px, [3, 5, 14, 9])
     assert found.score == 0.9
-
-
-def test_missing_and_damaged_networks_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
-    with pytest.raises(SetupError, match="pose_detection.onnx is missing"):
-        network_path("pose_detection")
-    broken = tmp_path / "broken.onnx"
-    broken.write_bytes(b"no network")
-    with pytest.raises(ModelFileError, match=r"broken\.onnx"):
-        open_session(broken, 1)
-    with pytest.raises(UsageError, match="0 threads"):
-        open_session(broken, 0)
 
 
 def iou(a: np.ndarray, b: np.ndarray) -> float:
@@ -289,7 +254,6 @@ def test_each_box_is_in_the_cluster_of_the_best_box_that_it_overlaps():
     assert 1 < len(clusters) < len(boxes)
 
 
-def test_boxes_without_area_and_further_columns():
-    boxes = np.array([[3.0, 3, 3, 3, 7], [0, 0, 2, 2, 8], [3, 3, 3, 3, 9]])
+def test_boxes_without_area():
+    boxes = np.array([[3.0, 3, 3, 3], [0, 0, 2, 2], [3, 3, 3, 3]])
     assert [cluster.tolist() for cluster in overlap_clusters(boxes, 0.5)] == [[0], [1], [2]]
-    assert overlap_clusters(np.zeros((0, 4)), 0.5) == []

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 from scope.scope_addon.capture.perception import sessions
-from scope.scope_addon.errors import SetupError
+from scope.scope_addon.errors import SetupError, UsageError
+from scope.solver.errors import ModelFileError
 
 PROGRAM = """
 from scope.scope_addon.capture.perception.adapters import network_server
@@ -44,11 +45,18 @@ def test_opening_a_network_records_no_events(tmp_path: Path, networks: None) -> 
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_a_wheel_has_no_networks_and_says_what_has(
+def test_missing_and_damaged_networks_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sessions, "NETWORKS_FOLDER", tmp_path)
     with pytest.raises(
-        SetupError, match="a wheel contains none: capture with the scripts of the repository"
+        SetupError,
+        match="lite.onnx is missing.*a wheel contains none: capture with the scripts of the repo",
     ):
         sessions.network_path("pose_landmark_lite")
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(b"no network")
+    with pytest.raises(ModelFileError, match=r"broken\.onnx"):
+        sessions.open_session(broken, 1)
+    with pytest.raises(UsageError, match="0 threads"):
+        sessions.open_session(broken, 0)
