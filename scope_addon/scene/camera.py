@@ -30,13 +30,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...solver.rotations import quaternion_from_matrix
 from ..errors import VideoError
 from ..exif import picture_view
 from ..footage import LAST_NUMBER, PICTURE_SUFFIXES, numbered_from, picture_slots
 from ..motion import Motion
 from ..notices import Notice, notice
 from .actions import Channels, fcurves_of
-from .character.animation import on_one_hemisphere, quaternion_from_matrix
+from .character.animation import on_one_hemisphere
 from .stored_values import stored_numbers
 from .timing import rows_of_scene_frames
 
@@ -109,9 +110,7 @@ def build_camera(
     obj.location = locations[0]
     obj.rotation_quaternion = quaternion_from_matrix(T_world_blendcam[0, :3, :3])
     if np.ptp(T_world_blendcam, axis=0).max() > 1e-6:
-        rotations = on_one_hemisphere(
-            np.stack([quaternion_from_matrix(T[:3, :3]) for T in T_world_blendcam])
-        )
+        rotations = on_one_hemisphere(quaternion_from_matrix(T_world_blendcam[:, :3, :3]))
         channels = Channels(obj, bpy.data.actions.new(name))
         channels.write("location", frames, locations, group="Object Transforms")
         channels.write("rotation_quaternion", frames, rotations, group="Object Transforms")

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
-from ...solver.rotations import matrix_from_quaternion
+from ...solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 from ..kinematics.axes import R_WORLD_MODEL
 from .character import armature, body_mesh
-from .character.animation import quaternion_from_matrix, quaternion_product
+from .character.animation import quaternion_product
 from .datablocks import NewDatablocks, found, remove, scene_of
 
 _Q_MODEL_WORLD = quaternion_from_matrix(R_WORLD_MODEL.T)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
+from ....solver.rotations import quaternion_from_matrix
 from ...kinematics.axes import R_WORLD_MODEL
 from ...motion import Motion
 from ..actions import Channels, bone_path
@@ -44,18 +45,6 @@ def quaternion_product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArra
     y = aw * by + ay * bw + az * bx - ax * bz
     z = aw * bz + az * bw + ax * by - ay * bx
     return np.stack([w, x, y, z], axis=-1)
-
-
-def quaternion_from_matrix(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Convert a rotation (3, 3) to a unit quaternion (4,), the eigenvector of Bar-Itzhack's
-    symmetric matrix.
-    """
-    K = np.zeros((4, 4))
-    K[0, 0] = np.trace(R)
-    K[0, 1:] = K[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    K[1:, 1:] = R + R.T - np.trace(R) * np.eye(3)
-    q = np.linalg.eigh(K)[1][:, -1]
-    return q if q[0] >= 0 else -q
 
 
 def on_one_hemisphere(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

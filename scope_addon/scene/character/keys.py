@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....solver.body import Body
-from ....solver.rotations import matrix_from_quaternion
-from ....solver.rotations import quaternion_from_matrix as quaternions
+from ....solver.rotations import matrix_from_quaternion, quaternion_from_matrix
 from ...edit.clip import Clip, band_limited, sample
 from ...errors import UsageError
 from ...kinematics.axes import R_WORLD_MODEL
@@ -97,7 +96,7 @@ def channel_values(
     rotations = clip.rotations.copy()
     rotations[:, 0] = R_WORLD_MODEL.T @ rotations[:, 0]
     B = C @ rotations @ np.swapaxes(C, 1, 2)
-    return on_one_hemisphere(quaternions(B)), clip.root - _root_head(armature, body)
+    return on_one_hemisphere(quaternion_from_matrix(B)), clip.root - _root_head(armature, body)
 
 
 def write_clip(
