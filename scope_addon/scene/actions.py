@@ -20,7 +20,7 @@ from bpy_extras import anim_utils
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from .datablocks import shape_keys_of
+from .datablocks import changed, shape_keys_of
 
 # Values of Blender's keyframe interpolation enum, which foreach_set takes as integers.
 INTERPOLATION = {"CONSTANT": 0, "LINEAR": 1, "BEZIER": 2}
@@ -123,22 +123,13 @@ class Channels:
         :param interpolation: a key of ``INTERPOLATION``, for every key.
         :param group: name under which the channel lists show the curves.
         """
-        values = np.asarray(values, np.float32)
         columns = values[:, None] if values.ndim == 1 else values
-        coordinates = np.empty((len(frames), 2), np.float32)
-        coordinates[:, 0] = frames
-        modes = np.full(len(frames), INTERPOLATION[interpolation], np.int32)
         curves = []
         for index in range(columns.shape[1]):
             curve = self._owner.fcurves.new(data_path, index=index)
             if group:
                 curve.group = self._group(group)
-            keys = curve.keyframe_points
-            keys.add(len(frames))
-            coordinates[:, 1] = columns[:, index]
-            keys.foreach_set("co", coordinates.ravel())
-            keys.foreach_set("interpolation", modes)
-            curve.update()
+            rewrite_keys(curve, frames, columns[:, index], interpolation)
             curves.append(curve)
         return curves
 
@@ -219,14 +210,8 @@ def values_between_keys(
     """Evaluate a curve at frames (T,) as its keys and their repetition have it, without its other
     modifiers: these are added to whatever keys are written from the values.
     """
-    added = [m for m in curve.modifiers if m.type != "CYCLES" and not m.mute]
-    try:
-        for modifier in added:
-            modifier.mute = True
+    with changed([m for m in curve.modifiers if m.type != "CYCLES"], mute=True):
         return np.array([curve.evaluate(frame) for frame in frames])
-    finally:
-        for modifier in added:
-            modifier.mute = False
 
 
 def rewrite_keys(
@@ -438,8 +423,8 @@ def check_not_moved_by_nla(datablock: bpy.types.ID) -> None:
 
 @contextmanager
 def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
-    """Bake the NLA of the scene's objects and shape keys to actions for the duration of the block,
-    on whole frames.
+    """Bake the NLA of the scene's objects and shape keys to new actions for the duration of the
+    block, on whole frames.
     """
     options = anim_utils.BakeOptions(
         only_selected=False,
@@ -462,16 +447,15 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
     shaped = [keys for keys in blocks if nla_strips(keys)]
     animations = [datablock.animation_data for datablock in (*blended, *shaped)]
     kept = [(a, a.action, used_slot(a), a.action_blend_type) for a in animations]
-    baked: list[bpy.types.Action] = []
     try:
         frames = range(scene.frame_start, scene.frame_end + 1)
         # an object without bones disables do_pose for all objects that share the options
         for posed in (True, False):
             pairs = [(obj, None) for obj in blended if (obj.pose is not None) is posed]
             if pairs:
-                baked += anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
-        shown = shape_key_values(scene, shaped, frames)
-        baked += [key_shape_keys(keys, frames, values) for keys, values in shown.items()]
+                anim_utils.bake_action_objects(pairs, frames=frames, bake_options=options)
+        for keys, values in shape_key_values(scene, shaped, frames).items():
+            key_shape_keys(keys, frames, values)
         for animation in animations:
             animation.use_nla = False
         yield
@@ -480,7 +464,6 @@ def nla_as_actions(scene: bpy.types.Scene) -> Iterator[None]:
             animation.use_nla = True
             assign_action(animation, action, slot)
             animation.action_blend_type = blend_type
-        bpy.data.batch_remove([action for action in baked if action is not None])
 
 
 def shape_key_values(
@@ -496,14 +479,11 @@ def shape_key_values(
     return shown
 
 
-def key_shape_keys(
-    keys: bpy.types.Key, frames: range, values: NDArray[np.float32]
-) -> bpy.types.Action:
-    """Give shape keys an action with the values of ``shape_key_values``; return it."""
+def key_shape_keys(keys: bpy.types.Key, frames: range, values: NDArray[np.float32]) -> None:
+    """Give shape keys an action with the values of ``shape_key_values``."""
     channels = Channels(keys, bpy.data.actions.new(keys.name))
     for name, column in zip(keys.key_blocks.keys()[1:], values.T, strict=True):
         channels.write(shape_key_path(name), np.array(frames, float), column)
-    return channels.action
 
 
 def frame_range(datablocks: Iterable[bpy.types.ID]) -> tuple[float, float] | None:

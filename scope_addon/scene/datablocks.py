@@ -8,7 +8,9 @@ A scene that is linked from another file cannot be changed: Blender refuses, or 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import bpy
 
@@ -74,9 +76,7 @@ def is_person(obj: bpy.types.Object) -> bool:
 
 
 def is_part(block: bpy.types.ID) -> bool:
-    """Return whether a body, camera or action was made for a capture; those from before it was
-    stored do not say so.
-    """
+    """Return whether a body, camera or action was made for a capture."""
     return PART_TAG in block
 
 
@@ -113,6 +113,19 @@ def check_local(scene: bpy.types.Scene) -> None:
         )
 
 
+@contextmanager
+def changed(structs: Iterable[Any], **values: Any) -> Iterator[None]:
+    """Give properties of Blender's structs other values inside the block."""
+    before = [(struct, name, getattr(struct, name)) for struct in structs for name in values]
+    try:
+        for struct, name, _ in before:
+            setattr(struct, name, values[name])
+        yield
+    finally:
+        for struct, name, value in before:
+            setattr(struct, name, value)
+
+
 class NewDatablocks:
     """The datablocks that are new since a moment."""
 
@@ -131,6 +144,16 @@ class NewDatablocks:
     def remove(self) -> None:
         """Remove them."""
         bpy.data.batch_remove([block for _, block in self.all()])
+
+
+@contextmanager
+def temporary_datablocks() -> Iterator[None]:
+    """Remove all datablocks that the block has added to the file."""
+    new = NewDatablocks()
+    try:
+        yield
+    finally:
+        new.remove()
 
 
 def remove_blocks(blocks: Sequence[bpy.types.ID]) -> None:

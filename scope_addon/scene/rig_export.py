@@ -19,6 +19,7 @@ from ..output_paths import check_output
 from ..retarget.expression_map import ExpressionMap
 from ..retarget.rig_source import RigSource
 from .build import BuildOptions, build_scene
+from .datablocks import temporary_datablocks
 from .export.export import ExportOptions, export
 from .export.export_states import temporary_scene
 from .face_retarget import (
@@ -29,7 +30,7 @@ from .face_retarget import (
     only_bones_move,
     retarget_expressions,
 )
-from .rig_file import load_rig, rig_bone_map, temporary_datablocks, with_meshes
+from .rig_file import load_rig, rig_bone_map, with_meshes
 from .rig_retarget import RetargetOptions, common_travel, retarget
 
 

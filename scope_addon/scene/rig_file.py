@@ -6,8 +6,7 @@ deforms.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -19,7 +18,7 @@ from ..retarget.bone_map import PHALANGES, BoneMap, check_bone_count
 from ..retarget.guess import from_humanoid
 from ..retarget.rig_source import RigSource, files_beside_gltf
 from .actions import fcurves_of, shape_key_path
-from .datablocks import NewDatablocks, is_deformed_by
+from .datablocks import is_deformed_by, temporary_datablocks
 from .export import formats
 from .export.export_states import temporary_scene
 from .rig_probe import at_rest, probe
@@ -140,16 +139,6 @@ def rig_bone_map(source: RigSource, rig: bpy.types.Object) -> BoneMap:
         advice = "" if source.bone_map else "; give a map with --bone-map"
         raise InputError(f"{source.path}: {error}{advice}") from error
     return found
-
-
-@contextmanager
-def temporary_datablocks() -> Iterator[None]:
-    """Remove all datablocks that the block has added to the file."""
-    new = NewDatablocks()
-    try:
-        yield
-    finally:
-        new.remove()
 
 
 def _append(path: Path) -> tuple[list[bpy.types.Object], float]:

@@ -85,12 +85,11 @@ def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]
 
 def copy_expressions(
     mesh: bpy.types.Object, source: bpy.types.Key, offsets: dict[str, NDArray[np.float32]]
-) -> bpy.types.Action:
+) -> None:
     """Give a mesh without shape keys those of another one's expressions, with their keyframes.
 
     :param source: the other mesh's shape keys.
     :param offsets: (V, 3) each, as from `expression_offsets`.
-    :return: the new action.
     """
     rest = _places(mesh.shape_key_add(name="Basis", from_mix=False))
     for name, offset in offsets.items():
@@ -102,7 +101,6 @@ def copy_expressions(
             keys = read_keys(curve).astype(float)
             if len(keys):
                 channels.write(curve.data_path, keys[:, 0], keys[:, 1])
-    return channels.action
 
 
 def _places(key: bpy.types.ShapeKey) -> NDArray[np.float32]:

@@ -29,10 +29,9 @@ from ...output_paths import WITHOUT_SCENE, check_output, person_paths
 from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
-from ..build import NEW_SCENE, BuildOptions, BuildResult, build_scene
-from ..character.armature import remove_unused_ring
-from ..datablocks import captures_of
-from ..packed_motion import motion_texts, pack_motion
+from ..build import NEW_SCENE, BuildOptions, build_scene
+from ..datablocks import captures_of, temporary_datablocks
+from ..packed_motion import pack_motion
 from . import formats
 from .bone_names import OWN, SKELETONS, bone_names
 from .bvh import UNITS_PER_METRE
@@ -151,6 +150,7 @@ def _write_one(
     by_scene = suffix in (".fbx", ".blend")  # which regard the scene's unit
     is_in_metres = by_scene or abs(unit - 1.0) < 1e-6
     with (
+        temporary_datablocks(),
         out_of_edit_mode(collections),
         # A .blend file goes on as a capture, whose bones are known by their names.
         renamed_bones(rigs, OWN if suffix == ".blend" else options.skeleton),
@@ -215,35 +215,14 @@ def export_motions(
         check_output(each)
     written: list[Path] = []
     build_options = build_options or replace(NEW_SCENE, name=paths[0].stem)
-    with temporary_scene("Capturing"):
+    with temporary_datablocks(), temporary_scene("Capturing"):
         result = build_scene(motions, body, footage, build_options)
-        try:
-            if any(each.suffix.lower() == ".blend" for each in paths):
-                for person in result.people:
-                    pack_motion(person.armature, person.motion.to_bytes())
-            for each in paths:
-                written += export(each, [result.collection], export_options)
-        finally:
-            _remove(result)
+        if any(each.suffix.lower() == ".blend" for each in paths):
+            for person in result.people:
+                pack_motion(person.armature, person.motion.to_bytes())
+        for each in paths:
+            written += export(each, [result.collection], export_options)
     return written, result.warnings
-
-
-def _remove(result: BuildResult) -> None:
-    """Remove the datablocks of a build from the file."""
-    objects = list(result.collection.objects)
-    data = {obj.data for obj in objects}
-    owners = [*objects, *(obj.data.shape_keys for obj in objects if obj.type == "MESH")]
-    owners += [obj.data for obj in objects if obj.type == "CAMERA"]
-    used = {owner.animation_data.action for owner in owners if owner and owner.animation_data} - {
-        None
-    }
-    materials = {m for block in data for m in getattr(block, "materials", ())}
-    shown = {footage for block in data for picture in getattr(block, "background_images", ())
-             for footage in (picture.clip, picture.image) if footage}  # fmt: skip
-    texts = motion_texts(objects)
-    bpy.data.batch_remove([result.collection, *objects, *data, *used, *materials, *texts])
-    bpy.data.batch_remove([footage for footage in shown if footage.users == 0])
-    remove_unused_ring()
 
 
 def _write(path: Path, writer: Callable[[Path], None]) -> None:

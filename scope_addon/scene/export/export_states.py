@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Context managers that prepare captures for an exporter and restore them afterwards."""
+"""Context managers that prepare captures for an exporter and restore them afterwards. What they
+make stays in the file: use them within ``temporary_datablocks``.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ from ..camera import set_resolution
 from ..character.animation import on_one_hemisphere
 from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
-from ..datablocks import is_deformed_by
+from ..datablocks import changed, is_deformed_by
 from ..visibility import world_matrix
 from ..window_scene import window_shows
 
@@ -127,12 +129,10 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
         for obj, trajectory in zip(children, trajectories, strict=True):
             seen = obj.evaluated_get(evaluated)
             trajectory.append(seen.matrix_world @ seen.matrix_basis.inverted_safe())
-    created: list[bpy.types.ID] = []
     try:
         for obj, trajectory in zip(children, trajectories, strict=True):
             empty = bpy.data.objects.new(f"{obj.parent.name}_carrier", None)
             channels = actions.Channels(empty, bpy.data.actions.new(empty.name))
-            created += [empty, channels.action]
             empty.rotation_mode = "QUATERNION"
             place, turn, size = (
                 np.array(each) for each in zip(*(m.decompose() for m in trajectory), strict=True)
@@ -152,7 +152,6 @@ def external_parents_replaced(scene: bpy.types.Scene) -> Iterator[None]:
             obj.parent_type = kind
             obj.parent_bone = bone
             obj.matrix_parent_inverse = inverse
-        bpy.data.batch_remove(created)
 
 
 @contextmanager
@@ -174,7 +173,6 @@ def scaled(scene: bpy.types.Scene, size: float) -> Iterator[None]:
         for obj, inverse in tops:
             obj.parent = None
             obj.matrix_parent_inverse = inverse
-        bpy.data.objects.remove(empty)
 
 
 @contextmanager
@@ -205,30 +203,19 @@ def all_evaluated(collections: Sequence[bpy.types.Collection]) -> Iterator[None]
         for group in (collection, *collection.children_recursive)
     }
     objects = {obj for collection in collections for obj in collection.all_objects}
-    hidden = [(each, each.hide_viewport, each.hide_render) for each in (*groups, *objects)]
-    try:
-        for each, _, _ in hidden:
-            each.hide_viewport = each.hide_render = False
-        with in_position(objects, "POSE"):
-            yield
-    finally:
-        for each, in_viewports, in_renders in hidden:
-            each.hide_viewport = in_viewports
-            each.hide_render = in_renders
+    with (
+        changed((*groups, *objects), hide_viewport=False, hide_render=False),
+        in_position(objects, "POSE"),
+    ):
+        yield
 
 
 @contextmanager
 def in_position(objects: Iterable[bpy.types.Object], position: str) -> Iterator[None]:
     """Show the armatures among the objects in ``POSE`` or ``REST`` position inside the block."""
     armatures = {obj.data for obj in objects if obj.type == "ARMATURE"}
-    before = [(armature, armature.pose_position) for armature in armatures]
-    try:
-        for armature in armatures:
-            armature.pose_position = position
+    with changed(armatures, pose_position=position):
         yield
-    finally:
-        for armature, kept in before:
-            armature.pose_position = kept
 
 
 @contextmanager
@@ -244,15 +231,10 @@ def actions_over_scene_range(scene: bpy.types.Scene) -> Iterator[None]:
     extended = [
         a for a in {data.action for data in moving} if a is not None and not a.use_frame_range
     ]
-    try:
-        for action in extended:
-            action.use_frame_range = True
-            action.frame_start = scene.frame_start
-            action.frame_end = scene.frame_end
+    first = scene.frame_start
+    last = scene.frame_end
+    with changed(extended, use_frame_range=True, frame_start=first, frame_end=last):
         yield
-    finally:
-        for action in extended:
-            action.use_frame_range = False
 
 
 @contextmanager
@@ -273,16 +255,12 @@ def baked_meshes(scene: bpy.types.Scene) -> Iterator[None]:
         baked[obj].vertices.foreach_set("co", vertices.ravel())
         baked[obj].update()
     sources = {obj: obj.data.shape_keys for obj in bodies}
-    actions_made = []
-    try:
-        with replaced_meshes(baked):
-            for obj in bodies:
-                if offsets[obj]:
-                    actions_made.append(copy_expressions(obj, sources[obj], offsets[obj]))
-            bpy.context.view_layer.update()
-            yield
-    finally:
-        bpy.data.batch_remove(actions_made)
+    with replaced_meshes(baked):
+        for obj in bodies:
+            if offsets[obj]:
+                copy_expressions(obj, sources[obj], offsets[obj])
+        bpy.context.view_layer.update()
+        yield
 
 
 @contextmanager

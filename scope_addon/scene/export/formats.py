@@ -45,6 +45,7 @@ from ...errors import OutputError
 from .. import timing
 from ..capture_parts import cameras_in
 from ..character.root_object import parent_transform, root_object
+from ..datablocks import changed
 from . import bvh
 from .fbx_file import correct_fbx
 from .usd_file import has_content, is_whole_crate, saved_layers
@@ -203,7 +204,9 @@ def sample_armature(scene: bpy.types.Scene, rig: bpy.types.Object) -> bvh.Sample
     rest = np.array([np.array(bone.matrix_local) for bone in bones])
     frames = range(scene.frame_start, scene.frame_end + 1)
     posed = np.empty((len(frames), len(bones), 4, 4))
-    with timing.current_frame_kept(scene), _without_deformation(scene):
+    # deforming meshes would take most of the time
+    deforming = [m for obj in scene.objects for m in obj.modifiers if m.type == "ARMATURE"]
+    with timing.current_frame_kept(scene), changed(deforming, show_viewport=False):
         for row, frame in enumerate(frames):
             scene.frame_set(frame)
             evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -238,24 +241,6 @@ def _place_at_rest(rig: bpy.types.Object) -> Matrix:
 def _unscaled(R: NDArray[np.float64]) -> NDArray[np.float64]:
     rotations: NDArray[np.float64] = R / np.linalg.norm(R, axis=-2, keepdims=True)
     return rotations
-
-
-@contextmanager
-def _without_deformation(scene: bpy.types.Scene) -> Iterator[None]:
-    """Disable mesh deformation while only bones are read; it would take most of the time."""
-    modifiers = [
-        m
-        for obj in scene.objects
-        for m in obj.modifiers
-        if m.type == "ARMATURE" and m.show_viewport
-    ]
-    for modifier in modifiers:
-        modifier.show_viewport = False
-    try:
-        yield
-    finally:
-        for modifier in modifiers:
-            modifier.show_viewport = True
 
 
 class _NullStream(io.TextIOBase):
@@ -389,13 +374,11 @@ def _has_all_frames(path: Path) -> bool:
 def corrected_key_times(path: Path, scene: bpy.types.Scene) -> Iterator[None]:
     """Correct the key times of the .glb that the block writes to ``path``."""
     base = scene.render.fps_base
-    scene.render.fps_base = 1.0
-    try:
+    with changed([scene.render], fps_base=1.0):
         yield
-    finally:
-        scene.render.fps_base = base
     if base != 1.0 and path.is_file():
-        _scale_times(path, base)
+        with _changed_glb(path) as (gltf, binary):
+            _scale_key_times(gltf, binary, base)
 
 
 @contextmanager
@@ -430,13 +413,8 @@ def _set_aspect(camera: dict[str, Any], aspects: dict[str, float]) -> None:
     lens["yfov"] = 2 * math.atan(half_width / aspect)
 
 
-def _scale_times(path: Path, factor: float) -> None:
-    """Multiply the times of all keys in the file."""
-    with _changed_glb(path) as (gltf, binary):
-        _scale_key_times(gltf, binary, factor)
-
-
 def _scale_key_times(gltf: dict[str, Any], binary: bytearray, factor: float) -> None:
+    """Multiply the times of all keys in a file."""
     for index in {
         sampler["input"]
         for animation in gltf.get("animations", ())

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...notices import Notice, notice
 from .. import actions
+from ..datablocks import changed
 from .export_states import in_position, replaced_meshes
 
 # Modifiers whose effect depends on the pose or the time.
@@ -40,12 +41,10 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
     """
     meshes = [obj for obj in scene.objects if obj.type == "MESH"]
     shown = {obj: modifiers for obj in meshes if (modifiers := _shown_modifiers(obj))}
-    hidden = [(m, m.show_viewport, m.show_render) for each in shown.values() for m in each]
     shaped = {obj: obj.data.shape_keys for obj in shown if obj.data.shape_keys}
     animated = {keys for keys in shaped.values() if keys.animation_data}
     frames = range(scene.frame_start, scene.frame_end + 1)
     modified: dict[bpy.types.Object, bpy.types.Mesh] = {}
-    actions_made: list[bpy.types.Action] = []
     notices: list[Notice] = []
     with in_position(scene.objects, "REST"):
         for obj, modifiers in shown.items():
@@ -55,9 +54,8 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
                 notices.append(notice("modifiers_left_out", **values, modifiers=moving))
             if keys_left_out:
                 notices.append(notice("shape_keys_left_out", **values, keys=keys_left_out))
-    try:
-        for modifier, _, _ in hidden:
-            modifier.show_viewport = modifier.show_render = False
+    applied = [modifier for each in shown.values() for modifier in each]
+    with changed(applied, show_viewport=False, show_render=False):
         shown_values = actions.shape_key_values(scene, animated, frames)
         with replaced_meshes(modified):
             for obj, mesh in modified.items():
@@ -65,14 +63,9 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
                     names = shaped[obj].key_blocks.keys()[1:]
                     columns = [names.index(name) for name in mesh.shape_keys.key_blocks.keys()[1:]]
                     kept = shown_values[shaped[obj]][:, columns]
-                    actions_made.append(actions.key_shape_keys(mesh.shape_keys, frames, kept))
+                    actions.key_shape_keys(mesh.shape_keys, frames, kept)
             bpy.context.view_layer.update()
             yield notices
-    finally:
-        bpy.data.batch_remove(actions_made)
-        for modifier, in_viewports, in_renders in hidden:
-            modifier.show_viewport = in_viewports
-            modifier.show_render = in_renders
 
 
 def _shown_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
