@@ -39,7 +39,6 @@ from .datablocks import (
     check_local,
     enter_object_mode,
     is_part,
-    is_person,
     remove_blocks,
     short_name,
 )
@@ -335,7 +334,6 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     enter_object_mode(bpy.context.view_layer)
     own = parts_of(collection)
     used = [*_data_of(own), *motion_texts(own)]
-    untagged = _untagged_actions(own)
     for child in [child for obj in own for child in obj.children if child not in own]:
         place = world_matrix(child)
         child.parent = None
@@ -348,7 +346,7 @@ def delete_capture(scene: bpy.types.Scene, collection: bpy.types.Collection) -> 
     bpy.data.batch_remove(collections)
     # What the objects used is free now, unless something else uses it too; actions are freed by the
     # data that they animate.
-    used = [block for block in used if block in untagged or not _is_kept(block)]
+    used = [block for block in used if not _is_kept(block)]
     while unused := [block for block in used if block.users == int(block.use_fake_user)]:
         used = [block for block in used if block not in unused]
         bpy.data.batch_remove(unused)
@@ -380,21 +378,6 @@ def _keep_in_scenes(obj: bpy.types.Object, collections: Sequence[bpy.types.Colle
             (scene.collection, *scene.collection.children_recursive)
         ):
             scene.collection.objects.link(obj)
-
-
-def _untagged_actions(objects: Iterable[bpy.types.Object]) -> set[bpy.types.ID]:
-    """Return the actions of people that were built before actions had a tag. They have the name of
-    the armature, or that of its data if the armature was renamed, and a fake user.
-    """
-    people = [obj for obj in objects if is_person(obj) and obj.type == "ARMATURE"]
-    return {
-        block
-        for person in people
-        for block in _data_of([person])
-        if isinstance(block, bpy.types.Action)
-        and block.name in (person.name, person.data.name)
-        and block.asset_data is None
-    }
 
 
 def _is_kept(block: bpy.types.ID) -> bool:

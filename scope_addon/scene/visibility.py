@@ -61,7 +61,8 @@ def _person(armature: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list
     without what the user has parented to the armature.
     """
     meshes = [obj for obj in armature.children if obj.type == "MESH"]
-    bodies = [mesh for mesh in meshes if is_part(mesh)] or meshes  # older ones are not marked
+    # the body of a live capture is not marked
+    bodies = [mesh for mesh in meshes if is_part(mesh)] or meshes
     return [obj for obj in (armature, *bodies) if is_in_layer(view_layer, obj)]
 
 

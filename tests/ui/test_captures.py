@@ -216,9 +216,6 @@ def test_a_rig_finds_its_person_after_renaming(two):
     person.name = "hero"
     bpy.context.view_layer.objects.active = rig
     assert captured_armature(bpy.context) == person
-    rig[PERSON] = "hero"  # as older files store it
-    assert captured_armature(bpy.context) == person
-    rig[PERSON] = person
     bpy.context.scene.scope.capture = bpy.data.collections["person"]
     bpy.data.collections["person"].objects.unlink(person)
     assert captured_armature(bpy.context) != person
@@ -378,10 +375,7 @@ def test_a_deleted_capture_leaves_nothing_and_the_one_before_it_is_shown(two, co
     assert not bpy.ops.scope.delete_capture.poll()
 
 
-@pytest.mark.parametrize("is_tagged", [True, False], ids=["now", "from an earlier version"])
-def test_what_the_user_has_put_into_a_capture_is_not_deleted_with_it(
-    fake_worker, footage, is_tagged
-):
+def test_what_the_user_has_put_into_a_capture_is_not_deleted_with_it(fake_worker, footage):
     collection = capture(fake_worker, footage)
     body = bpy.data.objects["person_body"]
     garment = body.copy()
@@ -394,9 +388,7 @@ def test_what_the_user_has_put_into_a_capture_is_not_deleted_with_it(
     path["scope_root"] = "Rig"
     for obj in (garment, camera, path, rig):
         collection.objects.link(obj)
-    for obj in collection.objects:
-        if obj == garment or not is_tagged:
-            obj.pop("scope_part", None)
+    garment.pop("scope_part")
     assert camera_of(bpy.context.scene).name == "person_camera"
     bpy.ops.scope.root_motion(mode="OBJECT")
     bpy.ops.scope.delete_capture()
@@ -431,16 +423,9 @@ def test_the_users_own_actions_are_not_deleted_with_a_capture(fake_worker, foota
     assert bpy.data.actions.keys() == ["my edit"]
 
 
-@pytest.mark.parametrize("change", ["none", "renamed", "in the NLA"])
-def test_a_capture_from_before_actions_had_a_tag_leaves_none(fake_worker, footage, change):
-    collection = capture(fake_worker, footage)
-    person = bpy.data.objects["person"]
-    for block in (person.animation_data.action, *collection.all_objects):
-        block.pop("scope_part", None)
-    if change == "renamed":
-        person.name = "hero"
-    elif change == "in the NLA":
-        bpy.ops.scope.push_to_nla()
+def test_the_action_of_a_capture_in_the_nla_is_deleted_with_it(fake_worker, footage):
+    capture(fake_worker, footage)
+    bpy.ops.scope.push_to_nla()
     bpy.ops.scope.delete_capture()
     assert not bpy.data.actions
 
