@@ -36,18 +36,16 @@ def projected_by_intrinsics(motion, t: int) -> np.ndarray:
     return p[:, :2] / p[:, 2:]
 
 
-INTRINSICS = {
-    "centred": (900.0, 900.0, 0.5, 0.5),
-    "off centre": (900.0, 900.0, 0.41, 0.63),
-    "wide pixels": (600.0, 900.0, 0.45, 0.57),
-    "tall pixels": (900.0, 700.0, 0.52, 0.4),
-}
-
-
-@pytest.mark.parametrize("size", [(1920, 1080), (1080, 1920)])
-@pytest.mark.parametrize("lens", INTRINSICS)
+@pytest.mark.parametrize(
+    ("size", "lens"),
+    [
+        ((1080, 1920), (900.0, 900.0, 0.41, 0.63)),
+        ((1080, 1920), (600.0, 900.0, 0.45, 0.57)),  # wide pixels
+        ((1920, 1080), (900.0, 700.0, 0.52, 0.4)),  # tall pixels
+    ],
+)
 def test_the_camera_sees_joints_at_their_pixels(body, make_motion, joints_world, size, lens):
-    fx, fy, x, y = INTRINSICS[lens]
+    fx, fy, x, y = lens
     K = np.array([[fx, 0, x * size[0]], [0, fy, y * size[1]], [0, 0, 1]])
     motion = make_motion(body, 8, image_size=size, intrinsics=K)
     camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
@@ -134,22 +132,6 @@ def test_footage_is_shown_in_the_background(body, make_motion, clip):
     assert not bpy.data.movieclips  # Blender crashes when one is deleted that is shown
 
 
-def test_footage_of_a_distorting_lens_is_shown_undistorted(body, make_motion, clip):
-    motion = make_motion(body, 5, image_size=(64, 48))
-    motion.dist[:] = [-0.2, 0.05, 0.02, -0.03, 0.01]
-    result = build_scene([motion], body, footage=clip, options=BuildOptions(frame_rate="set"))
-    background = result.people[0].camera.data.background_images[0]
-    lens = background.clip.tracking.camera
-    assert lens.focal_length_pixels == pytest.approx(600.0, rel=1e-4)
-    np.testing.assert_allclose(lens.principal_point_pixels, [32, 24], atol=1e-3)
-    assert lens.distortion_model == "BROWN"
-    np.testing.assert_allclose(
-        [lens.brown_k1, lens.brown_k2, lens.brown_k3], [-0.2, 0.05, 0.01], atol=1e-6
-    )
-    np.testing.assert_allclose([lens.brown_p1, lens.brown_p2], [-0.03, -0.02], atol=1e-6)
-    assert background.clip_user.use_render_undistorted
-
-
 def distorted_by_opencv(points: np.ndarray, K: np.ndarray, dist: np.ndarray) -> np.ndarray:
     """(N, 2) pixels in the picture of points (N, 2) in that of a pinhole."""
     cv2 = package("cv2")
@@ -182,8 +164,10 @@ def undistorted_by_blender(clip: bpy.types.MovieClip, folder: Path) -> np.ndarra
     return pixels.reshape(image.size[1], image.size[0], 4)[::-1, :, 0]
 
 
-@pytest.mark.parametrize("fy", [300.0, 360.0])
-@pytest.mark.parametrize("dist", [[-0.2, 0.05, 0.0, 0.0, 0.01], [-0.1, 0.03, 0.02, -0.03, 0.0]])
+@pytest.mark.parametrize(
+    ("dist", "fy"),
+    [([-0.2, 0.05, 0.0, 0.0, 0.01], 300.0), ([-0.1, 0.03, 0.02, -0.03, 0.0], 360.0)],
+)
 def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist, fy):
     """Blobs at five points distorted by OpenCV's model are undistorted to the pinhole
     projection.
@@ -208,7 +192,9 @@ def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist
     motion = make_motion(body, 1, image_size=(width, height), intrinsics=K)
     motion.dist[:] = dist
     camera = build_scene([motion], body, footage=picture, options=NEW_SCENE).people[0].camera
-    clip = camera.data.background_images[0].clip
+    (background,) = camera.data.background_images
+    assert background.clip_user.use_render_undistorted
+    clip = background.clip
     clip.colorspace_settings.name = "Non-Color"
     seen = undistorted_by_blender(clip, tmp_path)
     found = []
@@ -296,10 +282,8 @@ def save_pictures(folder, numbers):
 @pytest.mark.parametrize(
     ("offset", "numbers", "expected"),
     [
-        (-2, range(7, 13), [7, 7, 7, 8, 9]),  # it began two pictures later
-        (-2, range(7, 9), [7, 7, 7, 8, 8]),  # and ended earlier
+        (-2, range(7, 9), [7, 7, 7, 8, 8]),  # it began two pictures later, and ended earlier
         (0, [7, 8, 10, 11, 12], [7, 8, 8, 10, 11]),  # one is missing
-        (0, [10, 20, 30, 40, 50], [10, 20, 30, 40, 50]),
     ],
 )
 def test_numbered_pictures_of_a_further_camera_are_shown_by_its_clock(
@@ -352,8 +336,7 @@ def shown_by_blender(
     return np.diag([2 / frame[0], 2 / frame[1]]) @ np.array([[c, -s], [s, c]]) @ fitted
 
 
-@pytest.mark.parametrize("turn", [0, 90, 180, 270])
-@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize(("turn", "mirrored"), [(90, False), (180, True), (270, True)])
 def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(
     body, make_motion, clip, turn, mirrored
 ):
@@ -374,9 +357,15 @@ def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(
     assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=1e-3)
 
 
-@pytest.mark.parametrize("orientation", range(1, 9))
-@pytest.mark.parametrize("chosen", [FootageView(), FootageView(90, True)])
-@pytest.mark.parametrize("k1", [0.0, -0.1])
+@pytest.mark.parametrize(
+    ("orientation", "chosen", "k1"),
+    [
+        (6, FootageView(), 0.0),
+        (4, FootageView(), -0.1),
+        (5, FootageView(90, True), 0.0),
+        (8, FootageView(90, True), -0.1),
+    ],
+)
 def test_a_picture_is_turned_as_its_exif_says(body, make_motion, tmp_path, orientation, chosen, k1):
     """Blender shows it as it is stored."""
     cv2 = package("cv2")

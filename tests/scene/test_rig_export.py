@@ -4,7 +4,6 @@
 import json
 import struct
 from dataclasses import replace
-from itertools import product
 
 import bpy
 import numpy as np
@@ -138,7 +137,7 @@ def test_a_rig_from_a_file_goes_into_every_format(tmp_path, kind):
             assert not any(actions.read_keys(curve)[:, 1].any() for curve in actions.fcurves(keys))
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc", ".bvh"])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
 def test_a_rig_of_a_scene_in_centimetres_has_its_true_size(tmp_path, suffix):
     bpy.context.scene.unit_settings.scale_length = 0.01
     source = captured(motion_of(walk(0.5)))
@@ -299,8 +298,8 @@ def test_bones_that_are_nowhere_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("suffix", "damage"),
     [
-        *product((".blend", ".fbx", ".glb", ".gltf", ".obj"), ("missing", "empty", "text")),
-        *product((".blend", ".fbx", ".glb"), ("half", "head")),
+        *((".glb", "missing"), (".fbx", "empty"), (".gltf", "text"), (".obj", "text")),
+        *((".blend", "half"), (".fbx", "half"), (".glb", "half"), (".blend", "head")),
     ],
 )
 def test_damaged_files_are_refused_in_one_sentence(tmp_path, suffix, damage):
