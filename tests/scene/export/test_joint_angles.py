@@ -45,17 +45,16 @@ def posed(whole_body, make_motion):
     return pose
 
 
-@pytest.mark.parametrize("joint", POSES)
-def test_a_joint_that_turns_has_the_angle_that_is_named(joint, posed, whole_body):
-    turn, expected = POSES[joint]
-    angles = joint_angles(posed({joint: turn}), whole_body)
+def test_a_joint_that_turns_has_the_angle_that_is_named(posed, whole_body):
     at_rest = joint_angles(posed({}), whole_body)
-    for name, degrees in expected.items():
-        np.testing.assert_allclose(angles[name], degrees, atol=1e-3)
-    side = {"left": "_l", "right": "_r"}.get(joint.partition("_")[0], "")
-    others = [n for n in angles if not n.endswith(side) and not n.startswith("lumbar")]
-    for name in others if side else ():
-        np.testing.assert_allclose(angles[name], at_rest[name], atol=1e-3)
+    for joint, (turn, expected) in POSES.items():
+        angles = joint_angles(posed({joint: turn}), whole_body)
+        for name, degrees in expected.items():
+            np.testing.assert_allclose(angles[name], degrees, atol=1e-3, err_msg=joint)
+        side = {"left": "_l", "right": "_r"}.get(joint.partition("_")[0], "")
+        others = [n for n in angles if not n.endswith(side) and not n.startswith("lumbar")]
+        for name in others if side else ():
+            np.testing.assert_allclose(angles[name], at_rest[name], atol=1e-3, err_msg=joint)
 
 
 def test_flexion_is_where_the_limbs_go(posed, whole_body):
