@@ -10,10 +10,10 @@ import pytest
 from scope.scope_addon.kinematics.face import body_with_mouth, expressions_of, mouth_faces_of
 from scope.solver.body_file import load_body
 
-from .test_expressions import by_name
+from .test_expressions import by_name, foremost, triangles_of
 
 
-@pytest.fixture(scope="module", params=["scope", "scope_h", "scope_child_h"])
+@pytest.fixture(scope="module", params=["scope", "scope_child_h"])
 def plain(request):
     return load_body(request.param)
 
@@ -34,44 +34,6 @@ def moved(body, beta, **weights) -> np.ndarray:
     for name, weight in weights.items():
         expression = by_name(body)[name]
         out[expression.vertices] += weight * expression.offsets
-    return out
-
-
-def nearest_skin(body, vertices: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The largest z of the skin outside the mouth at each point's x and y; -inf where there is
-    none.
-    """
-    own = np.setdiff1d(np.arange(body.faces.shape[0]), mouth_faces_of(body))
-    own = own[
-        ~np.isin(
-            body.face_material[own],
-            [body.material_names.index(n) for n in ("teeth", "gums", "tongue")],
-        )
-    ]
-    triangles = vertices[
-        np.concatenate([body.faces[own][:, [0, 1, 2]], body.faces[own][:, [0, 2, 3]]])
-    ]
-    points = points + [1e-6, 0.0, 0.0]  # off the edges in the middle
-    low = points.min(axis=0)
-    high = points.max(axis=0)
-    beside = (triangles.max(axis=1) < low)[:, :2] | (triangles.min(axis=1) > high)[:, :2]
-    near = triangles[~beside.any(axis=1)]
-    (left, below) = near.min(axis=1)[:, :2].T
-    (right, above) = near.max(axis=1)[:, :2].T
-    out = np.full(len(points), -np.inf)
-    for i, point in enumerate(points):
-        x, y = point[:2]
-        a, b, c = near[(left <= x) & (x <= right) & (below <= y) & (y <= above)].transpose(1, 0, 2)
-        p, q, r = (each[:, :2] - point[:2] for each in (a, b, c))
-        areas = np.stack(
-            [q[:, 0] * r[:, 1] - q[:, 1] * r[:, 0], r[:, 0] * p[:, 1] - r[:, 1] * p[:, 0]], axis=1
-        )
-        areas = np.concatenate([areas, (p[:, :1] * q[:, 1:] - p[:, 1:] * q[:, :1])], axis=1)
-        inside = (areas > 0).all(axis=1) | (areas < 0).all(axis=1)
-        z = (areas * np.stack([a[:, 2], b[:, 2], c[:, 2]], axis=1)).sum(axis=1)[inside] / areas[
-            inside
-        ].sum(axis=1)
-        out[i] = z.max(initial=-np.inf)
     return out
 
 
@@ -132,13 +94,12 @@ CLOSED: dict[str, dict[str, float]] = {
 @pytest.mark.parametrize("weights", CLOSED.values(), ids=list(CLOSED))
 def test_no_tooth_sticks_through_the_lips_of_any_shape(body, weights):
     """Seen from in front, lips that are closed hide them, but for some in the gap between."""
-    inside = vertices_of(body, "teeth", "gums", "tongue")
-    rng = np.random.default_rng(2)
-    shapes = [np.zeros(body.P), *rng.normal(size=(1, body.P))]
-    if body.P > 10:
-        shapes = [
-            np.append(beta[:10], growth) for beta, growth in zip(shapes, (-0.3, -1), strict=True)
-        ]
-    for beta in shapes:
-        vertices = moved(body, beta, **weights)
-        assert (nearest_skin(body, vertices, vertices[inside]) < vertices[inside, 2]).mean() < 0.02
+    shape = np.random.default_rng(2).normal(size=body.P)
+    shape[10:] = -1.0  # growth, of children
+    vertices = moved(body, shape, **weights)
+    of_mouth = [body.material_names.index(name) for name in ("teeth", "gums", "tongue")]
+    is_skin = ~np.isin(body.face_material, of_mouth)
+    is_skin[mouth_faces_of(body)] = False
+    inside = vertices[vertices_of(body, "teeth", "gums", "tongue")[::3]]
+    skin = vertices[triangles_of(body.faces[is_skin])]
+    assert (foremost(inside, skin) < inside[:, 2]).mean() < 0.02
