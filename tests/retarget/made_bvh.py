@@ -29,13 +29,6 @@ MIXAMO = CMU.replace("Spine1", "Spine2").replace("Spine ", "Spine1 ").replace("L
 XSENS = "Hips LeftHip RightHip Chest LeftKnee RightKnee Chest2 LeftAnkle RightAnkle Chest4 LeftToe"
 XSENS += " RightToe Neck LeftCollar RightCollar Head LeftShoulder RightShoulder LeftElbow"
 XSENS += " RightElbow LeftWrist RightWrist LeftFingerTip RightFingerTip"
-ROKOKO = "Hips LeftThigh RightThigh Spine1 LeftShin RightShin Spine2 LeftFoot RightFoot Spine4"
-ROKOKO += " LeftToe RightToe Neck LeftShoulder RightShoulder Head LeftArm RightArm LeftForeArm"
-ROKOKO += " RightForeArm LeftHand RightHand LeftHandTip RightHandTip"
-SMPL = "Pelvis L_Hip R_Hip Spine1 L_Knee R_Knee Spine2 L_Ankle R_Ankle Spine3 L_Foot R_Foot Neck"
-SMPL += (
-    " L_Collar R_Collar Head L_Shoulder R_Shoulder L_Elbow R_Elbow L_Wrist R_Wrist L_Hand R_Hand"
-)
 PLAIN = "hips left_hip right_hip spine left_knee right_knee chest left_ankle right_ankle upperchest"
 PLAIN += " left_toe right_toe neck left_clavicle right_clavicle head left_shoulder right_shoulder"
 PLAIN += " left_elbow right_elbow left_wrist right_wrist left_finger right_finger"
@@ -45,8 +38,6 @@ TOOLS = {
     "mixamo without prefix": MIXAMO.split(),
     "neuron": [f"Robot_{name}" for name in MIXAMO.split()],
     "xsens": XSENS.split(),
-    "rokoko": ROKOKO.split(),
-    "smpl": SMPL.split(),
     "mediapipe": PLAIN.split(),
     "with spaces": [name.replace("_", " ") for name in NAMES],
     "nameless": [f"joint{k}" for k in range(len(NAMES))],
@@ -86,10 +77,6 @@ def bvh(
     order: str = "ZXY",
     R_file: np.ndarray | None = None,
     unit: float = 100.0,
-    step: str = "0.033333",
-    all_positions: bool = False,
-    root: str = "",
-    without: tuple[str, ...] = (),
 ) -> str:
     """The motion as a BVH file.
 
@@ -97,9 +84,6 @@ def bvh(
     :param order: of the channels, whose rotations are multiplied in that order.
     :param R_file: to the file's axes from y up.
     :param unit: of the file in a metre.
-    :param all_positions: whether joints have position channels, too.
-    :param root: a joint above the pelvis that moves instead of it.
-    :param without: joints that are left out, with those below them.
     """
     R = np.eye(3) if R_file is None else R_file
     S = R @ (np.tile(np.eye(3), (len(NAMES), 1, 1)) if rest is None else rest)
@@ -110,9 +94,7 @@ def bvh(
 
     def add(joint: int) -> None:
         parent = PARENTS[joint]
-        children = [
-            k for k, above in enumerate(PARENTS) if above == joint and NAMES[k] not in without
-        ]
+        children = [k for k, above in enumerate(PARENTS) if above == joint]
         offset = unit * (AT_REST[joint] - AT_REST[parent])
         local = Q[:, joint]
         if parent >= 0:
@@ -120,17 +102,14 @@ def bvh(
             local = np.swapaxes(Q[:, parent], -1, -2) @ local
         else:
             offset = np.zeros(3)
-        has_position = all_positions or (parent < 0 and not root)
-        lines.append(f"{'ROOT' if parent < 0 and not root else 'JOINT'} {names[joint]}")
+        is_root = parent < 0
+        lines.append(f"{'ROOT' if is_root else 'JOINT'} {names[joint]}")
         lines.append("{")
-        # A wrong offset, where position channels replace it.
-        stated = offset + 5.0 if all_positions and parent < 0 else offset
-        lines.append("OFFSET " + " ".join(f"{value:.6f}" for value in stated))
-        position = "Xposition Yposition Zposition " if has_position else ""
+        lines.append("OFFSET " + " ".join(f"{value:.6f}" for value in offset))
+        position = "Xposition Yposition Zposition " if is_root else ""
         rotation = " ".join(f"{axis}rotation" for axis in order)
-        lines.append(f"CHANNELS {6 if has_position else 3} {position}{rotation}")
-        if has_position:
-            columns.extend(np.tile(offset, (FRAMES, 1)).T if parent >= 0 else places[:, 0].T)
+        lines.append(f"CHANNELS {6 if is_root else 3} {position}{rotation}")
+        columns.extend(places[:, 0].T if is_root else [])
         columns.extend(np.degrees(euler(local, order)))
         for child in children:
             add(child)
@@ -139,12 +118,8 @@ def bvh(
             lines.append(f"End Site\n{{\nOFFSET {end[0]:.6f} {end[1]:.6f} {end[2]:.6f}\n}}")
         lines.append("}")
 
-    if root:
-        lines += [f"ROOT {root} {{", "OFFSET 0 0 0", "CHANNELS 3 Xposition Yposition Zposition"]
-        columns.extend(places[:, 0].T)
     add(0)
-    lines += ["}"] if root else []
-    lines += ["MOTION", f"Frames: {FRAMES}", f"Frame Time: {step}"]
+    lines += ["MOTION", f"Frames: {FRAMES}", "Frame Time: 0.033333"]
     lines += [" ".join(f"{value:.5f}" for value in row) for row in np.array(columns).T]
     return "\n".join(lines) + "\n"
 

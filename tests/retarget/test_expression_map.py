@@ -9,7 +9,6 @@ import json
 
 import numpy as np
 import pytest
-from scope.scope_addon.errors import OutputError
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import (
     ExpressionMap,
@@ -19,40 +18,9 @@ from scope.scope_addon.retarget.expression_map import (
 )
 from scope.solver.errors import InputError
 
-OCULUS = [
-    f"viseme_{v}"
-    for v in ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
-]
-VRM0 = [
-    "A",
-    "I",
-    "U",
-    "E",
-    "O",
-    "Blink",
-    "Blink_L",
-    "Blink_R",
-    "Joy",
-    "Angry",
-    "Sorrow",
-    "Fun",
-    "LookUp",
-    "LookLeft",
-]
-VRM1 = [
-    "aa",
-    "ih",
-    "ou",
-    "ee",
-    "oh",
-    "blink",
-    "blinkLeft",
-    "blinkRight",
-    "happy",
-    "angry",
-    "sad",
-    "surprised",
-]
+OCULUS = [f"viseme_{v}" for v in "sil PP FF TH DD kk CH SS nn RR aa E I O U".split()]
+VRM0 = "A I U E O Blink Blink_L Blink_R Joy Angry Sorrow Fun LookUp LookLeft".split()
+VRM1 = "aa ih ou ee oh blink blinkLeft blinkRight happy angry sad surprised".split()
 VROID = [
     f"Face.M_F00_000_00_Fcl_{n}"
     for n in ("ALL_Joy", "EYE_Close", "EYE_Close_L", "EYE_Close_R", "MTH_A", "MTH_O")
@@ -70,9 +38,7 @@ def weights(**values: float) -> np.ndarray:
     "spelled",
     [
         lambda n: n,
-        lambda n: n[0].upper() + n[1:],
         lambda n: f"head.{n}",
-        lambda n: n.replace("Left", "_L").replace("Right", "_R"),
         lambda n: n.replace("Left", ".L").replace("Right", ".R"),
         lambda n: "".join(f"_{c.lower()}" if c.isupper() else c for c in n),
     ],
@@ -116,49 +82,33 @@ def test_no_key_closes_both_eyes_beside_keys_that_close_one_each(names: list[str
         assert found.keys[moved_by[0]] == {eye: 1.0}
 
 
-def test_what_is_written_is_read_and_other_files_are_kept(tmp_path):
+def test_what_is_written_is_read(tmp_path):
     path = tmp_path / "face.json"
-    other = tmp_path / "package.json"
     written = ExpressionMap(
         {"mund": {"jawOpen": 1.5, "mouthClose": -1.0}, "auge": {"eyeBlinkLeft": 1.0}}
     )
     save_expression_map(written, path)
     assert load_expression_map(path).keys == written.keys
-    save_expression_map(guess_expression_map(VRM1), path)
-    other.write_text('{"name": "a game"}')
-    with pytest.raises(OutputError, match="not an expression map, so it is not overwritten"):
-        save_expression_map(written, other)
-    assert other.read_text("utf-8") == '{"name": "a game"}'
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         ({"format": "scope bone map", "version": 1, "bones": {}}, "not a Scope expression map"),
-        ({"shape_keys": {"a": ["jawOpen"]}}, "correct the file"),
         ({"shape_keys": {"a": {"jawOpen": True}}}, "correct the file"),
         ({"shape_keys": {"a\0b": {"jawOpen": 1}}}, "correct the file"),
         ({"shape_keys": {"a": {"jawopen": 1}}}, "'jawopen', which is not an expression"),
         ({"shape_keys": {"a": {"jawOpen": 1e9}}}, "use at most 10"),
-        ({"shape_keys": {"a": {"jawOpen": float("nan")}}}, "use at most 10"),
         (
             {"shape_keys": {"a": {"jawOpen": 10**400}}},
             "not an expression map: .* a number of 401 digits",
         ),
-        ({"shape_keys": {}}, "no shape key and no control"),
-        ({"controls": ["lip.B"]}, "'controls' must be an object"),
-        ({"controls": {"lip.B": {"jawOpen": 1}}}, "'controls' must be an object"),
         ({"controls": {"lip.B": {"up": {"jawOpen": "1"}}}}, "'controls' must be an object"),
         ({"controls": {"lip\0": {"up": {"jawOpen": 1}}}}, "'controls' must be an object"),
         (
             {"controls": {"lip.B": {"sideways": {"jawOpen": 1}}}},
             "'sideways'; use one of left, up, forward, pitch",
         ),
-        (
-            {"controls": {"lip.B": {"up": {"grin": 1}}}},
-            "control 'lip.B' is mapped to 'grin', which is not an expression",
-        ),
-        ({"controls": {"lip.B": {"up": {"jawOpen": 11}}}}, "use at most 10"),
         ({"controls": {"jaw": {"pitch": {"jawOpen": -181}}}}, "use at most 180"),
         ({"controls": {"jaw": {"pitch": {}}}}, "no shape key and no control"),
     ],

@@ -27,12 +27,10 @@ def test_a_whole_file_passes(tmp_path):
     ("properties", "says"),
     [
         ([array(b"d", 4, bytes(24))], "not have the size"),
-        ([array(b"d", 2, bytes(24))], "not have the size"),
         ([array(b"i", 3, bytes(8), compressed=False)], "not have the size"),
         ([array(b"i", 2, bytes(8), size=1000)], "does not lie within"),
         ([array(b"d", 0xFFFFFFFF, bytes(24))], "too large"),
         ([b"S" + struct.pack("<I", 0xFFFFFFFF)], "does not lie within"),
-        ([b"Q"], "of type 'Q'"),
         ([b"d" + struct.pack("<III", 1, 1, 3) + b"bad"], "incorrect header"),
     ],
 )
@@ -74,9 +72,9 @@ def test_bones_are_counted_before_blender_imports_them(tmp_path, kind, bones):
 
 
 def test_a_bomb_takes_no_memory(tmp_path):
-    """100 MB of zeros in 100 kB, said to be 24 bytes."""
-    path = fbx(tmp_path / "rig.fbx", array(b"d", 3, bytes(100_000_000)))
-    assert path.stat().st_size < 200_000
+    """30 MB of zeros in 30 kB, said to be 24 bytes."""
+    path = fbx(tmp_path / "rig.fbx", array(b"d", 3, bytes(30_000_000)))
+    assert path.stat().st_size < 60_000
     tracemalloc.start()
     with pytest.raises(InputError, match="not have the size"):
         check_fbx(path)

@@ -54,17 +54,12 @@ def test_a_whole_file_passes(tmp_path):
     "gltf",
     [
         changed("accessors", 0, "count", to=7),
-        changed("accessors", 0, "count", to=2_000_000_000),
-        changed("accessors", 0, "count", to=-1),
         changed("accessors", 0, "count", to="6"),
         changed("accessors", 0, "byteOffset", to=4),
-        changed("accessors", 0, "bufferView", to=2),
         changed("accessors", 1, "count", to=2_000_000_000),
         changed("accessors", 1, "sparse", "count", to=9),
         changed("bufferViews", 0, "byteLength", to=385),
-        changed("bufferViews", 0, "byteStride", to=65),
         changed("buffers", 0, "byteLength", to=401),
-        changed("buffers", 0, to=None),
         changed("buffers", 0, "uri", to="data:application/octet-stream;base64,AAAA"),
         [1, 2],
     ],
@@ -91,28 +86,21 @@ def test_files_beside_the_rig_are_used(tmp_path):
 @pytest.mark.parametrize(
     ("uri", "says"),
     [
-        ("/dev/zero", "outside its own folder"),
         ("../other.bin", "outside its own folder"),
         ("..%2Fother.bin", "outside its own folder"),
-        ("file:///etc/passwd", "outside its own folder"),
         ("https://example.com/a.bin", "outside its own folder"),
         ("link.bin", "outside its own folder"),
         ("missing.bin", "is missing"),
     ],
 )
-@pytest.mark.parametrize("where", ["buffers", "images"])
-def test_other_files_are_not_read(tmp_path, uri, says, where):
+def test_other_files_are_not_read(tmp_path, uri, says):
     folder = tmp_path / "rig"
     folder.mkdir()
     (tmp_path / "other.bin").write_bytes(bytes(400))
     (folder / "link.bin").symlink_to(tmp_path / "other.bin")
-    gltf = (
-        changed("buffers", 0, "uri", to=uri)
-        if where == "buffers"
-        else {**GLTF, "images": [{"uri": uri}]}
-    )
-    with pytest.raises(InputError, match=says):
-        check_gltf(glb(folder / "rig.glb", gltf))
+    for gltf in (changed("buffers", 0, "uri", to=uri), {**GLTF, "images": [{"uri": uri}]}):
+        with pytest.raises(InputError, match=says):
+            check_gltf(glb(folder / "rig.glb", gltf))
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes in folders")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.errors import MotionFileError
-from scope.scope_addon.retarget.import_motions import import_motions
 from scope.solver.rotations import exp, shortest_turn
 
 from ..edit.walking import NAMES
@@ -34,10 +33,8 @@ def test_joints_are_recognized_by_the_names_of_common_tools(tmp_path, tool):
     ("order", "unit", "up"),
     [
         ("XYZ", 1.0, [1, 0, 0]),
-        ("ZXY", 100.0, [2, 0, 0]),
         ("YZX", 1 / 0.0254, [-1, 0, 0]),
-        ("YXZ", 1000.0, [0, 0, 1]),
-        ("ZYX", 17.7, [0, 2, 0]),
+        ("ZYX", 1000.0, [0, 0, 1]),
     ],
 )
 def test_any_order_of_channels_unit_and_axis(tmp_path, order, unit, up):
@@ -60,7 +57,7 @@ def rest_of(arms: float, bent: float = 0.0, spread: float = 0.0) -> np.ndarray:
     return S
 
 
-@pytest.mark.parametrize("rest", [rest_of(0.8), rest_of(1.4, 0.3, 0.2), rest_of(0.2, 0.6, 0.15)])
+@pytest.mark.parametrize("rest", [rest_of(0.8), rest_of(1.4, 0.3, 0.2)])
 def test_limbs_keep_their_directions_whatever_the_rest_pose(tmp_path, rest):
     assert_is_the_motion(imported(tmp_path, bvh(TOOLS["mixamo"], rest)))
 
@@ -87,22 +84,12 @@ WHOLE = bvh(TOOLS["cmu"])
     ("step", "rate"),
     [
         ("0.017", 60.0),
-        ("0.0167", 60.0),
         ("0.0166", 60.0),  # cut off
         ("0.016683", 60000 / 1001),
-        ("0.0334", 30000 / 1001),
-        ("0.03", 30.0),
         ("0.02", 50.0),
         ("0.008", 125.0),
         ("0.0083", 120.0),
-        ("0.004", 250.0),
-        ("0.0042", 240.0),
-        ("0.005", 200.0),
-        ("0.1", 10.0),
-        ("2", 0.5),
-        ("0.016", 60.0),  # cut off
         ("5e-2", 20.0),
-        ("0.0123", 81.0),
         ("0.012400", 1 / 0.0124),
     ],
 )
@@ -115,18 +102,13 @@ def test_a_rounded_frame_time_is_that_of_the_usual_rate(tmp_path, step, rate):
     ("text", "says"),
     [
         ("", "no MOTION"),
-        ("HIERARCHY\nMOTION\nFrames: 1\nFrame Time: 0.1\n", "does not end"),
         (WHOLE[:-500], "numbers can be read"),
         (WHOLE.replace("Frame Time: 0.033333", "Frame Time: 0"), "frame time is 0"),
         (WHOLE.replace("Frame Time: 0.033333", "Frame Time: 0,033"), "'0,033'"),
         (WHOLE.replace(f"Frames: {FRAMES}", "Frames: 0"), "0 frames"),
-        (WHOLE.replace(f"Frames: {FRAMES}", "Frames: 1e999"), "'1e999'"),
         (WHOLE.replace("CHANNELS 6", "CHANNELS 99", 1), "99 channels"),
-        (WHOLE.replace("Xposition", "Wposition", 1), "'Wposition'"),
         (WHOLE.replace("OFFSET", "OFFSET nan", 1), "'nan'"),
         (WHOLE.replace("}", "", 1), "not expected|does not end"),
-        (WHOLE.replace("JOINT LeftUpLeg", "JONIT LeftUpLeg"), "'JONIT'"),
-        (WHOLE + " nan", "numbers can be read"),
         (WHOLE.rstrip().rpartition(" ")[0] + " inf\n", "infinity"),
         ("HIERARCHY\n" + "ROOT a {\n" * 5000 + "MOTION\nFrames: 1\nFrame Time: 0.1\n", "no place"),
         (
@@ -152,8 +134,3 @@ def test_the_time_to_read_grows_with_the_size_alone(tmp_path):
     chain = f"HIERARCHY\nROOT a {{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n{joint * depth}"
     with pytest.raises(MotionFileError, match=r"they are a, a\.1, a\.2"):
         imported(tmp_path, chain + "}" * (depth + 1) + "\nMOTION\nFrames: 1\nFrame Time: 0.1\n0\n")
-
-
-def test_a_file_that_does_not_exist(tmp_path):
-    with pytest.raises(MotionFileError, match="does not exist"):
-        import_motions(tmp_path / "walk.bvh")

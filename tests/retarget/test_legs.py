@@ -60,10 +60,7 @@ def test_the_knee_bends_about_the_same_axis_of_the_bones_as_before(axis, other):
     assert (bend[:, other[0], other[1]] > 0).all()  # and to the same side
 
 
-OFF_THE_LINE = [(0.0, 0.0), (0.005, 0.005), (-0.01, 0.005), (-0.03, 0.0)]
-
-
-@pytest.mark.parametrize(("forward", "outward"), OFF_THE_LINE)
+@pytest.mark.parametrize(("forward", "outward"), [(0.0, 0.0), (-0.01, 0.005), (-0.03, 0.0)])
 def test_a_nearly_straight_or_overstretched_leg_bends_with_the_knee_forward(forward, outward):
     """Its own plane is not that in which a knee bends. Forward is -y of the world, left +x.
 
@@ -81,17 +78,8 @@ def test_a_nearly_straight_or_overstretched_leg_bends_with_the_knee_forward(forw
     assert abs(new_knee[0, 0]) < 0.03
 
 
-def lowered(fps, seconds=2.0):
-    """Return times, needed and computed drop for a leg that is 5 cm too short for a fifth of a
-    second.
-    """
-    times = np.arange(round(seconds * fps)) / fps
-    needed = np.where(np.abs(times - 1.0) < 0.095, 0.05, 0.0)
-    hips = np.zeros((len(times), 1, 3))
-    goals = np.zeros((len(times), 1, 3))
-    hips[:, 0, 2] = 1.0 + needed
-    return times, needed, pelvis_drop(hips, goals, np.array([1.0]), times)
-
-
 def test_a_single_key_gets_its_own_drop():
-    assert lowered(1, 2.0)[2].tolist() == pytest.approx([0.0, 0.05])
+    """Of a leg that is 5 cm too short for it."""
+    hips = np.array([[[0.0, 0.0, 1.0]], [[0.0, 0.0, 1.05]]])
+    drop = pelvis_drop(hips, np.zeros((2, 1, 3)), np.array([1.0]), np.array([0.0, 1.0]))
+    assert drop.tolist() == pytest.approx([0.0, 0.05])

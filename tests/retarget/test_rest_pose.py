@@ -54,26 +54,3 @@ def standing(**moved: tuple[float, float, float]) -> dict[str, np.ndarray]:
 def test_parts_that_cannot_be_right_are_found(moved, reasons) -> None:
     found = rest_faults(standing(**moved))
     assert list(dict.fromkeys(fault.reason for fault in found)) == reasons
-
-
-def test_ten_thousand_bones_are_looked_at_once_each(monkeypatch):
-    """Not once for each of them, which took a minute."""
-    count = 10_000
-    parents = np.array([-1, *range(count // 2), *[0] * (count // 2 - 1)])
-    heads = np.zeros((count, 3))
-    heads[:, 2] = np.arange(count) / count
-    looked = []
-    real = RestPose.children.func
-    children = real(RestPose([""] * count, parents, heads))
-
-    class Counted(list):
-        def __getitem__(self, bone):
-            looked.append(bone)
-            return super().__getitem__(bone)
-
-    rest = RestPose([""] * count, parents, heads)
-    monkeypatch.setitem(rest.__dict__, "children", Counted(children))
-    below = [rest.below(bone) for bone in range(count // 2 + 1, count)]
-    assert all(not found for found in below)
-    assert len(looked) <= 2 * count
-    assert rest.below(count // 2 - 10) == list(range(count // 2 - 9, count // 2 + 1))

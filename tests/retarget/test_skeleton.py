@@ -6,7 +6,6 @@ them.
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from scope.scope_addon.retarget.skeleton import Skeleton, basis, head_positions
 from scope.solver.rotations import exp
 
@@ -27,12 +26,9 @@ def random_rig(rng: np.random.Generator, bones: int = 6) -> Skeleton:
     return Skeleton([f"b{i}" for i in range(bones)], parents, parents, heads, heads + 1, rotations)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_channels_and_heads_give_the_world_rotations_when_blender_multiplies_them(
-    seed: int,
-) -> None:
+def test_channels_and_heads_give_the_world_rotations_when_blender_multiplies_them() -> None:
     """Pose matrix of a bone = that of its parent x (parent's rest)^-1 x own rest x channel."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     rig = random_rig(rng)
     wanted = exp(rng.normal(size=(FRAMES, len(rig.names), 3)))
     channels = basis(rig, wanted)

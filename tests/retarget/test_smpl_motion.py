@@ -35,10 +35,8 @@ def flat(first: int, last: int) -> np.ndarray:
 
 LAYOUTS = {
     "SMPL": ({"poses": flat(0, 24)}, 24),
-    "SMPL+H": ({"poses": flat(0, 52)}, 52),
     "SMPL-X": ({"poses": flat(0, 55)}, 55),
     "body only": ({"poses": flat(0, 22)}, 22),
-    "joints apart": ({"thetas": RANDOM[:, :24]}, 24),
     "AIST++": (
         {"smpl_poses": flat(0, 24), "smpl_trans": np.ones((T, 3)), "smpl_scaling": np.array([2.0])},
         24,
@@ -48,24 +46,11 @@ LAYOUTS = {
         52,
     ),
     "SMPL parameters": ({"global_orient": flat(0, 1), "body_pose": flat(1, 24)}, 24),
-    "hands apart": (
+    "hands apart, one in six numbers": (
         {
             "global_orient": flat(0, 1),
             "body_pose": flat(1, 22),
             "left_hand_pose": flat(22, 37),
-            "right_hand_pose": flat(37, 52),
-        },
-        52,
-    ),
-    "hand components": (
-        {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "left_hand_pose": np.zeros((T, 6))},
-        22,
-    ),
-    "hands apart in six numbers": (
-        {
-            "global_orient": flat(0, 1),
-            "body_pose": flat(1, 22),
-            "left_hand_pose": exp(RANDOM[:, 22:37])[..., :2].reshape(T, 15, 6),
             "right_hand_pose": exp(RANDOM[:, 37:52])[..., :2].reshape(T, 15, 6),
         },
         52,
@@ -93,10 +78,10 @@ def test_every_layout_gives_the_same_rotations(tmp_path, layout):
     assert motion.has_fingers == (joints >= 52)
 
 
+BODY = {"global_orient": flat(0, 1), "body_pose": flat(1, 22)}
 FACE = {
     "apart": ({"jaw_pose": flat(22, 23), "leye_pose": flat(23, 24), "reye_pose": flat(24, 25)}, 3),
     "both eyes": ({"pose_jaw": RANDOM[:, 22:23], "pose_eye": flat(23, 25)}, 3),
-    "matrices": ({"jaw_pose": exp(RANDOM[:, 22])}, 1),
     "two rows": ({"jaw_pose": exp(RANDOM[:, 22:23])[..., :2, :].reshape(T, 1, 6)}, 1),
 }
 
@@ -104,8 +89,7 @@ FACE = {
 @pytest.mark.parametrize("layout", FACE)
 def test_jaw_and_eyes_apart_are_read(tmp_path: Path, layout: str) -> None:
     arrays, count = FACE[layout]
-    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22)}
-    np.savez(tmp_path / "walk.npz", **arrays, **parts)
+    np.savez(tmp_path / "walk.npz", **arrays, **BODY)
     motion = read_one(tmp_path / "walk.npz")
     assert motion.joint_names == (*BODY_JOINTS, *FACE_JOINTS[:count])
     np.testing.assert_allclose(exp(motion.poses), exp(RANDOM[:, : 22 + count]), atol=1e-5)
@@ -114,8 +98,7 @@ def test_jaw_and_eyes_apart_are_read(tmp_path: Path, layout: str) -> None:
 
 
 def test_a_jaw_that_nobody_has_set_is_at_rest_in_every_frame() -> None:
-    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "jaw_pose": np.zeros((1, 3))}
-    motion = smpl_motion(parts, FILE)
+    motion = smpl_motion(BODY | {"jaw_pose": np.zeros((1, 3))}, FILE)
     assert len(motion) == T
     assert not motion.has_face
 
@@ -127,60 +110,38 @@ def test_expressions_are_named_as_left_out(tmp_path: Path) -> None:
         assert smpl_motion(GOOD | {"expression": nothing}, FILE).left_out == ()
 
 
-def test_hands_as_components_are_named_as_left_out(tmp_path: Path) -> None:
-    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22)}
-    np.savez(
-        tmp_path / "walk.npz",
-        left_hand_pose=np.ones((T, 6)),
-        right_hand_pose=np.zeros((T, 6)),
-        **parts,
-    )
-    assert read_one(tmp_path / "walk.npz").left_out == ("left_hand_pose",)
-    assert smpl_motion(parts, FILE).left_out == ()
+def test_hands_as_components_are_named_as_left_out() -> None:
+    hands = {"left_hand_pose": np.ones((T, 6)), "right_hand_pose": np.zeros((T, 6))}
+    assert smpl_motion(BODY | hands, FILE).left_out == ("left_hand_pose",)
     assert smpl_motion({"poses": flat(0, 52), "hand_pose": np.ones((T, 12))}, FILE).left_out == ()
 
 
-@pytest.mark.parametrize("shape", [(6,), (T, 6), (T, 1, 6)])
+@pytest.mark.parametrize("shape", [(6,), (T, 1, 6)])
 def test_components_have_other_axes_in_some_files(shape: tuple[int, ...]) -> None:
-    parts = {
-        "global_orient": flat(0, 1),
-        "body_pose": flat(1, 22),
-        "left_hand_pose": np.ones(shape),
-    }
-    motion = smpl_motion(parts, FILE)
+    motion = smpl_motion(BODY | {"left_hand_pose": np.ones(shape)}, FILE)
     assert motion.left_out == ("left_hand_pose",)
     assert not motion.has_fingers
 
 
 @pytest.mark.parametrize(
-    "jaw",
-    [
-        np.ones(3),
-        np.ones((T + 1, 3)),
-        np.full((T, 3), np.nan),
-        np.ones((T, 1, 3, 3)),
-        np.ones((T, 6)),
-    ],
+    "jaw", [np.ones(3), np.ones((T + 1, 3)), np.full((T, 3), np.nan), np.ones((T, 6))]
 )
 def test_a_face_that_does_not_fit_is_left_out_rather_than_the_file_refused(jaw: np.ndarray) -> None:
-    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "jaw_pose": jaw}
-    motion = smpl_motion(parts, FILE)
+    motion = smpl_motion(BODY | {"jaw_pose": jaw}, FILE)
     assert motion.left_out == ("jaw_pose",)
     np.testing.assert_allclose(motion.poses, RANDOM[:, :22], atol=1e-6)
 
 
-@pytest.mark.parametrize("jaw", [np.zeros((0, 3)), np.zeros((T, 0)), np.array(None)])
+@pytest.mark.parametrize("jaw", [np.zeros((T, 0)), np.array(None)])
 def test_a_face_of_nothing_says_nothing(jaw: np.ndarray) -> None:
-    parts = {"global_orient": flat(0, 1), "body_pose": flat(1, 22), "jaw_pose": jaw}
-    assert smpl_motion(parts, FILE).left_out == ()
+    assert smpl_motion(BODY | {"jaw_pose": jaw}, FILE).left_out == ()
 
 
-@pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
-def test_frame_rate_gender_and_shape_are_read(key):
+def test_frame_rate_gender_and_shape_are_read():
     betas = np.arange(T * 10.0).reshape(T, 10)
     arrays = {
         "poses": flat(0, 24),
-        key: np.array(120),
+        "fps": np.array(120),
         "gender": np.array(b"female"),
         "betas": betas,
     }
@@ -207,15 +168,10 @@ PARTS = {"global_orient": flat(0, 1), "body_pose": flat(1, 24)}
 BROKEN = {
     "nothing": ({}, "no SMPL-style motion"),
     "root alone": ({"global_orient": flat(0, 1)}, "no SMPL-style motion"),
-    "scalar": ({"poses": np.array(1.0)}, "no frames"),
     "no frames": ({"poses": np.zeros((0, 72))}, "no frames"),
-    "no joints": ({"poses": np.zeros((T, 0))}, "shape"),
     "another skeleton": ({"poses": np.zeros((T, 75))}, "75 numbers per frame"),
-    "not in threes": ({"poses": np.zeros((T, 71))}, "shape"),
     "several people": ({"poses": np.zeros((2, T, 24, 3, 3))}, "shape"),
     "quaternions": ({"poses": np.zeros((T, 24, 4))}, "quaternions that are not of length 1"),
-    "text": ({"poses": np.full((T, 72), "x")}, "must hold numbers"),
-    "complex": ({"poses": np.zeros((T, 72), complex)}, "must hold numbers"),
     "NaN": ({"poses": with_nan()}, "NaN or infinity, first in frame 3"),
     "too long": ({"poses": np.broadcast_to(np.float32(0), (10_000_000, 72))}, "at most 500000"),
     "not rotations": (
@@ -233,15 +189,9 @@ BROKEN = {
         "must have 15 joints",
     ),
     "short trans": (GOOD | {"trans": np.zeros((2, 3))}, "trans must have shape"),
-    "scalar trans": (GOOD | {"trans": np.array(1.0)}, "trans must have shape"),
-    "empty trans": (GOOD | {"trans": np.zeros((0, 3))}, "trans must have shape"),
     "infinite trans": (GOOD | {"trans": np.full((T, 3), np.inf)}, "NaN or infinity"),
     "far away": (GOOD | {"trans": np.full((T, 3), 1e30)}, "metres"),
-    "rate of text": (GOOD | {"mocap_framerate": np.array("fast")}, "frames per second"),
-    "rate of zero": (GOOD | {"mocap_framerate": np.array(0)}, "frames per second"),
     "rate of NaN": (GOOD | {"mocap_framerate": np.array(np.nan)}, "frames per second"),
-    "rates": (GOOD | {"mocap_framerate": np.ones(2)}, "frames per second"),
-    "wrong betas": (GOOD | {"betas": np.zeros((3, 4, 5))}, "betas has shape"),
     "betas of text": (GOOD | {"betas": np.array(["a"])}, "must hold numbers"),
     "scaling of zero": (
         GOOD | {"trans": np.zeros((T, 3)), "smpl_scaling": np.array([0.0])},

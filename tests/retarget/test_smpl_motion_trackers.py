@@ -169,9 +169,7 @@ def compressed_joblib(content: Any, path: Path) -> None:
 
 FILES: dict[str, tuple[Callable[[Any, Path], None], Any, list[np.ndarray]]] = {
     "wham.pkl": (as_pickle, {0: wham(POSES), 1: wham(OTHER)}, [POSES, OTHER]),
-    "wham_joblib.pkl": (as_joblib, {0: wham(POSES), 1: wham(OTHER)}, [POSES, OTHER]),
     "compressed.pkl": (compressed_joblib, {3: wham(POSES)}, [POSES]),
-    "gvhmr.npz": (as_npz, GVHMR, [POSES]),
     "gvhmr.pt": (as_pytorch, GVHMR, [POSES]),
     "gvhmr_flat.npz": (
         as_npz,
@@ -247,7 +245,7 @@ def test_quaternions_of_somebody_upside_down_in_the_camera_are_read_in_the_order
     np.testing.assert_allclose(exp(motion.poses[:, :1].astype(float)), [root[0]] * T, atol=1e-5)
 
 
-@pytest.mark.parametrize("write", [as_pickle, as_joblib, as_npy])
+@pytest.mark.parametrize("write", [as_joblib, as_npy])
 def test_a_file_without_a_motion_is_refused_by_what_it_holds(
     tmp_path: Path, write: Callable[[Any, Path], None]
 ) -> None:

@@ -12,7 +12,9 @@ from scope.scope_addon.retarget.face_controls import (
     built_in,
     control_motions,
     guess_control_map,
+    measure_face,
 )
+from scope.solver.errors import InputError
 from scope.solver.rotations import exp
 
 # A face that looks along -y with the person's left along +x, as Blender's characters do; metres.
@@ -32,13 +34,12 @@ PLACES = {
 RIGS = ("rigify", "rigify_skin", "mpfb")
 
 
-def face(size=1.0, turned=(0, 0, 0), seed=0):
-    """The face, scaled and turned as a whole, whose bones have any axes."""
-    random = np.random.default_rng(seed)
-    R = exp(np.array(turned, float))
+def face(size=1.0):
+    """The face, whose bones have any axes."""
+    random = np.random.default_rng(0)
     return {
-        n: RestBone(size * R @ np.array(p), R @ exp(random.normal(size=3)))
-        for n, p in PLACES.items()
+        name: RestBone(size * np.array(place), exp(random.normal(size=3)))
+        for name, place in PLACES.items()
     }
 
 
@@ -167,3 +168,12 @@ def test_the_map_of_a_rig_is_guessed_by_its_bones(rig, sign):
     assert set(found.controls) <= set(rig)
     assert "jawOpen" in found.controls[sign]["pitch"]
     assert not guess_control_map(rig[1:]).controls
+
+
+def test_faces_that_cannot_be_measured_say_why():
+    for missing, says in (("ORG-eye.R", "eyes"), ("lips.L", "corners of the mouth")):
+        bones = {name: bone for name, bone in face().items() if name not in (missing, "eye.R")}
+        with pytest.raises(InputError, match=f"no bones for the {says}"):
+            measure_face(bones)
+    with pytest.raises(InputError, match="in one place"):
+        measure_face(face(size=0.0))
