@@ -3,13 +3,12 @@
 
 import numpy as np
 import pytest
-from scope.solver import rotations
 from scope.solver.fast import rows as fast
 from scope.solver.gauss_newton import plain_rows as plain
 from scope.solver.kernel import kernel
 from scope.solver.residuals import joint_flow
 
-WIDTHS = (0, 4, 8, 12, 40)
+WIDTHS = (0, 8, 40)
 
 
 def numbers(rng, count):
@@ -28,7 +27,8 @@ def arguments(name, W, rng):
     vectors = [numbers(rng, count) for count in (9, 6, 6, 9, 3)]
     return {
         "place_origin": ((V, numbers(rng, 9), rng.normal(size=(3, W)), np.zeros((3, W))), [3]),
-        "add_point": ((V, *vectors, A, C, c, moved), [6, 7, 8]),
+        # the focal length's column needs the first rows of the memory, the turned point
+        "add_point": ((V, *vectors, A, C, c, moved), [6, 7, 8, 9]),
         "add_origin": (
             (V, numbers(rng, 6), numbers(rng, 9), numbers(rng, 3), numbers(rng, 3), A, C, c, moved),
             [5, 6, 7],
@@ -38,16 +38,6 @@ def arguments(name, W, rng):
         "add_to_parent": ((A, Y, rng.normal(size=(6, row))), [2]),
         "subtract_eliminated": ((A, C, c), [1, 2]),
     }[name]
-
-
-def runner(apply):
-    """A kernel that Python can call."""
-
-    @kernel
-    def run(table, at, state):
-        apply(table, at, state)
-
-    return run
 
 
 NAMES = [
@@ -66,37 +56,21 @@ def test_both_compute_the_same(name, W):
     getattr(fast, name)(*copies)
     for k, value in enumerate(given):
         if isinstance(value, np.ndarray) and k in written:
-            # Of a product, only the upper triangle counts.
-            is_square = value.ndim == 2 and value.shape == (W, W)
-            pick = np.triu if is_square else np.asarray
+            # of a product, only the upper triangle counts
+            pick = np.triu if value.shape == (W, W) else np.asarray
             np.testing.assert_allclose(pick(copies[k]), pick(value), rtol=1e-12, atol=1e-12)
 
 
-def test_the_first_rows_of_the_memory_are_the_turned_point():
-    """The focal length's column needs them."""
-    given, _ = arguments("add_point", 12, np.random.default_rng(1))
-    copies = [value.copy() if isinstance(value, np.ndarray) else value for value in given]
-    plain.add_point(*given)
-    fast.add_point(*copies)
-    R = np.reshape(given[1], (3, 3))
-    np.testing.assert_allclose(given[9][:3], R @ given[0], atol=1e-12)
-    np.testing.assert_allclose(copies[9][:3], R @ given[0], atol=1e-12)
+def test_plain_formulas_of_joints_side_by_side():
+    """Those in SIMD are compared with numpy's in test_joint_flow.py."""
+    apply = plain.in_lanes(joint_flow.normal)
 
+    @kernel
+    def run(table, at, state):
+        apply(table, at, state)
 
-@pytest.mark.parametrize("name", ["chart", "layer", "finish", "normal"])
-def test_formulas_of_joints_side_by_side(name):
-    rng = np.random.default_rng(7)
-    formula = getattr(joint_flow, name)
-    lanes = plain.LANES
-    table = rng.normal(size=3 + lanes * joint_flow.SIZE)
-    state = rng.normal(size=(plain.STATE, lanes))
-    if name == "chart":
-        turned = rotations.exp(0.4 * rng.normal(size=(lanes, 3)))
-        state[:9] = turned.reshape(lanes, 9).T
-        table[3 : 3 + 9 * lanes] = np.repeat(np.eye(3).ravel(), lanes)
-    q = table[3:].reshape(-1, lanes)
-    expected = np.array(np.broadcast_arrays(*formula(q, 0, 1, tuple(state))))
-    for module in (plain, fast):
-        found = state.ravel().copy()
-        runner(module.in_lanes(formula))(table, 3, found)
-        np.testing.assert_allclose(found, expected.ravel(), rtol=1e-12)
+    state = np.random.default_rng(7).normal(size=(plain.STATE, plain.LANES))
+    expected = np.array(joint_flow.normal(None, 0, 1, tuple(state)))
+    found = state.ravel().copy()
+    run(np.zeros(0), 0, found)
+    np.testing.assert_allclose(found, expected.ravel(), rtol=1e-12)
