@@ -91,9 +91,8 @@ def refined(body, measurements, focal=True):
     return second, first.focal_scale * second.focal_scale
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_recovers_shape_and_focal_length_without_noise(seed):
-    body, states, measurements, beta = clip(seed)
+def test_recovers_shape_and_focal_length_without_noise():
+    body, states, measurements, beta = clip(0)
     found, scale = refined(body, measurements)
     np.testing.assert_allclose(found.beta, beta, atol=1e-4)
     assert scale == pytest.approx(SCALE, abs=1e-5)
@@ -101,17 +100,15 @@ def test_recovers_shape_and_focal_length_without_noise(seed):
         assert np.linalg.norm(f.t_camera_part - forward(body, *state)[1], axis=1).max() < 1e-3
 
 
-@pytest.mark.parametrize("subset", [slice(0, 3), slice(2, 11, 4), slice(5, None)])
-def test_recovers_them_from_any_subset_of_frames(subset):
+def test_recovers_them_from_three_frames():
     body, _, measurements, beta = clip(1)
-    found, scale = refined(body, measurements[subset])
+    found, scale = refined(body, measurements[2:11:4])
     np.testing.assert_allclose(found.beta, beta, atol=2e-4)
     assert scale == pytest.approx(SCALE, abs=2e-5)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_noise_leaves_errors_of_the_size_the_information_says(seed):
-    body, _, measurements, beta = clip(seed, noise=1.0)
+def test_noise_leaves_errors_of_the_size_the_information_says():
+    body, _, measurements, beta = clip(0, noise=1.0)
     found, scale = refined(body, measurements)
     error = found.beta - beta
     # noise variance times weight: (2 px / 1100)^2 1e6 = 3.3 and 0.01^2 24000 = 2.4; chi^2 of P
@@ -268,8 +265,7 @@ def from_behind():
     return body, t, Measurements(person.INTRINSICS, image, space)
 
 
-@pytest.mark.parametrize("temporal", [None, Temporal()])
-@pytest.mark.parametrize("unseen", [1, 3])
+@pytest.mark.parametrize(("unseen", "temporal"), [(1, None), (3, None), (3, Temporal())])
 def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, temporal):
     body, joints, seen = from_behind()
     found = fit_clip(body, [*[Measurements()] * unseen, seen, seen, seen], temporal=temporal)
@@ -280,16 +276,12 @@ def test_whoever_appears_later_is_fitted_as_from_the_first_frame(unseen, tempora
     assert {f.status for f in before} == {Status.NO_MEASUREMENTS}
 
 
-def test_a_clip_is_deterministic_and_refuses_nonsense():
-    body, _, measurements, _ = clip(10, noise=1.0)
-    a = fit_clip(body, measurements, focal=True)
-    b = fit_clip(body, measurements, focal=True)
-    assert a.cost == b.cost
-    np.testing.assert_array_equal(a.beta, b.beta)
+def test_a_clip_without_a_frame_or_a_state_for_each_is_refused():
+    body, _, measurements, _ = clip(10, frames=2)
     with pytest.raises(ShapeError, match="at least one frame"):
         fit_clip(body, [])
     with pytest.raises(ShapeError, match="one initial state per frame"):
-        fit_clip(body, measurements, init=[a.frames[0].state])
+        fit_clip(body, measurements, init=[State.rest(K, P)])
 
 
 def test_a_report_changes_nothing_of_what_is_found():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scope.solver import (
     InputError,
-    InvalidValueError,
     Keypoints2D,
     Keypoints3D,
     Measurements,
@@ -21,12 +20,9 @@ from scope.solver import (
     Status,
     Weights,
     fit,
-    make_tree,
+    gauss_newton_step,
     rotations,
 )
-from scope.solver.gauss_newton.linearize import linearize, make_blocks, make_pose
-from scope.solver.gauss_newton.recursion import make_workspace, retract, step
-from scope.solver.gauss_newton.terms import make_terms
 from scope.solver.residuals.registry import RESIDUALS
 
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
@@ -64,7 +60,7 @@ def scene(seed, angle=0.4, keypoints=M):
     return body, random_state(rng, K, P, angle)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_recovers_pose_and_shape_without_noise(seed):
     body, state = scene(seed)
     m = measured(body, state)
@@ -76,7 +72,7 @@ def test_recovers_pose_and_shape_without_noise(seed):
     assert found.status in (Status.CONVERGED, Status.STALLED)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_cold_start_finds_the_person_with_the_default_schedule(seed):
     body, state = scene(seed)
     found = fit(body, measured(body, state, noise=1.0, seed=seed))
@@ -128,71 +124,28 @@ def test_an_outlier_moves_the_fit_less_than_without_the_robust_kernel():
     assert error[0] < 0.3 * error[1]
 
 
-def run_iterates(body, state, m, count=5):
-    tree = make_tree(body)
-    table, _, _ = Options().stage_table([Stage()])
-    terms = make_terms(tree, m, Priors())
-    pose = State(*state).pose(tree)
-    trial = make_pose(tree)
-    blocks = make_blocks(tree)
-    work = make_workspace(tree)
-    out = []
-    for _ in range(count):
-        cost = linearize(tree, terms, table[0], pose, blocks, work.scratch)
-        out.append((cost, pose.Omega[1:].copy(), pose.beta.copy(), pose.t - pose.t[0]))
-        step(tree, pose, blocks, 30.0, 1 / 0.3, work)
-        retract(tree, pose, work, trial)
-        pose, trial = trial, pose
-    return out
-
-
-def test_moving_camera_and_person_together_leaves_the_iterates_unchanged():
+def test_a_step_turns_with_camera_and_person():
+    """However far away they are moved together, the step is the same in the new axes."""
     body, state = scene(3)
-    m = measured(body, state, noise=2.0)
-    start = random_state(np.random.default_rng(9), K, P)
+    m = replace(measured(body, state, noise=2.0), keypoints2d=None)
+    start = State(*random_state(np.random.default_rng(9), K, P))
     G = rotations.exp([0.3, -1.0, 0.5])
     shift = np.array([2.0, -30.0, 400.0])
-    m = replace(m, keypoints2d=None)
-    m2 = replace(
+    field = m.orientation_field
+    elsewhere = replace(
         m,
         keypoints3d=replace(m.keypoints3d, points=m.keypoints3d.points @ G.T + shift),
-        orientation_field=replace(
-            m.orientation_field, directions=m.orientation_field.directions @ G.T
-        ),
+        orientation_field=replace(field, directions=field.directions @ G.T),
     )
-    for a, b in zip(
-        run_iterates(body, start, m),
-        run_iterates(body, (G @ start[0], G @ start[1] + shift, *start[2:]), m2),
-        strict=True,
-    ):
-        assert a[0] == pytest.approx(b[0], rel=1e-8)
-        np.testing.assert_allclose(a[1], b[1], atol=1e-8)
-        np.testing.assert_allclose(a[2], b[2], atol=1e-7)
-        np.testing.assert_allclose(a[3] @ G.T, b[3], atol=1e-8)
-
-
-@pytest.mark.parametrize("damping", [0.1, 10.0, 1000.0])
-def test_predicted_decrease_is_the_actual_one_near_the_solution(damping):
-    body, state = scene(4)
-    m = measured(body, state)
-    tree = make_tree(body)
-    off = Options(
-        robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf
+    moved = replace(
+        start, R_camera_root=G @ start.R_camera_root, t_camera_root=G @ start.t_camera_root + shift
     )
-    table, _, _ = off.stage_table([Stage(FREE)])
-    terms = make_terms(tree, m, Priors())
-    start = State(
-        state[0] @ rotations.exp([1e-4, -2e-4, 1e-4]), state[1] + 1e-4, state[2], state[3] + 1e-3
-    )
-    pose = start.pose(tree)
-    trial = make_pose(tree)
-    blocks = make_blocks(tree)
-    work = make_workspace(tree)
-    cost = linearize(tree, terms, table[0], pose, blocks, work.scratch)
-    predicted = step(tree, pose, blocks, damping, 1 / 0.3, work)
-    retract(tree, pose, work, trial)
-    actual = cost - linearize(tree, terms, table[0], trial, blocks, work.scratch)
-    assert actual == pytest.approx(predicted, rel=2e-3)
+    a = gauss_newton_step(body, m, start, priors=Priors(), damping=30.0)
+    b = gauss_newton_step(body, elsewhere, moved, priors=Priors(), damping=30.0)
+    assert a.predicted_decrease == pytest.approx(b.predicted_decrease, rel=1e-8)
+    turned = a.direction[:-P].reshape(-1, 3) @ G.T
+    np.testing.assert_allclose(b.direction[:-P].reshape(-1, 3), turned, atol=1e-8)
+    np.testing.assert_allclose(b.direction[-P:], a.direction[-P:], atol=1e-7)
 
 
 def test_joint_limit_keeps_a_knee_from_bending_forwards():
@@ -231,21 +184,9 @@ def test_nothing_measured_returns_the_initial_state():
     [
         (
             Measurements(INTRINSICS, Keypoints2D([0, 1], [[0.0, 0.0]], [1.0, 1.0])),
-            r"\(2, 2\), but "
-            r"got shape \(1, "
-            r"2\)",
+            r"\(2, 2\), but got shape \(1, 2\)",
         ),
         (Measurements(None, Keypoints2D([0], [[0.0, 0.0]], [1.0])), "intrinsics"),
-        (
-            Measurements(np.eye(4), Keypoints2D([0], [[0.0, 0.0]], [1.0])),
-            r"\(3, 3\), but got shape "
-            r"\(4, 4\)",
-        ),
-        (
-            Measurements(keypoints3d=Keypoints3D([0], [[0.0, 0.0]], [1.0])),
-            r"\(1, 3\), but got "
-            r"shape \(1, 2\)",
-        ),
         (
             Measurements(keypoints3d=Keypoints3D([M + K + 1], [[0.0, 0.0, 1.0]], [1.0])),
             f"0..{M + K}",
@@ -258,14 +199,6 @@ def test_nothing_measured_returns_the_initial_state():
         (
             Measurements(pose_priors=PosePriors([0], np.eye(3), np.zeros((1, 3)), [1.0], [1.0])),
             r"\(1, 3, 3\)",
-        ),
-        (
-            Measurements(tables={"nonesuch": (np.zeros((0, 1)), np.zeros((0, 1)))}),
-            "pose_prior, joint_prior",
-        ),
-        (
-            Measurements(tables={"joint_limits": (np.zeros((1, 1), int), np.zeros((1, 3)))}),
-            "joint_limits",
         ),
     ],
 )
@@ -300,36 +233,13 @@ def test_rows_of_tables_that_point_outside_the_body_are_refused(name):
                 )
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (
-            lambda: Weights(tables={"nosuch": 5.0}),
-            "no residual named 'nosuch'; the registered ones are pose_prior",
-        ),
-        (lambda: Weights(tables={"keypoints2d": 5.0}), "no residual named 'keypoints2d'"),
-        (lambda: Options(damping=np.nan), "damping must be positive and finite, but is nan"),
-        (lambda: Options(damping=0.0), "damping must be positive"),
-        (lambda: Options(root_length=0), "root_length must be positive and finite, but is 0"),
-        (
-            lambda: Options(root_length=np.inf),
-            "root_length must be positive and finite, but is inf",
-        ),
-    ],
-)
-def test_options_that_no_fit_could_use_are_refused(make, message):
-    with pytest.raises(InvalidValueError, match=message):
-        make()
-
-
-@pytest.mark.parametrize("nothing", [0.0, 7.0])
-def test_a_mean_without_weight_may_be_anything(nothing):
+def test_a_mean_without_weight_may_be_anything():
     """Without a state, a fit starts from the means, from the rest pose where they weigh nothing."""
     body, state = scene(3)
     weights = np.ones(K)
     weights[::2] = 0.0
     mean = np.tile(np.eye(3), (K, 1, 1))
     expected = fit(body, measured(body, state), priors=Priors(mean, weights))
-    mean[::2] = nothing
+    mean[::2] = 7.0
     found = fit(body, measured(body, state), priors=Priors(mean, weights))
     np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)

