@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scope import solver
 from scope.benchmarks.solver.cold_starts import (
+    COSTLY,
     FOCAL,
     SIGMA_M,
     SIGMA_PX,
@@ -20,6 +21,8 @@ from scope.benchmarks.solver.cold_starts import (
     calibration,
     coco_of,
     farthest,
+    image_of,
+    markers_of,
     random_person,
     without_deviations,
 )
@@ -48,7 +51,7 @@ from scope.solver.residuals import external
 from .small_problem import BODY, POINTS, SEEN, K, M, P
 from .synthetic import INTRINSICS
 
-PEOPLE = 60
+PEOPLE = 12  # among them two that the stated deviations of exact points lead to a twisted limb
 
 
 @cache
@@ -56,60 +59,51 @@ def people() -> tuple[Any, list[int], list[Person]]:
     body = solver.load_body("scope")
     prior = solver.load_joint_prior()
     found = [random_person(body, prior, seed) for seed in range(PEOPLE)]
-    plain = [person._replace(seen=without_deviations(person.seen)) for person in found]
-    return body, coco_of(body), plain
+    return body, coco_of(body), found
 
 
 def test_cold_starts_find_every_limb():
     body, _, everyone = people()
-    assert farthest(body, everyone, [person.seen for person in everyone]).max() < 0.2
+    plain = [without_deviations(person.seen) for person in everyone]
+    assert farthest(body, everyone, plain).max() < 0.2
 
 
 def test_from_the_image_alone_several_headings_find_the_lowest_cost():
     """As "multi" does always, a fit without 3D keypoints starts from several headings."""
     body, _, everyone = people()
-    seen = [replace(person.seen, keypoints3d=None) for person in everyone]
+    seen = [image_of(person) for person in everyone]
     from_truth = solver.fit_batch(body, seen, init=[person.state for person in everyone])
-    least = np.array([fit.cost for fit in from_truth])
     found = solver.fit_batch(body, seen)
-    cost = np.array([fit.cost for fit in found])
-    assert (cost > 1.5 * least).sum() <= PEOPLE / 30
+    for fit, best in zip(found, from_truth, strict=True):
+        assert fit.cost <= COSTLY * best.cost
     turned = [fit for fit in found if fit.state.R_camera_root[2, 2] > 0.0]  # seen from behind
     assert len(turned) > PEOPLE / 4
     one = solver.fit(body, seen[0], init="multi")
-    assert one.cost == cost[0]
+    assert one.cost == found[0].cost
 
 
 def test_cold_starts_from_exact_points_find_every_limb():
     """Points of millimetres are taken for less exact at first, where the cost asks for it."""
     body, _, everyone = people()
-    seen = [
-        Measurements(keypoints3d=Keypoints3D(body.joint_names, person.joints, sigma_m=0.002))
-        for person in everyone
-    ]
+    seen = [markers_of(person, body) for person in everyone]
     from_truth = solver.fit_batch(body, seen, init=[person.state for person in everyone])
     least = np.array([fit.cost for fit in from_truth])
     as_stated = solver.fit_batch(body, seen, options=Options(stages=COLD_STAGES))
     cost_as_stated = np.array([fit.cost for fit in as_stated])
-    assert (cost_as_stated > 1.5 * least).any()
+    assert (cost_as_stated > COSTLY * least).any()
     cost = np.array([fit.cost for fit in solver.fit_batch(body, seen)])
-    assert (cost <= 1.5 * least).all()
+    assert (cost <= COSTLY * least).all()
     assert (cost <= cost_as_stated).all()
 
 
 def test_with_standard_deviations_those_of_the_result_are_calibrated():
-    """The squares of the errors over the covariance are one on average."""
-    body = solver.load_body("scope")
-    prior = solver.load_joint_prior()
-    everyone = [random_person(body, prior, seed) for seed in range(30)]
+    body, _, everyone = people()
     assert 0.8 < calibration(body, everyone) < 1.2
 
 
 def test_a_standard_deviation_is_a_weight():
     body, _, everyone = people()
-    seen = everyone[0].seen
-    assert seen.keypoints2d is not None
-    assert seen.keypoints3d is not None
+    seen = without_deviations(everyone[0].seen)
     with_sigmas = replace(
         seen,
         keypoints2d=replace(seen.keypoints2d, sigma_px=SIGMA_PX),
@@ -140,7 +134,7 @@ def test_one_weight_changes_all_default_stages():
 
 def test_regularization_draws_a_person_to_the_population():
     body, _, everyone = people()
-    seen = everyone[0].seen
+    seen = without_deviations(everyone[0].seen)
     assert Weights().regularized(1.0) == Weights()
     betas = []
     for strength in (1.0, 100.0):
@@ -273,7 +267,6 @@ MISTAKES = {
     ),
     "a start in millimetres": (from_start([0.0, 0.0, 3000.0]), UnitsWarning, "init lies more"),
     "a start behind the camera": (from_start([0.0, 0.0, -3.0]), ScopeWarning, "init lies behind"),
-    "a weight as deviation": (pixels(IMAGE, sigma_px=1e6), UnitsWarning, "no measurement has"),
     "a robust kernel in pixels": (
         lambda: Options(robust_keypoints2d=100.0),
         UnitsWarning,
@@ -298,17 +291,6 @@ MISTAKES = {
         lambda: Options(weights=Weights(keypoints2d=4.0)),
         UnitsWarning,
         "weights are 1/sigma",
-    ),
-    "frame numbers": (
-        lambda: solver.fit_motion(BODY, [SEEN] * 5, np.arange(5.0), priors=Priors()),
-        UnitsWarning,
-        "probably frame numbers",
-    ),
-    "pixels in 0..1": (pixels(IMAGE / 1000.0), UnitsWarning, "normalized image; .* by its size"),
-    "pixels in -1..1": (
-        pixels(IMAGE / INTRINSICS[:2, 2] - 1.0),
-        UnitsWarning,
-        "normalized image; .* by its size",
     ),
     "pixels in 0..1 of a person who is partly beside the image": (
         pixels(IMAGE / 600.0),
@@ -352,7 +334,6 @@ RIGHT = {
     "without a camera": space(POINTS * [1.0, -1.0, -1.0]),
     "weights": space(POINTS, np.full(M, 90.0), sigma_m=0.01),
     "some points behind": space(POINTS - POINTS.mean(axis=0)),
-    "weights of a few times one": space(POINTS, np.full(M, 5.0)),
     "a floor below": on_floor(UP, LOWEST),
     "points below a floor that are left out": on_floor(
         UP,
@@ -424,13 +405,3 @@ def test_of_wrong_cameras_nothing_else_is_told():
         solver.fit_motion(body, frames, [0.0, 0.1])
     assert len(told) == 1
     assert "transpose R_camera_world" in str(told[0].message)
-
-
-def test_confidence_may_be_left_out_or_one_for_all():
-    index = np.arange(M)
-    with_ones = solver.fit(BODY, SEEN, priors=Priors())
-    for confidence in (1.0, np.ones(M)):
-        seen = Measurements(keypoints3d=Keypoints3D(index, POINTS, confidence))
-        assert solver.fit(BODY, seen, priors=Priors()).cost == with_ones.cost
-    left_out = Measurements(keypoints3d=Keypoints3D(index, POINTS))
-    assert solver.fit(BODY, left_out, priors=Priors()).cost == with_ones.cost

@@ -22,7 +22,7 @@ from scope.solver import (
 )
 
 WIDTH = 2.0 * CAMERA[0, 2]
-PEOPLE = 6
+PEOPLE = 3
 
 
 @cache
@@ -89,10 +89,10 @@ MISTAKES = {
 @pytest.mark.parametrize(("change", "message"), MISTAKES.values(), ids=MISTAKES)
 def test_mirrored_measurements_are_told(change, message):
     body, everyone = people()
-    for person in everyone[:3]:
-        for seen in (person.seen, without_deviations(person.seen)):
-            with pytest.warns(ScopeWarning, match=message):
-                solver.fit(body, change(seen))
+    seen = everyone[0].seen
+    for each in (seen, without_deviations(seen)):
+        with pytest.warns(ScopeWarning, match=message):
+            solver.fit(body, change(each))
 
 
 IMAGE_MISTAKES = {
@@ -117,13 +117,13 @@ def rolled(person, turns):
     return in_space(seen, lambda p: p @ R.T)
 
 
-@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+@pytest.mark.parametrize("turns", [1, 2])
 def test_people_who_lie_or_stand_on_the_head_are_no_mistake(turns):
     body, everyone = people()
     seen = [rolled(person, turns) for person in everyone]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for each in seen[:3]:
+        for each in seen[:2]:
             solver.fit(body, each)
             solver.fit(body, only_3d(each))
             solver.fit(body, without_deviations(each))
@@ -138,23 +138,8 @@ def test_noise_that_is_larger_than_stated_is_no_mirror():
         warnings.filterwarnings("error", "A body fits")
         for person in everyone:
             noise = 0.05 * rng.standard_normal((17, 3))
-            seen = in_space(only_3d(person.seen), lambda p, noise=noise: p + noise)
-            solver.fit(body, without_sigma(seen))
-
-
-def without_sigma(m):
-    return replace(m, keypoints3d=replace(m.keypoints3d, sigma_m=None))
-
-
-def test_clips_motions_and_batches_are_told_as_well():
-    body, everyone = people()
-    frames = [in_space(only_3d(everyone[0].seen), y_up)] * 3
-    with pytest.warns(ScopeWarning, match="negate one axis"):
-        solver.fit_clip(body, frames)
-    with pytest.warns(ScopeWarning, match="negate one axis"):
-        solver.fit_motion(body, [[View(m)] for m in frames], [0.0, 0.1, 0.2])
-    with pytest.warns(ScopeWarning, match="negate one axis"):
-        solver.fit_batch(body, frames)
+            seen = in_space(without_deviations(person.seen), lambda p, noise=noise: p + noise)
+            solver.fit(body, only_3d(seen))
 
 
 def test_mirrored_directions_are_told():
@@ -185,20 +170,27 @@ UNLIKELY = {
 @pytest.mark.parametrize("change", UNLIKELY.values(), ids=UNLIKELY)
 def test_what_only_a_body_unlike_any_fits_is_told(change):
     body, everyone = people()
-    for person in everyone[:3]:
-        with pytest.warns(ScopeWarning, match="standard deviations from the mean of people"):
-            solver.fit(body, change(person))
+    with pytest.warns(ScopeWarning, match="standard deviations from the mean of people"):
+        solver.fit(body, change(everyone[0]))
 
 
-def test_of_clips_motions_and_batches_an_unlikely_body_is_told_as_well():
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda person: in_space(only_3d(person.seen), y_up), "negate one axis"),
+        (UNLIKELY["feet for metres"], "from the mean of people"),
+    ],
+)
+def test_clips_motions_and_batches_are_told_as_well(change, message):
     body, everyone = people()
-    frames = [UNLIKELY["feet for metres"](everyone[0])] * 3
-    with pytest.warns(ScopeWarning, match="from the mean of people"):
-        solver.fit_clip(body, frames)
-    with pytest.warns(ScopeWarning, match="from the mean of people"):
-        solver.fit_motion(body, frames, [0.0, 0.1, 0.2])
-    with pytest.warns(ScopeWarning, match="from the mean of people"):
-        solver.fit_batch(body, frames)
+    frames = [change(everyone[0])] * 3
+    for fit in (
+        solver.fit_clip,
+        solver.fit_batch,
+        lambda body, frames: solver.fit_motion(body, frames, [0.0, 0.1, 0.2]),
+    ):
+        with pytest.warns(ScopeWarning, match=message):
+            fit(body, frames)
 
 
 def seen_around(person, change, pitches):
