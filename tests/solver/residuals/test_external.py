@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scope.solver import (
     Floor,
-    FootContacts,
     InvalidValueError,
     Keypoints3D,
     Measurements,
@@ -30,10 +29,9 @@ from scope.solver import (
     register_residual,
     rotations,
 )
-from scope.solver.part import Part
-from scope.solver.residuals import external, floor, foot_contact, joint_prior, pose_prior
+from scope.solver.kernels import add_to_point
+from scope.solver.residuals import external, floor, joint_prior, pose_prior
 
-from .. import own_residual
 from ..synthetic import forward, random_body, random_state
 
 K = 6
@@ -41,7 +39,7 @@ P = 4
 M = 14
 BODY = random_body(np.random.default_rng(1), K, P, M)
 R0, T0, OMEGA, BETA = random_state(np.random.default_rng(2), K, P)
-POINTS = forward(BODY, R0, T0, OMEGA, BETA)[2]
+_, JOINTS, POINTS = forward(BODY, R0, T0, OMEGA, BETA)
 SEEN = Measurements(keypoints3d=Keypoints3D(np.arange(M), POINTS, np.ones(M)))
 TRUTH = State(R0, T0, OMEGA, BETA)
 
@@ -58,11 +56,24 @@ def solved(m, weights=STIFF):
     return fit(BODY, m, init=TRUTH, priors=Priors(), options=options)
 
 
-own_residual.register()
+def accumulate(tree, ints, floats, weight, pose, blocks):
+    """A joint at a known height: r = sqrt(w) (t_y - height), metres; floats (n, 2): height, w."""
+    cost = 0.0
+    for k in range(ints.shape[0]):
+        i = ints[k, 0]
+        w = weight * floats[k, 1]
+        r = pose.t[i, 1] - floats[k, 0]
+        cost += 0.5 * w * r * r
+        origin = tree.keypoints + i  # a joint is a point too
+        add_to_point(
+            tree, pose, blocks, origin, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, w, 0.0, 0.0, 0.0, w * r, 0.0
+        )
+    return cost
+
+
+HEIGHT = np.array([[3]]), np.array([[0.9, 2.0]])
+register_residual("height", kernel=accumulate, floats=2)
 register_residual("own_floor", kernel=floor.accumulate, ints=1, floats=6, indexes="points")
-register_residual(
-    "own_contact", kernel=foot_contact.accumulate.py_func, ints=1, floats=4, indexes="points"
-)
 register_residual(
     "slow_joint",
     function=lambda part, ints, f: (
@@ -82,6 +93,9 @@ def slow_pose(part, ints, f):
 register_residual("slow_pose", function=slow_pose, floats=14)
 
 
+UP = np.array([0.0, -1.0, 0.0])
+
+
 def fitted(name, rows, weight=1.0):
     return solved(replace(SEEN, tables={name: rows}), replace(STIFF, tables={name: weight}))
 
@@ -94,29 +108,18 @@ def assert_same(a, b, atol):
 
 
 UP = np.array([0.0, -1.0, 0.0])
-POINT_ROWS = {
-    "own_floor": floor.pack(np.arange(M), UP, np.full(M, -0.1), np.ones(M), np.full(M, 0.5)),
-    "own_contact": foot_contact.pack(np.arange(4), POINTS[:4] + 0.1, np.ones(4)),
-}
-SAME = {
-    "floor": replace(SEEN, floor=Floor(np.arange(M), UP, -0.1, contact=np.full(M, 0.5))),
-    "foot_contact": replace(
-        SEEN, foot_contacts=FootContacts(np.arange(4), POINTS[:4] + 0.1, np.ones(4))
-    ),
-}
 
 
-@pytest.mark.parametrize(
-    ("own", "built_in"), [("own_floor", "floor"), ("own_contact", "foot_contact")]
-)
-def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver(own, built_in):
-    """One that numba has compiled already, and one as plain Python."""
-    b = solved(SAME[built_in], replace(STIFF, **{built_in: 4e4}))
-    a = fitted(own, POINT_ROWS[own], 4e4)
+def test_a_registered_kernel_fits_as_the_same_kernel_within_the_solver():
+    """One that numba has compiled already."""
+    within = replace(SEEN, floor=Floor(np.arange(M), UP, -0.1, contact=np.full(M, 0.5)))
+    b = solved(within, replace(STIFF, floor=4e4))
+    rows = floor.pack(np.arange(M), UP, np.full(M, -0.1), np.ones(M), np.full(M, 0.5))
+    a = fitted("own_floor", rows, 4e4)
     none = solved(SEEN)
     assert_same(a, b, 1e-9)
     assert np.abs(a.t_camera_part - none.t_camera_part).max() > 1e-3
-    np.testing.assert_allclose(a.cost_by_term[own], b.cost_by_term[built_in], rtol=1e-9)
+    np.testing.assert_allclose(a.cost_by_term["own_floor"], b.cost_by_term["floor"], rtol=1e-9)
 
 
 def test_a_python_residual_of_a_joint_fits_as_the_solvers_own_kernel():
@@ -142,72 +145,43 @@ def test_a_python_residual_of_a_part_fits_as_the_solvers_own_kernel():
 
 
 def test_the_cost_of_an_own_residual_is_what_its_equation_says():
-    rows = np.array([[3]]), np.array([[0.9, 2.0]])
-    found = fitted("height", rows, 500.0)
+    found = fitted("height", HEIGHT, 500.0)
     r = found.t_camera_part[3, 1] - 0.9
     np.testing.assert_allclose(found.cost_by_term["height"], 0.5 * 500.0 * 2.0 * r * r, rtol=1e-9)
     np.testing.assert_allclose(sum(found.cost_by_term.values()), found.cost, rtol=1e-9)
 
 
 def test_without_a_weight_it_is_one_and_zero_turns_it_off():
-    rows = np.array([[3]]), np.array([[0.9, 2.0]])
-    m = replace(SEEN, tables={"height": rows})
-    assert_same(solved(m), fitted("height", rows, 1.0), 1e-12)
-    assert_same(fitted("height", rows, 0.0), solved(SEEN), 1e-9)
+    m = replace(SEEN, tables={"height": HEIGHT})
+    assert_same(solved(m), fitted("height", HEIGHT, 1.0), 1e-12)
+    assert_same(fitted("height", HEIGHT, 0.0), solved(SEEN), 1e-9)
 
 
 def test_a_clip_and_a_batch_know_it_too():
-    rows = np.array([[3]]), np.array([[0.9, 1.0]])
     options = Options(stages=[Stage(Weights(tables={"height": 1e5}))], report=True)
-    m = replace(SEEN, tables={"height": rows})
+    m = replace(SEEN, tables={"height": HEIGHT})
     single = fit(BODY, m, priors=Priors(), options=options)
-    for found in fit_batch(BODY, [m] * 40, priors=Priors(), options=options, threads=2):
+    for found in fit_batch(BODY, [m] * 20, priors=Priors(), options=options, threads=2):
         np.testing.assert_array_equal(found.t_camera_part, single.t_camera_part)
     clip = fit_clip(BODY, [m, m], priors=Priors(), options=options)
     assert clip.cost_by_term["height"] > 0.0
-    assert abs(clip.frames[1].t_camera_part[3, 1] - 0.9) < abs(forward_height(3) - 0.9)
+    assert abs(clip.frames[1].t_camera_part[3, 1] - 0.9) < abs(JOINTS[3, 1] - 0.9)
 
 
-def forward_height(part):
-    return forward(BODY, R0, T0, OMEGA, BETA)[1][part, 1]
-
-
-def test_derivatives_by_differences_are_those_of_the_equation():
-    """A residual linear in everything, whose derivatives are known; the part's origin moves with
-    the shape.
-    """
-    rng = np.random.default_rng(5)
-    part = Part(
-        rotations.exp(rng.standard_normal(3)),
-        rng.standard_normal(3),
-        rng.standard_normal((3, P)),
-        rotations.exp(rng.standard_normal(3)),
-        rotations.exp(rng.standard_normal(3)),
-        rng.standard_normal(3),
-        rng.standard_normal(P),
-    )
-    found = external.differentiate(
-        lambda p: np.concatenate([p.t, p.beta, rotations.log(p.Omega @ part.Omega.T)]), part
-    )
-    e = part.t - part.origin
-    np.testing.assert_allclose(found.J_x[:3], np.hstack([-rotations.hat(e), np.eye(3)]), atol=1e-8)
-    np.testing.assert_allclose(found.J_beta[:3], part.D, atol=1e-8)
-    np.testing.assert_allclose(found.J_beta[3 : 3 + P], np.eye(P), atol=1e-8)
-    np.testing.assert_allclose(found.J_u[3 + P :], part.R_parent.T, atol=1e-8)
-    assert not found.J_u[:3].any()
-    assert not found.J_x[3:].any()
+def broken(part, ints, floats):
+    raise KeyError("a mistake of the user's")
 
 
 def test_what_a_python_residual_raises_reaches_the_caller_once():
-    def broken(part, ints, floats):
-        raise KeyError("a mistake of the user's")
-
+    """From a long motion too, whose second half another thread linearizes."""
     register_residual("broken", function=broken, floats=0)
     m = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 0)))})
+    times = np.arange(20) / 30
     for attempt in (
         lambda: fit(BODY, m),
         lambda: fit_clip(BODY, [m]),
         lambda: fit_batch(BODY, [m]),
+        lambda: fit_motion(BODY, [SEEN] * 19 + [m], times, init=[TRUTH] * 20, priors=Priors()),
     ):
         with pytest.raises(
             InvalidValueError, match="residual 'broken' raised KeyError: \"a mistake of the user's"
@@ -216,27 +190,11 @@ def test_what_a_python_residual_raises_reaches_the_caller_once():
     assert fit(BODY, SEEN).status is Status.CONVERGED
 
 
-def test_what_it_raises_in_a_thread_reaches_the_caller_of_a_long_motion():
-    def broken(part, ints, floats):
-        raise KeyError("a mistake of the user's")
-
-    register_residual("broken", function=broken, floats=0)
-    last = replace(SEEN, tables={"broken": (np.array([[1]]), np.zeros((1, 0)))})
-    with pytest.raises(InvalidValueError, match="residual 'broken' raised KeyError"):
-        fit_motion(
-            BODY, [SEEN] * 39 + [last], np.arange(40) / 30, init=[TRUTH] * 40, priors=Priors()
-        )
-
-
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
         ("text", "must return numbers"),
-        (
-            1.0,
-            r"shape \(n,\), but returned shape "
-            r"\(\)",
-        ),
+        (1.0, r"shape \(n,\), but returned shape \(\)"),
         ([np.nan], "finite numbers"),
     ],
 )
@@ -261,20 +219,13 @@ def test_a_kernel_that_does_not_compile_is_refused():
 
 
 def test_rows_that_do_not_fit_are_refused_as_the_solvers_own():
-    for part in (-1, K + 1):
-        with pytest.raises(
-            ShapeError,
-            match=rf"Parts of 'height' must lie in 0..{K}, but go from "
-            rf"{part}",
-        ):
-            fitted("height", (np.array([[part]]), np.ones((1, 2))))
-    for point in (-1, M + K + 1):
-        with pytest.raises(
-            ShapeError,
-            match=rf"Points of 'own_floor' must lie in 0..{M + K}, but "
-            rf"go from {point}",
-        ):
-            fitted("own_floor", (np.array([[point]]), np.ones((1, 6))))
+    for name, index, columns, wanted in (
+        ("height", K + 1, 2, f"Parts of 'height' must lie in 0..{K}"),
+        ("height", -1, 2, f"Parts of 'height' must lie in 0..{K}"),
+        ("own_floor", M + K + 1, 6, f"Points of 'own_floor' must lie in 0..{M + K}"),
+    ):
+        with pytest.raises(ShapeError, match=f"{wanted}, but go from {index}"):
+            fitted(name, (np.array([[index]]), np.ones((1, columns))))
     with pytest.raises(ShapeError, match=r"\(n, 1\) and \(n, 2\), but got \(1, 1\) and \(1, 3\)"):
         fitted("height", (np.array([[1]]), np.ones((1, 3))))
 
@@ -299,11 +250,8 @@ def nothing(*_):
     ("arguments", "message"),
     [
         ({"name": "floor", "kernel": nothing}, "name other than .*floor.* but got 'floor'"),
-        ({"name": "keypoints2d", "kernel": nothing}, "name other than"),
-        ({"name": "", "kernel": nothing}, "name other than"),
         ({"name": "mine"}, "exactly one callable"),
         ({"name": "mine", "kernel": nothing, "function": nothing}, "exactly one callable"),
-        ({"name": "mine", "kernel": "nothing"}, "exactly one callable"),
         (
             {"name": "mine", "kernel": nothing, "ints": 0},
             "ints of 'mine' must be a whole number of at least 1",
@@ -328,17 +276,17 @@ def test_registrations_that_cannot_work_are_refused(arguments, message):
 
 
 def test_registering_again_replaces_and_other_threads_see_it():
-    rows = np.array([[3]]), np.array([[0.9, 1.0]])
-    register_residual("again", kernel=own_residual.accumulate, floats=2)
+    rows = np.array([[3]]), np.array([[0.9]])
+    register_residual("again", function=lambda part, ints, floats: part.t[2:] - floats)
     before = fitted("again", rows, 1e4)
-    register_residual(
-        "again", function=lambda part, ints, floats: part.t[1:2] - floats[0], floats=2
-    )
+    register_residual("again", function=lambda part, ints, floats: part.t[1:2] - floats)
     after = []
     thread = threading.Thread(target=lambda: after.append(fitted("again", rows, 1e4)))
     thread.start()
     thread.join()
-    assert_same(before, after[0], 1e-6)
+    expected = fitted("height", (rows[0], np.array([[0.9, 1.0]])), 1e4)
+    assert_same(after[0], expected, 1e-6)
+    assert np.abs(before.t_camera_part - expected.t_camera_part).max() > 1e-3
 
 
 def test_the_solvers_machine_code_on_disk_stays_good():
@@ -347,23 +295,17 @@ def test_the_solvers_machine_code_on_disk_stays_good():
     """
     code = """
 import scope.scope_addon
-from tests.solver import own_residual
+from tests.solver.residuals.test_external import HEIGHT, fitted
 from scope.solver.gauss_newton.optimizer import optimize
-own_residual.main()
+fitted("height", HEIGHT)
 stats = optimize.stats
 assert sum(stats.cache_hits.values()) == 1 and not stats.cache_misses, stats
 """
-    own_residual.main()
+    solved(SEEN)
     root = Path(__file__).resolve().parents[3]
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=root)
     assert done.returncode == 0, done.stderr
-
-
-def test_the_example_brings_the_hands_to_their_height():
-    before, after = own_residual.main()
-    assert after < 2.0
-    assert before > 5.0 * after
 
 
 def test_there_is_room_for_sixteen_and_each_can_be_replaced(monkeypatch):
