@@ -109,13 +109,16 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("seed", range(2))
-def test_derivatives_at_random_states(name, seed):
-    check_derivatives(lambda part: CASES[name](part, 1.7), random_part(np.random.default_rng(seed)))
+def test_derivatives_and_weights_at_a_random_state(name):
+    """The cost is linear in a weight."""
+    part = random_part(np.random.default_rng(0))
+    one = check_derivatives(lambda part: CASES[name](part, 1.0), part)
+    for a, b in zip(one, CASES[name](part, 4.0), strict=True):
+        np.testing.assert_allclose(b, 2.0 * a, rtol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["joint_prior", "joint_flow", "pose_prior", "joint_limits"])
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 1e-2, 3.0, np.pi - 1e-3])
+@pytest.mark.parametrize("angle", [0.0, 1e-5, np.pi - 1e-3])
 def test_derivatives_near_identity_and_near_pi(name, angle):
     rng = np.random.default_rng(3)
     part = random_part(rng)
@@ -139,15 +142,6 @@ def test_derivatives_behind_the_camera():
         part.t[2] = depth - (part.R @ (V @ part.beta + V_BAR))[2]
         found = check_derivatives(lambda p: CASES["keypoint2d"](p, 1.0), part)
         assert found.r[2] > 0
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_weight_is_linear_in_the_cost(name):
-    part = random_part(np.random.default_rng(1))
-    one = CASES[name](part, 1.0)
-    four = CASES[name](part, 4.0)
-    for a, b in zip(one, four, strict=True):
-        np.testing.assert_allclose(b, 2.0 * a, rtol=1e-14)
 
 
 def test_every_registered_residual_is_in_these_tests():
@@ -197,80 +191,79 @@ def check_blocks(tree, blocks, cost, i, found):
     assert not blocks.H_uu[others].any()
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("pose_prior", "joint_prior", "joint_flow", "joint_limits"),
-        *(
-            "foot_contact",
-            "floor",
-            "floor_above",
-            "foot_contact_of_a_joint",
-            "outline",
-            "outline_inside",
+def outline_of_a_side(part, v_bar, shape, normal, w):
+    """The residual with the weight 2 w outside of the mask, 3 w inside."""
+    r = ref.outline(part, v_bar, shape, CONTOUR, normal).r[0]
+    return ref.outline(part, v_bar, shape, CONTOUR, normal, (2.0 if r > 0.0 else 3.0) * w)
+
+
+def rows_and_residuals(i, k, part, v_bar, shape, w):
+    """One row of each kernel, of part i and its keypoint k, and the residual that it stands for."""
+    place = np.array([0.1, 0.2, 3.1])
+    delta = np.array([0.02, -0.01, 0.03])
+    sides = ([2.0], [3.0]), ([np.inf], [np.inf])
+    cases = {
+        "pose_prior": (
+            pose_prior.pack([i], HAT[None], place[None], [2.0], [3.0]),
+            ref.pose_prior(part, HAT, place, 2.0, 3.0, w),
         ),
-    ],
-)
-def test_table_kernels_accumulate_their_residual(name):
+        "joint_prior": (
+            joint_prior.pack([i], HAT[None], [2.0]),
+            ref.joint_prior(part, HAT, 2.0 * w),
+        ),
+        "joint_flow": (
+            joint_flow.pack([i], FLOW[None], [2.0]),
+            ref.joint_flow(part, FLOW, 2.0 * w),
+        ),
+        "joint_limits": (
+            joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0]),
+            ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w),
+        ),
+        "foot_contact": (
+            foot_contact.pack([k], place[None], [2.0]),
+            ref.foot_contact(part, v_bar, shape, place, 2.0 * w),
+        ),
+        "foot_contact of a joint": (
+            foot_contact.pack([10 + i], place[None], [2.0]),
+            ref.foot_contact(part, np.zeros(3), np.zeros((3, P)), place, 2.0 * w),
+        ),
+    }
+    for side, offset in (("below", 9.0), ("above", -9.0)):
+        cases[f"floor {side}"] = (
+            floor.pack([k], AXIS, offset, [2.0], [3.0]),
+            ref.floor(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w),
+        )
+    for side, normal in (("on one side", NORMAL), ("on the other", -NORMAL)):
+        cases[f"outline {side}"] = (
+            outline.pack([k], delta[None], CONTOUR[None], normal[None], *sides),
+            outline_of_a_side(part, v_bar + delta, shape, normal, w),
+        )
+    return cases
+
+
+def test_table_kernels_accumulate_their_residual():
     _, body, tree, pose = chain()
     i = 3
     w = 1.9
     k = int(np.flatnonzero(body.keypoint_part == i)[0])
-    v_bar = body.v_bar[k]
-    shape = body.V[k]
-    part = part_of(tree, pose, i)
-    if name == "pose_prior":
-        tables = pose_prior.pack([i], HAT[None], np.array([[0.1, 0.1, 2.5]]), [2.0], [3.0])
-        found = ref.pose_prior(part, HAT, np.array([0.1, 0.1, 2.5]), 2.0, 3.0, w)
-    elif name == "joint_prior":
-        tables = joint_prior.pack([i], HAT[None], [2.0])
-        found = ref.joint_prior(part, HAT, 2.0 * w)
-    elif name == "joint_flow":
-        tables = joint_flow.pack([i], FLOW[None], [2.0])
-        found = ref.joint_flow(part, FLOW, 2.0 * w)
-    elif name.startswith("foot_contact"):
-        if name.endswith("joint"):
-            k = 10 + i
-            v_bar = np.zeros(3)
-            shape = np.zeros((3, P))
-        tables = foot_contact.pack([k], np.array([[0.1, 0.2, 3.1]]), [2.0])
-        found = ref.foot_contact(part, v_bar, shape, np.array([0.1, 0.2, 3.1]), 2.0 * w)
-        name = "foot_contact"
-    elif name.startswith("floor"):
-        offset = -9.0 if name.endswith("above") else 9.0
-        tables = floor.pack([k], AXIS, offset, [2.0], [3.0])
-        found = ref.floor(part, v_bar, shape, AXIS, offset, 2.0, 3.0, w)
-        name = "floor"
-    elif name.startswith("outline"):
-        delta = np.array([0.02, -0.01, 0.03])
-        normal = NORMAL * (-1.0 if name.endswith("inside") else 1.0)
-        found = ref.outline(part, v_bar + delta, shape, CONTOUR, normal, 1.0)
-        inside = bool(found.r[0] < 0)
-        never = [[np.inf], [np.inf]]
-        tables = outline.pack([k], delta[None], CONTOUR[None], normal[None], ([2.0], [3.0]), never)
-        found = ref.outline(
-            part, v_bar + delta, shape, CONTOUR, normal, (3.0 if inside else 2.0) * w
-        )
-        name = "outline"
-    else:
-        tables = joint_limits.pack([i], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0])
-        found = ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0, w)
-    blocks = make_blocks(tree)
-    cost = registry.RESIDUALS[name].accumulate(tree, *tables, w, pose, blocks)
-    check_blocks(tree, blocks, cost, i, found)
+    cases = rows_and_residuals(i, k, part_of(tree, pose, i), body.v_bar[k], body.V[k], w)
+    assert {name.split()[0] for name in cases} == set(registry.RESIDUALS)
+    for name, (rows, found) in cases.items():
+        accumulate = registry.RESIDUALS[name.split()[0]].accumulate
+        blocks = make_blocks(tree)
+        check_blocks(tree, blocks, accumulate(tree, *rows, w, pose, blocks), i, found)
 
 
 MEASURED = {
-    "image": (lambda i: {"keypoints2d": Keypoints2D([i], [[700.0, 300.0]], [0.5])}),
-    "space": (lambda i: {"keypoints3d": Keypoints3D([i], [[0.2, 0.1, 4.2]], [0.5])}),
-    "direction": (
-        lambda i: {"orientation_field": OrientationField([10 + i // 2], [i], [AXIS], [0.5])}
-    ),
+    "image": lambda j, i: {"keypoints2d": Keypoints2D([j], [[700.0, 300.0]], [0.5])},
+    "space": lambda j, i: {"keypoints3d": Keypoints3D([j], [[0.2, 0.1, 4.2]], [0.5])},
+    "direction": lambda j, i: {"orientation_field": OrientationField([10 + i], [j], [AXIS], [0.5])},
 }
 
 
-@pytest.mark.parametrize("behind", [False, True])
-@pytest.mark.parametrize("way", MEASURED)
+@pytest.mark.parametrize(
+    ("way", "behind"), [("image", False), ("image", True), ("space", False), ("direction", False)]
+)
 def test_measurement_kernel_accumulates_its_residual(way, behind):
     _, body, tree, pose = chain(2)
     if behind:
@@ -278,21 +271,9 @@ def test_measurement_kernel_accumulates_its_residual(way, behind):
         place_parts(tree, pose)
     j = 7
     i = int(body.keypoint_part[j])
-    measurements = Measurements(INTRINSICS, **MEASURED[way](j))
-    if way == "direction":
-        measurements.orientation_field.starts = [10 + i]
-    weights = Weights(
-        shape=0.0,
-        joint_prior=0.0,
-        joint_limits=0.0,
-        keypoints2d=30.0,
-        keypoints3d=40.0,
-        orientation_field=50.0,
-    )
-    off = Options(
-        robust_keypoints2d=np.inf, robust_keypoints3d=np.inf, robust_orientation_field=np.inf
-    )
-    table, _, _ = off.stage_table([Stage(weights)])
+    measurements = Measurements(INTRINSICS, **MEASURED[way](j, i))
+    weights = Weights(30.0, 40.0, 50.0, joint_prior=0.0, joint_limits=0.0, shape=0.0)
+    table, _, _ = Options(None, np.inf, np.inf, np.inf).stage_table([Stage(weights)])
     blocks = make_blocks(tree)
     cost = linearize(
         tree,
