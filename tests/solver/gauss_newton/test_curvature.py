@@ -17,7 +17,6 @@ from scope.solver import (
     Weights,
     default_priors,
     fit,
-    fit_batch,
     fit_clip,
     make_tree,
     rotations,
@@ -94,13 +93,18 @@ def test_three_steps_teach_the_hessian_of_a_quadratic(small, accepted):
             at = at + w
             set_current(tree, pose, trial_blocks, curvature)
     np.testing.assert_allclose(curvature.S[1:], (true - known)[1:], atol=1e-8)
+    # Residuals that couple joint and part teach nothing.
+    blocks = filled(tree, pose, known, -at)
+    blocks.cross[0] = 1
+    update(tree, pose, u, placed(rng, tree), blocks, accepted, curvature)
+    np.testing.assert_allclose(curvature.S[1:], (true - known)[1:], atol=1e-8)
     reset(curvature)
     assert not curvature.S.any()
 
 
 def test_what_is_solved_with_stays_above_a_share_of_gauss_newton(small):
     rng, tree, curvature = small
-    for _ in range(50):
+    for _ in range(20):
         J = rng.standard_normal((K + 1, 3, 3))
         H = J @ np.swapaxes(J, 1, 2)
         pose = placed(rng, tree)
@@ -112,32 +116,10 @@ def test_what_is_solved_with_stays_above_a_share_of_gauss_newton(small):
         assert np.linalg.eigvalsh(blocks.H_uu[1:] - 0.2 * before[1:]).min() > -1e-9
         apply_correction(tree, pose, blocks, curvature, 0.0)
         np.testing.assert_allclose(blocks.H_uu, before, atol=1e-12)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
-def test_what_overflowed_is_not_added(small, bad):
-    rng, tree, curvature = small
-    pose = placed(rng, tree)
-    blocks = filled(tree, pose, np.tile(np.eye(3), (K + 1, 1, 1)), np.zeros((K + 1, 3)))
-    before = blocks.H_uu.copy()
-    set_current(tree, pose, blocks, curvature)
-    curvature.S[:] = bad
-    apply_correction(tree, pose, blocks, curvature, 1.0)
-    assert np.isfinite(blocks.H_uu).all()
-    if not abs(bad) < np.inf:
-        np.testing.assert_allclose(blocks.H_uu, before, atol=1e-12)
-
-
-def test_residuals_that_couple_joint_and_part_teach_nothing(small):
-    rng, tree, curvature = small
-    pose = placed(rng, tree)
-    trial = placed(rng, tree)
-    ones = np.ones((K + 1, 3))
-    set_current(tree, pose, filled(tree, pose, symmetric(rng, K + 1), ones), curvature)
-    blocks = filled(tree, trial, symmetric(rng, K + 1), -ones)
-    blocks.cross[0] = 1
-    update(tree, pose, 0.1 * ones, trial, blocks, True, curvature)
-    assert not curvature.S.any()
+    for overflowed in (np.nan, 1e300):
+        curvature.S[:] = overflowed
+        apply_correction(tree, pose, blocks, curvature, 1.0)
+        assert np.isfinite(blocks.H_uu).all()
 
 
 def noisy(body, seed):
@@ -163,7 +145,7 @@ def test_the_default_stop_is_close_to_the_end(body):
     solver = FrameSolver(body)
     close = []
     end = Options(stages=(Stage(Weights(), 1e-13, 500),))
-    for seed in range(40):
+    for seed in range(20):
         start, m = noisy(body, seed)
         found, best = (solver.fit(m, start, None, o) for o in (Options(), end))
         apart = np.linalg.norm(found.t_camera_part - best.t_camera_part, axis=1).max()
@@ -171,9 +153,8 @@ def test_the_default_stop_is_close_to_the_end(body):
     assert np.mean(close) >= 0.95
 
 
-@pytest.mark.parametrize("seed", range(1, 4))  # of ten seeds, 0 alone has two minima near the start
-def test_without_it_the_minimum_is_the_same(body, seed):
-    start, m = noisy(body, seed)
+def test_without_it_the_minimum_is_the_same(body):
+    start, m = noisy(body, 1)  # of ten seeds, 0 alone has two minima near the start
     to_the_end = (Stage(Weights(), 1e-14, 1000),)
     found, plain = (
         fit(body, m, init=start, options=Options(to_the_end, curvature=on)) for on in (True, False)
@@ -210,19 +191,11 @@ def test_without_it_every_step_is_a_dense_gauss_newton_step():
     assert np.abs(other.state.Omega - state[2]).max() > 1e-6
 
 
-def test_clips_and_batches_heed_the_option(body):
-    """Frames of both come out as `fit` gives them with the same option, and otherwise than without
-    it.
-    """
-    start, m = noisy(body, 1)
-    off = Options(curvature=False)
-    plain, found = (fit(body, m, init=start, options=options) for options in (off, Options()))
-    assert plain.iterations != found.iterations
-    (alone,) = fit_batch(body, [m], init=[start], options=off)
-    np.testing.assert_array_equal(alone.t_camera_part, plain.t_camera_part)
+def test_clips_heed_the_option(body):
+    _, m = noisy(body, 1)
     first, then = (
-        fit_clip(body, [m, m], options=options).frames[0].state.Omega
-        for options in (off, Options())
+        fit_clip(body, [m, m], options=Options(curvature=on)).frames[0].state.Omega
+        for on in (False, True)
     )
     assert np.abs(first - then).max() > 1e-9
 
