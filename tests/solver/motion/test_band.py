@@ -45,7 +45,7 @@ def dense_step(clip):
     return d[: T * n].reshape(T, n), d[T * n :], -g @ d - 0.5 * d @ JTJ @ d, JTJ
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 4, 7])
+@pytest.mark.parametrize("frames", [1, 2, 3, 6])
 def test_step_is_the_dense_step_of_the_clip(frames):
     clip = noisy_clip(frames, frames=frames)
     problem, poses, system = clip.problem()

@@ -18,7 +18,7 @@ from .test_band import dense_step
 
 
 def test_covariance_is_that_of_the_dense_inverse():
-    clip = noisy_clip(4, frames=7)
+    clip = noisy_clip(4, frames=5)
     problem, poses, system = clip.problem()
     problem.linearize(0, poses, system)
     found, from_root, shared = joint_covariances(
@@ -78,7 +78,7 @@ def dense_matrix(system, T):
 
 
 def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
-    T = 60
+    T = 30
     n = 6 + 3 * K
     clip = noisy_clip(4, frames=T, cameras=1)
     stiff = replace(
@@ -88,7 +88,7 @@ def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
     problem.linearize(0, poses, system)
     found, _, _ = joint_covariances(problem.tree, system, poses, 1.0, make_factor(system))
     S = np.linalg.inv(dense_matrix(system, T))
-    for f in (0, 30, T - 1):
+    for f in (0, T // 2, T - 1):
         # the pelvis moves as its twist says
         expected = S[f * n + 3 : f * n + 6, f * n + 3 : f * n + 6]
         np.testing.assert_allclose(found[f, 0], expected, rtol=1e-6)
@@ -96,7 +96,7 @@ def test_covariances_far_from_the_middle_of_a_long_clip_are_exact():
 
 
 def test_a_column_of_the_shape_that_nothing_fixes_is_unknown():
-    clip = noisy_clip(4, frames=7)
+    clip = noisy_clip(4, frames=5)
     problem, poses, system = clip.problem()
     problem.linearize(0, poses, system)
     column = P - 1

@@ -33,11 +33,14 @@ TIGHT = Options(stages=[Stage(Weights(joint_prior=1e-2, joint_limits=0.0, shape=
 SMOOTH = MotionPrior(robust_joints=np.inf, robust_root_rotation=np.inf, robust_root_position=np.inf)
 
 
+def placed(body, s):
+    """Rotations, joints and markers of a state, from the definition."""
+    return forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
+
+
 def joints(body, states):
-    """The joints (T, K+1, 3) of states, from the definition."""
-    return np.array(
-        [forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[1] for s in states]
-    )
+    """The joints (T, K+1, 3) of states."""
+    return np.array([placed(body, s)[1] for s in states])
 
 
 def smooth_walk(rng, frames, rate):
@@ -61,14 +64,9 @@ def markers(body, states, rng, noise=0.01):
     """Measured points of every frame, in the world."""
     out = []
     for s in states:
-        points = forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2]
-        out.append(
-            Keypoints3D(
-                np.arange(MARKERS),
-                points + noise * rng.standard_normal(points.shape),
-                np.ones(MARKERS),
-            )
-        )
+        points = placed(body, s)[2]
+        points = points + noise * rng.standard_normal(points.shape)
+        out.append(Keypoints3D(np.arange(MARKERS), points))
     return out
 
 
@@ -200,9 +198,7 @@ def test_markers_come_and_go():
     for f in range(40):
         if f % 3 and frames[f] and f not in range(15, 21):
             keep = rng.permutation(MARKERS)[: MARKERS // 2]
-            frames[f] = Measurements(
-                keypoints3d=Keypoints3D(keep, measured[f].points[keep], np.ones(len(keep)))
-            )
+            frames[f] = Measurements(keypoints3d=Keypoints3D(keep, measured[f].points[keep]))
     found = fit_motion(body, frames, times, priors=Priors(), options=TIGHT)
     error = np.linalg.norm(found.t_world_part - joints(body, states), axis=-1)
     assert error[:15].max() < 0.02
@@ -261,21 +257,13 @@ def test_a_standing_point_stands():
         stands=held,
         motion=MotionPrior(contact=1e7),
     )
-    points = np.array(
-        [
-            forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3]
-            for s in found.states
-        ]
-    )
     loose = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT)
-    free = np.array(
-        [
-            forward(body, s.R_camera_root, s.t_camera_root, s.Omega, s.beta)[2][3]
-            for s in loose.states
-        ]
-    )
-    assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 1e-3
-    assert np.linalg.norm(np.diff(free, axis=0), axis=1).max() > 5e-3
+    steps = []
+    for each in (found, loose):
+        point = np.array([placed(body, s)[2][3] for s in each.states])
+        steps.append(np.linalg.norm(np.diff(point, axis=0), axis=1).max())
+    assert steps[0] < 1e-3
+    assert steps[1] > 5e-3
 
 
 def test_what_cannot_be_used_is_refused():
@@ -295,20 +283,13 @@ def test_what_cannot_be_used_is_refused():
         fit_motion(body, frames, times, window=0.0)
     with pytest.raises(InvalidValueError, match="leave `shape` out"):
         fit_motion(body, frames, times, shape=np.zeros(P), focal=True)
-    with pytest.raises(InvalidValueError, match="MotionPrior.contact"):
-        MotionPrior(contact=-1.0)
     with pytest.raises(InvalidValueError, match="Probability of standing"):
         fit_motion(body, frames, times, stands=StandingPoints([0], [[1.0], [np.nan], [1.0]]))
-    with pytest.raises(InvalidValueError, match=r"frames\[1\]\[0\]"):
-        fit_motion(body, [frames[0], [frames[1]], frames[2]], times, init=states)
     assert fit_motion(body, frames, times, init=states).status is Status.NO_MEASUREMENTS
-    with pytest.raises(InvalidValueError, match="rotation"):
-        fit_motion(body, [[View(Measurements(), 2.0 * np.eye(3))]] * 3, times, init=states)
 
 
 TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FRAMES_REFUSED = {
-    "no frame": (None, "frames[1] must be Measurements or a list of View, but is None"),
     "a view": (
         View(Measurements()),
         "frames[1] must be Measurements or a list of View, but is a View",
@@ -324,10 +305,6 @@ FRAMES_REFUSED = {
     "scaled": (
         [View(Measurements()), View(Measurements(), 2.0 * TURNED)],
         "R_camera_world of frames[1][1] must be",
-    ),
-    "mirrored": (
-        [View(Measurements(), np.diag([1.0, 1.0, -1.0]))],
-        "R_camera_world of frames[1][0] must be rotation",
     ),
     "flat": (
         [View(Measurements(), TURNED, np.zeros(2))],
@@ -383,8 +360,7 @@ def test_what_nothing_fixes_is_not_taken_for_known_beside_what_is_known_well():
     part = np.array([0, 0, 0, 1])
     body = RandomBody(parents, np.zeros((3, 3, 0)), offsets, part, levers, np.zeros((4, 3, 0)))
     state = State.rest(2, 0)
-    points = forward(body, state.R_camera_root, state.t_camera_root, state.Omega, state.beta)[2]
-    seen = Measurements(keypoints3d=Keypoints3D(np.arange(4), points, sigma_m=1e-4))
+    seen = Measurements(keypoints3d=Keypoints3D(np.arange(4), placed(body, state)[2], sigma_m=1e-4))
     found = fit_motion(
         body,
         [seen],

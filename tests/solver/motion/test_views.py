@@ -2,10 +2,8 @@
 """The terms of a clip's views, laid out one after the other, are those that each view has alone."""
 
 import numpy as np
-import pytest
 from scope.solver import (
     Floor,
-    InvalidValueError,
     Keypoints2D,
     Keypoints3D,
     Measurements,
@@ -16,7 +14,7 @@ from scope.solver import (
     rotations,
 )
 from scope.solver.gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, make_terms, pack_priors
-from scope.solver.motion.views import pack_frames, terms_of, view_frames_of
+from scope.solver.motion.views import pack_frames, terms_of
 
 from ..synthetic import INTRINSICS, random_body
 
@@ -79,10 +77,3 @@ def test_the_terms_of_every_view_are_those_it_has_alone():
                 np.testing.assert_array_equal(found.ints[k], expected.ints[k])
                 np.testing.assert_array_equal(found.floats[k], table)
     assert len(terms_of(views, 6).floats[1]) < len(terms_of(views, 5).floats[1])
-
-
-def test_frames_that_are_neither_measurements_nor_views_are_refused():
-    body = random_body(np.random.default_rng(0), K, P, M)
-    for frame, name in (([Measurements()], r"frames\[1\]\[0\]"), (3, r"frames\[1\]")):
-        with pytest.raises(InvalidValueError, match=name):
-            view_frames_of(body, [Measurements(), frame])
