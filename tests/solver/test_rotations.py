@@ -1,31 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import numpy as np
 import pytest
-from scope.solver import ShapeError, rotations
+from scope.solver import rotations
 
 RNG = np.random.default_rng(0)
 AXES = RNG.standard_normal((20, 3))
 AXES /= np.linalg.norm(AXES, axis=1)[:, None]
-ANGLES = [
-    0.0,
-    1e-12,
-    1e-8,
-    1e-5,
-    1e-3,
-    0.02,
-    0.099,
-    0.101,
-    0.45,
-    0.5,
-    0.55,
-    1.0,
-    2.0,
-    3.0,
-    3.13,
-    np.pi - 1e-3,
-    np.pi - 1e-5,
-]
-ANGLES += [np.pi - 1e-7, np.pi - 1e-9]
+ANGLES = [0.0, 1e-12, 1e-8, 1e-5, 1e-3, 0.02, 0.099, 0.101, 0.45, 0.5, 0.55, 1.0, 2.0, 3.0, 3.13]
+ANGLES += [np.pi - gap for gap in (1e-3, 1e-5, 1e-7, 1e-9)]
 VECTORS = np.concatenate([angle * AXES for angle in ANGLES])
 
 
@@ -55,12 +37,12 @@ def test_log_inverts_exp_up_to_pi():
     np.testing.assert_allclose([rotations.log3(*r.ravel()) for r in R], VECTORS, atol=1e-9)
 
 
-@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3), *AXES])
-def test_log_at_pi_is_a_half_turn(axis):
-    R = 2 * np.outer(axis, axis) - np.eye(3)
-    for phi in (rotations.log(R), np.array(rotations.log3(*R.ravel()))):
-        assert np.linalg.norm(phi) == pytest.approx(np.pi, abs=1e-9)
-        np.testing.assert_allclose(rotations.exp(phi), R, atol=1e-9)
+def test_log_at_pi_is_a_half_turn():
+    for axis in (*np.eye(3), *-np.eye(3), *AXES):
+        R = 2 * np.outer(axis, axis) - np.eye(3)
+        for phi in (rotations.log(R), np.array(rotations.log3(*R.ravel()))):
+            assert np.linalg.norm(phi) == pytest.approx(np.pi, abs=1e-9)
+            np.testing.assert_allclose(rotations.exp(phi), R, atol=1e-9)
 
 
 def test_left_jacobian_is_the_derivative_of_exp():
@@ -104,11 +86,6 @@ def test_nearest_rotation_repairs_and_survives_anything():
     np.testing.assert_allclose(
         fixed @ np.swapaxes(fixed, 1, 2), np.tile(np.eye(3), (4, 1, 1)), atol=1e-12
     )
-
-
-def test_shapes_are_checked():
-    with pytest.raises(ShapeError, match=r"\(\.\.\., 3\), but got shape \(4,\)"):
-        rotations.exp(np.zeros(4))
 
 
 def test_the_shortest_turn_takes_one_direction_to_the_other_about_what_is_across_both():

@@ -15,7 +15,6 @@ from scope.solver import (
     State,
     Weights,
     fit,
-    fit_clip,
     make_tree,
     measurements,
     rotations,
@@ -27,7 +26,6 @@ from scope.solver.residuals import joint_flow, joint_limits
 
 from .synthetic import (
     INTRINSICS,
-    RandomBody,
     forward,
     project,
     random_body,
@@ -36,17 +34,6 @@ from .synthetic import (
 )
 
 TIGHT = Options(stages=[Stage(Weights(joint_prior=0.0, shape=0.0, joint_limits=0.0), 1e-14, 300)])
-
-
-def shaped_tree(rng, kind, K, P, M, shape=0.02):
-    body = random_body(rng, K, P, M, shape)
-    if kind == "chain":
-        parents = np.arange(-1, K)
-    elif kind == "star":
-        parents = np.array([-1] + [0] * K)
-    else:
-        return body
-    return RandomBody(parents, body.S, body.l, body.keypoint_part, body.v_bar, body.V)
 
 
 def check_recovery(body, state, K, atol=1e-5):
@@ -71,43 +58,25 @@ def check_recovery(body, state, K, atol=1e-5):
 
 
 @pytest.mark.parametrize(
-    ("K", "kind"), [(1, "chain"), (2, "star"), (23, "random"), (51, "star"), (100, "chain")]
+    ("K", "kind", "P"),
+    [(1, "chain", 0), (2, "star", 1), (23, "random", 1), (51, "star", 10), (100, "chain", 0)],
 )
-@pytest.mark.parametrize("P", [0, 1, 10])
 def test_trees_and_shapes(K, kind, P):
     rng = np.random.default_rng(K + P)
-    body = shaped_tree(rng, kind, K, P, 4 * (K + 1))
+    body = random_body(rng, K, P, 4 * (K + 1))
+    if kind == "chain":
+        body.parents = np.arange(-1, K)
+    elif kind == "star":
+        body.parents = np.array([-1] + [0] * K)
     body.l *= 0.3 if K == 100 else 1.0
     check_recovery(body, random_state(rng, K, P, 0.3), K)
 
 
-@pytest.mark.parametrize("P", [100, 300])
-def test_many_shape_coefficients(P):
-    rng = np.random.default_rng(P)
-    K = 23
-    body = shaped_tree(rng, "random", K, P, 10 * (K + 1), shape=0.005)
-    found = check_recovery(body, random_state(rng, K, P, 0.3), K, atol=1e-4)
-    assert found.state.beta.shape == (P,)
-
-
-def test_three_hundred_coefficients_over_a_clip():
-    rng = np.random.default_rng(1)
-    body = random_body(rng, 23, 300, 200, shape=0.005)
-    beta = rng.standard_normal(300)
-    clip = []
-    for _ in range(3):
-        R0, t0, Omega, _ = random_state(rng, 23, 300, 0.2)
-        points = forward(body, R0, t0, Omega, beta)[2]
-        clip.append(Measurements(keypoints3d=Keypoints3D(np.arange(200), points, np.ones(200))))
-    found = fit_clip(body, clip, priors=Priors())
-    assert found.beta.shape == (300,)
-    assert np.isfinite(found.beta).all()
-    residual = [
-        forward(body, f.state.R_camera_root, f.state.t_camera_root, f.state.Omega, found.beta)[2]
-        - m.keypoints3d.points
-        for f, m in zip(found.frames, clip, strict=True)
-    ]
-    assert np.sqrt(np.mean(np.square(residual))) < 0.01
+def test_many_shape_coefficients():
+    rng = np.random.default_rng(100)
+    body = random_body(rng, 23, 100, 240, shape=0.005)
+    found = check_recovery(body, random_state(rng, 23, 100, 0.3), 23, atol=1e-4)
+    assert found.state.beta.shape == (100,)
 
 
 def test_measurements_that_cannot_be_written_to_need_no_other_machine_code():

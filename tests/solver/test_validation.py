@@ -30,12 +30,10 @@ from scope.solver import (
     fit,
     fit_batch,
     fit_clip,
-    fit_clips,
     fit_motion,
     load_joint_prior,
     make_tree,
     rotations,
-    validation,
     with_previous,
 )
 
@@ -106,14 +104,10 @@ INTRINSICS_REFUSED = {
         2.0 * INTRINSICS,
         "Intrinsics must be a camera matrix .* divide it by its last entry, 2",
     ),
-    "negated": (
-        -INTRINSICS,
-        "Intrinsics must be a camera matrix .* divide it by its last entry, -1",
-    ),
     "last row": (moved([[0, 0, 0], [0, 0, 0], [0, 0.1, 0]]), "Intrinsics must be a camera matrix"),
-    "last entry": (moved([[0, 0, 0], [0, 0, 0], [0, 0, -1]]), "Intrinsics must be a camera matrix"),
     "turned": (moved([[0, 0, 0], [300, 0, 0], [0, 0, 0]]), "Intrinsics must be a camera matrix"),
     "behind": (np.diag([-1000.0, 1000.0, 1.0]), "positive focal lengths"),
+    "NaN": (moved([[0, 0, NAN], [0, 0, 0], [0, 0, 0]]), "Intrinsics must be finite"),
     "3 by 4": (np.eye(3, 4), r"Intrinsics must have shape \(3, 3\), but got shape \(3, 4\)"),
 }
 
@@ -132,28 +126,13 @@ STATES_REFUSED = {
         ShapeError,
         r"Omega must have shape \(4, 3, 3\), but got shape \(3, 3, 3\)",
     ),
-    "root scaled": (
-        {"R_camera_root": 2.0 * np.eye(3)},
-        InvalidValueError,
-        "R_camera_root of the initial state",
-    ),
     "root mirrored": (
         {"R_camera_root": MIRROR},
         InvalidValueError,
         "R_camera_root of the initial state",
     ),
-    "root sheared": (
-        {"R_camera_root": np.eye(3) + 0.1 * np.eye(3, k=1)},
-        InvalidValueError,
-        "R_camera_root",
-    ),
     "root NaN": (
         {"R_camera_root": np.full((3, 3), NAN)},
-        InvalidValueError,
-        "R_camera_root of the initial state",
-    ),
-    "root zero": (
-        {"R_camera_root": np.zeros((3, 3))},
         InvalidValueError,
         "R_camera_root of the initial state",
     ),
@@ -179,7 +158,6 @@ MEASURED_REFUSED = {
         seen(pose_priors=pose_prior(2.0 * np.eye(3))),
         "Rotations of pose priors must be rotation",
     ),
-    "pose prior mirrored": (seen(pose_priors=pose_prior(MIRROR)), "Rotations of pose priors"),
     "pose prior w_R": (
         seen(pose_priors=pose_prior(w_R=-1.0)),
         "Rotation weights of pose priors .* number 0 is -1",
@@ -187,10 +165,6 @@ MEASURED_REFUSED = {
     "contact": (
         seen(foot_contacts=FootContacts([0, 1], np.zeros((2, 3)), [1.0, -0.5])),
         "Probability of foot contacts must not be negative, but number 1 is -0.5",
-    ),
-    "floor's contact": (
-        seen(floor=Floor([0], UP, 1.0, [-1.0])),
-        "Contact with the floor must not be negative",
     ),
     "floor's normal": (seen(floor=Floor([0], 2.0 * UP, 1.0, [1.0])), "normal of length 2"),
     "a table's indices": (
@@ -204,10 +178,6 @@ MEASURED_REFUSED = {
     "a table of a field": (
         lambda: Measurements(tables={"floor": untyped(([[0]], np.ones((1, 6))))}),
         "tables must not hold 'floor', which has a field of its own; give it as Measurements.floor",
-    ),
-    "a table of a field, joints": (
-        lambda: Measurements(tables={"pose_prior": untyped(([], []))}),
-        "give it as Measurements.pose_priors",
     ),
     "frames for the shape": (
         lambda: fit_clip(BODY, [SEEN], shape_frames=0),
@@ -224,10 +194,6 @@ MEASURED_REFUSED = {
     "threads": (
         lambda: fit_batch(BODY, [SEEN], threads=-2),
         "threads must be a whole number of at least 0, but is -2",
-    ),
-    "threads of clips": (
-        lambda: fit_clips(BODY, [[SEEN]], threads=untyped(1.5)),
-        "threads must be a whole number",
     ),
 }
 
@@ -282,10 +248,6 @@ SETTINGS_REFUSED = {
         lambda: Weights(keypoints3d=-1.0),
         "Weights.keypoints3d must be finite and not negative, but is -1",
     ),
-    "weight of a table": (
-        lambda: Weights(tables={"floor": -1.0}),
-        r"Weights.tables\['floor'\] must be finite",
-    ),
     "tolerance": (
         lambda: Stage(tolerance=-1e-6),
         "Stage.tolerance must be a number of at least 0, but is -1e-06",
@@ -298,6 +260,8 @@ SETTINGS_REFUSED = {
         lambda: Options(robust_keypoints2d=0.0),
         "Options.robust_keypoints2d must be positive",
     ),
+    "damping": (lambda: Options(damping=NAN), "damping must be positive and finite, but is nan"),
+    "root length": (lambda: Options(root_length=INF), "root_length must be positive and finite"),
     "a joint of the prior": (
         lambda: load_joint_prior().of("tail"),
         "no joint 'tail'; it has .*left_knee",
@@ -308,8 +272,7 @@ SETTINGS_REFUSED = {
     ),
     "its parameters": (
         lambda: JointPrior(("neck",), np.zeros((2, 5))),
-        r"must have shape \(1, "
-        r"243\), .* \(2, 5\)",
+        r"must have shape \(1, 243\), .* \(2, 5\)",
     ),
 }
 
@@ -346,12 +309,7 @@ def test_bodies_that_cannot_be_used_are_refused(given, error, message):
 
 @pytest.mark.parametrize(
     "times",
-    [
-        np.arange(5),
-        np.arange(10.0, 15.0),
-        np.array([0, 33, 67, 100, 133]),
-        np.arange(5) * 1000.0 / 30.0,
-    ],
+    [np.arange(5), np.arange(5) * 1000.0 / 30.0],
 )
 def test_frame_numbers_or_milliseconds_for_seconds_bring_a_warning_and_a_motion(times):
     with pytest.warns(
@@ -375,8 +333,6 @@ NOT_REFUSED = {
         keypoints3d=replace(KEYPOINTS, points=np.vstack([POINTS[:-1], [[0, 0, 9000.0]]]))
     ),
     "a skewed camera": seen_2d(moved([[0, 2.0, 0], [0, 0, 0], [0, 0, 0]])),
-    "lists": seen_2d(INTRINSICS.tolist(), [[1, 2]], [True]),
-    "single precision": seen_2d(INTRINSICS.astype(np.float32), np.ones((1, 2), np.float32)),
     "no points": seen(keypoints3d=Keypoints3D([], np.zeros((0, 3)), [])),
     "weights of zero": seen(pose_priors=pose_prior(w_R=0.0, w_t=0.0)),
     "a position without a rotation": seen(pose_priors=pose_prior(np.zeros((3, 3)), w_R=0.0)),
@@ -392,9 +348,6 @@ NOT_REFUSED = {
     "no iterations": lambda: fit(
         BODY, SEEN, options=Options(stages=[Stage(max_iterations=0, tolerance=0.0)])
     ),
-    "whole numbers of numpy's": lambda: fit(
-        BODY, SEEN, options=Options(stages=[Stage(max_iterations=untyped(np.int64(1)))])
-    ),
     "no pull": lambda: fit_clip(
         BODY, [SEEN, SEEN], options=SHORT, temporal=Temporal(0.0, 0.0, 0.0)
     ),
@@ -406,22 +359,3 @@ def test_what_can_be_used_passes_without_a_warning(make):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         make()
-
-
-def test_random_information_is_refused_exactly_where_an_eigenvalue_is_negative():
-    """Against numpy's eigenvalues, also where only a combination of coefficients is negative."""
-    rng = np.random.default_rng(3)
-    refused = 0
-    for _ in range(200):
-        basis = np.linalg.qr(rng.standard_normal((6, 6)))[0]
-        values = rng.uniform(0.1, 5.0, 6)
-        values[0] *= rng.choice([-1.0, 0.0, 1.0])
-        A = basis * values @ basis.T
-        try:
-            validation.check_information(A, "A")
-        except InvalidValueError:
-            refused += 1
-            assert values[0] < 0.0
-        else:
-            assert values[0] >= 0.0
-    assert 40 < refused < 90
