@@ -7,6 +7,7 @@ import re
 import struct
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 
@@ -29,6 +30,12 @@ def coded(picture_rgb: np.ndarray) -> tuple[bytes, bytes]:
     """Return the decoder's configuration (hvcC box, ISO 14496-15) and the coded picture, by
     x265.
     """
+    return _coded(picture_rgb.tobytes(), picture_rgb.shape)
+
+
+@cache
+def _coded(pixels: bytes, shape: tuple[int, ...]) -> tuple[bytes, bytes]:
+    picture_rgb = np.frombuffer(pixels, np.uint8).reshape(shape)
     av = package("av")
     need_encoder("libx265")
     encoder = av.CodecContext.create("libx265", "w")

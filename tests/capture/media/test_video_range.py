@@ -189,10 +189,10 @@ def timecode(text: str) -> Timecode:
 
 
 def labels(rate: int, dropped: int) -> Iterator[str]:
-    """Iterate over the timecodes of 21 minutes, without the first ``dropped`` of each minute except
+    """Iterate over the timecodes of 12 minutes, without the first ``dropped`` of each minute except
     every tenth.
     """
-    for minute in range(21):
+    for minute in range(12):
         for second in range(60):
             for frame in range(rate):
                 if not (minute % 10 and second == 0 and frame < dropped):
@@ -202,11 +202,9 @@ def labels(rate: int, dropped: int) -> Iterator[str]:
 @pytest.mark.parametrize(
     ("fps", "rate", "dropped"),
     [
-        (Fraction(30000, 1001), 30, 2),
         (Fraction(60000, 1001), 60, 4),
         (Fraction(2997, 100), 30, 2),
         (Fraction(30000, 1001), 30, 0),
-        (Fraction(25), 25, 0),
     ],
 )
 def test_consecutive_timecodes_are_consecutive_frames(

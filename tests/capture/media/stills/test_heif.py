@@ -39,30 +39,26 @@ def read(path: Path, data: bytes) -> np.ndarray:
     return frame.image_rgb.astype(int)
 
 
-@pytest.mark.parametrize("tile", [None, 64])
-@pytest.mark.parametrize("name", ["IMG_0001.HEIC", "a.jpg"])
-def test_tiles_are_assembled(tmp_path: Path, tile: int | None, name: str) -> None:
+@pytest.mark.parametrize(("name", "tile"), [("IMG_0001.HEIC", 64), ("a.jpg", None)])
+def test_tiles_are_assembled(tmp_path: Path, name: str, tile: int | None) -> None:
     found = read(tmp_path / name, heic(slopes(), tile))
     assert found.shape == (H, W, 3)
     assert np.abs(found - slopes()).mean() < 3
 
 
-@pytest.mark.parametrize("tile", [None, 64])
 @pytest.mark.parametrize(
-    ("turns", "expected"),
+    ("turns", "tile", "expected"),
     [
         # 90° anticlockwise: right becomes top
-        ([("irot", 1)], lambda a: a.transpose(1, 0, 2)[::-1]),
-        ([("irot", 2)], lambda a: a[::-1, ::-1]),
-        ([("irot", 3)], lambda a: a[::-1].transpose(1, 0, 2)),
-        ([("imir", 0)], lambda a: a[::-1]),
-        ([("imir", 1)], lambda a: a[:, ::-1]),
-        ([("imir", 1), ("irot", 1)], lambda a: a[:, ::-1].transpose(1, 0, 2)[::-1]),
+        ([("irot", 1)], 64, lambda a: a.transpose(1, 0, 2)[::-1]),
+        ([("irot", 3)], None, lambda a: a[::-1].transpose(1, 0, 2)),
+        ([("imir", 0)], None, lambda a: a[::-1]),
+        ([("imir", 1), ("irot", 1)], None, lambda a: a[:, ::-1].transpose(1, 0, 2)[::-1]),
     ],
-    ids=["left turn", "half turn", "right turn", "upside down", "mirrored", "mirrored, left turn"],
+    ids=["left turn", "right turn", "upside down", "mirrored, left turn"],
 )
 def test_rotations_and_mirroring_are_applied(
-    tmp_path: Path, turns: list, expected, tile: int | None
+    tmp_path: Path, turns: list, tile: int | None, expected
 ) -> None:
     found = read(tmp_path / "a.heic", heic(slopes(), tile, turns))
     wanted = expected(slopes().astype(int))
@@ -121,7 +117,7 @@ def test_damaged_files_raise_only_video_errors(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     boxes = whole.index(b"mdat")
     refused = 0
-    for _ in range(150):
+    for _ in range(50):
         broken = bytearray(whole)
         for at in rng.integers(24, boxes, 3):
             broken[at] = rng.integers(256)
@@ -130,7 +126,7 @@ def test_damaged_files_raise_only_video_errors(tmp_path: Path) -> None:
         refused += picture is None
         if picture is not None:  # harmless damage, or another turn
             assert picture.rgb.shape in {(48, 64, 3), (64, 48, 3)}
-    assert 0 < refused < 150
+    assert 0 < refused < 50
 
 
 def patched(data: bytes, name: bytes, content: bytes) -> bytes:
