@@ -5,20 +5,12 @@ show. A process of its own decodes it, and writes it scaled down.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import VideoError
-from .process import (
-    START_SCRIPT,
-    WARM_UP_FIELDS,
-    Fields,
-    WorkerFailedError,
-    WorkerProcess,
-    is_number,
-    is_side,
-)
+from .process import WARM_UP_FIELDS, WorkerFailedError, WorkerProcess, is_number, is_side
 from .request import PictureRequest
 
 LONGER_SIDE = 1280  # pixels, of what is written
@@ -72,34 +64,19 @@ def write_picture(request: PictureRequest, job_folder: Path, send: Callable[...,
     )
 
 
-_FIELDS: Fields = {
-    "progress": WARM_UP_FIELDS["progress"],
-    "result": {
-        "shown_width": is_side,
-        "shown_height": is_side,
-        "width": is_number,
-        "height": is_number,
-        "time_ms": is_number,
-    },
-}
-
-
 class PictureProcess(WorkerProcess):
     """The process for one frame. Call ``answer`` regularly; ``close`` ends it at once."""
 
-    def __init__(
-        self,
-        request: PictureRequest,
-        job_folder: Path,
-        python: Sequence[str],
-        script: Path = START_SCRIPT,
-    ) -> None:
-        """Start the process; see `WorkerProcess`.
-
-        :raises SetupError: it cannot be started.
-        """
-        super().__init__(request, job_folder, None, python, script)
-        self._fields = _FIELDS
+    fields = {
+        "progress": WARM_UP_FIELDS["progress"],
+        "result": {
+            "shown_width": is_side,
+            "shown_height": is_side,
+            "width": is_number,
+            "height": is_number,
+            "time_ms": is_number,
+        },
+    }
 
     def answer(self) -> FootagePicture | None:
         """Return the frame; None as long as it is not there.

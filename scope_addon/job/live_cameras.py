@@ -24,7 +24,7 @@ from typing import Any
 from ..errors import UsageError, VideoError
 from ..live.system_cameras import camera_names, camera_with_modes, described
 from ..temporary import temporary_folder
-from .process import START_SCRIPT, WARM_UP_FIELDS, Fields, WorkerFailedError, WorkerProcess
+from .process import START_SCRIPT, WARM_UP_FIELDS, WorkerFailedError, WorkerProcess
 from .request import FormatsRequest
 
 NAMES = Path("/sys/class/video4linux")
@@ -205,14 +205,13 @@ def _are_formats(value: object) -> bool:
     )
 
 
-_FIELDS: Fields = {
-    "progress": WARM_UP_FIELDS["progress"],
-    "result": {"name": _is_shown, "formats": _are_formats},
-}
-
-
 class FormatsProcess(WorkerProcess):
     """The question to one camera. Call ``answer`` regularly; ``close`` ends the process at once."""
+
+    fields = {
+        "progress": WARM_UP_FIELDS["progress"],
+        "result": {"name": _is_shown, "formats": _are_formats},
+    }
 
     def __init__(
         self, source: str, job_folder: Path, python: Sequence[str], script: Path = START_SCRIPT
@@ -225,7 +224,6 @@ class FormatsProcess(WorkerProcess):
         self.source = source
         self._began_s = time.monotonic()
         super().__init__(FormatsRequest(source), job_folder, None, python, script)
-        self._fields = _FIELDS
 
     def answer(self) -> Camera | None:
         """Return the camera with its formats; None as long as there is no answer.

@@ -18,7 +18,6 @@ from .process import (
     CAPTURE_FIELDS,
     LONGEST_LINE,
     START_SCRIPT,
-    Fields,
     WorkerProcess,
     is_number,
     is_text,
@@ -37,20 +36,6 @@ def _is_measure(value: object) -> bool:
     return type(value) in (int, float) and 0 <= value < 1e12  # type: ignore[operator]
 
 
-_FIELDS: Fields = {
-    "progress": CAPTURE_FIELDS["progress"],
-    "status": {
-        "presence": lambda value: value in PRESENCES,
-        "rate": _is_measure,
-        "latency_ms": _is_measure,
-        "recorded_s": _is_measure,
-    },
-    "notice": {"text": is_text},
-    "ended": {},
-    "result": CAPTURE_FIELDS["result"],
-}
-
-
 @dataclass(frozen=True)
 class ShownPose:
     """A pose as it came from the capture."""
@@ -67,6 +52,19 @@ class ShownPose:
 class LiveProcess(WorkerProcess):
     """A live capture. Call ``poll`` and ``newest_poses`` regularly; ``close`` ends it at once."""
 
+    fields = {
+        "progress": CAPTURE_FIELDS["progress"],
+        "status": {
+            "presence": lambda value: value in PRESENCES,
+            "rate": _is_measure,
+            "latency_ms": _is_measure,
+            "recorded_s": _is_measure,
+        },
+        "notice": {"text": is_text},
+        "ended": {},
+        "result": CAPTURE_FIELDS["result"],
+    }
+
     def __init__(
         self,
         request: LiveRequest,
@@ -81,7 +79,6 @@ class LiveProcess(WorkerProcess):
         """
         self._newest: dict[int, bytes] = {}  # by person
         super().__init__(request, job_folder, kernels, python, script)
-        self._fields = _FIELDS
 
     def record(self) -> None:
         """Have the poses kept from now on."""

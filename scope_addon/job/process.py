@@ -15,7 +15,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ...solver.errors import ScopeError
 from ..errors import SetupError
@@ -171,11 +171,13 @@ class WorkerProcess:
     in any state.
     """
 
+    fields: ClassVar[Fields] = CAPTURE_FIELDS  # of its messages; of a warm-up, those of one
+
     def __init__(
         self,
         request: JobRequest | LiveRequest | FormatsRequest | PictureRequest | None,
         job_folder: Path,
-        kernels: Path | None,
+        kernels: Path | None = None,
         python: Sequence[str] = (sys.executable,),
         script: Path = START_SCRIPT,
     ) -> None:
@@ -192,7 +194,7 @@ class WorkerProcess:
         """
         self.job_folder = job_folder
         self.finished = False
-        self._fields: Fields = CAPTURE_FIELDS if request else WARM_UP_FIELDS
+        self._fields = self.fields if request else WARM_UP_FIELDS
         command, environment = worker_command(python, ROOT, job_folder, kernels, script)
         try:
             with (job_folder / LOG).open("wb") as log:

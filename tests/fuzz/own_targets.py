@@ -63,7 +63,7 @@ def read_live_reply(path: Path) -> None:
     from scope.scope_addon.job.process import parse_message
 
     for line in path.read_bytes().splitlines(keepends=True):
-        parse_message(line, live_process._FIELDS)
+        parse_message(line, live_process.LiveProcess.fields)
         pose = live_process.parse_pose(line, JOINTS, COEFFICIENTS)
         assert pose is None or (np.isfinite(pose.rotations).all() and np.isfinite(pose.betas).all())
 
@@ -92,12 +92,6 @@ def run_network(path: Path) -> None:
             np.full((opened.height, opened.width, 3), 255, np.uint8),
             graph.Normalization(std=(0.01,)),
         )
-
-
-def read_expression_map(path: Path) -> None:
-    from scope.scope_addon.retarget.expression_map import load_expression_map
-
-    load_expression_map(path)
 
 
 def read_description(path: Path) -> None:
@@ -255,16 +249,11 @@ def answers(_: Path) -> list[bytes]:
 
 def expression_maps(folder: Path) -> list[bytes]:
     from scope.scope_addon.retarget.expression_map import guess_expression_map, save_expression_map
+    from scope.scope_addon.retarget.face_controls import FOLDER
 
     path = folder / "seed.json"
     save_expression_map(guess_expression_map(EXPRESSIONS), path)
-    return [path.read_bytes(), (built_in_maps() / "rigify.json").read_bytes()]
-
-
-def built_in_maps() -> Path:
-    from scope.scope_addon.retarget.face_controls import FOLDER
-
-    return FOLDER
+    return [path.read_bytes(), (FOLDER / "rigify.json").read_bytes()]
 
 
 def descriptions(_: Path) -> list[bytes]:

@@ -4,7 +4,6 @@ it.
 """
 
 import json
-import sys
 from pathlib import Path
 
 import cv2
@@ -29,7 +28,7 @@ def picture_of(tmp_path):
         folder = tmp_path / "job"
         folder.mkdir()
         request = PictureRequest(str(footage), time_s=time_s, rotate=rotate, mirror=mirror)
-        process = PictureProcess(request, folder, [sys.executable])
+        process = PictureProcess(request, folder)
         answers = []
         try:
             wait_for(lambda: answers.append(process.answer()) or answers[-1] is not None)
@@ -52,11 +51,8 @@ def test_a_frame_is_turned_and_mirrored_as_for_a_capture(picture_of, tmp_path):
     image[:10, :10] = 0, 0, 255  # red at the top left
     path = tmp_path / "picture.png"
     cv2.imwrite(str(path), image)
-    plain = picture_of(path)
-    assert (plain.size, plain.shown_size, plain.time_s) == ((40, 30), (40, 30), 0.0)
-    assert rows_of(plain)[2, 2].tolist() == [255, 0, 0]
     turned = picture_of(path, rotate="90")
-    assert turned.size == (30, 40)
+    assert (turned.size, turned.shown_size, turned.time_s) == ((30, 40), (30, 40), 0.0)
     assert rows_of(turned)[2, 27].tolist() == [255, 0, 0]
     assert rows_of(picture_of(path, rotate="90", mirror=True))[2, 2].tolist() == [255, 0, 0]
 
