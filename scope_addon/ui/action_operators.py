@@ -17,7 +17,7 @@ from ..scene.stored_values import start_frame, stored_text
 from . import comparison
 from .captured_person import captured_armature, motion_of, stored_person
 from .captures import show_again, shown_capture
-from .reporting import ReportingOperator, refuse, rpt_, tip_
+from .reporting import ReportingOperator, refuse, rpt_
 
 
 def animated_armature(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -39,20 +39,18 @@ class ActionOperator(ReportingOperator):
         """
         armature = animated_armature(context)
         if armature is None:
-            return refuse(cls, tip_("Select the armature of a capture first"))
+            return refuse(cls, "Select the armature of a capture first")
         if armature.library is not None:
             file = armature.library.filepath
             return refuse(
                 cls,
-                tip_(
-                    "'{name}' is linked from {file}: make it local", name=armature.name, file=file
-                ),
+                "'{name}' is linked from {file}: make it local",
+                name=armature.name,
+                file=file,
             )
         if armature.animation_data is None or armature.animation_data.action is None:
             name = armature.name
-            return refuse(
-                cls, tip_("'{name}' has no action; choose one in the Action Editor", name=name)
-            )
+            return refuse(cls, "'{name}' has no action; choose one in the Action Editor", name=name)
         return True
 
 
@@ -100,10 +98,10 @@ class CaptureOperator(ReportingOperator):
         """Require a capture that is stored in this file."""
         collection = context.scene.scope.result.collection
         if collection is None:
-            return refuse(cls, tip_("The scene contains no capture yet"))
+            return refuse(cls, "The scene contains no capture yet")
         if collection.library is not None:
             file = collection.library.filepath
-            return refuse(cls, tip_("The capture is linked from {file}: make it local", file=file))
+            return refuse(cls, "The capture is linked from {file}: make it local", file=file)
         return True
 
 

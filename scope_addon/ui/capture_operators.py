@@ -22,7 +22,7 @@ from .export_operators import unused_path, write_at_own_rate, write_captures
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
 from .job_operator import JobOperator, clear_status_bar
 from .live_properties import state as live_state
-from .reporting import iface_, refuse, restore_libraries, rpt_, sentence, tip_
+from .reporting import iface_, refuse, restore_libraries, rpt_, sentence
 from .sidebar import redraw_sidebars, redraw_sidebars_twice, show_tab
 from .view_operators import hide_startup_cube, show_new_capture
 
@@ -59,7 +59,7 @@ def nothing_runs(cls: type[bpy.types.Operator]) -> bool:
     """
     if state.job is None and live_state.job is None:
         return True
-    return refuse(cls, tip_("A capture is running; wait for it or cancel it"))
+    return refuse(cls, "A capture is running; wait for it or cancel it")
 
 
 def end_capture() -> None:
@@ -121,9 +121,9 @@ class SCOPE_OT_add_view(SeveralFootageBrowser, bpy.types.Operator):
         """Require footage, and that there may be another view."""
         settings = context.scene.scope
         if not settings.footage:
-            return refuse(cls, tip_("Choose a video or image first"))
+            return refuse(cls, "Choose a video or image first")
         if len(settings.views) >= MOST_FURTHER_VIEWS:
-            return refuse(cls, tip_("There are at most eight cameras"))
+            return refuse(cls, "There are at most eight cameras")
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -194,7 +194,7 @@ class CapturingOperator(JobOperator):
         if not nothing_runs(cls):
             return False
         if not context.scene.scope.footage:
-            return refuse(cls, tip_("Choose a video or image first"))
+            return refuse(cls, "Choose a video or image first")
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -325,11 +325,11 @@ class SCOPE_OT_capture_queue(CapturingOperator):
             return False
         settings = context.scene.scope
         if settings.views:
-            return refuse(cls, tip_("Remove the other cameras' videos first"))
+            return refuse(cls, "Remove the other cameras' videos first")
         if all(clip.status == DONE for clip in settings.queue):
-            return refuse(cls, tip_("All clips of the list have been captured; choose others"))
+            return refuse(cls, "All clips of the list have been captured; choose others")
         if settings.queue_format != NO_FILES and not os.path.isdir(_folder_of_files(settings)):
-            return refuse(cls, tip_("Choose a folder for the files"))
+            return refuse(cls, "Choose a folder for the files")
         return True
 
     def start(self, context: bpy.types.Context) -> bool:

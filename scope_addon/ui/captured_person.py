@@ -13,7 +13,7 @@ from bpy.props import IntProperty
 from ..errors import UsageError
 from ..scene.datablocks import holds, is_person
 from ..scene.stored_values import source_of, stored_numbers, stored_text
-from .reporting import ReportingOperator, refuse, tip_
+from .reporting import ReportingOperator, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -190,18 +190,16 @@ def may_edit(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """
     armature = captured_armature(context)
     if armature is None:
-        return refuse(cls, tip_("Select the armature of a capture first"))
+        return refuse(cls, "Select the armature of a capture first")
     library = library_of(armature)
     if library is not None:
         return refuse(
             cls,
-            tip_(
-                "'{name}' or its motion is linked from {file}, so changes would be lost: make both "
-                "local (Object > "
-                "Relations > Make Local > All) or edit them in that file",
-                name=armature.name,
-                file=library.filepath,
-            ),
+            "'{name}' or its motion is linked from {file}, so changes would be lost: make both "
+            "local (Object > "
+            "Relations > Make Local > All) or edit them in that file",
+            name=armature.name,
+            file=library.filepath,
         )
     return True
 

@@ -31,7 +31,7 @@ from .captured_person import (
     set_motion_of,
 )
 from .preferences import keep_machine_code
-from .reporting import iface_, refuse, rpt_, tip_
+from .reporting import iface_, refuse, rpt_
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -540,7 +540,7 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
             return False
         armature = captured_armature(context)
         if armature is None or not listed_corrections(armature):
-            return refuse(cls, tip_("The selected person has no corrections"))
+            return refuse(cls, "The selected person has no corrections")
         return True
 
     def edit(

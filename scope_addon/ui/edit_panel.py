@@ -40,7 +40,7 @@ from .correction_operators import (
     floor_warning,
 )
 from .preferences import keep_machine_code
-from .reporting import refuse, rpt_, tip_
+from .reporting import refuse, rpt_
 from .translations import CONTEXT
 
 if TYPE_CHECKING:
@@ -458,10 +458,8 @@ class SCOPE_OT_refloor(CorrectionOperator):
         if armature is not None and armature.get("scope_uneven_ground", False):
             return refuse(
                 cls,
-                tip_(
-                    "This motion was captured on uneven ground, where feet rest at any height: "
-                    "use Floor Here"
-                ),
+                "This motion was captured on uneven ground, where feet rest at any height: "
+                "use Floor Here",
             )
         return True
 

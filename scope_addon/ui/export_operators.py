@@ -153,7 +153,7 @@ class SCOPE_OT_export(SavingOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture in the scene."""
         if not captures_of(context.scene):
-            return refuse(cls, tip_("The scene contains no capture yet"))
+            return refuse(cls, "The scene contains no capture yet")
         return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -19,7 +19,7 @@ from .captured_person import (
     retargeted_from,
 )
 from .captures import people_of, shown_capture
-from .reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning, tip_
+from .reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning
 
 if TYPE_CHECKING:
     from ..motion import Motion
@@ -90,7 +90,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         """
         scene = context.scene
         if scene.scope.result.footage_rate <= 0:
-            return refuse(cls, tip_("The scene contains no captured video or imported motion"))
+            return refuse(cls, "The scene contains no captured video or imported motion")
         linked = next(
             (block for block in [scene, *captured_people(context)] if _library(block)), None
         )
@@ -99,7 +99,7 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
             name = linked.name
             file = library.filepath
             return refuse(
-                cls, tip_("'{name}' is linked from {file}: make it local", name=name, file=file)
+                cls, "'{name}' is linked from {file}: make it local", name=name, file=file
             )
         return True
 

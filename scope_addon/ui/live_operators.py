@@ -20,7 +20,7 @@ from .capture_panel import draw_text
 from .job_operator import JobOperator
 from .live_properties import state, stop_job
 from .preferences import cache, python_command
-from .reporting import iface_, refuse, restore_libraries, sentence, tip_, warning_text
+from .reporting import iface_, refuse, restore_libraries, sentence, warning_text
 from .sidebar import redraw_sidebars, viewports
 from .view_operators import frame_selected, hide_startup_cube
 
@@ -180,7 +180,7 @@ class SCOPE_OT_record_live(_RunningOperator):
             return False
         assert state.job is not None
         if not state.job.has_body:
-            return refuse(cls, tip_("Wait until somebody is seen"))
+            return refuse(cls, "Wait until somebody is seen")
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -266,7 +266,7 @@ class SCOPE_OT_camera_formats(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that no camera is being asked or used."""
         if state.job is not None or state.asking is not None:
-            return refuse(cls, tip_("A camera is in use; wait for it or stop it"))
+            return refuse(cls, "A camera is in use; wait for it or stop it")
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:

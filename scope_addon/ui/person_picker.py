@@ -14,7 +14,7 @@ from . import comparison
 from .capture_operators import nothing_runs
 from .drawing import Pointer, redraw_viewport, viewport_of
 from .preferences import cache, python_command
-from .reporting import iface_, refuse, sentence, tip_
+from .reporting import iface_, refuse, sentence
 from .sidebar import redraw_sidebars
 
 if TYPE_CHECKING:
@@ -74,11 +74,11 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
             return False
         settings = context.scene.scope
         if not settings.footage:
-            return refuse(cls, tip_("Choose a video or image first"))
+            return refuse(cls, "Choose a video or image first")
         if settings.views:
-            return refuse(cls, tip_("Remove the other cameras' videos first"))
+            return refuse(cls, "Remove the other cameras' videos first")
         if settings.queue:
-            return refuse(cls, tip_("In each clip of the list, somebody else is at that place"))
+            return refuse(cls, "In each clip of the list, somebody else is at that place")
         return True
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -149,9 +149,7 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
             path, time_s=time_s, rotate=settings.rotate, mirror=settings.mirror
         )
         try:
-            self._process = PictureProcess(
-                request, cache().new_job_folder(), python=python_command()
-            )
+            self._process = PictureProcess(request, cache().new_job_folder(), python_command())
         except (ScopeError, OSError) as error:
             self.report({"ERROR"}, sentence(error))
             return False

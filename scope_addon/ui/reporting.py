@@ -49,9 +49,11 @@ def tip_(text: str, **values: object) -> str:
     return translated.format(**values) if values else translated
 
 
-def refuse(operator: type[bpy.types.Operator], reason: str) -> bool:
-    """Say why an operator cannot be used; return False, as its ``poll`` then does."""
-    operator.poll_message_set(reason)
+def refuse(operator: type[bpy.types.Operator], reason: str, **values: object) -> bool:
+    """Say in the user's language why an operator cannot be used, with values for placeholders;
+    return False, as its ``poll`` then does.
+    """
+    operator.poll_message_set(tip_(reason, **values))
     return False
 
 

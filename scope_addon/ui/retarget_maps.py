@@ -16,7 +16,7 @@ from bpy.props import EnumProperty, StringProperty
 from ...solver.errors import ScopeError
 from ..scene.datablocks import is_in_layer, is_person
 from .file_field import SavingOperator, output_file
-from .reporting import ReportingOperator, refuse, rpt_, tip_
+from .reporting import ReportingOperator, refuse, rpt_
 
 if TYPE_CHECKING:
     from ..retarget.bone_map import BoneMap
@@ -35,11 +35,9 @@ def is_in_view_layer(
         return True
     return refuse(
         cls,
-        tip_(
-            "'{rig}' is not in the scene's view layer: add it to the scene, or enable its "
-            "collection in the Outliner",
-            rig=chosen.name,
-        ),
+        "'{rig}' is not in the scene's view layer: add it to the scene, or enable its "
+        "collection in the Outliner",
+        rig=chosen.name,
     )
 
 

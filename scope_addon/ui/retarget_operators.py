@@ -13,7 +13,7 @@ from bpy.props import StringProperty
 from ..errors import UsageError
 from ..scene.datablocks import enter_object_mode
 from .captured_person import PERSON, betas_of, body_of, captured_armature, captured_people
-from .reporting import ReportingOperator, refuse, rpt_, tip_
+from .reporting import ReportingOperator, refuse, rpt_
 from .retarget_maps import (
     EditListOperator,
     LoadMapOperator,
@@ -45,7 +45,7 @@ class _RigOperator(ReportingOperator):
         """Require a rig in the view layer."""
         rig = context.scene.scope_retarget.rig
         if rig is None:
-            return refuse(cls, tip_("Choose your rig first"))
+            return refuse(cls, "Choose your rig first")
         return is_in_view_layer(cls, context, rig)
 
 
@@ -91,23 +91,19 @@ class SCOPE_OT_retarget(_RigOperator):
         if rig.library is not None:
             return refuse(
                 cls,
-                tip_(
-                    "'{rig}' is linked from {file}, so its motion would not be saved in this file: "
-                    "make an override of "
-                    "it (Object > Library Override > Make)",
-                    rig=rig.name,
-                    file=rig.library.filepath,
-                ),
+                "'{rig}' is linked from {file}, so its motion would not be saved in this file: "
+                "make an override of "
+                "it (Object > Library Override > Make)",
+                rig=rig.name,
+                file=rig.library.filepath,
             )
         if captured_armature(context) is None:
             return refuse(
                 cls,
-                tip_(
-                    "Several people are captured: select the armature of the one whose motion to "
-                    "retarget"
-                )
+                "Several people are captured: select the armature of the one whose motion to "
+                "retarget"
                 if captured_people(context)
-                else tip_("The scene contains no capture yet"),
+                else "The scene contains no capture yet",
             )
         return True
 
@@ -244,9 +240,7 @@ class _FaceOperator(ReportingOperator):
         """Require a mesh with shape keys, or a rig whose face is known, in the view layer."""
         face = context.scene.scope_retarget.face
         if not has_targets(face):
-            return refuse(
-                cls, tip_("Choose a mesh with shape keys, or a rig with face controls, first")
-            )
+            return refuse(cls, "Choose a mesh with shape keys, or a rig with face controls, first")
         return is_in_view_layer(cls, context, face)
 
 
@@ -305,15 +299,13 @@ class SCOPE_OT_retarget_face(_FaceOperator):
         if library is not None:
             return refuse(
                 cls,
-                tip_(
-                    "'{mesh}' is linked from {file}, so its keyframes would not be saved in this "
-                    "file: make it local",
-                    mesh=face.name,
-                    file=library.filepath,
-                ),
+                "'{mesh}' is linked from {file}, so its keyframes would not be saved in this "
+                "file: make it local",
+                mesh=face.name,
+                file=library.filepath,
             )
         if captured_armature(context) is None:
-            return refuse(cls, tip_("Select the captured person whose face to retarget"))
+            return refuse(cls, "Select the captured person whose face to retarget")
         return True
 
     def work(self, context: bpy.types.Context) -> str:

@@ -17,7 +17,7 @@ from .captured_person import captured_armature, may_edit, motion_of
 from .comparison import camera_of
 from .correction_operators import CorrectionOperator, change_world, shown_frame
 from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
-from .reporting import iface_, refuse, rpt_, sentence, tip_
+from .reporting import iface_, refuse, rpt_, sentence
 
 if TYPE_CHECKING:
     from ...solver.body import Body
@@ -137,10 +137,8 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
         ):
             return refuse(
                 cls,
-                tip_(
-                    "Press Compare with Footage or switch to an orthographic side view; the line "
-                    "is drawn there"
-                ),
+                "Press Compare with Footage or switch to an orthographic side view; the line "
+                "is drawn there",
             )
         return may_edit(cls, context)
 

@@ -18,7 +18,7 @@ from . import comparison
 from .captured_person import captured_people, motion_of
 from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
-from .reporting import ReportingOperator, refuse, rpt_, tip_
+from .reporting import ReportingOperator, refuse, rpt_
 from .sidebar import redraw_sidebars_twice, viewport_of
 
 if TYPE_CHECKING:
@@ -92,14 +92,11 @@ class SCOPE_OT_look_through(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require that the last capture has a camera and is not hidden."""
         if is_side_view(context):
-            return refuse(cls, tip_("Use this in the viewport with the footage"))
+            return refuse(cls, "Use this in the viewport with the footage")
         if camera_of(context.scene) is None:
             return refuse(
                 cls,
-                tip_(
-                    "The scene has no camera of a capture: capture with the option Camera with "
-                    "Footage"
-                ),
+                "The scene has no camera of a capture: capture with the option Camera with Footage",
             )
         collection = context.scene.scope.result.collection
         if not is_looking_through(context) and not _is_shown(
@@ -107,7 +104,7 @@ class SCOPE_OT_look_through(bpy.types.Operator):
         ):
             name = collection.name
             return refuse(
-                cls, tip_("The collection '{name}' is hidden; show it in the Outliner", name=name)
+                cls, "The collection '{name}' is hidden; show it in the Outliner", name=name
             )
         return True
 
@@ -192,7 +189,7 @@ class SCOPE_OT_side_view(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a viewport that compares a capture with its footage."""
         if not is_looking_through(context):
-            return refuse(cls, tip_("Compare with Footage first"))
+            return refuse(cls, "Compare with Footage first")
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -231,7 +228,7 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """Require a capture."""
         if not context.scene.scope.result.footage:
-            return refuse(cls, tip_("The capture does not say where its footage is"))
+            return refuse(cls, "The capture does not say where its footage is")
         return True
 
     def work(self, context: bpy.types.Context) -> str:

@@ -70,7 +70,8 @@ _NOTICES = {
     for text in (*SENTENCES.values(), *PHRASES.values(), *PARTS)
     if any(map(str.isalpha, re.sub(r"\{[^}]*\}", "", text)))
 }
-_LOOKUPS = {"iface_", "rpt_", "tip_", "translate"}
+# Functions that look a text up, and the place of the text among their arguments.
+_LOOKUPS = {"iface_": 0, "rpt_": 0, "tip_": 0, "translate": 0, "refuse": 1}
 _LAYOUT_TEXTS = {"text", "placeholder", "title", "message", "confirm_text"}
 
 Message = tuple[str, str]  # context and text
@@ -178,7 +179,8 @@ def _of_source(tree: ast.Module) -> Iterator[Message]:
                 else getattr(call.func, "id", "")
             )
             if name in _LOOKUPS and call.args:
-                yield from ((CONTEXT, text) for text in _constants(call.args[0], tree))
+                looked_up = call.args[_LOOKUPS[name]]
+                yield from ((CONTEXT, text) for text in _constants(looked_up, tree))
             elif name == "report" and len(call.args) == 2:
                 yield from ((DEFAULT, text) for text in _constants(call.args[1], scope_node))
             for keyword in call.keywords:
