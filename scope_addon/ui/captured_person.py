@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import IntProperty
 
+from ...solver.errors import ScopeError
 from ..errors import UsageError
 from ..scene.datablocks import holds, is_person
 from ..scene.stored_values import source_of, stored_numbers, stored_text
@@ -153,6 +154,14 @@ def motion_of(armature: bpy.types.Object) -> Motion:
     from ..scene.packed_motion import stored_motion
 
     return stored_motion(armature)
+
+
+def motion_if_stored(armature: bpy.types.Object) -> Motion | None:
+    """Return the captured motion as `motion_of` does; None if it is lost or damaged."""
+    try:
+        return motion_of(armature)
+    except ScopeError:
+        return None
 
 
 def set_motion_of(armature: bpy.types.Object, motion: Motion, keys: bytes = b"") -> None:

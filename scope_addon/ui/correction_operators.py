@@ -5,7 +5,7 @@ in the list for the panel. The tool with the mouse is in ``pin_tool.py``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import (
@@ -17,7 +17,6 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...solver.errors import ScopeError
 from ..errors import UsageError
 from ..scene.character.correction_list import listed_corrections, store_corrections
 from ..scene.datablocks import captures_of, holds, is_person
@@ -27,6 +26,7 @@ from .captured_person import (
     SpanOperator,
     body_of,
     captured_armature,
+    motion_if_stored,
     motion_of,
     set_motion_of,
 )
@@ -55,6 +55,7 @@ def change_corrections(
     armature: bpy.types.Object,
     body: Body,
     rate: float,
+    before: Motion,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
     added: Correction | None = None,
     rise: float = 0.0,
@@ -62,19 +63,19 @@ def change_corrections(
     """Change the corrections of a captured person: of the motion, the keys and the list.
 
     :param rate: for which the keys were written, frames per second.
+    :param before: the person's motion, which takes long to read.
     :param change: returns the new corrections for the present ones.
     :param added: the one that this adds; a pin or an edit holds even if edited keys differ from the
         motion.
     :param rise: metres by which all keys are raised, until the floor is no longer corrected.
     :return: the corrected motion.
-    :raises UsageError: the motion is no longer there, or keys are missing.
+    :raises UsageError: keys are missing.
     """
     from ..edit.corrected_motion import corrections_of, with_corrections
     from ..scene.character.corrected_keys import pinned_places, rewrite_changed_keys
     from ..scene.packed_motion import stored_keys
 
     keep_machine_code()
-    before = motion_of(armature)
     after = with_corrections(before, body, change(corrections_of(before)))
     keys = rewrite_changed_keys(
         armature, body, rate, before, after, stored_keys(armature), added, rise
@@ -85,18 +86,32 @@ def change_corrections(
     return after
 
 
+def add_correction(
+    armature: bpy.types.Object, body: Body, rate: float, before: Motion, new: Correction
+) -> Motion:
+    """Add a correction; parameters and result are those of `change_corrections`."""
+    from ..edit.corrections import added
+
+    return change_corrections(
+        armature, body, rate, before, lambda present: added(present, new), new
+    )
+
+
 def change_world(
     scene: bpy.types.Scene,
     armature: bpy.types.Object,
+    motion: Motion,
     change: Callable[[tuple[Correction, ...]], tuple[Correction, ...]],
     rise: float = 0.0,
-) -> None:
+) -> Motion:
     """Change the upright line or floor of everybody that the same camera has captured, and move the
     camera with them. People of one clip whose files were imported are in several captures.
 
+    :param motion: of this person.
     :param change: returns the new corrections for the present ones, and changes the same of
         everybody.
     :param rise: metres by which the keys of this person are raised.
+    :return: the corrected motion of this person.
     :raises UsageError: the root motion is on an object, or keys are missing.
     """
     import numpy as np
@@ -109,7 +124,6 @@ def change_world(
     from ..scene.timing import keyed_rate
     from ..scene.transaction import all_or_nothing
 
-    motion = motion_of(armature)
     captures = [capture for capture in captures_of(scene) if holds(capture, armature)]
     near = captures or armature.users_collection
     # each once, though it may be in several collections
@@ -125,27 +139,26 @@ def change_world(
         if people and armature not in people:
             others |= dict.fromkeys(people)
             cameras |= {c: people[0] for c in cameras_of_clip(capture) if c not in cameras}
-    together = [armature, *others]
     was = world_of(corrections_of(motion))
     now = world_of(change(corrections_of(motion)))
     turn = (np.eye(4) if now is None else now) @ np.linalg.inv(np.eye(4) if was is None else was)
-    with all_or_nothing(scene, *together[1:], *cameras):
-        for person in together:
+    with all_or_nothing(scene, *others, *cameras):
+        rate = keyed_rate(armature, scene)
+        after = change_corrections(armature, body_of(armature), rate, motion, change, rise=rise)
+        for person in others:
             rate = keyed_rate(person, scene)
-            change_corrections(
-                person, body_of(person), rate, change, rise=rise if person == armature else 0.0
-            )
+            change_corrections(person, body_of(person), rate, motion_of(person), change)
         for camera, person in cameras.items():
             turn_camera(camera, person, turn, to_captured=now is None)
+    return after
 
 
 def _is_in_footage(person: bpy.types.Object, motion: Motion) -> bool:
     """Return whether a person was captured in the same footage as a motion, and is in its world."""
     from ..scene.camera import same_camera
 
-    try:
-        own = motion_of(person)
-    except ScopeError:
+    own = motion_if_stored(person)
+    if own is None:
         return False  # They can be corrected neither alone nor with others.
     return bool(motion.source) and own.source == motion.source and same_camera(own, motion)
 
@@ -174,48 +187,6 @@ def shown_frame(scene: bpy.types.Scene, armature: bpy.types.Object, motion: Moti
     )
 
 
-def pin_at(
-    context: bpy.types.Context,
-    armature: bpy.types.Object,
-    motion: Motion,
-    joint: str,
-    location: Any,
-    *,
-    in_image: bool,
-    reach: float,
-) -> Pin:
-    """Return a pin at the scene's current frame.
-
-    :param location: (3,) the joint's position in the scene.
-    :param in_image: whether it was placed in the view of the capture's camera, which then has to
-        be where it was captured.
-    :param reach: seconds over which the correction fades out.
-    :raises UsageError: the current frame is outside of the motion.
-    """
-    import numpy as np
-
-    from ..edit.corrected_motion import corrections_of, shot_of
-    from ..edit.corrections import Pin, world_of
-    from ..scene.character.corrected_keys import captured_points
-
-    scene = context.scene
-    context.view_layer.update()
-    current = scene.frame_current + scene.frame_subframe
-    frame = shown_frame(scene, armature, motion)
-    points = [np.array(location, float)]
-    if in_image and scene.camera is not None:
-        points.append(np.array(scene.camera.matrix_world.translation))
-    at = captured_points(armature, current, np.array(points))
-    row = int(np.abs(motion.frames - frame).argmin())
-    centre = motion.world_from_camera[row, :3, 3]
-    if len(at) == 2 and np.linalg.norm(at[1] - centre) < 0.02:
-        u, v = shot_of(motion).project(frame, at[0])
-        return Pin(frame, joint, pixel=(float(u), float(v)), reach=reach)
-    world = world_of(corrections_of(motion))
-    x, y, z = at[0] if world is None else (np.linalg.inv(world) @ [*at[0], 1.0])[:3]
-    return Pin(frame, joint, position=(float(x), float(y), float(z)), reach=reach)
-
-
 _RESTS_M = 0.02  # from the floor, within which what shall rest there does
 _NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the current one
 
@@ -224,21 +195,13 @@ _NOW = -LAST_FRAME  # the first frame that Blender allows; stands for the curren
 last_pin_warnings: list[str] = []
 
 
-def _pin_warnings(armature: bpy.types.Object, body: Body, joint: str, frame: int) -> list[str]:
-    """Return what to warn of after a pin in a scene frame: that its joint cannot reach it, feet
-    under the floor.
-    """
-    return [*filter(None, (_unreached(armature, joint, frame), floor_warning(armature, body)))]
-
-
-def floor_warning(armature: bpy.types.Object, body: Body) -> str:
+def floor_warning(armature: bpy.types.Object, motion: Motion, body: Body) -> str:
     """Return the message about feet that corrections have put under the floor; empty if there are
     none.
     """
     from ..edit.corrected_motion import corrections_of, feet_under_floor
     from ..edit.corrections import Contact
 
-    motion = motion_of(armature)
     found = feet_under_floor(motion, body)
     if found is None:
         return ""
@@ -320,28 +283,50 @@ class SCOPE_OT_add_pin(EditOperator):
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
         """Add the pin and change the keys around it."""
-        from ..edit.corrections import added
         from ..scene.timing import current_frame_kept
 
         scene = context.scene
+        motion = motion_of(armature)
         with current_frame_kept(scene):
             if self.frame != _NOW:
                 scene.frame_set(self.frame)
-            pin = pin_at(
-                context,
-                armature,
-                motion_of(armature),
-                self.joint,
-                tuple(self.location),
-                in_image=self.in_image,
-                reach=self.reach,
-            )
-            change_corrections(armature, body, rate, lambda present: added(present, pin), pin)
-            here = scene.frame_current
-        last_pin_warnings[:] = _pin_warnings(armature, body, self.joint, here)
+            pin = self._pin(context, armature, motion)
+            motion = add_correction(armature, body, rate, motion, pin)
+            missed = _unreached(armature, self.joint, scene.frame_current)
+        warnings = (missed, floor_warning(armature, motion, body))
+        last_pin_warnings[:] = filter(None, warnings)
         for warning in last_pin_warnings:
             self.report({"WARNING"}, warning)
         return ""
+
+    def _pin(self, context: bpy.types.Context, armature: bpy.types.Object, motion: Motion) -> Pin:
+        """Return the pin at the scene's current frame. One in the image needs the capture's camera
+        where it was captured.
+
+        :raises UsageError: the current frame is outside of the motion.
+        """
+        import numpy as np
+
+        from ..edit.corrected_motion import corrections_of, shot_of
+        from ..edit.corrections import Pin, world_of
+        from ..scene.character.corrected_keys import captured_points
+
+        scene = context.scene
+        context.view_layer.update()
+        current = scene.frame_current + scene.frame_subframe
+        frame = shown_frame(scene, armature, motion)
+        points = [np.array(self.location, float)]
+        if self.in_image and scene.camera is not None:
+            points.append(np.array(scene.camera.matrix_world.translation))
+        at = captured_points(armature, current, np.array(points))
+        row = int(np.abs(motion.frames - frame).argmin())
+        centre = motion.world_from_camera[row, :3, 3]
+        if len(at) == 2 and np.linalg.norm(at[1] - centre) < 0.02:
+            u, v = shot_of(motion).project(frame, at[0])
+            return Pin(frame, self.joint, pixel=(float(u), float(v)), reach=self.reach)
+        world = world_of(corrections_of(motion))
+        x, y, z = at[0] if world is None else (np.linalg.inv(world) @ [*at[0], 1.0])[:3]
+        return Pin(frame, self.joint, position=(float(x), float(y), float(z)), reach=self.reach)
 
 
 class CorrectSpanOperator(CorrectionOperator, SpanOperator):
@@ -356,20 +341,25 @@ class CorrectSpanOperator(CorrectionOperator, SpanOperator):
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
         """Add the correction and change the keys."""
-        from ..edit.corrections import added
+        self.correct(armature, body, rate, motion_of(armature))
+        return ""
+
+    def correct(self, armature: bpy.types.Object, body: Body, rate: float, motion: Motion) -> None:
+        """Do what `edit` does, with the person's motion."""
         from ..scene.character.corrected_keys import source_frame, whole_span
 
-        motion = motion_of(armature)
         begins, ends = whole_span(armature, motion, rate)
         span = self.start, self.end
         if begins <= self.end and self.start <= ends:  # the part of it in which there is a motion
             span = max(self.start, begins), min(self.end, ends)
         first, last = (source_frame(armature, motion, frame, rate) for frame in span)
-        new = self.correction(first, last)
-        change_corrections(armature, body, rate, lambda present: added(present, new), new)
-        if warning := floor_warning(armature, body):
+        motion = add_correction(armature, body, rate, motion, self.correction(first, last))
+        for warning in filter(None, self.warnings(armature, motion, body)):
             self.report({"WARNING"}, warning)
-        return ""
+
+    def warnings(self, armature: bpy.types.Object, motion: Motion, body: Body) -> list[str]:
+        """Return what to warn of in a corrected motion; empty texts are left out."""
+        return [floor_warning(armature, motion, body)]
 
 
 class SCOPE_OT_foot_stands(CorrectSpanOperator):
@@ -420,21 +410,15 @@ class SCOPE_OT_this_rests(CorrectSpanOperator):
 
         return Contact(first, last, self.part)
 
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
-        """Add the correction, and say where the body cannot reach the floor."""
-        message = super().edit(context, armature, body, rate)
-        if warning := self._off_floor(armature, body):
-            self.report({"WARNING"}, warning)
-        return message
+    def warnings(self, armature: bpy.types.Object, motion: Motion, body: Body) -> list[str]:
+        """Say also where the body cannot reach the floor."""
+        return [*super().warnings(armature, motion, body), self._off_floor(motion, body)]
 
-    def _off_floor(self, armature: bpy.types.Object, body: Body) -> str:
+    def _off_floor(self, motion: Motion, body: Body) -> str:
         """Return the message about a part that stays away from the floor; empty if it rests."""
         from ..edit.corrected_motion import corrections_of, distance_from_floor
         from ..edit.corrections import Contact
 
-        motion = motion_of(armature)
         own = [c for c in corrections_of(motion) if isinstance(c, Contact) and c.part == self.part]
         distance = max((distance_from_floor(motion, body, each) for each in own), default=0.0)
         if distance < _RESTS_M:
@@ -553,21 +537,24 @@ class SCOPE_OT_remove_correction(CorrectionOperator):
         """
         from ..edit.corrections import without
 
-        count = len(listed_corrections(armature))
-        if self.index >= count:
+        kinds = [entry["kind"] for entry in listed_corrections(armature)]
+        if self.index >= len(kinds):
             raise UsageError(
-                f"there is no correction {self.index}; '{armature.name}' has {count}, "
+                f"there is no correction {self.index}; '{armature.name}' has {len(kinds)}, "
                 "counted from 0"
             )
-        kinds = [entry["kind"] for entry in listed_corrections(armature)]
+        motion = motion_of(armature)
         removed = set(kinds if self.index < 0 else kinds[self.index : self.index + 1])
         if shared := removed & {"UPRIGHT", "FLOOR"}:  # which others of the capture have too
-            change_world(context.scene, armature, lambda present: without_kinds(present, shared))
+            motion = change_world(
+                context.scene, armature, motion, lambda present: without_kinds(present, shared)
+            )
         if removed - shared:
             change_corrections(
                 armature,
                 body,
                 rate,
+                motion,
                 lambda present: without(present, self.index) if self.index >= 0 else (),
             )
         return ""

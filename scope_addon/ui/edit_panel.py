@@ -36,7 +36,7 @@ from .captures import people_of, shown_capture
 from .correction_operators import (
     CorrectionOperator,
     CorrectSpanOperator,
-    change_corrections,
+    add_correction,
     floor_warning,
 )
 from .preferences import keep_machine_code
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from ...solver.body import Body
     from ..edit.clip import Clip
     from ..edit.corrections import Correction
+    from ..motion import Motion
 
 
 class SCOPE_PT_edit(PersonTab, bpy.types.Panel):
@@ -404,9 +405,11 @@ class KeptSpanOperator(CorrectSpanOperator):
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
         """Edit the keys, and keep that with the motion."""
-        if _has_motion(armature):
-            return super().edit(context, armature, body, rate)
-        edit_clip(armature, body, rate, self.change(body, rate))
+        motion = _correctable_motion(armature)
+        if motion is None:
+            edit_clip(armature, body, rate, self.change(body, rate))
+        else:
+            self.correct(armature, body, rate, motion)
         return ""
 
 
@@ -467,11 +470,12 @@ class SCOPE_OT_refloor(CorrectionOperator):
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
         """Edit all keys, and keep that with the motion."""
-        from ..edit.corrections import FeetOnFloor, added
+        from ..edit.corrections import FeetOnFloor
         from ..scene.character.corrected_keys import floored
 
         feet = FeetOnFloor(self.level, self.lift)
-        if not _has_motion(armature):
+        motion = _correctable_motion(armature)
+        if motion is None:
             betas = betas_of(armature, body)
             edit_clip(
                 armature,
@@ -480,21 +484,22 @@ class SCOPE_OT_refloor(CorrectionOperator):
                 lambda clip, frames: floored(armature, body, betas, clip, frames, feet),
             )
             return ""
-        change_corrections(armature, body, rate, lambda present: added(present, feet), feet)
-        if warning := floor_warning(armature, body):
+        motion = add_correction(armature, body, rate, motion, feet)
+        if warning := floor_warning(armature, motion, body):
             self.report({"WARNING"}, warning)
         return ""
 
 
-def _has_motion(armature: bpy.types.Object) -> bool:
-    """Return whether the captured motion is there and can be read, with its corrections."""
+def _correctable_motion(armature: bpy.types.Object) -> Motion | None:
+    """Return the captured motion; None if it, or a correction of it, is lost or damaged."""
     from ..edit.corrected_motion import corrections_of
 
     try:
-        corrections_of(motion_of(armature))
+        motion = motion_of(armature)
+        corrections_of(motion)
     except ScopeError:
-        return False
-    return True
+        return None
+    return motion
 
 
 CLASSES = (

@@ -3,11 +3,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import bpy
 
-from ...solver.errors import ScopeError
 from ..notices import Notice, notice
 from ..scene.datablocks import holds
 from ..scene.stored_values import parse_spans, spans_text, start_frame, stored_rate
@@ -15,14 +12,11 @@ from .captured_person import (
     body_of,
     captured_people,
     library_of,
-    motion_of,
+    motion_if_stored,
     retargeted_from,
 )
 from .captures import people_of, shown_capture
 from .reporting import ReportingOperator, add_warning, refuse, rpt_, stored_warning
-
-if TYPE_CHECKING:
-    from ..motion import Motion
 
 _SAME = 0.01  # frames per second
 _WHOLE = 1e-5  # how far the keys' distance may be from whole frames, of which thousands add up
@@ -119,7 +113,8 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         for person, body in bodies.items():  # which fails without keys, before anything is changed
             read_clip(person, body, former)
         keyed = {person: keyed_rate(person, scene) for person in people}
-        motions = {person: _motion(person) for person in people}
+        # keys can be moved without the motion, too
+        motions = {person: motion_if_stored(person) for person in people}
         sources = {obj: retargeted_from(scene, obj) for obj in scene.objects}
         rigs = [(obj, person) for obj, person in sources.items() if person in people]
         cameras = [obj for obj in scene.objects if obj.type == "CAMERA"]
@@ -148,14 +143,6 @@ def _exact(rate: float) -> float:
 
     fps, base = blender_rate(rate)
     return fps / base
-
-
-def _motion(person: bpy.types.Object) -> Motion | None:
-    """Return the person's motion; None if it is lost, without which keys can be moved too"""
-    try:
-        return motion_of(person)
-    except ScopeError:
-        return None
 
 
 def _update_results(

@@ -20,6 +20,9 @@ from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
 from .reporting import iface_, refuse, rpt_, sentence
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ...solver.body import Body
     from ..motion import Motion
 
@@ -50,15 +53,27 @@ class SCOPE_OT_set_upright(CorrectionOperator):
         self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
     ) -> str:
         """Move everybody of the capture, and the camera."""
-        from ..edit.corrections import Upright, added
         from ..edit.upright import upright_transform
 
         scene = context.scene
         motion = motion_of(armature)
         frame = shown_frame(scene, armature, motion)
         transform = upright_transform(motion, body, frame, (tuple(self.start), tuple(self.end)))
-        change_world(scene, armature, lambda present: added(present, Upright.of(transform)))
+        _set_upright(scene, armature, motion, transform)
         return ""
+
+
+def _set_upright(
+    scene: bpy.types.Scene,
+    armature: bpy.types.Object,
+    motion: Motion,
+    transform: NDArray[np.float64],
+) -> None:
+    """Move everybody of a capture, and the camera, by a transform (4, 4) of the world."""
+    from ..edit.corrections import Upright, added
+
+    upright = Upright.of(transform)
+    change_world(scene, armature, motion, lambda present: added(present, upright))
 
 
 class SCOPE_OT_set_upright_in_view(CorrectionOperator):
@@ -90,7 +105,6 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
         """Move everybody of the capture, and the camera."""
         import numpy as np
 
-        from ..edit.corrections import Upright, added
         from ..edit.upright import upright_transform_in_view
         from ..scene.character.corrected_keys import captured_points
 
@@ -101,7 +115,7 @@ class SCOPE_OT_set_upright_in_view(CorrectionOperator):
         current = scene.frame_current + scene.frame_subframe
         start, end, beyond = captured_points(armature, current, points)
         transform = upright_transform_in_view(motion, body, (start, end), beyond - start)
-        change_world(scene, armature, lambda present: added(present, Upright.of(transform)))
+        _set_upright(scene, armature, motion, transform)
         return ""
 
 
@@ -308,8 +322,8 @@ class SCOPE_OT_floor_here(CorrectionOperator):
         floor = Floor(frame, height)
         # Edited keys may have the foot elsewhere than the motion.
         rise = height - shown if abs(height - shown) > _SAME_M else 0.0
-        change_world(scene, armature, lambda present: added(present, floor), rise)
-        if warning := _others_under_floor(motion_of(armature), body):
+        motion = change_world(scene, armature, motion, lambda present: added(present, floor), rise)
+        if warning := _others_under_floor(motion, body):
             self.report({"WARNING"}, warning)
         return ""
 

@@ -3,26 +3,19 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-from typing import TYPE_CHECKING
-
 import bpy
 from bpy.props import IntProperty
 from mathutils import Matrix
 
-from ...solver.errors import ScopeError
 from ..footage import PICTURE_SUFFIXES
 from ..scene.datablocks import holds
 from ..scene.stored_values import start_frame
 from . import comparison
-from .captured_person import captured_people, motion_of
+from .captured_person import captured_people, motion_if_stored
 from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .reporting import ReportingOperator, refuse, rpt_
 from .sidebar import redraw_sidebars_twice, viewport_of
-
-if TYPE_CHECKING:
-    from ..motion import Motion
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -247,7 +240,7 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
         start = next((start_frame(o) for o in armatures), 0.0)
         known = set(strips_of(scene.sequence_editor)) if scene.sequence_editor else set()
         footage = bpy.path.abspath(result.footage)
-        motion = _motion_of_any(armatures)
+        motion = next((m for m in map(motion_if_stored, armatures) if m is not None), None)
         pictures: list[int] = []
         is_picture = footage.lower().endswith(PICTURE_SUFFIXES)
         if motion is not None and len(motion) > 1 and is_picture:
@@ -272,14 +265,6 @@ class SCOPE_OT_footage_to_sequencer(ReportingOperator):
             )
             return ""
         return rpt_("The footage is already in the sequencer") if strips[-1] in known else ""
-
-
-def _motion_of_any(people: list[bpy.types.Object]) -> Motion | None:
-    """Return the captured motion of one of the people; None if the motions are lost."""
-    for person in people:
-        with suppress(ScopeError):
-            return motion_of(person)
-    return None
 
 
 CLASSES = (
