@@ -43,7 +43,7 @@ from . import preview_picture
 from .captures import hide_others, show_again
 from .declared_properties import option_values
 from .frame_rate_operators import rate_warnings
-from .preferences import cache, preferences, python_command
+from .preferences import body_file, cache, preferences, python_command
 from .reporting import add_warning
 from .scene_camera import scene_camera_path
 
@@ -337,13 +337,12 @@ def chosen_values(scene: bpy.types.Scene) -> dict[str, Any]:
     chosen = preferences()
     values = option_values(settings, Place.PANEL) | option_values(chosen, Place.PREFERENCES)
     if values["body"] == "file":
-        path = settings.body_file or (chosen.body_file if chosen else "")
-        if not path:
+        values["body"] = body_file(scene)
+        if not values["body"]:
             raise UsageError(
                 "no body file is chosen; choose one here or in the preferences, or "
                 "use the built-in body"
             )
-        values["body"] = bpy.path.abspath(path)
     return values
 
 

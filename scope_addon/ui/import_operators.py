@@ -17,7 +17,7 @@ from ..options import option
 from ..scene.datablocks import captures_of
 from .captures import hide_others
 from .declared_properties import blender_property
-from .preferences import preferences
+from .preferences import body_file
 from .reporting import ReportingOperator, iface_, rpt_, sentence
 from .view_operators import show_new_capture
 
@@ -111,13 +111,12 @@ class SCOPE_OT_import_motion(ReportingOperator):
         """
         if self.body != "FILE":
             return str(self.body).lower()
-        chosen = preferences()
-        path = context.scene.scope.body_file or (chosen.body_file if chosen else "")
+        path = body_file(context.scene)
         if not path:
             raise UsageError(
                 "no body file is chosen; choose one under Options or in the preferences"
             )
-        return str(bpy.path.abspath(path))
+        return path
 
     def _build_options(self, scene: bpy.types.Scene) -> BuildOptions:
         """Return the scene's options, but change the frame rate only on request."""

@@ -132,6 +132,15 @@ def preferences() -> SCOPE_AP_preferences | None:
     return addon.preferences if addon else None
 
 
+def body_file(scene: bpy.types.Scene) -> str:
+    """Return the path of the body file that is chosen in a scene or else in the preferences; empty
+    if none is.
+    """
+    chosen = preferences()
+    path = scene.scope.body_file or (chosen.body_file if chosen else "")
+    return str(bpy.path.abspath(path))
+
+
 def cache() -> Cache:
     """Return the cache: in the folder of the preferences, or else in the user folder, also where
     that of the preferences is relative to a .blend file that was never saved.
