@@ -149,7 +149,9 @@ class SCOPE_OT_pick_person(bpy.types.Operator):
             path, time_s=time_s, rotate=settings.rotate, mirror=settings.mirror
         )
         try:
-            self._process = PictureProcess(request, cache().new_job_folder(), python_command())
+            self._process = PictureProcess(
+                request, cache().new_job_folder(), python=python_command()
+            )
         except (ScopeError, OSError) as error:
             self.report({"ERROR"}, sentence(error))
             return False
