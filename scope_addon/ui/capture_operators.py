@@ -20,7 +20,7 @@ from . import preview_picture, warm_up
 from .captures import shown_capture, unit_text
 from .export_operators import unused_path, write_at_own_rate, write_captures
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
-from .job_operator import JobOperator, clear_status_bar
+from .job_operator import JobOperator, JobState, clear_status_bar
 from .live_properties import state as live_state
 from .reporting import iface_, refuse, restore_libraries, rpt_, sentence
 from .sidebar import redraw_sidebars, redraw_sidebars_twice, show_tab
@@ -41,13 +41,16 @@ FAILED = "FAILED"
 NO_FILES = "NONE"  # of the formats in which the clips of the queue are written
 
 
-class _State:
-    """The running capture, and the error message of the last one. Never saved."""
+class _State(JobState):
+    """The running capture, and when it was started."""
 
     job: CaptureJob | None = None
-    scene_uid = 0  # of the scene that the job or the message belongs to
-    message = ""  # why the last capture failed
-    started = 0.0  # when the job was started, in seconds of the monotonic clock
+    started = 0.0  # in seconds of the monotonic clock
+
+    def stop(self) -> None:
+        """End the job in any state, and remove its preview."""
+        super().stop()
+        preview_picture.clear()
 
 
 state = _State()
@@ -64,7 +67,7 @@ def nothing_runs(cls: type[bpy.types.Operator]) -> bool:
 
 def end_capture() -> None:
     """End a running capture: the extension is being disabled, or a test begins."""
-    stop_job()
+    state.stop()
     clear_status_bar()
     state.message = ""
 
@@ -206,7 +209,7 @@ class CapturingOperator(JobOperator):
                 time.sleep(0.02)
             return outcome
         finally:
-            stop_job()
+            state.stop()
 
     def start(self, context: bpy.types.Context) -> bool:
         """Start the job; return whether that worked."""
@@ -287,10 +290,6 @@ class CapturingOperator(JobOperator):
         """Say that nothing has changed."""
         self.report({"INFO"}, "Capture cancelled; the scene is unchanged")
 
-    def stop_job(self) -> None:
-        """End the job in any state."""
-        stop_job()
-
     def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         """Stop the job and the timer, show what was built, and return the outcome."""
         if "FINISHED" in outcome:
@@ -356,7 +355,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
     def fail(self, error: Exception | str) -> bool:
         """Note why the clip cannot be captured, and go on; return False."""
         self._end_clip(FAILED, sentence(error))
-        stop_job()
+        state.stop()
         self.report({"WARNING"}, sentence(error))
         return False
 
@@ -383,7 +382,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         if "FINISHED" in outcome:
             self._finished += 1
             self._end_clip(DONE, self._write_files(scene) if scene is not None else "")
-            stop_job()
+            state.stop()
             if scene == bpy.context.scene:
                 hide_startup_cube(bpy.context)  # as a part of what can be undone
             if not bpy.app.background:  # so that each capture can be undone alone
@@ -538,14 +537,6 @@ def ask_to_stop() -> None:
     cancelled.
     """
     bpy.ops.wm.call_panel(name=SCOPE_PT_stop_capture.bl_idname, keep_open=False)
-
-
-def stop_job() -> None:
-    """End the job in any state."""
-    if state.job is not None:
-        state.job.close()
-    state.job = None
-    preview_picture.clear()
 
 
 class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):

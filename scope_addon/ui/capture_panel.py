@@ -122,8 +122,8 @@ class SCOPE_PT_capture(Tab, bpy.types.Panel):
             name = "scope.capture_queue" if settings.queue else "scope.capture"
             row.operator(name, icon="ARMATURE_DATA")
             warm_up.draw(layout)
-        if state.message and state.scene_uid == context.scene.session_uid:
-            draw_text(context, layout.box(), state.message, "ERROR")
+        if message := state.message_in(context.scene):
+            draw_text(context, layout.box(), message, "ERROR")
 
 
 def _draw_view(layout: bpy.types.UILayout, view: bpy.types.PropertyGroup, index: int) -> None:

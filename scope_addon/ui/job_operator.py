@@ -13,15 +13,31 @@ from .reporting import sentence
 from .sidebar import is_over_tab, redraw_sidebars_twice
 
 
+class JobState:
+    """The running job, and the error message of the last one. Never saved."""
+
+    job: Any = None
+    scene_uid = 0  # of the scene that the job or the message belongs to
+    message = ""  # why the last job failed
+
+    def message_in(self, scene: bpy.types.Scene) -> str:
+        """Return the message if it belongs to a scene, and otherwise an empty text."""
+        return self.message if self.scene_uid == scene.session_uid else ""
+
+    def stop(self) -> None:
+        """End the job in any state."""
+        if self.job is not None:
+            self.job.close()
+        self.job = None
+
+
 class JobOperator(bpy.types.Operator):
     """An operator that starts a job, and continues on a timer while Blender stays usable. Not
     registered.
     """
 
     timer_s: float  # between two steps
-    # with the running ``job``, whose ``cancelled`` is set by the operator that cancels, and
-    # ``message``
-    job_state: Any
+    job_state: JobState  # whose job's ``cancelled`` is set by the operator that cancels
 
     if TYPE_CHECKING:  # implemented by each operator
 
@@ -38,9 +54,6 @@ class JobOperator(bpy.types.Operator):
 
         def say_cancelled(self) -> None:
             """Report that the job was cancelled."""
-
-        def stop_job(self) -> None:
-            """End the job in any state."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start from the panel, and continue on a timer."""
@@ -85,14 +98,14 @@ class JobOperator(bpy.types.Operator):
     def fail(self, error: Exception | str) -> bool:
         """Stop, and say why; return False."""
         self.job_state.message = sentence(error)
-        self.stop_job()  # before the report, which raises in a script
+        self.job_state.stop()  # before the report, which raises in a script
         redraw_sidebars_twice()
         self.report({"ERROR"}, self.job_state.message)
         return False
 
     def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         """Stop the job and the timer, and return the outcome."""
-        self.stop_job()
+        self.job_state.stop()
         if (timer := getattr(self, "_timer", None)) is not None:
             context.window_manager.event_timer_remove(timer)
             self._timer = None

@@ -18,7 +18,7 @@ from . import live_properties, warm_up
 from .capture_operators import nothing_runs
 from .capture_panel import draw_text
 from .job_operator import JobOperator
-from .live_properties import state, stop_job
+from .live_properties import state
 from .preferences import cache, python_command
 from .reporting import iface_, refuse, restore_libraries, sentence, warning_text
 from .sidebar import redraw_sidebars, viewports
@@ -29,7 +29,7 @@ _ANSWER_INTERVAL_S = 0.1
 
 def end_live() -> None:
     """End a running live capture: the extension is being disabled, or a test begins"""
-    stop_job()
+    state.stop()
     end_question()
     state.cameras.clear()
     state.message = ""
@@ -123,10 +123,6 @@ class _LiveOperator(JobOperator):
     def say_cancelled(self) -> None:
         """Say that nothing has changed."""
         self.report({"INFO"}, "Live capture cancelled; the scene is unchanged")
-
-    def stop_job(self) -> None:
-        """End the job in any state."""
-        stop_job()
 
     def end(self, context: bpy.types.Context, outcome: set[str]) -> set[str]:
         """Stop the job, the timer and the scene's animation, and return the outcome."""

@@ -38,7 +38,7 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
                 text, icon = _recorded(job), "REC"
             layout.label(text=text, translate=False, icon=icon)
             layout.operator("scope.stop_live", text="", icon="SNAP_FACE", emboss=False)
-        elif state.message and state.scene_uid == context.scene.session_uid:
+        elif state.message_in(context.scene):
             layout.label(text="", icon="ERROR")
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -85,8 +85,8 @@ class SCOPE_PT_live(Tab, bpy.types.Panel):
             row.operator("scope.stop_live", icon="SNAP_FACE")
             row.operator("scope.cancel_live", text="", icon="CANCEL")
             _draw_status(context, layout, job)
-        if state.message and state.scene_uid == context.scene.session_uid:
-            draw_text(context, layout.box(), state.message, "ERROR")
+        if message := state.message_in(context.scene):
+            draw_text(context, layout.box(), message, "ERROR")
 
 
 def _draw_unfinished(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:

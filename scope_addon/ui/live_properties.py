@@ -15,6 +15,7 @@ from ..footage import display_address, has_login
 from ..options import Place
 from .declared_properties import PATH_OPTIONS, with_options
 from .file_field import path_text
+from .job_operator import JobState
 
 _VIDEO = {"name": "Video", "description": "Video of a person, which is played in real time"}
 _addresses: dict[str, str] = {}  # whole ones, by what is left of them without their secrets
@@ -130,24 +131,14 @@ def detach() -> None:
     del bpy.types.Scene.scope_live
 
 
-class _State:
-    """The running live capture, the message of the last one, and what cameras have told."""
+class _State(JobState):
+    """The running live capture, a LiveJob, and what cameras have told."""
 
-    job: Any = None  # a LiveJob; named here, its module would import this one again
     asking: Any = None  # a FormatsProcess, while a camera is asked for its formats
     cameras: ClassVar[dict[int, Any]] = {}  # that were asked, each a Camera, by number
-    scene_uid = 0  # of the scene that the job or the message belongs to
-    message = ""  # why the last live capture failed
 
 
 state = _State()
-
-
-def stop_job() -> None:
-    """End the process in any state; the scene stays as it is."""
-    if state.job is not None:
-        state.job.close()
-    state.job = None
 
 
 def take_login(address: str) -> str:

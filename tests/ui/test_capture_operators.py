@@ -59,7 +59,7 @@ def test_an_unexpected_error_ends_the_capture():
     state.job = SimpleNamespace(
         close=lambda: closed.append(True), step=lambda: 1 / 0, cancelled=False
     )
-    operator = SimpleNamespace(job_state=state, stop_job=capture_operators.stop_job)
+    operator = SimpleNamespace(job_state=state)
     operator.step, operator._advance = (
         partial(getattr(SCOPE_OT_capture, name), operator) for name in ("step", "_advance")
     )
