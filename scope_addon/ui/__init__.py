@@ -44,6 +44,17 @@ from . import (
 )
 
 _command: object | None = None
+# Modules that attach things other than classes to Blender.
+_ATTACHING = (
+    capture_panel,
+    retarget_panel,
+    live_properties,
+    comparison,
+    menus,
+    preferences,
+    warm_up,
+    translations,
+)
 # Panels come last: they are drawn in this order, and those within another after it.
 _MODULES = (
     preferences,
@@ -143,16 +154,7 @@ def _remove_ring_handler() -> None:
 def _attachments() -> list[tuple[Callable[[], None], Callable[[], None]]]:
     """Return what attaches things other than classes to Blender, and what detaches them."""
     return [
-        (capture_panel.attach, capture_panel.detach),
-        (retarget_panel.attach, retarget_panel.detach),
-        (live_properties.attach, live_properties.detach),
         (_add_command, _remove_command),
-        (correction_panel.attach, correction_panel.detach),
-        (comparison.attach, comparison.detach),
         (_add_ring_handler, _remove_ring_handler),
-        (import_operators.attach, import_operators.detach),
-        (menus.attach, menus.detach),
-        (preferences.attach, preferences.detach),
-        (warm_up.attach, warm_up.detach),
-        (translations.register, translations.unregister),
+        *((module.attach, module.detach) for module in _ATTACHING),
     ]

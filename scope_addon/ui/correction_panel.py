@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel for correcting a captured motion, and the entry in the Pose menu."""
+"""The panel for correcting a captured motion."""
 
 from __future__ import annotations
 
@@ -74,23 +74,6 @@ def draw_corrections(layout: bpy.types.UILayout, feet: bpy.types.UILayout) -> No
     layout.operator("scope.this_rests", icon="SNAP_FACE")
     layout.operator("scope.flip_limb", icon="ARROW_LEFTRIGHT")
     layout.operator("scope.turn_around", icon="FILE_REFRESH")
-
-
-def draw_in_pose_menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
-    """Add the tool to Blender's Pose menu."""
-    if captured_armature(context) is not None:
-        self.layout.separator()
-        self.layout.operator("scope.pin_limb", icon="PINNED")
-
-
-def attach() -> None:
-    """Add the menu's entry."""
-    bpy.types.VIEW3D_MT_pose.append(draw_in_pose_menu)
-
-
-def detach() -> None:
-    """Remove the menu's entry."""
-    bpy.types.VIEW3D_MT_pose.remove(draw_in_pose_menu)
 
 
 CLASSES = (SCOPE_PT_corrections,)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that imports motion files, and its entry in File > Import."""
+"""The operator that imports motion files."""
 
 from __future__ import annotations
 
@@ -168,20 +168,6 @@ def _footage_beside(path: Path, source: str) -> Path | None:
     # Path.is_file raises where the name, which the motion's file says, is too long.
     is_footage = beside.suffix.lower() in FOOTAGE_SUFFIXES and os.path.isfile(beside)
     return beside if is_footage else None
-
-
-def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(SCOPE_OT_import_motion.bl_idname, text="Scope, SMPL or BVH Motion")
-
-
-def attach() -> None:
-    """Add the operator to File > Import"""
-    bpy.types.TOPBAR_MT_file_import.append(_draw_menu)
-
-
-def detach() -> None:
-    """Remove the operator from File > Import"""
-    bpy.types.TOPBAR_MT_file_import.remove(_draw_menu)
 
 
 CLASSES = (SCOPE_OT_import_motion,)

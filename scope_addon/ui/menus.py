@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import bpy
 
+from .captured_person import captured_armature
 from .correction_panel import draw_corrections
 from .export_operators import FORMATS, is_available
 from .reporting import iface_
@@ -70,6 +71,10 @@ def draw_import_video(layout: bpy.types.UILayout, icon: str) -> None:
     )
 
 
+def _draw_import_motion(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.operator("scope.import_motion", text="Scope, SMPL or BVH Motion")
+
+
 def _draw_import(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     draw_import_video(self.layout, "NONE")
 
@@ -83,10 +88,18 @@ def _draw_motion_capture(self: bpy.types.Menu, _context: bpy.types.Context) -> N
     self.layout.menu(SCOPE_MT_motion_capture.bl_idname)
 
 
+def _draw_pin_limb(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+    if captured_armature(context) is not None:
+        self.layout.separator()
+        self.layout.operator("scope.pin_limb", icon="PINNED")
+
+
 _ENTRIES = (
+    ("TOPBAR_MT_file_import", _draw_import_motion),
     ("TOPBAR_MT_file_import", _draw_import),
     ("TOPBAR_MT_file_export", _draw_export),
     ("VIEW3D_MT_object", _draw_motion_capture),
+    ("VIEW3D_MT_pose", _draw_pin_limb),
     ("VIEW3D_MT_pose", _draw_motion_capture),
 )
 

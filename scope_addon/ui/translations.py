@@ -83,11 +83,11 @@ def blender_translations() -> dict[str, dict[tuple[str, str], str]]:
     return by_code
 
 
-def register() -> None:
+def attach() -> None:
     """Add the translations to Blender's."""
     bpy.app.translations.register(__name__, blender_translations())
 
 
-def unregister() -> None:
+def detach() -> None:
     """Remove the translations."""
     bpy.app.translations.unregister(__name__)

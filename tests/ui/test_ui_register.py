@@ -93,7 +93,7 @@ def test_a_failing_registration_leaves_nothing(unregistered, monkeypatch):
     handlers = len(bpy.app.handlers.undo_pre)
     entries = drawn()
     with monkeypatch.context() as patch:
-        patch.setattr(translations, "register", refuse)
+        patch.setattr(translations, "attach", refuse)
         with pytest.raises(RuntimeError, match="refused"):
             scope.register()
     assert not hasattr(bpy.types.Scene, "scope")

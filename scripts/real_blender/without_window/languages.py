@@ -43,8 +43,8 @@ for code, language in LANGUAGES.items():
     texts = {entry["en"]: entry[language] for entry in table.texts}
     expected = (labels[english[0]], *(texts[text] for text in english[1:]))
     assert shown() == expected, (shown(), expected)
-    translations.unregister()
+    translations.detach()
     assert shown() == english, shown()
-    translations.register()
+    translations.attach()
     assert shown() == expected, shown()
 print("languages:", ", ".join(LANGUAGES), flush=True)
