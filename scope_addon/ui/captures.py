@@ -119,9 +119,13 @@ def shown_index(settings: bpy.types.PropertyGroup) -> int:
 def show_index(settings: bpy.types.PropertyGroup, index: int) -> None:
     """Show the capture at an index among the file's collections."""
     if 0 <= index < len(bpy.data.collections):
-        settings.capture = bpy.data.collections[index]
-        show_again(settings.capture)
-        _make_active(settings.capture)
+        _show(settings, bpy.data.collections[index])
+
+
+def _show(settings: bpy.types.PropertyGroup, capture: bpy.types.Collection) -> None:
+    settings.capture = capture
+    show_again(capture)
+    _make_active(capture)
 
 
 def _make_active(capture: bpy.types.Collection) -> None:
@@ -194,9 +198,7 @@ class SCOPE_OT_show_capture(bpy.types.Operator):
         capture = bpy.data.collections.get(self.name)
         if capture not in captures_of(context.scene):
             return {"CANCELLED"}
-        context.scene.scope.capture = capture
-        show_again(capture)
-        _make_active(capture)
+        _show(context.scene.scope, capture)
         return {"FINISHED"}
 
 

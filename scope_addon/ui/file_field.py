@@ -233,13 +233,8 @@ class SCOPE_OT_choose_file(bpy.types.Operator):
         return owner if self.setting in _FILTERS and hasattr(owner, self.setting) else None
 
 
-class SCOPE_FH_footage(bpy.types.FileHandler):
-    """Make a dropped video or image the scene's footage."""
-
-    bl_idname = "SCOPE_FH_footage"
-    bl_label = "Capture with Scope"
-    bl_import_operator = "scope.choose_footage"
-    bl_file_extensions = ";".join(FOOTAGE_SUFFIXES)
+class _ViewportFileHandler(bpy.types.FileHandler):
+    """Takes files that are dropped into a 3D viewport. Not registered."""
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
@@ -247,18 +242,22 @@ class SCOPE_FH_footage(bpy.types.FileHandler):
         return bool(context.area) and context.area.type == "VIEW_3D"
 
 
-class SCOPE_FH_motion(bpy.types.FileHandler):
+class SCOPE_FH_footage(_ViewportFileHandler):
+    """Make a dropped video or image the scene's footage."""
+
+    bl_idname = "SCOPE_FH_footage"
+    bl_label = "Capture with Scope"
+    bl_import_operator = "scope.choose_footage"
+    bl_file_extensions = ";".join(FOOTAGE_SUFFIXES)
+
+
+class SCOPE_FH_motion(_ViewportFileHandler):
     """Import dropped motion files."""
 
     bl_idname = "SCOPE_FH_motion"
     bl_label = "Import Motion with Scope"
     bl_import_operator = "scope.import_motion"
     bl_file_extensions = ".npz"
-
-    @classmethod
-    def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Accept files over a 3D viewport."""
-        return bool(context.area) and context.area.type == "VIEW_3D"
 
 
 CLASSES = (

@@ -59,19 +59,37 @@ def show_new_capture(context: bpy.types.Context, scene: bpy.types.Scene | None) 
 
     :param scene: None if it was removed.
     """
-    from ..scene.visibility import hide_again
-
     if scene != context.scene:
         return
     hide_startup_cube(context)
     shown = context.scene.scope.result.collection
     if shown is not None:
         comparison.end_others(context.scene, shown)
-        for other in [obj for obj in captured_people(context) if not holds(shown, obj)]:
-            hide_again(other, context.view_layer)  # it was shown for the comparison alone
+        _hide_others_again(context, shown)
         if not any(holds(shown, obj) for obj in context.selected_objects):
             return  # the user is working on something else
     frame_selected(context)
+
+
+def _hide_others_again(context: bpy.types.Context, shown: bpy.types.Collection) -> None:
+    """Hide people of other captures than the shown one who were shown for a comparison alone."""
+    from ..scene.visibility import hide_again
+
+    for other in [obj for obj in captured_people(context) if not holds(shown, obj)]:
+        hide_again(other, context.view_layer)
+
+
+def _set_camera(context: bpy.types.Context, camera: bpy.types.Object, filmed: bpy.types.ID) -> None:
+    """Set the scene's camera, and the resolution to that of the footage.
+
+    :param filmed: what stores the footage's resolution: a capture, or a further camera.
+    """
+    from ..scene.camera import set_resolution
+
+    context.scene.camera = camera
+    camera.hide_viewport = False  # a hidden camera shows no footage
+    camera.hide_set(False, view_layer=context.view_layer)
+    set_resolution(context.scene, filmed)
 
 
 class SCOPE_OT_look_through(bpy.types.Operator):
@@ -103,30 +121,23 @@ class SCOPE_OT_look_through(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and the viewport's view."""
-        from ..scene.camera import set_resolution
         from ..scene.visibility import hide_again
 
-        scene = context.scene
+        shown = context.scene.scope.result.collection
         camera = camera_of(context.scene)
         if is_looking_through(context):
             comparison.end(context.window, context.area)
             if side := comparison.side_area(context.window.screen):
                 comparison.close_side_view(context.window, side)
-            for person in people_of(scene.scope.result.collection):
+            for person in people_of(shown):
                 hide_again(person, context.view_layer)
             redraw_sidebars_twice()
             return {"FINISHED"}
         assert camera is not None  # checked by poll
-        scene.camera = camera
-        camera.hide_viewport = False  # a hidden camera shows no footage
-        camera.hide_set(False, view_layer=context.view_layer)
-        set_resolution(scene, scene.scope.result.collection)
-        for other in [
-            obj for obj in captured_people(context) if not holds(scene.scope.result.collection, obj)
-        ]:
-            hide_again(other, context.view_layer)  # it was compared before
+        _set_camera(context, camera, shown)
+        _hide_others_again(context, shown)  # which were compared before
         if not bpy.app.background and context.area and context.area.type == "VIEW_3D":
-            comparison.begin(context, context.area, scene.scope.result.collection)
+            comparison.begin(context, context.area, shown)
         redraw_sidebars_twice()
         return {"FINISHED"}
 
@@ -147,7 +158,7 @@ class SCOPE_OT_compare_view(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Set the scene's camera and resolution, and what the viewport shows."""
-        from ..scene.camera import set_resolution, view_number
+        from ..scene.camera import view_number
 
         scene = context.scene
         cameras = cameras_of(scene)
@@ -155,11 +166,8 @@ class SCOPE_OT_compare_view(bpy.types.Operator):
             return {"CANCELLED"}
         camera = cameras[self.index]
         is_compared = is_looking_through(context)
-        scene.camera = camera
-        camera.hide_viewport = False  # a hidden camera shows no footage
-        camera.hide_set(False, view_layer=context.view_layer)
         is_first = view_number(camera) is None
-        set_resolution(scene, scene.scope.result.collection if is_first else camera)
+        _set_camera(context, camera, scene.scope.result.collection if is_first else camera)
         if is_compared:
             comparison.look_from(scene, context.area)
         redraw_sidebars_twice()
