@@ -5,8 +5,6 @@ NLA, asset browser.
 
 from __future__ import annotations
 
-import re
-
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
@@ -165,9 +163,7 @@ def _rename(collection: bpy.types.Collection, name: str) -> None:
     """
     from ..scene.rig_action import follow_renaming
 
-    # Files from before the name was stored have objects of a numbered capture without the number.
-    unnumbered = re.sub(r"(?<=.)\.\d{3,}$", "", collection.name)
-    former = [collection.name, stored_text(collection, NAME_TAG) or unnumbered]
+    former = [collection.name, stored_text(collection, NAME_TAG) or collection.name]
     collection.name = name
     collection[NAME_TAG] = name = collection.name  # numbered if there is one of that name
     armatures = {
@@ -290,10 +286,7 @@ def _captured(armature: bpy.types.Object) -> bpy.types.Object:
     """Return the captured armature whose motion an armature has; the armature itself if that is
     unknown.
     """
-    person = stored_person(armature)
-    if isinstance(person, str):
-        person = bpy.data.objects.get(person)
-    return person if isinstance(person, bpy.types.Object) else armature
+    return stored_person(armature) or armature
 
 
 def _described(context: bpy.types.Context, armature: bpy.types.Object) -> str:

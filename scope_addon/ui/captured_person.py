@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from ..edit.clip import Clip
     from ..motion import Motion
 
-# Custom property of a rig: the captured armature that it was retargeted from; its name in older
-# .blend files.
+# Custom property of a rig: the captured armature that it was retargeted from.
 PERSON = "scope_person"
 
 
@@ -52,29 +51,30 @@ def captured_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     return last[0] if len(last) == 1 else found[0] if len(found) == 1 else None
 
 
-def stored_person(rig: bpy.types.Object) -> bpy.types.Object | str | None:
-    """Return the captured armature that a rig was retargeted from, or its name.
+def stored_person(rig: bpy.types.Object) -> bpy.types.Object | None:
+    """Return the captured armature that a rig was retargeted from; None if it was deleted.
 
     Blender does not save what a library override of a rig stores, so that an opened file has what
     the library stores; it saves the override's own action.
     """
-    person: bpy.types.Object | str | None = rig.get(PERSON)
+    stored = rig.get(PERSON)
+    person = stored if isinstance(stored, bpy.types.Object) else None
     animation = rig.animation_data
     action = animation.action if animation is not None else None
     if rig.override_library is None or action is None or action.library is not None:
         return person
     name = source_of(action)
-    is_local = isinstance(person, bpy.types.Object) and person.library is None
-    is_renamed = is_local and bpy.data.objects.get((name, None)) is None
-    return name if name and not is_renamed else person
+    own = bpy.data.objects.get((name, None))
+    is_renamed = own is None and person is not None and person.library is None
+    if is_renamed or not name:
+        return person
+    return own or bpy.data.objects.get(name)
 
 
 def retargeted_from(scene: bpy.types.Scene, rig: bpy.types.Object) -> bpy.types.Object | None:
     """Return the captured armature in the scene that a rig was retargeted from."""
     person = stored_person(rig)
-    if isinstance(person, str):
-        person = scene.objects.get(person)
-    if not isinstance(person, bpy.types.Object) or not is_person(person):
+    if person is None or not is_person(person):
         return None
     return person if holds(scene.collection, person) else None
 
