@@ -18,6 +18,7 @@ from ..errors import UsageError
 from ..scene.datablocks import found
 from . import preview_picture, warm_up
 from .captures import shown_capture, unit_text
+from .declared_properties import split
 from .export_operators import unused_path, write_at_own_rate, write_captures
 from .file_field import FootageBrowser, SeveralFootageBrowser, chosen_files, stored_path
 from .job_operator import JobOperator, JobState, clear_status_bar
@@ -557,10 +558,8 @@ class SCOPE_OT_import_video(FootageBrowser, bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings of the capture in the sidebar of the file browser."""
-        layout = self.layout
+        layout = split(self.layout)
         settings = context.scene.scope
-        layout.use_property_split = True
-        layout.use_property_decorate = False
         for name in ("quality", "people", "people_count", "hands", "face", "height_cm", "take"):
             if name != "people_count" or settings.people == "COUNT":
                 layout.prop(settings, name)

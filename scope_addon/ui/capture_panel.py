@@ -41,7 +41,7 @@ from .captures import (
     unit_text,
 )
 from .comparison import camera_of, cameras_of, is_looking_through, side_area
-from .declared_properties import PATH_OPTIONS, draw_section, property_name, with_options
+from .declared_properties import PATH_OPTIONS, draw_section, property_name, split, with_options
 from .export_operators import FORMATS, is_available
 from .file_field import draw_file, path_text
 from .frame_rate_operators import differs, keyed_for
@@ -179,7 +179,7 @@ class SCOPE_PT_person(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout = _split(self.layout)
+        layout = split(self.layout)
         settings = context.scene.scope
         layout.enabled = state.job is None
         layout.prop(settings, "take")
@@ -223,7 +223,7 @@ class SCOPE_PT_scene(Tab, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the panel."""
-        layout = _split(self.layout)
+        layout = split(self.layout)
         settings = context.scene.scope
         layout.enabled = state.job is None
         draw_section(layout, settings, Section.SCENE)
@@ -392,13 +392,6 @@ def _draw_warning(
         grid = box.grid_flow(columns=4, even_columns=True, align=True, row_major=True)
         for span in parse_spans(warning.spans):
             grid.operator("scope.go_to_frame", text=str(span)).frame = span.first
-
-
-def _split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
-    """Set the layout to labels on the left and values on the right, and return it."""
-    layout.use_property_split = True
-    layout.use_property_decorate = False
-    return layout
 
 
 def draw_text(

@@ -89,6 +89,13 @@ def limits_of(option: Option) -> tuple[float | None, float | None]:
     return low, high
 
 
+def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """Set the layout to labels on the left and values on the right, and return it."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
+
+
 def draw_section(
     layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, section: Section
 ) -> None:

@@ -20,7 +20,7 @@ from ..scene.datablocks import captures_of, holds
 from .captured_person import body_of, motion_of, stored_person
 from .captures import people_of, shown_capture
 from .comparison import cameras_of
-from .declared_properties import with_options
+from .declared_properties import split, with_options
 from .file_field import SavingOperator, output_file
 from .reporting import refuse, rpt_, tip_
 
@@ -169,9 +169,7 @@ class SCOPE_OT_export(SavingOperator):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the options in the sidebar of the file browser."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         layout.prop(self, "which")
         if self.format == "BVH":
             layout.prop(self, "bvh_unit")
@@ -399,12 +397,8 @@ def _check_available(kind: str) -> None:
 
 def _take_of(rig: bpy.types.Object, collections: list[bpy.types.Collection]) -> str:
     """Return the name of the capture whose motion a rig has; empty if it is unknown."""
-    person = stored_person(rig)  # None if it was deleted
-    if isinstance(person, bpy.types.Object):
-        return next((c.name for c in collections if holds(c, person)), "")
-    return next(
-        (c.name for c in collections if isinstance(person, str) and person in c.all_objects), ""
-    )
+    person = stored_person(rig)
+    return next((c.name for c in collections if person and holds(c, person)), "")
 
 
 CLASSES = (SCOPE_OT_export, SCOPE_OT_save_calibration)

@@ -16,7 +16,7 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ..options import Place
-from .declared_properties import with_options
+from .declared_properties import split, with_options
 from .file_field import draw_file, path_text
 from .reporting import iface_, rpt_
 
@@ -63,9 +63,7 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the preferences."""
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = split(self.layout)
         layout.prop(self, "threads")
         layout.prop(self, "provider")
         draw_file(layout, self, "detector_file")

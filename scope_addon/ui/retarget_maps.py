@@ -185,11 +185,9 @@ def has_targets(face: bpy.types.Object | None) -> bool:
     return bones_move(face)
 
 
-def target_names(face: bpy.types.Object) -> list[str]:
-    """Return the names of a face's shape keys or bones."""
-    return list(
-        (face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks).keys()
-    )
+def targets_of(face: bpy.types.Object) -> bpy.types.bpy_prop_collection:
+    """Return a face's bones or shape keys."""
+    return face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks
 
 
 def face_of_rig(rig: bpy.types.Object) -> bpy.types.Object | None:

@@ -29,7 +29,7 @@ from .retarget_maps import (
     guess_into_list,
     guessed_map,
     has_targets,
-    target_names,
+    targets_of,
 )
 from .translations import CONTEXT
 
@@ -196,9 +196,7 @@ def _is_known(face: bpy.types.Object | None, pair: bpy.types.PropertyGroup) -> b
         or (face.type == "ARMATURE") == (pair.channel == SHAPE_KEY)
     ):
         return False
-    return pair.key in (
-        face.data.bones if face.type == "ARMATURE" else face.data.shape_keys.key_blocks
-    )
+    return pair.key in targets_of(face)
 
 
 def offered_parts(
@@ -305,7 +303,7 @@ def _list_bones_of_new_rig(settings: bpy.types.PropertyGroup, _context: bpy.type
 
     if settings.face is None or bones_move(settings.face):
         settings.face = face_of_rig(rig)
-    bones = "\n".join(sorted(bone.name for bone in rig.data.bones))
+    bones = "\n".join(sorted(rig.data.bones.keys()))
     if settings.listed_bones == bones:
         return
     settings.listed_bones = bones
@@ -321,7 +319,7 @@ def _list_keys_of_new_face(settings: bpy.types.PropertyGroup, _context: bpy.type
     """
     if not has_targets(settings.face):
         return
-    keys = "\n".join(sorted(target_names(settings.face)))
+    keys = "\n".join(sorted(targets_of(settings.face).keys()))
     if settings.listed_keys == keys:
         return
     settings.listed_keys = keys
