@@ -115,30 +115,41 @@ def fill_silhouette(
     """
     height, width = coverage.shape
     for f in range(len(triangles)):
-        a, b, c = triangles[f]
-        ax = screen[a, 0]
-        ay = screen[a, 1]
-        bx = screen[b, 0]
-        by = screen[b, 1]
-        cx = screen[c, 0]
-        cy = screen[c, 1]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if not (area < 0 and abs(area) < 1e18):
-            continue
-        u0 = int(np.ceil(min(max(min(ax, bx, cx), 0.0), width)))
-        u1 = int(np.floor(min(max(max(ax, bx, cx), -1.0), width - 1.0)))
-        v0 = int(np.ceil(min(max(min(ay, by, cy), 0.0), height)))
-        v1 = int(np.floor(min(max(max(ay, by, cy), -1.0), height - 1.0)))
-        du_a = -(cy - by) / area
-        dv_a = (cx - bx) / area
-        du_b = -(ay - cy) / area
-        dv_b = (ax - cx) / area
+        i, j, k = triangles[f]
+        a = screen[i]
+        b = screen[j]
+        c = screen[k]
+        u0, u1, v0, v1, du_a, dv_a, du_b, dv_b = _extent(a, b, c, width, height)
         for v in range(v0, v1 + 1):
             for u in range(u0, u1 + 1):
-                la = du_a * (u - bx) + dv_a * (v - by)
-                lb = du_b * (u - cx) + dv_b * (v - cy)
+                la = du_a * (u - b[0]) + dv_a * (v - b[1])
+                lb = du_b * (u - c[0]) + dv_b * (v - c[1])
                 if la >= -1e-9 and lb >= -1e-9 and 1.0 - la - lb >= -1e-9:
                     coverage[v, u] = True
+
+
+@cached
+@njit(nogil=True)
+def _extent(
+    a: Float64Array, b: Float64Array, c: Float64Array, width: int, height: int
+) -> tuple[int, int, int, int, float, float, float, float]:
+    """Return the first and the last u and v, within the picture, of a triangle with corners (u, v,
+    ...), and by how much the shares of a and of b grow with u and v; no pixel where it is seen from
+    inside.
+    """
+    area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    # A triangle that is counter-clockwise seen from outside is clockwise here, since v points down.
+    if not (area < 0 and abs(area) < 1e18):
+        return 0, -1, 0, -1, 0.0, 0.0, 0.0, 0.0
+    u0 = int(np.ceil(min(max(min(a[0], b[0], c[0]), 0.0), width)))
+    u1 = int(np.floor(min(max(max(a[0], b[0], c[0]), -1.0), width - 1.0)))
+    v0 = int(np.ceil(min(max(min(a[1], b[1], c[1]), 0.0), height)))
+    v1 = int(np.floor(min(max(max(a[1], b[1], c[1]), -1.0), height - 1.0)))
+    du_a = -(c[1] - b[1]) / area
+    dv_a = (c[0] - b[0]) / area
+    du_b = -(a[1] - c[1]) / area
+    dv_b = (a[0] - c[0]) / area
+    return u0, u1, v0, v1, du_a, dv_a, du_b, dv_b
 
 
 @cached
@@ -324,18 +335,7 @@ def _fill(
     that pass the depth test.
     """
     height, width = depth.shape
-    area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    # A triangle that is counter-clockwise seen from outside is clockwise here, since v points down.
-    if not (area < 0 and abs(area) < 1e18):
-        return
-    u0 = int(np.ceil(min(max(min(a[0], b[0], c[0]), 0.0), width)))
-    u1 = int(np.floor(min(max(max(a[0], b[0], c[0]), -1.0), width - 1.0)))
-    v0 = int(np.ceil(min(max(min(a[1], b[1], c[1]), 0.0), height)))
-    v1 = int(np.floor(min(max(max(a[1], b[1], c[1]), -1.0), height - 1.0)))
-    du_a = -(c[1] - b[1]) / area
-    dv_a = (c[0] - b[0]) / area
-    du_b = -(a[1] - c[1]) / area
-    dv_b = (a[0] - c[0]) / area
+    u0, u1, v0, v1, du_a, dv_a, du_b, dv_b = _extent(a, b, c, width, height)
     for v in range(v0, v1 + 1):
         la = du_a * (u0 - b[0]) + dv_a * (v - b[1])
         lb = du_b * (u0 - c[0]) + dv_b * (v - c[1])
