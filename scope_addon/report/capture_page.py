@@ -159,22 +159,15 @@ def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> l
     """
     times = motions[0].timestamps
     x_axis = time_axis(times)
-    colors = [page.person_color(n) for n in range(len(motions))]
-    legend = (
-        {_name(n, motions): color for n, color in enumerate(colors)} if len(motions) > 1 else None
-    )
+    people = [(m, page.person_color(n), _name(n, motions)) for n, m in enumerate(motions)]
+    legend = {name: color for _, color, name in people} if len(people) > 1 else None
     confidence = [
-        Curve(times, body_confidence(m).astype(float), color, _name(n, motions))
-        for n, (m, color) in enumerate(zip(motions, colors, strict=True))
+        Curve(times, body_confidence(motion).astype(float), color, name)
+        for motion, color, name in people
     ]
     error = [
-        Curve(
-            times,
-            np.where(m.has_residual, m.residual_px, np.nan).astype(float),
-            color,
-            _name(n, motions),
-        )
-        for n, (m, color) in enumerate(zip(motions, colors, strict=True))
+        Curve(times, np.where(m.has_residual, m.residual_px, np.nan).astype(float), color, name)
+        for m, color, name in people
     ]
     far = FAR_SHARE * float(motions[0].image_size.max())
     known = [float(np.nanmax(curve.y)) for curve in error if np.isfinite(curve.y).any()]
@@ -200,20 +193,15 @@ def over_time(motions: Sequence[Motion], marked: Sequence[MarkedSpan] = ()) -> l
         _SHORT[reason]: f"var(--{reason})" for reason in sorted({span.kind for span in marked})
     }
     figures = [page.plot_figure(title, svg, legend, areas) for title, svg in plots]
-    for n, (motion, color) in enumerate(zip(motions, colors, strict=True)):
-        rows = [(name, motion.foot_contact[:, k].astype(float)) for k, name in enumerate(CONTACTS)]
-        of_whom = f", {_name(n, motions)}" if len(motions) > 1 else ""
-        title = f"Contact of the feet{of_whom}"
-        figures.append(
-            page.plot_figure(title, band_plot(rows, times, x_axis, label=title, color=color))
-        )
+    for motion, color, name in people:
+        of_whom = f", {name}" if len(people) > 1 else ""
+        contacts = motion.foot_contact.T.astype(float)
+        bands = {f"Contact of the feet{of_whom}": list(zip(CONTACTS, contacts, strict=True))}
         if motion.face:
-            title = f"Face{of_whom}"
-            figures.append(
-                page.plot_figure(
-                    title, band_plot(face_rows(motion), times, x_axis, label=title, color=color)
-                )
-            )
+            bands[f"Face{of_whom}"] = face_rows(motion)
+        for title, rows in bands.items():
+            svg = band_plot(rows, times, x_axis, label=title, color=color)
+            figures.append(page.plot_figure(title, svg))
     return figures
 
 
