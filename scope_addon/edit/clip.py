@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp
+from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..errors import UsageError
 from ..kinematics.contact_points import SOLES, contact_point_positions, with_contact_points
 from ..kinematics.smoothing import interpolate_rotations, smooth_rotations
@@ -21,9 +22,9 @@ from ..motion import Motion
 class Clip:
     """T keys of a body with K+1 parts, in the world frame (z up, metres)."""
 
-    times: NDArray[np.float64]  # (T,) seconds, increasing
-    rotations: NDArray[np.float64]  # (T, K+1, 3, 3): R_world_root, then the joint states Omega_i
-    root: NDArray[np.float64]  # (T, 3) position of the pelvis, metres
+    times: Float64Array  # (T,) seconds, increasing
+    rotations: Float64Array  # (T, K+1, 3, 3): R_world_root, then the joint states Omega_i
+    root: Float64Array  # (T, 3) position of the pelvis, metres
 
     def __len__(self) -> int:
         return len(self.times)
@@ -36,9 +37,7 @@ class Clip:
         """Return some of the keys, by their indices, a mask (T,) or a slice."""
         return Clip(self.times[which], self.rotations[which], self.root[which])
 
-    def parts(
-        self, body: Body, betas: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def parts(self, body: Body, betas: FloatArray) -> tuple[Float64Array, Float64Array]:
         """Return the orientations (T, K+1, 3, 3) and origins (T, K+1, 3) of the body's parts,
         metres, world frame; a part's origin is its joint.
 
@@ -47,11 +46,11 @@ class Clip:
         pelvis_at_rest = body.rest_joints(betas)[0]
         return body.forward_kinematics(self.rotations, self.root - pelvis_at_rest, betas)
 
-    def joints(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def joints(self, body: Body, betas: FloatArray) -> Float64Array:
         """Return the joints (T, K+1, 3), as of `parts`."""
         return self.parts(body, betas)[1]
 
-    def soles(self, body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    def soles(self, body: Body, betas: FloatArray) -> Float64Array:
         """Return the contact points of the feet.
 
         :param betas: (P,) shape coefficients.
@@ -59,7 +58,7 @@ class Clip:
             frame.
         """
         points = contact_point_positions(with_contact_points(body, betas), *self.parts(body, betas))
-        soles: NDArray[np.float64] = points[:, : len(SOLES)]
+        soles: Float64Array = points[:, : len(SOLES)]
         return soles
 
 
@@ -70,14 +69,14 @@ def clip_from_motion(body: Body, motion: Motion, raw: bool) -> Clip:
     return Clip(motion.timestamps, rotations, body.rest_joints(motion.betas)[0] + trans)
 
 
-def differ(a: Clip, b: Clip) -> NDArray[np.bool_]:
+def differ(a: Clip, b: Clip) -> BoolArray:
     """Return at which keys (T,) two clips differ."""
     turned = (a.rotations != b.rotations).any((1, 2, 3))
-    different: NDArray[np.bool_] = turned | (a.root != b.root).any(1)
+    different: BoolArray = turned | (a.root != b.root).any(1)
     return different
 
 
-def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:
+def keys_within(clip: Clip, start: float, end: float) -> IndexArray:
     """Return the indices of the keys from ``start`` to ``end`` seconds, both inclusive.
 
     :raises UsageError: when there is none.
@@ -90,7 +89,7 @@ def keys_within(clip: Clip, start: float, end: float) -> NDArray[np.intp]:
     return found
 
 
-def sample(clip: Clip, times: NDArray[np.float64]) -> Clip:
+def sample(clip: Clip, times: Float64Array) -> Clip:
     """Interpolate the motion at other times: rotations along the shorter arc, positions linearly.
 
     :param times: (T',) seconds; clamped to the first and the last key.

@@ -15,11 +15,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.names import BODY_JOINTS
 from ...solver.rotations import exp, log
+from ..arrays import Float64Array, FloatArray
 from ..errors import MotionFileError
 from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights
 from ..kinematics.smoothing import smooth_rotations
@@ -72,7 +72,7 @@ def shot_of(motion: Motion, start: float = 0.0) -> Shot:
     )
 
 
-def distance_from_pin(motion: Motion, pin: Pin, place: NDArray[np.float64] | None = None) -> float:
+def distance_from_pin(motion: Motion, pin: Pin, place: Float64Array | None = None) -> float:
     """Return how far a joint is from its pin: pixels of a pin in the image, metres of one in space.
 
     :param place: (3,) metres, the joint in the world; if None, the motion's own.
@@ -209,7 +209,7 @@ def _changed(clip: Clip, motion: Motion, body: Body, shot: Shot) -> Clip:
 def _changed_in_world(
     clip: Clip,
     shot: Shot,
-    world: NDArray[np.float64] | None,
+    world: Float64Array | None,
     change: Callable[[Clip, Shot], Clip],
 ) -> Clip:
     """Change a clip in a world that a transform (4, 4) has moved, and move what changes back; other
@@ -228,7 +228,7 @@ def _changed_in_world(
     return out
 
 
-def _in_world(pin: Pin, transform: NDArray[np.float64] | None) -> Pin:
+def _in_world(pin: Pin, transform: Float64Array | None) -> Pin:
     """Return a pin in a world that ``transform`` (4, 4) has moved; None: it was not moved."""
     if pin.position is None or transform is None:
         return pin
@@ -284,7 +284,7 @@ def before_smoothing(motion: Motion, body: Body) -> Motion:
     )
 
 
-def _poses(clip: Clip, before: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _poses(clip: Clip, before: FloatArray) -> FloatArray:
     """Return axis-angle vectors (T, 3(K+1)), unchanged in the frames that the clip has not
     changed.
     """
@@ -337,13 +337,11 @@ def feet_under_floor(motion: Motion, body: Body) -> FeetUnderFloor | None:
     return FeetUnderFloor(-float(lowest[deepest]), int(np.count_nonzero(under)), cause)
 
 
-def _lowest_without(
-    motion: Motion, body: Body, removed: Sequence[Correction]
-) -> NDArray[np.float64]:
+def _lowest_without(motion: Motion, body: Body, removed: Sequence[Correction]) -> Float64Array:
     """Return the height of the lower foot in each frame, (T,), without some of the corrections."""
     kept = tuple(c for c in corrections_of(motion) if c not in removed)
     reduced = with_corrections(motion, body, kept)
-    lowest: NDArray[np.float64] = foot_heights(reduced, body).min(axis=1)
+    lowest: Float64Array = foot_heights(reduced, body).min(axis=1)
     return lowest
 
 

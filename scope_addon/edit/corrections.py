@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Float64Array
 from ..errors import MotionFileError, UsageError
 from ..kinematics.mirrored_limbs import other_side
 from ..untrusted.files import in_one_line
@@ -189,12 +190,12 @@ class Upright:
             raise UsageError("an upright line needs a rigid transform of the world")
 
     @staticmethod
-    def of(transform: NDArray[np.float64]) -> Upright:
+    def of(transform: Float64Array) -> Upright:
         """Return the correction of a transform (4, 4)."""
         return Upright(tuple(float(x) for x in transform.ravel()))
 
     @property
-    def transform(self) -> NDArray[np.float64]:
+    def transform(self) -> Float64Array:
         """The transform (4, 4) from the captured world to the upright one."""
         return np.array(self.rows).reshape(4, 4)
 
@@ -219,7 +220,7 @@ class Floor:
             )
 
     @property
-    def transform(self) -> NDArray[np.float64]:
+    def transform(self) -> Float64Array:
         """The transform (4, 4) from the upright world to the one whose floor is z = 0."""
         out = np.eye(4)
         out[2, 3] = -self.height
@@ -229,11 +230,11 @@ class Floor:
 Correction = Pin | Contact | Exchange | DepthFlip | Interpolation | Upright | Floor | FeetOnFloor
 
 
-def world_of(corrections: Iterable[Correction]) -> NDArray[np.float64] | None:
+def world_of(corrections: Iterable[Correction]) -> Float64Array | None:
     """Return the transform (4, 4) of the captured world by the upright line, then the floor; None
     without both.
     """
-    out: NDArray[np.float64] | None = None
+    out: Float64Array | None = None
     for c in sorted(
         (c for c in corrections if isinstance(c, Upright | Floor)),
         key=lambda c: isinstance(c, Floor),

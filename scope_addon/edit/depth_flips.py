@@ -21,13 +21,12 @@ with the global rotations G, the horizontal line of sight v, and the opposite jo
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
+from ..arrays import Float64Array, FloatArray, IndexArray
 from ..kinematics.axes import UP
 from ..kinematics.mirrored_limbs import LIMBS, other_side
 from .clip import Clip
@@ -55,7 +54,7 @@ _UPPER = {"arm": True, "leg": True, "forearm": False, "shin": False}
 def flipped(
     clip: Clip,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     flips: Iterable[DepthFlip],
     shot: Shot,
 ) -> Clip:
@@ -98,7 +97,7 @@ def _limb(body: Body, part: str) -> tuple[int, int, int]:
     return first, second, end
 
 
-def _turned_around(clip: Clip, body: Body, centers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned_around(clip: Clip, body: Body, centers: Float64Array) -> Float64Array:
     """Return the rotations (T, K+1, 3, 3) of a body that is mirrored in depth."""
     names = list(body.joint_names)
     opposite = [names.index(other_side(name)) for name in names]
@@ -107,7 +106,7 @@ def _turned_around(clip: Clip, body: Body, centers: NDArray[np.float64]) -> NDAr
     is_level = np.linalg.norm(level, axis=1, keepdims=True) > _LEAST_HORIZONTAL
     v = _unit(np.where(is_level, level, sight))
     M = np.eye(3) - 2.0 * v[:, :, None] * v[:, None, :]
-    rotations: NDArray[np.float64] = SIDES_EXCHANGED @ clip.rotations[:, opposite] @ SIDES_EXCHANGED
+    rotations: Float64Array = SIDES_EXCHANGED @ clip.rotations[:, opposite] @ SIDES_EXCHANGED
     rotations[:, 0] = M @ clip.rotations[:, 0] @ SIDES_EXCHANGED
     return rotations
 
@@ -115,12 +114,12 @@ def _turned_around(clip: Clip, body: Body, centers: NDArray[np.float64]) -> NDAr
 def _mirrored_limb(
     clip: Clip,
     body: Body,
-    betas: NDArray[np.floating[Any]],
-    centers: NDArray[np.float64],
+    betas: FloatArray,
+    centers: Float64Array,
     limb: tuple[int, int, int],
     *,
     upper: bool,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return the rotations (T, 2, 3, 3) of both bones of a limb that is mirrored in depth.
 
     :param centers: (T, 3) the camera, metres, world.
@@ -146,17 +145,17 @@ def _mirrored_limb(
         twist = _twists(rotations[:, 0], rest[second] - rest[first])
         found.append((float(twist.mean()), rotations))
     is_unnatural = len(found) == 2 and found[0][0] > found[1][0] + _MORE_TWIST
-    chosen: NDArray[np.float64] = found[1][1] if is_unnatural else found[0][1]
+    chosen: Float64Array = found[1][1] if is_unnatural else found[0][1]
     return chosen
 
 
 def _on_ray(
-    joint: NDArray[np.float64],
-    start: NDArray[np.float64],
-    bone: NDArray[np.float64],
+    joint: Float64Array,
+    start: Float64Array,
+    bone: Float64Array,
     *,
     mirrored: bool,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return the place (T, 3) of a joint on its ray, at its bone's length from the bone's start.
 
     :param joint: (T, 3) from the camera, metres.
@@ -171,16 +170,16 @@ def _on_ray(
     side = np.where((ray * bone).sum(axis=1) >= 0.0, 1.0, -1.0) * (-1.0 if mirrored else 1.0)
     depth = np.maximum(nearest + side * half, _NEAREST_M)
     direction = _unit(depth[:, None] * ray - start)
-    place: NDArray[np.float64] = start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
+    place: Float64Array = start + np.linalg.norm(bone, axis=1, keepdims=True) * direction
     return place
 
 
 def _turned_bones(
-    rotations: tuple[NDArray[np.float64], NDArray[np.float64]],
-    before: tuple[NDArray[np.float64], NDArray[np.float64]],
-    after: tuple[NDArray[np.float64], NDArray[np.float64]],
-    hinge: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rotations: tuple[Float64Array, Float64Array],
+    before: tuple[Float64Array, Float64Array],
+    after: tuple[Float64Array, Float64Array],
+    hinge: Float64Array,
+) -> tuple[Float64Array, Float64Array]:
     """Turn both bones of a limb to other directions, each (T, 3), with the plane in which it bends.
 
     :param rotations: of the upper and the lower bone, global, (T, 3, 3) each.
@@ -200,9 +199,7 @@ def _turned_bones(
     return turned[0], turned[1]
 
 
-def _angle_about(
-    axis: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _angle_about(axis: Float64Array, start: Float64Array, end: Float64Array) -> Float64Array:
     """Return the angles (T,), −π to π, by which directions (T, 3) turn about an axis (T, 3) to
     others.
     """
@@ -210,23 +207,23 @@ def _angle_about(
     across = np.cross(axis, start)
     sine = (across * end).sum(axis=1)
     cosine = (np.cross(across, axis) * end).sum(axis=1)
-    angle: NDArray[np.float64] = np.arctan2(sine, cosine)
+    angle: Float64Array = np.arctan2(sine, cosine)
     return angle
 
 
-def _twists(rotations: NDArray[np.float64], bone: NDArray[np.float64]) -> NDArray[np.float64]:
+def _twists(rotations: Float64Array, bone: Float64Array) -> Float64Array:
     """Return the angles (T,), 0 to π, by which rotations (T, 3, 3) twist about a bone (3,) at
     rest.
     """
     swing = shortest_turn(
         np.broadcast_to(bone, (len(rotations), 3)), (rotations @ bone[:, None])[..., 0]
     )
-    twist: NDArray[np.float64] = log(np.swapaxes(swing, -1, -2) @ rotations)
-    angles: NDArray[np.float64] = np.linalg.norm(twist, axis=-1)
+    twist: Float64Array = log(np.swapaxes(swing, -1, -2) @ rotations)
+    angles: Float64Array = np.linalg.norm(twist, axis=-1)
     return angles
 
 
-def _blend_ends(clip: Clip, span: NDArray[np.intp], joints: NDArray[np.intp]) -> None:
+def _blend_ends(clip: Clip, span: IndexArray, joints: IndexArray) -> None:
     """Blend the joints of a span of keys into those before and after it."""
     times = clip.times
     inside_s = min(_BLEND_S, 0.25 * float(times[span[-1]] - times[span[0]]))
@@ -245,7 +242,7 @@ def _blend_ends(clip: Clip, span: NDArray[np.intp], joints: NDArray[np.intp]) ->
     clip.rotations[:] = blended.rotations
 
 
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unit(vectors: Float64Array) -> Float64Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    directions: NDArray[np.float64] = vectors / np.maximum(length, 1e-12)
+    directions: Float64Array = vectors / np.maximum(length, 1e-12)
     return directions

@@ -15,10 +15,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log, shortest_turn
+from ..arrays import Float64Array, FloatArray
 from ..kinematics.axes import UP
 from ..kinematics.foot_skin import FootSkin
 from ..kinematics.smoothing import gaussian_smooth
@@ -46,7 +46,7 @@ _PARTS = {LOWER: slice(0, 4), "left": slice(0, 2), "right": slice(2, 4)}
 def edited(
     clip: Clip,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     corrections: Iterable[Correction],
     shot: Shot,
 ) -> Clip:
@@ -101,7 +101,7 @@ def floor_above(corrections: Iterable[Correction], feet: FeetOnFloor) -> float:
     return feet.height - floor_height(corrections)
 
 
-def moved_motion(motion: Motion, body: Body, transform: NDArray[np.float64]) -> Motion:
+def moved_motion(motion: Motion, body: Body, transform: Float64Array) -> Motion:
     """Move a motion and its camera in the world; what its corrections say stays as it is.
 
     :param transform: (4, 4) rigid.
@@ -115,7 +115,7 @@ def moved_motion(motion: Motion, body: Body, transform: NDArray[np.float64]) -> 
     return replace(motion, **changed)
 
 
-def moved_clip(clip: Clip, transform: NDArray[np.float64]) -> Clip:
+def moved_clip(clip: Clip, transform: Float64Array) -> Clip:
     """Move a clip in the world; ``transform`` (4, 4) is rigid."""
     rotations = clip.rotations.copy()
     rotations[:, 0] = transform[:3, :3] @ rotations[:, 0]
@@ -123,11 +123,11 @@ def moved_clip(clip: Clip, transform: NDArray[np.float64]) -> Clip:
 
 
 def _moved(
-    poses: NDArray[np.floating[Any]],
-    trans: NDArray[np.floating[Any]],
-    rest: NDArray[np.float64],
-    transform: NDArray[np.float64],
-) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+    poses: FloatArray,
+    trans: FloatArray,
+    rest: Float64Array,
+    transform: Float64Array,
+) -> tuple[FloatArray, FloatArray]:
     """Move poses (T, 3(K+1)) and translations (T, 3) of a body whose pelvis rests at ``rest``
     (3,).
     """
@@ -140,7 +140,7 @@ def _moved(
 def refloor(
     clip: Clip,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     feet: FeetOnFloor,
     height: float = 0.0,
     shot: Shot | None = None,
@@ -180,9 +180,7 @@ def refloor(
     return out
 
 
-def _levelling(
-    soles: NDArray[np.float64], weight: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _levelling(soles: Float64Array, weight: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Fit a plane to the soles in contact and return the rotation that levels it.
 
     :param soles: (T, 4, 3) metres, world frame.
@@ -205,9 +203,7 @@ def _levelling(
     return shortest_turn(normal, UP), middle
 
 
-def foot_height(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], time: float, foot: str
-) -> float:
+def foot_height(clip: Clip, body: Body, betas: FloatArray, time: float, foot: str) -> float:
     """Return the height in metres of the lowest skin of a foot at a time.
 
     :param betas: (P,) shape coefficients.

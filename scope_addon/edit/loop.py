@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log
+from ..arrays import BoolArray, Float64Array, FloatArray
 from ..errors import UsageError
 from .clip import Clip, keys_within
 from .root_motion import floor_trajectory, relative_to_trajectory
@@ -35,7 +34,7 @@ class Cycle:
 def best_cycle(
     clip: Clip,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     start: float,
     end: float,
     shortest: float = 0.4,
@@ -100,7 +99,7 @@ def best_cycle(
     return Cycle(int(span[a]), int(span[b]), float(distance))
 
 
-def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
+def _moves(joints: Float64Array, least: float) -> BoolArray:
     """Return (N, N): whether the body leaves pose a by ``least`` and comes back at least halfway by
     pose b.
 
@@ -110,16 +109,14 @@ def _moves(joints: NDArray[np.float64], least: float) -> NDArray[np.bool_]:
     apart = np.sqrt(_squared_distances(joints.reshape(len(joints), -1)) / joints.shape[1])
     # The largest distance from pose a among the poses from a to b.
     farthest = np.maximum.accumulate(np.triu(apart), axis=1)
-    moves: NDArray[np.bool_] = (farthest >= least) & (apart <= 0.5 * farthest)
+    moves: BoolArray = (farthest >= least) & (apart <= 0.5 * farthest)
     return moves
 
 
-def _squared_distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _squared_distances(points: Float64Array) -> Float64Array:
     """Return the squared distances (N, N) between points (N, D)."""
     squares = (points**2).sum(1)
-    apart: NDArray[np.float64] = np.maximum(
-        squares[:, None] + squares[None] - 2 * points @ points.T, 0.0
-    )
+    apart: Float64Array = np.maximum(squares[:, None] + squares[None] - 2 * points @ points.T, 0.0)
     return apart
 
 
@@ -148,7 +145,7 @@ def close_cycle(clip: Clip, cycle: Cycle, blend: float = 0.2) -> Clip:
     return Clip(times, rotations, root)
 
 
-def _vertical_turns(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+def _vertical_turns(rotations: Float64Array) -> Float64Array:
     """Return the angles (N, N) in radians of the rotations about the vertical that take each of the
     rotations (N, 3, 3) closest to each other one, by row and column.
     """
@@ -156,5 +153,5 @@ def _vertical_turns(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     turns = np.einsum("bik,ajk->abij", level, level)
     sine = turns[..., 1, 0] - turns[..., 0, 1]
     cosine = turns[..., 0, 0] + turns[..., 1, 1]
-    angles: NDArray[np.float64] = np.arctan2(sine, cosine)
+    angles: Float64Array = np.arctan2(sine, cosine)
     return angles

@@ -24,7 +24,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +46,7 @@ from ...solver.body import Body
 from ...solver.measurements import SIGMA_3D
 from ...solver.residuals import joint_limits
 from ...solver.tree import with_fixed_shape
+from ..arrays import Float64Array, FloatArray
 from ..errors import UsageError
 from ..kinematics.contact_points import SOLES, with_contact_points
 from ..kinematics.foot_skin import UNDER_FLOOR_M, FootSkin
@@ -74,7 +74,7 @@ _LIMBS = {
 }
 _ENDS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "head")
 # A camera: world_from_camera (4, 4), metres, and intrinsics (3, 3).
-Camera = tuple[NDArray[np.float64], NDArray[np.float64]]
+Camera = tuple[Float64Array, Float64Array]
 _STEEP = np.radians(45.0)  # A steep camera looks farther up or down from the horizon.
 SLACK_M = 0.03
 _MOVES_BODY = ("pelvis", "left_hip", "right_hip")
@@ -85,12 +85,12 @@ class Points:
     """Measured points of one frame; numbers as in `PoseRefit.number`."""
 
     numbers: list[int] = field(default_factory=list)
-    values: list[NDArray[np.float64]] = field(default_factory=list)  # (3,) metres, or (2,) pixels
+    values: list[Float64Array] = field(default_factory=list)  # (3,) metres, or (2,) pixels
     weights: list[float] = field(default_factory=list)
     # The feet's skin stays above this height; None: it may be anywhere.
     floor: float | None = None
 
-    def add(self, number: int, value: NDArray[np.float64], weight: float) -> None:
+    def add(self, number: int, value: Float64Array, weight: float) -> None:
         """Add a point.
 
         :param value: (3,) metres in the world, or (2,) in the image.
@@ -138,7 +138,7 @@ def _options() -> Options:
 class PoseRefit:
     """Fits poses of one body of a fixed shape."""
 
-    def __init__(self, body: Body, betas: NDArray[np.floating[Any]]) -> None:
+    def __init__(self, body: Body, betas: FloatArray) -> None:
         """Prepare the body.
 
         :param betas: (P,) shape coefficients.
@@ -176,8 +176,8 @@ class PoseRefit:
         ]
 
     def place(
-        self, rotations: NDArray[np.float64], root: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        self, rotations: Float64Array, root: Float64Array
+    ) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return orientations (..., K+1, 3, 3) and positions (..., K+1, 3) of all parts, and the
         soles (..., 4, 3).
 
@@ -192,12 +192,12 @@ class PoseRefit:
 
     def solve(
         self,
-        rotations: NDArray[np.float64],
-        root: NDArray[np.float64],
+        rotations: Float64Array,
+        root: Float64Array,
         joints: tuple[str, ...],
         points: Points,
         camera: Camera | None = None,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Float64Array, Float64Array]:
         """Fit one pose to points.
 
         :param rotations, root: (K+1, 3, 3), (3,) the pose as it was, world.
@@ -242,11 +242,11 @@ class PoseRefit:
 
     def _shift_in_image(
         self,
-        rotations: NDArray[np.float64],
-        root: NDArray[np.float64],
+        rotations: Float64Array,
+        root: Float64Array,
         points: Points,
         camera: Camera | None,
-    ) -> NDArray[np.float64]:
+    ) -> Float64Array:
         """Return the shift (3,) by which hips that are measured in the image move there at their
         depth.
         """
@@ -261,12 +261,10 @@ class PoseRefit:
             return np.zeros(3)
         at = self.place(rotations, root)[1]
         shifts = [point_at_depth(camera, pixel, at[joint]) - at[joint] for joint, pixel in pixels]
-        mean: NDArray[np.float64] = np.mean(shifts, axis=0)
+        mean: Float64Array = np.mean(shifts, axis=0)
         return mean
 
-    def _root_prior(
-        self, R: NDArray[np.float64], t: NDArray[np.float64], joints: tuple[str, ...]
-    ) -> PosePriors:
+    def _root_prior(self, R: Float64Array, t: Float64Array, joints: tuple[str, ...]) -> PosePriors:
         """Return the prior on the pelvis, which may move where the trunk is corrected."""
         trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
         # Legs bend rather than let the body move away.
@@ -275,7 +273,7 @@ class PoseRefit:
         posed: PosePriors = PosePriors([0], R[None], t[None], [rotation], [PELVIS_POSITION * share])
         return posed
 
-    def _weights(self, joints: tuple[str, ...]) -> NDArray[np.float64]:
+    def _weights(self, joints: tuple[str, ...]) -> Float64Array:
         """Return the weights (K,) of the joints' prior."""
         weights = np.full(len(self.names), STIFF)
         for k, name in enumerate(self.names):
@@ -298,7 +296,7 @@ class PoseRefit:
                 part = int(self.body.parents[part])
         return weights[1:]
 
-    def _limits_of(self, joints: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _limits_of(self, joints: tuple[str, ...]) -> tuple[NDArray[np.int64], Float64Array]:
         """Return the limits of knees and elbows of the corrected limbs: other joints stay as they
         were.
         """
@@ -308,30 +306,26 @@ class PoseRefit:
         return ints[keep], floats[keep]
 
 
-def pixel_of(camera: Camera, point: NDArray[np.float64]) -> NDArray[np.float64]:
+def pixel_of(camera: Camera, point: Float64Array) -> Float64Array:
     """Project a point (3,), world, to a pixel (2,)."""
     T, K = camera
     p = K @ (T[:3, :3].T @ (np.asarray(point, float) - T[:3, 3]))
-    pixel: NDArray[np.float64] = p[:2] / p[2]
+    pixel: Float64Array = p[:2] / p[2]
     return pixel
 
 
-def nearest_on_ray(
-    camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def nearest_on_ray(camera: Camera, pixel: Float64Array, point: Float64Array) -> Float64Array:
     """Return the point (3,) nearest to another one of those in front of the camera that project to
     a pixel (2,).
     """
     T, K = camera
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
     ray /= np.linalg.norm(ray)
-    nearest: NDArray[np.float64] = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
+    nearest: Float64Array = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
     return nearest
 
 
-def point_at_depth(
-    camera: Camera, pixel: NDArray[np.float64], point: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def point_at_depth(camera: Camera, pixel: Float64Array, point: Float64Array) -> Float64Array:
     """Return the point (3,) that projects to a pixel (2,) and is as far away as another one, (3,).
 
     It is in the upright plane through the other point that faces the camera, so that somebody who
@@ -347,18 +341,18 @@ def point_at_depth(
     # The ray meets the plane beside or behind the camera, or nowhere.
     if along < 1e-3 * float(np.linalg.norm(ray) * np.linalg.norm(normal)):
         return nearest_on_ray(camera, pixel, point)
-    place: NDArray[np.float64] = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
+    place: Float64Array = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
     return place
 
 
 def within_reach(
     refit: PoseRefit,
     joint: str,
-    target: NDArray[np.float64],
-    places: tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]]],
+    target: Float64Array,
+    places: tuple[Float64Array, Mapping[str, Float64Array]],
     camera: Camera | None,
     slack: float = SLACK_M,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return where a pin can be met: the pin itself, or a place on the way to it.
 
     :param target: (3,) metres in the world, or (2,) pixels.
@@ -381,12 +375,12 @@ def within_reach(
     distance = float(np.linalg.norm(nearest - origin))
     if distance <= reach + slack:
         return target
-    place: NDArray[np.float64] = origin + (nearest - origin) * ((reach + slack) / distance)
+    place: Float64Array = origin + (nearest - origin) * ((reach + slack) / distance)
     return place if len(target) == 3 or camera is None else pixel_of(camera, place)
 
 
 def _first_joint(
-    refit: PoseRefit, joint: str, pinned: Mapping[str, NDArray[np.float64]]
+    refit: PoseRefit, joint: str, pinned: Mapping[str, Float64Array]
 ) -> tuple[str, float]:
     """Return the joint that a limb turns about, or a pinned one nearer to its end, and the limb's
     length from there.

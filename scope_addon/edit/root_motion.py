@@ -6,8 +6,8 @@ the motion.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array
 from ..kinematics.axes import R_WORLD_MODEL
 from ..kinematics.smoothing import gaussian_smooth
 from .clip import Clip
@@ -15,9 +15,7 @@ from .clip import Clip
 _HEADING_CUTOFF_HZ = 1.0  # Low enough to remove the rotation of the hips with each step.
 
 
-def floor_trajectory(
-    clip: Clip, *, heading: bool = True
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def floor_trajectory(clip: Clip, *, heading: bool = True) -> tuple[Float64Array, Float64Array]:
     """Project the pelvis on the floor.
 
     :param heading: also return the heading, smoothed; zeros otherwise.
@@ -35,9 +33,7 @@ def floor_trajectory(
     return positions, gaussian_smooth(angle, clip.times, _HEADING_CUTOFF_HZ)
 
 
-def relative_to_trajectory(
-    clip: Clip, positions: NDArray[np.float64], angles: NDArray[np.float64]
-) -> Clip:
+def relative_to_trajectory(clip: Clip, positions: Float64Array, angles: Float64Array) -> Clip:
     """Express the motion in the moving frame of a trajectory.
 
     :param positions: (T, 3) origins of the frame, metres.
@@ -49,9 +45,7 @@ def relative_to_trajectory(
     return Clip(clip.times, rotations, np.einsum("tji,tj->ti", turn, clip.root - positions))
 
 
-def with_trajectory(
-    clip: Clip, positions: NDArray[np.float64], angles: NDArray[np.float64]
-) -> Clip:
+def with_trajectory(clip: Clip, positions: Float64Array, angles: Float64Array) -> Clip:
     """Add a trajectory to the motion: the inverse of ``relative_to_trajectory``.
 
     :param positions: (T, 3) origins of the moving frame, metres.
@@ -63,7 +57,7 @@ def with_trajectory(
     return Clip(clip.times, rotations, np.einsum("tij,tj->ti", turn, clip.root) + positions)
 
 
-def about_z(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def about_z(angles: Float64Array) -> Float64Array:
     """Return rotations (T, 3, 3) about the vertical.
 
     :param angles: T angles in any shape, radians.
@@ -72,5 +66,5 @@ def about_z(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     s = np.sin(angles)
     zero = np.zeros_like(c)
     one = np.ones_like(c)
-    rows: NDArray[np.float64] = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1)
+    rows: Float64Array = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1)
     return rows.reshape(-1, 3, 3)

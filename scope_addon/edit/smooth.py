@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..arrays import Float64Array
 from ..errors import UsageError
 from ..kinematics.frame_blocks import by_blocks
 from ..kinematics.leg_reach import LEGS, move_ends
@@ -127,14 +127,12 @@ def _smoothed_further(clip: Clip, strength: float) -> Clip:
     return Clip(clip.times, R[inner], smooth_root(root, times, beyond)[inner])
 
 
-def _reflected(root: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
+def _reflected(root: Float64Array, end: Float64Array) -> Float64Array:
     """Return positions (n, 3) with directions turned by 180° about that of ``end``, and distances d
     as end² / d.
     """
     squared = np.maximum(np.sum(root * root, axis=1, keepdims=True), 1e-12)
-    reflected: NDArray[np.float64] = (
-        2 * (root @ end)[:, None] * end - float(end @ end) * root
-    ) / squared
+    reflected: Float64Array = (2 * (root @ end)[:, None] * end - float(end @ end) * root) / squared
     return reflected
 
 
@@ -146,9 +144,9 @@ def _with_resting_feet(calm: Clip, finished: Clip, motion: Motion, body: Body) -
     share = gaussian_smooth(rests, motion.times_with_gaps, ROTATION_CUTOFF_HZ)
 
     def bend(
-        R: NDArray[np.float64], root: NDArray[np.float64], R_held: NDArray[np.float64],
-        root_held: NDArray[np.float64], share: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float64]]:  # fmt: skip
+        R: Float64Array, root: Float64Array, R_held: Float64Array,
+        root_held: Float64Array, share: Float64Array,
+    ) -> tuple[Float64Array]:  # fmt: skip
         poses = body.forward_kinematics(R, root - pelvis_at_rest, motion.betas)
         held = body.forward_kinematics(R_held, root_held - pelvis_at_rest, motion.betas)[1]
         return (move_ends(body, LEGS, R, poses, share[..., None] * (held - poses[1])[:, ankles]),)

@@ -20,13 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log
+from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..kinematics.axes import UP
 from ..kinematics.contact_points import FOOT_PARTS, SOLES
 from ..kinematics.standing import standing_probability
@@ -64,12 +64,12 @@ class Shot:
     """When and from where each frame of the footage was taken."""
 
     frames: NDArray[np.int64]  # (N,) source frames, increasing
-    times: NDArray[np.float64]  # (N,) seconds, on the clock of the clip that is corrected
-    world_from_camera: NDArray[np.float64]  # (N, 4, 4)
-    intrinsics: NDArray[np.float64]  # (N, 3, 3)
-    valid: NDArray[np.bool_] | None = None  # (N,) whether the person was seen; None: in all
+    times: Float64Array  # (N,) seconds, on the clock of the clip that is corrected
+    world_from_camera: Float64Array  # (N, 4, 4)
+    intrinsics: Float64Array  # (N, 3, 3)
+    valid: BoolArray | None = None  # (N,) whether the person was seen; None: in all
     # (M,) seconds, when the footage cuts to another scene, on the same clock
-    cuts_s: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    cuts_s: Float64Array = field(default_factory=lambda: np.zeros(0))
 
     def with_gaps(self) -> Shot:
         """Return the shot on a clock that has gaps at scene cuts."""
@@ -80,11 +80,11 @@ class Shot:
         """Return a clip of this shot on the clock of `with_gaps`."""
         return replace(clip, times=with_scene_gaps(clip.times, self.cuts_s))
 
-    def seen_at(self, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def seen_at(self, times: Float64Array) -> BoolArray:
         """Return whether the person was seen in the frames nearest to times, (T,)."""
         if self.valid is None:
             return np.ones(len(times), bool)
-        seen: NDArray[np.bool_] = self.valid[
+        seen: BoolArray = self.valid[
             np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
         ]
         return seen
@@ -98,7 +98,7 @@ class Shot:
         row = int(np.abs(self.frames - frame).argmin())
         return self.world_from_camera[row], self.intrinsics[row]
 
-    def project(self, frame: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project(self, frame: int, point: Float64Array) -> Float64Array:
         """Project a point (3,), world, to the pixel (2,) of a source frame."""
         return pixel_of(self.camera(frame), point)
 
@@ -113,13 +113,13 @@ class _Track:
     keys: list[int]
     points: list[dict[str, Points]]
     cameras: list[Camera | None]
-    reach: NDArray[np.float64]  # (H,) seconds
+    reach: Float64Array  # (H,) seconds
 
 
 def resolve(
     clip: Clip,
     body: Body,
-    betas: NDArray[np.floating[Any]],
+    betas: FloatArray,
     corrections: Iterable[Contact | Pin],
     shot: Shot,
     slack: float = SLACK_M,
@@ -152,7 +152,7 @@ def resolve(
     return out
 
 
-def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, shot: Shot) -> float:
+def missed(clip: Clip, body: Body, betas: FloatArray, pin: Pin, shot: Shot) -> float:
     """Return how far the joint is from its pin: pixels of a pin in the image, metres of one in
     space.
 
@@ -163,7 +163,7 @@ def missed(clip: Clip, body: Body, betas: NDArray[np.floating[Any]], pin: Pin, s
     return distance_to(pin, where, shot.camera(pin.frame))
 
 
-def distance_to(pin: Pin, place: NDArray[np.float64], camera: Camera) -> float:
+def distance_to(pin: Pin, place: Float64Array, camera: Camera) -> float:
     """Return how far a place (3,), world, is from a pin: pixels of a pin in the image, metres of
     one in space.
     """
@@ -182,7 +182,7 @@ class _Correction:
         tracks: list[_Track],
         slack: float,
         floor: float,
-        stands: NDArray[np.bool_] | None = None,
+        stands: BoolArray | None = None,
     ) -> None:
         """Take what is corrected.
 
@@ -257,7 +257,7 @@ class _Correction:
             pose = self._refit.solve(rotations[k], root[k], tuple(track.joints), points, camera)
             clip.rotations[key], clip.root[key] = pose
 
-    def _limit(self, index: int, at: NDArray[np.float64]) -> None:
+    def _limit(self, index: int, at: Float64Array) -> None:
         """Move the pins of a limb that are out of its reach to where it can reach them, before it
         is first treated.
 
@@ -269,7 +269,7 @@ class _Correction:
         track = self._tracks[index]
         first = self._spans[index][0]
         for h, key in enumerate(track.keys):
-            pinned: dict[str, NDArray[np.float64]] = {}
+            pinned: dict[str, Float64Array] = {}
             moved: dict[str, Points] = {}
             for joint in (joint for joint in track.joints if joint in track.points[h]):
                 points = track.points[h][joint]
@@ -288,10 +288,10 @@ class _Correction:
         self,
         track: _Track,
         hard: list[int],
-        span: NDArray[np.intp],
+        span: IndexArray,
         before: Clip,
         held: list[Points],
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Float64Array, Float64Array]:
         """Fit the pinned keys; return the rotation vectors (H, K+1, 3) and shifts (H, 3) that this
         takes.
         """
@@ -308,9 +308,7 @@ class _Correction:
             shifts.append(root - before.root[k])
         return np.array(turns), np.array(shifts)
 
-    def _held(
-        self, index: int, key: int, joints: NDArray[np.float64], soles: NDArray[np.float64]
-    ) -> Points:
+    def _held(self, index: int, key: int, joints: Float64Array, soles: Float64Array) -> Points:
         """Return the points of other limbs, which stay where they are while a limb is corrected."""
         refit = self._refit
         own = self._tracks[index].joints
@@ -338,9 +336,7 @@ class _Correction:
                     points.add(refit.number(name), joints[refit.joint(name)], PINNED * share)
         return points
 
-    def _rise(
-        self, track: _Track, span: NDArray[np.intp], heights: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _rise(self, track: _Track, span: IndexArray, heights: Float64Array) -> Float64Array:
         """Return by how much, (T, 3), the points of a leg have to be higher for its foot to be
         above the floor.
 
@@ -348,7 +344,7 @@ class _Correction:
         """
         own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
         lowest = heights[:, own].min(axis=1, initial=np.inf)
-        rise: NDArray[np.float64] = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * UP
+        rise: Float64Array = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * UP
         return rise
 
     def _share(self, index: int, key: int) -> float:
@@ -363,8 +359,8 @@ class _Correction:
         points: Points,
         joint: str,
         track: _Track,
-        joints: NDArray[np.float64],
-        soles: NDArray[np.float64],
+        joints: Float64Array,
+        soles: Float64Array,
     ) -> None:
         """Add the corrected points of a key that is not pinned, where the interpolated pose has
         them.
@@ -395,7 +391,7 @@ class _Correction:
         return True
 
 
-def _met(where: NDArray[np.float64], target: NDArray[np.float64], camera: Camera | None) -> bool:
+def _met(where: Float64Array, target: Float64Array, camera: Camera | None) -> bool:
     if len(target) == 3 or camera is None:
         return float(np.linalg.norm(where - target)) < _MET_M
     return float(np.linalg.norm(pixel_of(camera, where) - target)) < _MET_PX
@@ -415,7 +411,7 @@ def _with_pins(held: Points, track: _Track, h: int) -> Points:
     return points
 
 
-def _keys_within_reach(clip: Clip, track: _Track) -> NDArray[np.intp]:
+def _keys_within_reach(clip: Clip, track: _Track) -> IndexArray:
     """Return the keys that a track changes, without gaps between the first and the last."""
     known = clip.times[track.keys]
     first = (known - track.reach).min()
@@ -432,7 +428,7 @@ def _key_at(clip: Clip, time: float) -> int | None:
     return key if abs(clip.times[key] - time) <= max(spacing, 0.05) else None
 
 
-def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> NDArray[np.intp]:
+def keys_of_span(clip: Clip, first: int, last: int, shot: Shot) -> IndexArray:
     """Return the indices of a clip's keys at the source frames from ``first`` to ``last``, both
     inclusive: those up to half of a step away from them, and nearer to them than to other frames.
     """
@@ -470,7 +466,7 @@ def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> li
 
 
 def _pin_track(
-    refit: PoseRefit, by_key: dict[int, list[Pin]], reach: NDArray[np.float64], shot: Shot
+    refit: PoseRefit, by_key: dict[int, list[Pin]], reach: Float64Array, shot: Shot
 ) -> _Track:
     """Return the track of a limb's pins.
 
@@ -536,12 +532,12 @@ def _contact_track(
     return _Track([joint], span.tolist(), [{joint: points}] * n, [None] * n, reach)
 
 
-def _soles_of_foot(refit: PoseRefit, side: str) -> NDArray[np.intp]:
+def _soles_of_foot(refit: PoseRefit, side: str) -> IndexArray:
     return np.flatnonzero([name.startswith(f"sole/{side}") for name in SOLES])
 
 
 def _resting_track(
-    refit: PoseRefit, clip: Clip, part: str, span: NDArray[np.intp], floor: float
+    refit: PoseRefit, clip: Clip, part: str, span: IndexArray, floor: float
 ) -> _Track:
     """Return the track of a part that rests: its joints stay at their median position, as high as
     the lowest skin that moves with them has to be moved to the floor. Without a floor, that skin
@@ -574,9 +570,7 @@ def resting_joints(part: str) -> list[str]:
     return [part.replace("hand", "wrist")]
 
 
-def lowest_skin(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]], joint: str
-) -> NDArray[np.float64]:
+def lowest_skin(clip: Clip, body: Body, betas: FloatArray, joint: str) -> Float64Array:
     """Return the heights z (T,) of the lowest skin that rests on the floor where a joint does: that
     of its own part, with a wrist the hand's, and with the pelvis the thighs'.
 

@@ -10,10 +10,10 @@ ends.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, log
+from ..arrays import BoolArray, Float64Array
 from ..errors import UsageError
 from .clip import Clip, keys_within
 
@@ -127,16 +127,16 @@ def _pairs_of_joints(body: Body, kind: str) -> list[tuple[int, int]]:
 
 
 def _hermite(
-    s: NDArray[np.float64],
-    p0: NDArray[np.float64],
-    p1: NDArray[np.float64],
-    v0: NDArray[np.float64],
-    v1: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    s: Float64Array,
+    p0: Float64Array,
+    p1: Float64Array,
+    v0: Float64Array,
+    v1: Float64Array,
+) -> Float64Array:
     """Evaluate the cubic from p0 to p1 with derivatives v0, v1 with respect to s, 0 to 1."""
     s2 = s * s
     s3 = s * s * s
-    value: NDArray[np.float64]
+    value: Float64Array
     value = (
         (2 * s3 - 3 * s2 + 1) * p0
         + (s3 - 2 * s2 + s) * v0
@@ -146,17 +146,17 @@ def _hermite(
     return value
 
 
-def _limited(v: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
+def _limited(v: Float64Array, step: Float64Array) -> Float64Array:
     """Limit velocities to three times the step; above that a cubic overshoots (Fritsch and
     Carlson).
     """
     size = np.linalg.norm(v, axis=-1, keepdims=True)
     most = 3.0 * np.linalg.norm(step, axis=-1, keepdims=True)
-    limited: NDArray[np.float64] = v * np.minimum(1.0, most / np.maximum(size, 1e-12))
+    limited: Float64Array = v * np.minimum(1.0, most / np.maximum(size, 1e-12))
     return limited
 
 
-def _velocities(clip: Clip, k: int, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _velocities(clip: Clip, k: int, side: int) -> tuple[Float64Array, Float64Array]:
     """Return the velocities at key k, from the neighbouring key on ``side``; zeros where there is
     none.
 
@@ -172,11 +172,11 @@ def _velocities(clip: Clip, k: int, side: int) -> tuple[NDArray[np.float64], NDA
 
 
 def faded(
-    times: NDArray[np.float64],
-    known: NDArray[np.float64],
-    values: NDArray[np.float64],
-    reach: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    times: Float64Array,
+    known: Float64Array,
+    values: Float64Array,
+    reach: Float64Array,
+) -> Float64Array:
     """Interpolate values that fade to zero ``reach`` seconds beyond the known ones.
 
     Between two known values it interpolates, unless they are far apart, see `are_far_apart`.
@@ -202,24 +202,22 @@ def faded(
         if is_far:
             at.append(known[k + 1 : k + 2] - reach[k + 1])
             rows.append(zero)
-    inside: NDArray[np.float64] = _monotone_cubic(times, np.concatenate(at), np.concatenate(rows))
+    inside: Float64Array = _monotone_cubic(times, np.concatenate(at), np.concatenate(rows))
     return inside.reshape(len(times), *values.shape[1:])
 
 
-def are_far_apart(known: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.bool_]:
+def are_far_apart(known: Float64Array, reach: Float64Array) -> BoolArray:
     """Return (H-1,) between which of the known times a correction fades out and in again: those
     farther apart than twice the sum of their reaches.
 
     :param known: (H,) seconds, increasing.
     :param reach: (H,) seconds.
     """
-    far: NDArray[np.bool_] = np.diff(known) > 2 * (reach[:-1] + reach[1:])
+    far: BoolArray = np.diff(known) > 2 * (reach[:-1] + reach[1:])
     return far
 
 
-def _monotone_cubic(
-    times: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _monotone_cubic(times: Float64Array, x: Float64Array, y: Float64Array) -> Float64Array:
     """Evaluate the monotone cubic through (x, y) with zero slopes at both ends; zero beyond them.
 
     :param x: (H,) increasing; y: (H, D), zero at both ends.
@@ -238,7 +236,7 @@ def _monotone_cubic(
     k = np.clip(np.searchsorted(x, times, side="right") - 1, 0, len(x) - 2)
     s = np.clip((times - x[k]) / (x[k + 1] - x[k]), 0.0, 1.0)[:, None]
     h = (x[k + 1] - x[k])[:, None]
-    value: NDArray[np.float64]
+    value: Float64Array
     value = (1 + 2 * s) * (1 - s) ** 2 * y[k] + s**2 * (3 - 2 * s) * y[k + 1]
     value += h * s * (1 - s) * ((1 - s) * m[k] - s * m[k + 1])
     return value

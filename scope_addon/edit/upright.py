@@ -13,10 +13,10 @@ camera or away from it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import shortest_turn
+from ..arrays import Float64Array
 from ..errors import UsageError
 from ..kinematics.axes import UP
 from ..kinematics.standing import standing_probability
@@ -32,7 +32,7 @@ _SIDE = np.radians(30.0)  # A view from a side deviates from level by at most th
 
 def upright_transform(
     motion: Motion, body: Body, frame: int, line: tuple[tuple[float, float], tuple[float, float]]
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return the rigid transform (4, 4) of the world after which a line in the image is upright.
 
     :param frame: source frame.
@@ -51,9 +51,9 @@ def upright_transform(
 def upright_transform_in_view(
     motion: Motion,
     body: Body,
-    line: tuple[NDArray[np.float64], NDArray[np.float64]],
-    direction: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    line: tuple[Float64Array, Float64Array],
+    direction: Float64Array,
+) -> Float64Array:
     """Return the rigid transform (4, 4) of the world after which a line in an orthographic view is
     upright.
 
@@ -73,7 +73,7 @@ def upright_transform_in_view(
     return _transform(motion, body, across)
 
 
-def _transform(motion: Motion, body: Body, normal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _transform(motion: Motion, body: Body, normal: Float64Array) -> Float64Array:
     """Return the transform (4, 4) after which a plane in which something stands is upright.
 
     :param normal: (3,) of the plane, of any length.

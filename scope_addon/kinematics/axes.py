@@ -14,10 +14,10 @@ Blender's cameras are in ``scene/camera.py``.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ..arrays import Float64Array, FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])  # The world's up direction.
 # Model y up becomes world z up, (x, y, z) -> (x, -z, y): the person faces world −y, into Blender's
@@ -32,7 +32,7 @@ R_OPENSIM_WORLD = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 R_OPENSIM_MODEL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
-def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArray[np.float64]:
+def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> Float64Array:
     """Return the camera pose in a world whose z axis is the given up direction and whose +y the
     camera faces.
 
@@ -57,8 +57,6 @@ def world_from_level_camera(up_camera: ArrayLike, height: float = 0.0) -> NDArra
     return T_world_camera
 
 
-def transform_points(
-    T_a_b: NDArray[np.floating[Any]], points_b: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
+def transform_points(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
     """Return ``p_a = R p_b + t`` for (..., 4, 4) transforms and (..., N, 3) points."""
     return points_b @ np.swapaxes(T_a_b[..., :3, :3], -1, -2) + T_a_b[..., None, :3, 3]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from .contact_points import PALMS, with_keypoints
 from .frame_blocks import by_blocks
 
@@ -58,12 +59,12 @@ class TangentPlanes:
     above.
     """
 
-    normal: NDArray[np.float64]  # (T, C, 3) unit, outwards
+    normal: Float64Array  # (T, C, 3) unit, outwards
     # (T, C) metres, with the room that the arm needs around the point.
-    offset: NDArray[np.float64]
+    offset: Float64Array
     # (T, C) height of the point above the plane, metres; negative inside the body.
-    height: NDArray[np.float64]
-    near: NDArray[np.bool_]  # (T, C) whether the surface is so near that the plane matters
+    height: Float64Array
+    near: BoolArray  # (T, C) whether the surface is so near that the plane matters
 
 
 class BodySurface:
@@ -71,7 +72,7 @@ class BodySurface:
     of a body.
     """
 
-    def __init__(self, body: Body, betas: NDArray[np.floating[Any]]) -> None:
+    def __init__(self, body: Body, betas: FloatArray) -> None:
         """Choose the vertices, and measure the room that the arm needs around each keypoint.
 
         :param body: whose keypoints on the arms are used, those of `with_arm_points` and the palms
@@ -95,7 +96,7 @@ class BodySurface:
         points = (body.keypoint_template + body.keypoint_shapedirs @ betas)[self.indices]
         self._room = np.linalg.norm(points[:, None] - arms, axis=-1).min(axis=1, initial=np.inf)
 
-    def planes(self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]) -> TangentPlanes:
+    def planes(self, R: FloatArray, t: FloatArray) -> TangentPlanes:
         """Return the tangent planes next to the points `indices` of a posed body.
 
         :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame; the result is in that
@@ -106,9 +107,7 @@ class BodySurface:
             return TangentPlanes(np.zeros((len(R), 0, 3)), none, none, none.astype(bool))
         return TangentPlanes(*by_blocks(self._planes, R, t, frames=_FRAMES))
 
-    def _planes(
-        self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[Any], ...]:
+    def _planes(self, R: FloatArray, t: FloatArray) -> tuple[NDArray[Any], ...]:
         v, normals = self._posed(R, t)
         points = self._body.keypoints(R, t, self._betas, self.indices.tolist())
         squared = (
@@ -123,9 +122,7 @@ class BodySurface:
         height = (normal * points).sum(-1) - offset
         return normal, offset, height, (squared.min(-1) < REACH_M**2) & (height < AHEAD_M)
 
-    def _posed(
-        self, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _posed(self, R: FloatArray, t: FloatArray) -> tuple[Float64Array, Float64Array]:
         """Return the vertices (T, V, 3) by linear blend skinning, and their unit normals (T, V,
         3).
         """
@@ -139,15 +136,11 @@ class BodySurface:
 
 def _skin(
     body: Body,
-    rows: NDArray[np.intp],
-    v: NDArray[np.floating[Any]],
-    J: NDArray[np.floating[Any]],
-    normals: NDArray[np.floating[Any]],
-) -> Iterator[
-    tuple[
-        int, NDArray[np.intp], NDArray[np.floating[Any]], NDArray[np.float64], NDArray[np.float64]
-    ]
-]:
+    rows: IndexArray,
+    v: FloatArray,
+    J: FloatArray,
+    normals: FloatArray,
+) -> Iterator[tuple[int, IndexArray, FloatArray, Float64Array, Float64Array]]:
     """Yield for each joint the chosen vertices that it moves, and their weights (n, 1), places and
     normals (n, 3).
 
@@ -161,7 +154,7 @@ def _skin(
             yield joint, moved, weights, weights * (v[moved] - J[joint]), weights * normals[moved]
 
 
-def _points_on_arms(body: Body) -> NDArray[np.intp]:
+def _points_on_arms(body: Body) -> IndexArray:
     """Return the keypoints (C,) on forearms and hands that stay outside: one for each name, of
     whichever set.
     """
@@ -182,7 +175,7 @@ def _arm_parts(body: Body) -> list[int]:
     return arms
 
 
-def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def _vertex_normals(body: Body, betas: FloatArray) -> Float64Array:
     """Return outward unit normals (V, 3) in the rest pose; zero where a vertex has no area around
     it.
 
@@ -197,12 +190,12 @@ def _vertex_normals(body: Body, betas: NDArray[np.floating[Any]]) -> NDArray[np.
     normals = np.zeros(v.shape)
     for corner in range(3):
         np.add.at(normals, triangles[:, corner], areas if volume > 0.0 else -areas)
-    length: NDArray[np.float64] = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: NDArray[np.float64] = normals / np.maximum(length, np.finfo(float).tiny)
+    length: Float64Array = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit: Float64Array = normals / np.maximum(length, np.finfo(float).tiny)
     return unit
 
 
-def one_per_cell(points: NDArray[np.floating[Any]], side_m: float) -> NDArray[np.intp]:
+def one_per_cell(points: FloatArray, side_m: float) -> IndexArray:
     """Return the rows of points (n, 3), metres, one in each cell of a grid; in order."""
     _, first = np.unique(np.floor(points / side_m).astype(int), axis=0, return_index=True)
     return np.sort(first)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...solver.body import Body
+from ..arrays import FloatArray
 
 FOOT_PARTS = ("left_ankle", "left_foot", "right_ankle", "right_foot")
 SOLES = ("sole/left_heel", "sole/left_toe", "sole/right_heel", "sole/right_toe")
@@ -23,7 +24,7 @@ PALMS = ("palm/left", "palm/right")
 CONTACT_POINTS = SOLES + PALMS
 
 
-def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
+def with_contact_points(body: Body, betas: FloatArray) -> Body:
     """Add six keypoints to a body, `CONTACT_POINTS`.
 
     Each is attached to an ankle, foot or hand part, in the centre of the part's lowest centimetre
@@ -49,8 +50,8 @@ def with_contact_points(body: Body, betas: NDArray[np.floating[Any]]) -> Body:
 
 
 def contact_point_positions(
-    body_with_contact_points: Body, R: NDArray[np.floating[Any]], t: NDArray[np.floating[Any]]
-) -> NDArray[np.floating[Any]]:
+    body_with_contact_points: Body, R: FloatArray, t: FloatArray
+) -> FloatArray:
     """Return the (T, 6, 3) positions of the contact points of a posed body.
 
     :param body_with_contact_points: from `with_contact_points`.
@@ -82,7 +83,7 @@ def with_points_on_parts(
     body: Body,
     names: Iterable[str],
     parts: NDArray[np.integer[Any]],
-    offsets: NDArray[np.floating[Any]],
+    offsets: FloatArray,
 ) -> Body:
     """Add n keypoints that keep their offsets (n, 3) from the joints of their parts (n,), whatever
     the shape.

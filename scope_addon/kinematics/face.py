@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.body_file import BUILT_IN
 from ...solver.errors import ModelFileError
+from ..arrays import Float64Array, IndexArray, Uint8Array
 from ..untrusted.body_file import Form, check_arrays, check_finite_array, check_index
 from ..untrusted.files import read_npz
 
@@ -63,7 +64,7 @@ _MOUTH_FORMS: dict[str, Form] = {
     "material_colors": ("numbers", (None, 4)),
 }
 # (n,) vertices and (n, 3) offsets at weight 1, metres in the model frame.
-Moves = tuple[NDArray[np.intp], NDArray[np.float64]]
+Moves = tuple[IndexArray, Float64Array]
 
 _MOVES: dict[str, Form] = {
     "starts": ("whole numbers", (len(EXPRESSIONS) + 1,)),
@@ -80,8 +81,8 @@ class Expression:
     """
 
     name: str
-    vertices: NDArray[np.intp]
-    offsets: NDArray[np.float64]
+    vertices: IndexArray
+    offsets: Float64Array
 
 
 def expressions_of(body: Body) -> tuple[Expression, ...]:
@@ -108,7 +109,7 @@ def body_with_mouth(body: Body) -> Body:
     return with_teeth_and_tongue(body) if plain else body
 
 
-def mouth_faces_of(body: Body) -> NDArray[np.intp]:
+def mouth_faces_of(body: Body) -> IndexArray:
     """Return which faces (n,) of the body line its mouth; none where there are no expressions.
 
     :raises ModelFileError: the file of the expressions is damaged.
@@ -136,7 +137,7 @@ def _with_mouth() -> tuple[Expression, ...]:
 
 
 @cache
-def _read() -> tuple[int, tuple[Expression, ...], NDArray[np.intp]]:
+def _read() -> tuple[int, tuple[Expression, ...], IndexArray]:
     data = read_face_file(FILE, "file of expressions", _FORMS)
     count = int(data["vertex_count"])
     with told_to_install():
@@ -153,13 +154,13 @@ def _read() -> tuple[int, tuple[Expression, ...], NDArray[np.intp]]:
 class Mouth:
     """Teeth and tongue at rest: M vertices, F quads; lengths in metres, in the model frame."""
 
-    vertices: NDArray[np.float64]  # (M, 3)
-    shapedirs: NDArray[np.float64]  # (M, 3, 11); the last column is that of growth
+    vertices: Float64Array  # (M, 3)
+    shapedirs: Float64Array  # (M, 3, 11); the last column is that of growth
     faces: NDArray[np.int32]  # (F, 4)
-    uv: NDArray[np.float64]  # (M, 2)
-    face_material: NDArray[np.uint8]  # (F,) indices into material_names
+    uv: Float64Array  # (M, 2)
+    face_material: Uint8Array  # (F,) indices into material_names
     material_names: tuple[str, ...]
-    material_colors: NDArray[np.float64]  # (C, 4) linear RGBA
+    material_colors: Float64Array  # (C, 4) linear RGBA
     moves: tuple[Moves, ...]  # One for each expression, in the order of `EXPRESSIONS`.
 
 

@@ -10,13 +10,12 @@ whether a foot is under the floor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp
+from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..motion import Motion
 from .axes import UP
 from .contact_points import FOOT_PARTS, with_points_on_parts
@@ -35,9 +34,7 @@ _DIRECTIONS = 400  # Directions in which the skin's outermost points are kept.
 class FootSkin:
     """The skin of the feet, for one shape of a body, or that of other parts."""
 
-    def __init__(
-        self, body: Body, betas: NDArray[np.floating[Any]], parts: Sequence[str] = FOOT_PARTS
-    ) -> None:
+    def __init__(self, body: Body, betas: FloatArray, parts: Sequence[str] = FOOT_PARTS) -> None:
         """Collect the vertices that move with each part, of which only the outermost matter.
 
         :param betas: (P,) shape coefficients.
@@ -46,7 +43,7 @@ class FootSkin:
         v = body.rest_vertices(betas)
         J = body.rest_joints(betas)
         self.parts = [body.joint_names.index(name) for name in parts]
-        self.points: list[NDArray[np.float64]] = []  # One (n, 3) for each part, from its joint.
+        self.points: list[Float64Array] = []  # One (n, 3) for each part, from its joint.
         for part in self.parts:
             own = v[body.strongest_joints == part] - J[part]
             own = own if len(own) else np.zeros((1, 3))
@@ -54,10 +51,10 @@ class FootSkin:
 
     def heights(
         self,
-        R: NDArray[np.floating[Any]],
-        t: NDArray[np.floating[Any]],
-        up: NDArray[np.floating[Any]],
-    ) -> NDArray[np.float64]:
+        R: FloatArray,
+        t: FloatArray,
+        up: FloatArray,
+    ) -> Float64Array:
         """Return the (T, N) heights of each part's lowest point, relative to the origin.
 
         :param R, t: (T, K+1, 3, 3) and (T, K+1, 3) part poses in any frame.
@@ -69,7 +66,7 @@ class FootSkin:
         ]
         return np.stack(lowest, axis=1)
 
-    def as_keypoints(self, body: Body) -> tuple[Body, NDArray[np.intp]]:
+    def as_keypoints(self, body: Body) -> tuple[Body, IndexArray]:
         """Add the skin's outermost points to the body as keypoints, and return their numbers, (n,),
         too.
 
@@ -83,7 +80,7 @@ class FootSkin:
         return extended, len(body.keypoint_names) + np.arange(len(points))
 
 
-def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.float64]:
+def foot_heights(motion: Motion, body: Body, raw: bool = False) -> Float64Array:
     """Return the (T, 4) heights of the lowest skin of left heel, left toes, right heel and right
     toes; z = 0 the floor.
 
@@ -93,9 +90,7 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
     betas = np.asarray(motion.betas, float)
     skin = FootSkin(body, betas)
 
-    def heights(
-        poses: NDArray[np.floating[Any]], trans: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float64]]:
+    def heights(poses: FloatArray, trans: FloatArray) -> tuple[Float64Array]:
         rotations = exp(poses.reshape(len(poses), -1, 3).astype(float))
         return (skin.heights(*body.forward_kinematics(rotations, trans.astype(float), betas), UP),)
 
@@ -103,27 +98,27 @@ def foot_heights(motion: Motion, body: Body, raw: bool = False) -> NDArray[np.fl
     return by_blocks(heights, *chosen)[0]
 
 
-def under_floor(motion: Motion, body: Body) -> NDArray[np.bool_]:
+def under_floor(motion: Motion, body: Body) -> BoolArray:
     """Return the (T,) frames in which a foot is more than `UNDER_FLOOR_M` under the floor; none on
     uneven ground.
     """
     return depth_under_floor(motion, body) > UNDER_FLOOR_M
 
 
-def depth_under_floor(motion: Motion, body: Body) -> NDArray[np.float64]:
+def depth_under_floor(motion: Motion, body: Body) -> Float64Array:
     """Return how far the lowest foot of each frame is under the floor, (T,) metres; 0 above it and
     on uneven ground.
     """
     if motion.uneven_ground:
         return np.zeros(len(motion))
-    depth: NDArray[np.float64] = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
+    depth: Float64Array = np.maximum(-foot_heights(motion, body).min(axis=1), 0.0)
     return depth
 
 
 def lower_floors(
-    heights: NDArray[np.floating[Any]],
-    contact: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
+    heights: FloatArray,
+    contact: FloatArray,
+    times: Float64Array,
 ) -> list[tuple[int, int]]:
     """Find the spans in which the feet walk or stand on another, lower floor, with the ways down
     and up.
@@ -153,9 +148,9 @@ def lower_floors(
 
 
 def upper_floors(
-    heights: NDArray[np.floating[Any]],
-    contact: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
+    heights: FloatArray,
+    contact: FloatArray,
+    times: Float64Array,
 ) -> list[tuple[int, int]]:
     """Find the spans in which the lower foot rests clearly above the floor.
 
@@ -171,9 +166,9 @@ def upper_floors(
 
 
 def steps(
-    heights: NDArray[np.floating[Any]],
-    contact: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
+    heights: FloatArray,
+    contact: FloatArray,
+    times: Float64Array,
 ) -> list[tuple[int, float]]:
     """Find where feet rest some centimetres above or below the floor, as on a step.
 
@@ -194,12 +189,12 @@ def steps(
     return sorted((first, height) for first, height in found if STEP_M < abs(height) <= LEVEL_M)
 
 
-def _duration(mask: NDArray[np.bool_], times: NDArray[np.float64]) -> float:
+def _duration(mask: BoolArray, times: Float64Array) -> float:
     """Return the seconds for which ``mask`` (T,) is True, of frames at ``times`` (T,)."""
     return float(mask.sum() * np.median(np.diff(times))) if len(times) > 1 else 0.0
 
 
-def _directions() -> NDArray[np.float64]:
+def _directions() -> Float64Array:
     """Return unit vectors (n, 3) that are spread evenly over the sphere, by a Fibonacci spiral."""
     k = np.arange(_DIRECTIONS) + 0.5
     z = 1 - 2 * k / _DIRECTIONS

@@ -16,13 +16,11 @@ takes its place.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
+from ..arrays import Float64Array, FloatArray
 
 HINGE = 0.3  # Sine of the least angle at which a knee bends mainly in its own plane.
 # Share of the stretched leg's length. Beyond it a knee snaps, unless the leg is longer already.
@@ -32,7 +30,7 @@ SHORTEST = 0.35  # Share of the stretched leg's length: a knee bent by 140 degre
 
 # Of a limb's two bones and its end: the joints, and the axis of the upper bone's part about which
 # the limb bends, on the left and on the right.
-Limbs = tuple[tuple[str, str, str], tuple[NDArray[np.float64], NDArray[np.float64]]]
+Limbs = tuple[tuple[str, str, str], tuple[Float64Array, Float64Array]]
 LEGS: Limbs = ("hip", "knee", "ankle"), (np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
 ARMS: Limbs = (
     ("shoulder", "elbow", "wrist"),
@@ -43,10 +41,10 @@ ARMS: Limbs = (
 def move_ends(
     body: Body,
     limbs: Limbs,
-    rotations: NDArray[np.floating[Any]],
-    poses: tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]],
-    shift: NDArray[np.floating[Any]],
-) -> NDArray[np.float64]:
+    rotations: FloatArray,
+    poses: tuple[FloatArray, FloatArray],
+    shift: FloatArray,
+) -> Float64Array:
     """Return the rotations (T, K+1, 3, 3) that move both ankles or wrists as far as legs or arms
     reach.
 
@@ -85,11 +83,11 @@ def move_ends(
 
 
 def knee_turn(
-    upper: NDArray[np.floating[Any]],
-    lower: NDArray[np.floating[Any]],
-    sideways: NDArray[np.floating[Any]],
-    wanted: NDArray[np.floating[Any]],
-) -> NDArray[np.float64]:
+    upper: FloatArray,
+    lower: FloatArray,
+    sideways: FloatArray,
+    wanted: FloatArray,
+) -> Float64Array:
     """Return the turns (n, 3, 3) of the shin about the knee that bring the ankle to a distance.
 
     A knee that is bent against ``sideways`` comes to the other side. What lies beyond the turn's
@@ -114,7 +112,7 @@ def knee_turn(
     return exp(axis * angle[:, None])
 
 
-def cross(a: NDArray[np.floating[Any]], b: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def cross(a: FloatArray, b: FloatArray) -> Float64Array:
     """Return a × b (n, 3), for a single frame in a third of the time that numpy takes.
 
     :param a, b: (n, 3).

@@ -10,12 +10,11 @@ length and nearly its image if its depth changes sign:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.rotations import shortest_turn
+from ..arrays import Float64Array, FloatArray, IndexArray
 from .sequences import runs
 from .standing import line_of_sight
 
@@ -35,21 +34,21 @@ def other_side(name: str) -> str:
 
 
 def bone_depths(
-    starts: NDArray[np.floating[Any]],
-    ends: NDArray[np.floating[Any]],
-    center: NDArray[np.floating[Any]],
-) -> NDArray[np.float64]:
+    starts: FloatArray,
+    ends: FloatArray,
+    center: FloatArray,
+) -> Float64Array:
     """Calculate b · v (T,), positive where a bone points away from the camera; metres.
 
     :param starts: (T, 3) one joint, in any axes, metres.
     :param ends: (T, 3) the next one.
     :param center: (T, 3) the camera.
     """
-    depths: NDArray[np.float64] = ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
+    depths: Float64Array = ((ends - starts) * line_of_sight(ends - center)).sum(axis=1)
     return depths
 
 
-def runs_of_one_sign(depths: NDArray[np.floating[Any]], shallow: float, deep: float) -> list[slice]:
+def runs_of_one_sign(depths: FloatArray, shallow: float, deep: float) -> list[slice]:
     """Return the runs of frames in which |depth| (T,) exceeds ``shallow`` on one side, and
     somewhere ``deep``.
     """
@@ -58,14 +57,14 @@ def runs_of_one_sign(depths: NDArray[np.floating[Any]], shallow: float, deep: fl
 
 
 def mirrored_limb(
-    parents: Sequence[int] | NDArray[np.intp],
-    R_part: NDArray[np.floating[Any]],
-    joints: NDArray[np.floating[Any]],
-    center: NDArray[np.floating[Any]],
+    parents: Sequence[int] | IndexArray,
+    R_part: FloatArray,
+    joints: FloatArray,
+    center: FloatArray,
     limb: tuple[int, int, int],
     upper: bool,
     lower: bool,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Mirror one or both bones of a limb, each by the shortest turn; a bone that is not mirrored
     keeps its direction.
 
@@ -92,13 +91,13 @@ def mirrored_limb(
 
 
 def _mirrored(
-    R: NDArray[np.floating[Any]],
-    starts: NDArray[np.floating[Any]],
-    ends: NDArray[np.floating[Any]],
-    center: NDArray[np.floating[Any]],
-) -> NDArray[np.floating[Any]]:
+    R: FloatArray,
+    starts: FloatArray,
+    ends: FloatArray,
+    center: FloatArray,
+) -> FloatArray:
     bone = ends - starts
     sight = line_of_sight(ends - center)
     other = bone - 2.0 * (bone * sight).sum(axis=1, keepdims=True) * sight
-    turned: NDArray[np.floating[Any]] = shortest_turn(bone, other) @ R
+    turned: FloatArray = shortest_turn(bone, other) @ R
     return turned

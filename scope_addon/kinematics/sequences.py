@@ -6,16 +6,17 @@ cost, where a step's cost depends on the state before (Viterbi).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import BoolArray, Float64Array, IndexArray
 
 
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs(mask: BoolArray) -> list[tuple[int, int]]:
     """Return the first row and the row after the last one of each run of True in ``mask``, (T,)."""
     edges = np.flatnonzero(np.diff(np.r_[False, mask, False]))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def least_cost_path(costs: NDArray[np.float64], switching: NDArray[np.float64]) -> NDArray[np.intp]:
+def least_cost_path(costs: Float64Array, switching: Float64Array) -> IndexArray:
     """Find the states x that minimize Σ_t costs[t, x_t] + Σ_{t≥1} switching[t−1, x_{t−1}, x_t].
 
     Ties are resolved in favour of lower state numbers.

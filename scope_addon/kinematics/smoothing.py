@@ -9,12 +9,10 @@ unlike axis-angle vectors.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.rotations import exp, log, matrix_from_quaternion, quaternion_from_matrix
+from ..arrays import BoolArray, Float64Array, FloatArray
 
 # Human limb motion lies below about 6 Hz; detector noise is white. A Gaussian has a slow roll-off:
 # at 4.5 Hz it passes as much noise as the 6 Hz Butterworth filter that is usual for marker data.
@@ -25,9 +23,7 @@ DEPTH_CUTOFF_HZ = 2.0
 _ROTATIONS_AT_ONCE = 50_000
 
 
-def fill_gaps(
-    values: NDArray[np.floating[Any]], valid: NDArray[np.bool_], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def fill_gaps(values: FloatArray, valid: BoolArray, times: Float64Array) -> FloatArray:
     """Interpolate linearly over the frames that are not valid; extend the nearest valid value at
     both ends.
 
@@ -46,22 +42,20 @@ def fill_gaps(
     return out.reshape(values.shape)
 
 
-def continuous_quaternions(R: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def continuous_quaternions(R: FloatArray) -> Float64Array:
     """Convert rotations to unit quaternions whose sign does not change from frame to frame.
 
     :param R: (T, J, 3, 3) rotation matrices.
     :return: (T, J, 4) quaternions (w, x, y, z).
     """
-    q: NDArray[np.float64] = quaternion_from_matrix(np.asarray(R, float))
+    q: Float64Array = quaternion_from_matrix(np.asarray(R, float))
     dots = (q[1:] * q[:-1]).sum(-1)
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
     q[1:] *= signs[..., None]
     return q
 
 
-def fill_rotation_gaps(
-    R: NDArray[np.floating[Any]], valid: NDArray[np.bool_], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def fill_rotation_gaps(R: FloatArray, valid: BoolArray, times: Float64Array) -> FloatArray:
     """Interpolate rotations over the frames that are not valid, along the shorter arc; see
     `fill_gaps`.
 
@@ -82,8 +76,8 @@ def fill_rotation_gaps(
 
 
 def interpolate_rotations(
-    a: NDArray[np.float64], b: NDArray[np.float64], share: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
+    a: Float64Array, b: Float64Array, share: Float64Array | float
+) -> Float64Array:
     """Interpolate along the shorter arc: ``a exp(share log(aᵀ b))``.
 
     :param a: (..., 3, 3) rotations at share 0.
@@ -95,9 +89,7 @@ def interpolate_rotations(
     return a @ exp(np.asarray(share)[..., None] * turn)
 
 
-def interpolated_rotations(
-    R: NDArray[np.float64], at: NDArray[np.float64], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def interpolated_rotations(R: Float64Array, at: Float64Array, times: Float64Array) -> Float64Array:
     """Return rotations (N, 3, 3) at the times ``at`` (N,), on arcs between them at others (T,)."""
     k = np.clip(np.searchsorted(at, times, side="right") - 1, 0, len(at) - 2)
     share = (times - at[k]) / (at[k + 1] - at[k])
@@ -105,13 +97,13 @@ def interpolated_rotations(
 
 
 def interpolated_places(
-    places: NDArray[np.float64], at: NDArray[np.float64], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    places: Float64Array, at: Float64Array, times: Float64Array
+) -> Float64Array:
     """Return places (N, 3) at the times ``at`` (N,), on lines between them at others (T,)."""
     return np.stack([np.interp(times, at, places[:, axis]) for axis in range(3)], axis=1)
 
 
-def _joint_blocks(R: NDArray[np.floating[Any]]) -> list[slice]:
+def _joint_blocks(R: FloatArray) -> list[slice]:
     """Divide the joints of rotations (T, J, 3, 3) so that a long clip's intermediate results stay
     small.
     """
@@ -120,9 +112,7 @@ def _joint_blocks(R: NDArray[np.floating[Any]]) -> list[slice]:
     return [slice(j, j + count) for j in range(0, J, count)]
 
 
-def gaussian_smooth(
-    values: NDArray[np.floating[Any]], times: NDArray[np.float64], cutoff_hz: float
-) -> NDArray[np.floating[Any]]:
+def gaussian_smooth(values: FloatArray, times: Float64Array, cutoff_hz: float) -> FloatArray:
     """Apply a zero-phase low-pass filter whose gain at the cut-off frequency is 1/√2.
 
     :param values: (T, ...) samples.
@@ -146,16 +136,16 @@ def gaussian_smooth(
         w = np.exp(-0.5 * ((times[start] - times[to]) / sigma) ** 2)
         total[to] += w[:, None] * flat[start]
         weight[to] += w
-    smooth: NDArray[np.float64] = (total / weight[:, None]).reshape(values.shape)
+    smooth: Float64Array = (total / weight[:, None]).reshape(values.shape)
     return smooth
 
 
 def smooth_rotations(
-    R: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
+    R: FloatArray,
+    times: Float64Array,
     cutoff_hz: float = ROTATION_CUTOFF_HZ,
-    out: NDArray[np.floating[Any]] | None = None,
-) -> NDArray[np.floating[Any]]:
+    out: FloatArray | None = None,
+) -> FloatArray:
     """Apply a zero-phase low-pass filter to rotations.
 
     :param R: (T, J, 3, 3) rotation matrices.
@@ -171,8 +161,8 @@ def smooth_rotations(
 
 
 def smooth_root(
-    t_camera_root: NDArray[np.floating[Any]], times: NDArray[np.float64], strength: float = 1.0
-) -> NDArray[np.floating[Any]]:
+    t_camera_root: FloatArray, times: Float64Array, strength: float = 1.0
+) -> FloatArray:
     """Apply a zero-phase low-pass filter to the root's position.
 
     Direction and distance (its logarithm) are filtered separately: distance is noisier, and its
@@ -186,7 +176,7 @@ def smooth_root(
     distance = np.maximum(np.linalg.norm(t_camera_root, axis=1, keepdims=True), 1e-6)
     ray = gaussian_smooth(t_camera_root / distance, times, ROTATION_CUTOFF_HZ / strength)
     ray /= np.maximum(np.linalg.norm(ray, axis=1, keepdims=True), 1e-6)
-    smooth: NDArray[np.floating[Any]] = ray * np.exp(
+    smooth: FloatArray = ray * np.exp(
         gaussian_smooth(np.log(distance), times, DEPTH_CUTOFF_HZ / strength)
     )
     return smooth

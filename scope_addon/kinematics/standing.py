@@ -5,11 +5,9 @@ does not fall.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array, FloatArray
 from .contact_points import SOLES
 from .smoothing import gaussian_smooth
 
@@ -33,23 +31,21 @@ UNEVEN_M = 0.6  # h_u: one foot may rest this much higher than the other on stai
 LEVEL_M = 0.25  # h_l: feet that stand farther above or below stand on something else.
 
 
-def line_of_sight(position: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def line_of_sight(position: FloatArray) -> FloatArray:
     """Return the (..., 3) unit vectors from the camera's centre to positions (..., 3) relative to
     it.
     """
-    unit: NDArray[np.floating[Any]] = position / np.maximum(
-        np.linalg.norm(position, axis=-1, keepdims=True), 1e-9
-    )
+    unit: FloatArray = position / np.maximum(np.linalg.norm(position, axis=-1, keepdims=True), 1e-9)
     return unit
 
 
 def standing_probability(
-    soles: NDArray[np.floating[Any]],
-    up: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
-    center: NDArray[np.floating[Any]] | None = None,
+    soles: FloatArray,
+    up: FloatArray,
+    times: Float64Array,
+    center: FloatArray | None = None,
     uneven_ground: bool = False,
-) -> NDArray[np.floating[Any]]:
+) -> FloatArray:
     """Return the (T, F) probability that each sole point rests on the floor: it is slow, low, and
     does not fall.
 
@@ -75,7 +71,7 @@ def standing_probability(
         upwards = np.abs(line_of_sight(soles - np.expand_dims(center, -2)) @ up)
         mean_speed = np.sqrt(gaussian_smooth(np.square(speed), times, STILL_CUTOFF_HZ))
         allowed += WRONG_DEPTH_M * upwards * logistic(4 * (1 - mean_speed / STILL_M_S))
-    p: NDArray[np.floating[Any]] = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(
+    p: FloatArray = logistic(4 * (1 - speed / CONTACT_SPEED_M_S)) * logistic(
         4 * (1 - height / allowed)
     )
     p *= logistic(8 * (1 - _downward_acceleration(velocity, up, times) / FALL_M_S2)) / logistic(8)
@@ -83,12 +79,12 @@ def standing_probability(
 
 
 def resting_probability(
-    contact_points: NDArray[np.floating[Any]],
-    up: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
-    center: NDArray[np.floating[Any]],
+    contact_points: FloatArray,
+    up: FloatArray,
+    times: Float64Array,
+    center: FloatArray,
     uneven_ground: bool = False,
-) -> NDArray[np.floating[Any]]:
+) -> FloatArray:
     """Return the (T, 6) probability that each sole point and palm rests on something.
 
     For soles, see `standing_probability`. A palm rests if it is slow and not higher than the lowest
@@ -112,27 +108,25 @@ def resting_probability(
 
 
 def speed_across(
-    points: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
-    center: NDArray[np.floating[Any]] | None,
-) -> NDArray[np.floating[Any]]:
+    points: FloatArray,
+    times: Float64Array,
+    center: FloatArray | None,
+) -> FloatArray:
     """Return the (T, F) speed in m/s; see `velocity_across`.
 
     :param points: (T, F, 3) metres.
     :param times: (T,) seconds.
     :param center: (T, 3) or (3,) the camera's centre; None: the whole speed.
     """
-    speed: NDArray[np.floating[Any]] = np.linalg.norm(
-        velocity_across(points, times, center), axis=-1
-    )
+    speed: FloatArray = np.linalg.norm(velocity_across(points, times, center), axis=-1)
     return speed
 
 
 def velocity_across(
-    points: NDArray[np.floating[Any]],
-    times: NDArray[np.float64],
-    center: NDArray[np.floating[Any]] | None,
-) -> NDArray[np.floating[Any]]:
+    points: FloatArray,
+    times: Float64Array,
+    center: FloatArray | None,
+) -> FloatArray:
     """Return the (T, F, 3) velocity in m/s, across the line of sight of a camera; 0 in clips of one
     or two frames.
 
@@ -142,7 +136,7 @@ def velocity_across(
     """
     if len(times) <= 2:
         return np.zeros(points.shape)
-    velocity: NDArray[np.floating[Any]] = np.gradient(
+    velocity: FloatArray = np.gradient(
         gaussian_smooth(points, times, CONTACT_CUTOFF_HZ), times, axis=0
     )
     if center is not None:
@@ -151,9 +145,7 @@ def velocity_across(
     return velocity
 
 
-def _downward_acceleration(
-    velocity: NDArray[np.floating[Any]], up: NDArray[np.floating[Any]], times: NDArray[np.float64]
-) -> NDArray[np.floating[Any]]:
+def _downward_acceleration(velocity: FloatArray, up: FloatArray, times: Float64Array) -> FloatArray:
     """Return the (T, F) downward acceleration, m/s², from velocities (T, F, 3); 0 where it is
     upward.
     """
@@ -162,10 +154,10 @@ def _downward_acceleration(
     down = -np.gradient(velocity @ up, times, axis=0)
     # Differences of the two outermost frames alone are mostly noise.
     down[0], down[-1] = down[1], down[-2]
-    falling: NDArray[np.floating[Any]] = np.maximum(down, 0.0)
+    falling: FloatArray = np.maximum(down, 0.0)
     return falling
 
 
-def logistic(x: NDArray[np.floating[Any]] | float) -> NDArray[np.floating[Any]]:
+def logistic(x: FloatArray | float) -> FloatArray:
     """Return the logistic function 1 / (1 + exp(−x)) of an array (...), clipped at |x| = 30."""
     return np.asarray(1 / (1 + np.exp(-np.clip(x, -30, 30))))

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.errors import InputError
+from ..arrays import Float64Array, FloatArray
 from ..json_file import load_map, save_map
 from ..kinematics.face import EXPRESSIONS
 from .bone_map import is_name
@@ -143,7 +143,7 @@ class ExpressionMap:
                 largest = LARGEST_ANGLE if channel in TURNED else LARGEST_FACTOR
                 _check_factors(f"control '{bone}'", factors, largest)
 
-    def values(self, weights: NDArray[np.floating[Any]]) -> dict[str, NDArray[np.float64]]:
+    def values(self, weights: FloatArray) -> dict[str, Float64Array]:
         """Return the value (T,) of each shape key, 0 to 1.
 
         :param weights: (T, 52) in the order of `EXPRESSIONS`.

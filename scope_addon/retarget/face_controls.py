@@ -21,13 +21,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.errors import InputError
 from ...solver.rotations import exp
+from ..arrays import Float64Array, FloatArray
 from ..kinematics.face import EXPRESSIONS
 from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map
 from .skeleton import BoneMotion
@@ -70,7 +69,7 @@ def guess_control_map(bones: Collection[str]) -> ExpressionMap:
 
 
 def control_motions(
-    expression_map: ExpressionMap, weights: NDArray[np.floating[Any]], bones: Mapping[str, RestBone]
+    expression_map: ExpressionMap, weights: FloatArray, bones: Mapping[str, RestBone]
 ) -> list[BoneMotion]:
     """Return the channels of the controls that the map and the rig have.
 
@@ -96,7 +95,7 @@ def control_motions(
 
 
 def _motion(
-    bone: str, sums: dict[str, NDArray[np.float64]], frame: FaceFrame, bones: Mapping[str, RestBone]
+    bone: str, sums: dict[str, Float64Array], frame: FaceFrame, bones: Mapping[str, RestBone]
 ) -> BoneMotion:
     """Return the channels of one control.
 
@@ -122,11 +121,11 @@ def _motion(
 
 
 def _around(
-    eye: NDArray[np.float64],
-    target: NDArray[np.float64],
-    turned: NDArray[np.float64],
+    eye: Float64Array,
+    target: Float64Array,
+    turned: Float64Array,
     frame: FaceFrame,
-) -> NDArray[np.float64]:
+) -> Float64Array:
     """Return how far (T, 3), in the face's axes, a target moves so that an eye turns; from where it
     looks at rest.
 
@@ -136,7 +135,7 @@ def _around(
     ahead = seen / max(float(np.linalg.norm(seen)), 1e-12)
     left = np.array([1.0, 0.0, 0.0]) - ahead[0] * ahead
     axes = np.stack([left, np.cross(ahead, left), ahead], axis=1)
-    moved: NDArray[np.float64] = exp(np.radians(turned) @ axes.T) @ seen - seen
+    moved: Float64Array = exp(np.radians(turned) @ axes.T) @ seen - seen
     return moved
 
 
@@ -159,8 +158,8 @@ def built_in(rig: str) -> ExpressionMap:
 class RestBone:
     """A bone at rest, in the armature's space."""
 
-    head: NDArray[np.float64]  # (3,)
-    rotation: NDArray[np.float64]  # (3, 3) bone to armature
+    head: Float64Array  # (3,)
+    rotation: Float64Array  # (3, 3) bone to armature
     local_location: bool = True  # whether its location is in its own axes, not the armature's
 
 
@@ -170,7 +169,7 @@ class FaceFrame:
     columns.
     """
 
-    axes: NDArray[np.float64]
+    axes: Float64Array
     mouth: float  # width, from corner to corner
     eyes: float  # distance between both eyes
     lids: float  # gap between the lids of an eye
@@ -201,7 +200,7 @@ def measure_face(bones: Mapping[str, RestBone]) -> FaceFrame:
     return FaceFrame(np.stack([left, up, np.cross(left, up)], axis=1), mouth, eyes, gap)
 
 
-def pivot(bones: Mapping[str, RestBone], control: str) -> NDArray[np.float64] | None:
+def pivot(bones: Mapping[str, RestBone], control: str) -> Float64Array | None:
     """Return the center (3,) of the eye that looks at a control; None for other controls."""
     eye = bones.get(f"ORG-{control}") if control in ("eye.L", "eye.R") else None
     return eye.head if eye else None
@@ -209,7 +208,7 @@ def pivot(bones: Mapping[str, RestBone], control: str) -> NDArray[np.float64] | 
 
 def _pair(
     bones: Mapping[str, RestBone], pairs: tuple[tuple[str, str], ...], what: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Float64Array, Float64Array]:
     for left, right in pairs:
         if left in bones and right in bones:
             return bones[left].head, bones[right].head
@@ -217,7 +216,7 @@ def _pair(
     raise InputError(f"the rig has no bones for the {what} of its face; it needs {known}")
 
 
-def _direction(along: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def _direction(along: Float64Array) -> tuple[Float64Array, float]:
     length = float(np.linalg.norm(along))
     if not length > _MIN_LENGTH:
         raise InputError(

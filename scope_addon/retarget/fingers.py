@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array, IndexArray
 from .bone_map import FINGERS
 from .rest_pose import RestPose
 
@@ -46,7 +46,7 @@ def find_fingers(rest: RestPose, wrists: dict[str, int]) -> dict[str, str]:
     return found
 
 
-def bone_ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> NDArray[np.float64]:
+def bone_ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> Float64Array:
     """Return where the bones end (B, 3), metres; hands end at the knuckles of the long fingers."""
     row = {name: index for index, name in enumerate(rest.names)}
     wrists = {
@@ -138,7 +138,7 @@ def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list
     return out
 
 
-def _longest(parents: NDArray[np.intp], bones: set[int]) -> list[int]:
+def _longest(parents: IndexArray, bones: set[int]) -> list[int]:
     """Return the longest chain of parents and children within ``bones``, from the top."""
     best: list[int] = []
     for i in sorted(bones):

@@ -26,13 +26,12 @@ captured foot does, unless the person is on a lower floor.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
+from ..arrays import BoolArray, Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..edit.root_motion import about_z
 from ..kinematics.axes import UP
@@ -65,22 +64,22 @@ class Legs:
     toed: list[int]  # the legs that have a bone for the toes
     toes: list[int]  # these bones
     # (len(toed), 3, 3) A_b F R_b of these bones, as in ``transfer.py``
-    toes_in_t_pose: NDArray[np.float64]
+    toes_in_t_pose: Float64Array
     body: FootRest  # (L, 3) and (L,)
     rig: FootRest
-    tips: NDArray[np.float64]  # (len(toed), 3) from the ball to the tip of the toes, metres
-    lengths: NDArray[np.float64]  # (L,) of the legs, nearly stretched, metres
+    tips: Float64Array  # (len(toed), 3) from the ball to the tip of the toes, metres
+    lengths: Float64Array  # (L,) of the legs, nearly stretched, metres
     # (3,) scale of positions: that on the floor twice, and the ratio of leg lengths, rig to body.
-    scales: NDArray[np.float64]
+    scales: Float64Array
 
 
 def legs_at_rest(
     rig: Skeleton,
     row: dict[str, int],
-    alignment: NDArray[np.float64],
+    alignment: Float64Array,
     body: Body,
-    rest: tuple[NDArray[np.float64], NDArray[np.float64]],
-    scales: NDArray[np.float64],
+    rest: tuple[Float64Array, Float64Array],
+    scales: Float64Array,
 ) -> Legs | None:
     """Measure the legs of a rig and of the body at rest; None if the rig has no ankles.
 
@@ -128,9 +127,7 @@ def legs_at_rest(
     )
 
 
-def _body_feet(
-    body: Body, v: NDArray[np.float64], J: NDArray[np.float64], sides: list[str]
-) -> list[FootRest]:
+def _body_feet(body: Body, v: Float64Array, J: Float64Array, sides: list[str]) -> list[FootRest]:
     """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its
     toes, stands on.
     """
@@ -148,7 +145,7 @@ def _body_feet(
 
 def _rig_foot(
     rig: Skeleton,
-    AF: NDArray[np.float64],
+    AF: Float64Array,
     ankle: int,
     toe: int | None,
     source: FootRest,
@@ -178,11 +175,11 @@ def _stacked(feet: list[FootRest]) -> FootRest:
 def place_feet(
     rig: Skeleton,
     legs: Legs,
-    bone_turns: NDArray[np.float64],
+    bone_turns: Float64Array,
     pose: Pose,
-    joints: NDArray[np.float64],
-    times: NDArray[np.float64],
-    one_floor: NDArray[np.bool_],
+    joints: Float64Array,
+    times: Float64Array,
+    one_floor: BoolArray,
 ) -> None:
     """Move the rig's ankles, and with them heels and balls, to where the body's are.
 
@@ -221,9 +218,7 @@ def place_feet(
     heads[:] = placed + (heads[:, first] - placed[:, first])[:, None]
 
 
-def frames_on_one_floor(
-    clip: Clip, body: Body, betas: NDArray[np.floating[Any]]
-) -> NDArray[np.bool_]:
+def frames_on_one_floor(clip: Clip, body: Body, betas: FloatArray) -> BoolArray:
     """Return the (T,) frames in which the feet do not walk or stand on another, lower floor, as at
     the foot of a stage.
     """
@@ -235,7 +230,7 @@ def frames_on_one_floor(
     return found
 
 
-def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rows(of_legs: Float64Array) -> Float64Array:
     """Return the entries (T·L, ...) of T frames and L legs, (T, L, ...), which are solved at
     once.
     """
@@ -243,12 +238,12 @@ def _rows(of_legs: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def solve_leg(
-    thigh: NDArray[np.float64],
-    shin: NDArray[np.float64],
-    joints: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    goal: NDArray[np.float64],
-    sideways: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    thigh: Float64Array,
+    shin: Float64Array,
+    joints: tuple[Float64Array, Float64Array, Float64Array],
+    goal: Float64Array,
+    sideways: Float64Array,
+) -> tuple[Float64Array, Float64Array]:
     """Rotate thigh and shin so that the ankle reaches the goal; a bent knee stays in its plane.
 
     The knee first turns about the axis of `leg_reach`, which leads a nearly straight or
@@ -287,19 +282,19 @@ def solve_leg(
 class FootRest:
     """Feet at rest, in metres of their own skeleton, world axes."""
 
-    heel: NDArray[np.float64]  # (..., 3) from the ankle
-    ball: NDArray[np.float64]  # (..., 3) from the ankle
-    height: NDArray[np.float64]  # (...) of the ankle above the floor
+    heel: Float64Array  # (..., 3) from the ankle
+    ball: Float64Array  # (..., 3) from the ankle
+    height: Float64Array  # (...) of the ankle above the floor
 
 
 def ankle_goal(
     source: FootRest,
     rig: FootRest,
-    scales: NDArray[np.float64],
-    turn: NDArray[np.float64],
-    ankle: NDArray[np.float64],
-    one_floor: NDArray[np.bool_] | bool = True,
-) -> NDArray[np.float64]:
+    scales: Float64Array,
+    turn: Float64Array,
+    ankle: Float64Array,
+    one_floor: BoolArray | bool = True,
+) -> Float64Array:
     """Compute the goals of the rig's ankles, for any number of frames and feet at once.
 
     :param source: the body's feet.
@@ -326,18 +321,18 @@ def ankle_goal(
         rolled.append(rig_point[..., 2] - (rig.height + q[..., 2]))
     # A weight of 1 means that the ball is in contact.
     share = 1.0 / (1.0 + np.exp(np.clip((heights[1] - heights[0]) / _SOFT_M, -50, 50)))
-    goal: NDArray[np.float64] = goals[0] + share[..., None] * (goals[1] - goals[0])
+    goal: Float64Array = goals[0] + share[..., None] * (goals[1] - goals[0])
     lowest = np.where(one_floor, -np.minimum(rolled[0], rolled[1]), -np.inf)
     goal[..., 2] = np.maximum(goal[..., 2], lowest)
     return goal
 
 
 def flat_toes(
-    toe: NDArray[np.float64],
-    rest: NDArray[np.float64],
-    ball: NDArray[np.float64],
-    ball_rest: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    toe: Float64Array,
+    rest: Float64Array,
+    ball: Float64Array,
+    ball_rest: Float64Array,
+) -> Float64Array:
     """Raise toes whose tips would penetrate the floor.
 
     A capture in which the toes never bend pushes them into the floor when the heel rises; here they
@@ -363,16 +358,16 @@ def flat_toes(
         np.stack([tip[..., 1], -tip[..., 0], np.zeros_like(across)], axis=-1)
         / np.maximum(across, 1e-9)[..., None]
     )
-    raised: NDArray[np.float64] = exp(side * lift[..., None]) @ toe
+    raised: Float64Array = exp(side * lift[..., None]) @ toe
     return raised
 
 
 def pelvis_drop(
-    hips: NDArray[np.float64],
-    goals: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-    times: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    hips: Float64Array,
+    goals: Float64Array,
+    lengths: Float64Array,
+    times: Float64Array,
+) -> Float64Array:
     """Compute how far the pelvis has to be lowered, smoothly in time, for the legs to reach the
     goals of the ankles.
 
@@ -384,7 +379,7 @@ def pelvis_drop(
     """
     level = np.linalg.norm((goals - hips)[..., :2], axis=-1)
     upright = np.sqrt(np.maximum(lengths**2 - level**2, (0.5 * lengths) ** 2))
-    needed: NDArray[np.float64] = np.maximum(0.0, (hips - goals)[..., 2] - upright).max(axis=1)
+    needed: Float64Array = np.maximum(0.0, (hips - goals)[..., 2] - upright).max(axis=1)
     if not needed.any() or len(needed) == 1:
         return needed
     # A maximum filter, then a weighted mean of the same width: nowhere less than needed, and
@@ -393,11 +388,11 @@ def pelvis_drop(
     width = np.arange(-frames, frames + 1)
     near = np.clip(np.arange(len(needed))[:, None] + width, 0, len(needed) - 1)
     weight = 1 + np.cos(np.pi * width / (frames + 1))
-    smooth: NDArray[np.float64] = needed[near].max(axis=1)[near] @ (weight / weight.sum())
+    smooth: Float64Array = needed[near].max(axis=1)[near] @ (weight / weight.sum())
     return smooth
 
 
-def _heading(turn: NDArray[np.float64]) -> NDArray[np.float64]:
+def _heading(turn: Float64Array) -> Float64Array:
     """Return the rotations (..., 3, 3) about the vertical alone, from the sideways axis, which
     stays horizontal.
     """

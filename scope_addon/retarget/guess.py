@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Float64Array
 from ..kinematics.mirrored_limbs import OTHER_SIDE, other_side
 from .bone_map import FINGERS, PHALANGES, SPINE, BoneMap
 from .bone_names import CENTRE, LIMBS, BoneName, parse_names
@@ -117,9 +117,9 @@ def _vrm_parts(table: Mapping[str, str]) -> dict[str, str]:
     return {vrm: part for vrm, part in found.items() if vrm in table}
 
 
-def _heads_of(rest: RestPose, parts: Mapping[str, str]) -> dict[str, NDArray[np.float64]]:
+def _heads_of(rest: RestPose, parts: Mapping[str, str]) -> dict[str, Float64Array]:
     """Return the head of each part, of several bones the first."""
-    heads: dict[str, NDArray[np.float64]] = {}
+    heads: dict[str, Float64Array] = {}
     for bone, part in parts.items():
         heads.setdefault(part, rest.heads[rest.names.index(bone)])
     return heads
@@ -401,7 +401,7 @@ def by_geometry(rest: RestPose) -> dict[str, str]:
     return found
 
 
-def _places(rest: RestPose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _places(rest: RestPose) -> tuple[Float64Array, Float64Array]:
     """Return how high and how far to the left each bone begins, as shares of the rig's height."""
     heads = rest.heads
     height = max(float(np.ptp(heads[:, 2])), 1e-9)
@@ -414,8 +414,8 @@ def _places(rest: RestPose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _limb_chains(
     rest: RestPose,
     leaves: list[int],
-    upwards: NDArray[np.float64],
-    leftwards: NDArray[np.float64],
+    upwards: Float64Array,
+    leftwards: Float64Array,
 ) -> dict[str, list[int]]:
     """Return the bones from the root to the end of each limb that is found, such as ``left leg``.
 
@@ -433,7 +433,7 @@ def _limb_chains(
     return chains
 
 
-def _is_leg(chain: list[int], upwards: NDArray[np.float64], outwards: NDArray[np.float64]) -> bool:
+def _is_leg(chain: list[int], upwards: Float64Array, outwards: Float64Array) -> bool:
     """Return whether bones lead down to a foot on one side. Goals of IK lie at the feet as well,
     but on no leg.
     """
@@ -491,7 +491,7 @@ def _arm_parts(rest: RestPose, chain: list[int]) -> dict[int, str]:
     return collar | {chain[first]: "shoulder", chain[elbow]: "elbow", chain[wrist]: "wrist"}
 
 
-def _middle(lengths: NDArray[np.float64]) -> int:
+def _middle(lengths: Float64Array) -> int:
     """Return the inner joint of a chain of segments that is nearest to the middle of its length."""
     reached = np.cumsum(lengths)
     inner = reached[:-1]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...solver.body import Body
 from ...solver.body_file import BUILT_IN
 from ...solver.rotations import exp, log
+from ..arrays import Float64Array, FloatArray
 from ..edit.clip import Clip
 from ..errors import MotionFileError, UsageError
 from ..kinematics.axes import R_WORLD_LEVELCAMERA, R_WORLD_MODEL, UP, transform_points
@@ -123,7 +124,7 @@ def _own(motion: Motion, body: Body, path: Path) -> Imported:
     return Imported(motion, body)
 
 
-def _check_size(body: Body, betas: NDArray[np.floating[Any]], path: Path) -> None:
+def _check_size(body: Body, betas: FloatArray, path: Path) -> None:
     """Refuse a shape that is nobody's: formats have no room for its numbers.
 
     :raises MotionFileError: it is such a shape.
@@ -225,7 +226,7 @@ def _shape_space(model: str) -> str:
     return "smpl" if model == "smplh" else model
 
 
-def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]:
+def _for_body(source: SmplMotion, body: Body) -> tuple[Float64Array, str]:
     """Return the axis-angle vectors of the body's joints, (T, K+1, 3), and what the body lacks of
     the source.
     """
@@ -241,7 +242,7 @@ def _for_body(source: SmplMotion, body: Body) -> tuple[NDArray[np.float64], str]
     return poses, " or ".join(what for what, is_lacking in lacks if is_lacking)
 
 
-def _up_axis(poses: NDArray[np.float64], body: Body, usual: str) -> tuple[str, bool]:
+def _up_axis(poses: Float64Array, body: Body, usual: str) -> tuple[str, bool]:
     """Return the axis along which the trunk points on average and True; the usual axis and False if
     there is none.
     """
@@ -255,11 +256,11 @@ def _up_axis(poses: NDArray[np.float64], body: Body, usual: str) -> tuple[str, b
 
 def _standing(
     body: Body,
-    betas: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    root: NDArray[np.float64],
-    times: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], float]:
+    betas: Float64Array,
+    poses: Float64Array,
+    root: Float64Array,
+    times: Float64Array,
+) -> tuple[Float64Array, float]:
     """Return the (T, 4) probability that each sole point is in contact, and the height of the floor
     that follows.
     """
@@ -274,10 +275,10 @@ def _standing(
 
 def _motion(
     body: Body,
-    betas: NDArray[np.float64],
-    poses: NDArray[np.float64],
-    trans: NDArray[np.float64],
-    contact: NDArray[np.float64],
+    betas: Float64Array,
+    poses: Float64Array,
+    trans: Float64Array,
+    contact: Float64Array,
     rate: float,
     frames: NDArray[np.int64] | None = None,
 ) -> Motion:

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import log, shortest_turn
+from ..arrays import Float64Array
 from ..errors import MotionFileError
 from ..kinematics.axes import R_WORLD_MODEL, UP
 from ..kinematics.frame_blocks import by_blocks
@@ -58,13 +58,11 @@ class Performer:
 
     file: BvhMotion
     parts: dict[str, str]  # joint -> body part
-    R_world_file: NDArray[np.float64]
+    R_world_file: Float64Array
     frame: int | None  # in which the person stands upright; None: the pose at rest
     notes: list[Notice]
 
-    def on_body(
-        self, body: Body, path: Path
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[Notice]]:
+    def on_body(self, body: Body, path: Path) -> tuple[Float64Array, Float64Array, list[Notice]]:
         """Return the axis-angle vectors (T, K+1, 3) of a body of mean shape, the place of its
         pelvis (T, 3), metres, and what cannot be as in the file. World frame, z up, any floor.
 
@@ -106,7 +104,7 @@ class Performer:
         hips = [row["left_hip"], row["right_hip"]]
         body_hips = [index["left_hip"], index["right_hip"]]
 
-        def block(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        def block(values: Float64Array) -> tuple[Float64Array, ...]:
             R_file, points = self.file.posed(values, joints)
             R_world_joint = self.R_world_file @ R_file
             turns = _of_parts(R_world_joint @ R_joint_part, part_of, body)
@@ -174,7 +172,7 @@ def _performer(file: BvhMotion, path: Path, up: str) -> Performer:
 
 
 def _without_rest_pose(
-    file: BvhMotion, path: Path, parts: dict[str, str], axes: dict[str, NDArray[np.float64]]
+    file: BvhMotion, path: Path, parts: dict[str, str], axes: dict[str, Float64Array]
 ) -> Performer:
     """Find a person whose rest pose is none of standing: by the names of the joints, and by the
     frame in which trunk and legs are most upright.
@@ -225,8 +223,8 @@ def _needed(parts: dict[str, str]) -> set[str]:
 
 
 def _pose(
-    file: BvhMotion, frame: int | None, R_world_file: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    file: BvhMotion, frame: int | None, R_world_file: Float64Array
+) -> tuple[Float64Array, Float64Array]:
     """Return all joints' rotations (N, 3, 3) and positions (N, 3) in the world, at rest or in a
     frame.
     """
@@ -238,8 +236,8 @@ def _pose(
 
 
 def _limbs(
-    file: BvhMotion, parts: dict[str, str], points: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
+    file: BvhMotion, parts: dict[str, str], points: Float64Array | None = None
+) -> Float64Array:
     """Return unit vectors (T, 3, 3) up the trunk, the left leg and the right leg, in the file's
     axes.
 
@@ -263,13 +261,11 @@ def _limbs(
         chosen = points[:, joints]
     trunk = chosen[:, :1] - chosen[:, 1:3].mean(axis=1, keepdims=True)
     along = np.concatenate([trunk, chosen[:, 1:3] - chosen[:, 3:]], axis=1)
-    unit: NDArray[np.float64] = along / np.maximum(
-        np.linalg.norm(along, axis=-1, keepdims=True), 1e-12
-    )
+    unit: Float64Array = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
     return unit
 
 
-def _of_parts(turns: NDArray[np.float64], part_of: list[str], body: Body) -> NDArray[np.float64]:
+def _of_parts(turns: Float64Array, part_of: list[str], body: Body) -> Float64Array:
     """Return D (T, K+1, 3, 3) of the body's parts from those of the file's joints (T, B, 3, 3).
 
     The spine's joints are spread over the file's; parts without a joint follow those above.

@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Float64Array, IndexArray
 
 # Below this share of the rig's size, two heads are at the same place.
 _SAME_PLACE = 0.002
@@ -42,14 +43,14 @@ class RestPose:
     """The B bones of a rig at rest in world axes, z up, metres; parents come before children."""
 
     names: list[str]
-    parents: NDArray[np.intp]  # (B,) indices, -1 for none
-    heads: NDArray[np.float64]  # (B, 3)
+    parents: IndexArray  # (B,) indices, -1 for none
+    heads: Float64Array  # (B, 3)
     # (B, 3); empty if unknown
-    tails: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    tails: Float64Array = field(default_factory=lambda: np.empty((0, 3)))
     # (V, 3) vertices of the skin
-    points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    points: Float64Array = field(default_factory=lambda: np.empty((0, 3)))
     # (V,) the bone that moves each of them
-    owners: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    owners: IndexArray = field(default_factory=lambda: np.empty(0, np.intp))
 
     @cached_property
     def size(self) -> float:
@@ -83,14 +84,14 @@ class RestPose:
         return sorted(found)
 
     @cached_property
-    def _rows_by_owner(self) -> dict[int, NDArray[np.intp]]:
+    def _rows_by_owner(self) -> dict[int, IndexArray]:
         """The rows of the points that each bone moves, if it moves any."""
         rows = np.argsort(self.owners, kind="stable")
         owners, starts = np.unique(self.owners[rows], return_index=True)
         groups = np.split(rows, starts[1:]) if len(rows) else []
         return dict(zip(owners.tolist(), groups, strict=True))
 
-    def points_of(self, bones: Iterable[int]) -> NDArray[np.float64]:
+    def points_of(self, bones: Iterable[int]) -> Float64Array:
         """Return the points that these bones move (V', 3), in the order of all points."""
         rows = [self._rows_by_owner[bone] for bone in bones if bone in self._rows_by_owner]
         return self.points[np.sort(np.concatenate(rows))] if rows else self.points[:0]
@@ -113,8 +114,8 @@ class RestPose:
         self,
         bone: int,
         knuckles: Iterable[int] = (),
-        forward: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
+        forward: Float64Array | None = None,
+    ) -> Float64Array:
         """Return where a bone ends (3,).
 
         :param knuckles: the first bones of the long fingers, if it is a hand; the thumb tells
@@ -139,9 +140,7 @@ class RestPose:
                 return np.asarray(head + away)
         return self._end_without_skin(bone, forward)
 
-    def _end_without_skin(
-        self, bone: int, forward: NDArray[np.float64] | None
-    ) -> NDArray[np.float64]:
+    def _end_without_skin(self, bone: int, forward: Float64Array | None) -> Float64Array:
         """Return the tail (3,) if it is plausible, or else a point straight on."""
         head = self.heads[bone]
         tail = self.tails[bone] if len(self.tails) else head
@@ -175,9 +174,7 @@ class RestPose:
         return float(owned.min()) if len(owned) else None
 
 
-def _ball(
-    skin: NDArray[np.float64], ankle: NDArray[np.float64], forward: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _ball(skin: Float64Array, ankle: Float64Array, forward: Float64Array) -> Float64Array:
     """Return the ball of a foot (3,), at the height of its sole.
 
     :param skin: (V, 3) of the whole foot, from heel to toes.
@@ -189,7 +186,7 @@ def _ball(
     direction[2] = 0.0
     direction /= max(float(np.linalg.norm(direction)), 1e-9)
     reach = float(((skin - ankle) @ direction).max())
-    ball: NDArray[np.float64] = ankle + _BALL * reach * direction
+    ball: Float64Array = ankle + _BALL * reach * direction
     ball[2] = skin[:, 2].min()
     return ball
 
@@ -202,7 +199,7 @@ class Fault:
     reason: str  # a key of the phrases of ``notices.py``
 
 
-def rest_faults(heads: Mapping[str, NDArray[np.float64]]) -> list[Fault]:
+def rest_faults(heads: Mapping[str, Float64Array]) -> list[Fault]:
     """Return what is impossible about a map, by the heads (3,) of the parts at rest, z up."""
     faults: list[Fault] = []
     lengths: dict[tuple[str, str, str], float] = {}
@@ -236,7 +233,7 @@ def rest_faults(heads: Mapping[str, NDArray[np.float64]]) -> list[Fault]:
     return faults
 
 
-def faces_backwards(heads: Mapping[str, NDArray[np.float64]]) -> bool | None:
+def faces_backwards(heads: Mapping[str, Float64Array]) -> bool | None:
     """Return whether the toes of both feet point to where the back should be: then the sides are
     confused. None without toes.
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Float64Array, IndexArray
 
 
 @dataclass(frozen=True)
@@ -22,27 +23,27 @@ class Skeleton:
     """
 
     names: list[str]
-    parents: NDArray[np.intp]  # (B,)
-    carriers: NDArray[np.intp]  # (B,)
-    heads: NDArray[np.float64]  # (B, 3) metres
-    ends: NDArray[np.float64]  # (B, 3) metres, where each bone ends; see `RestPose.end`
-    rotations: NDArray[np.float64]  # (B, 3, 3) bone to world
+    parents: IndexArray  # (B,)
+    carriers: IndexArray  # (B,)
+    heads: Float64Array  # (B, 3) metres
+    ends: Float64Array  # (B, 3) metres, where each bone ends; see `RestPose.end`
+    rotations: Float64Array  # (B, 3, 3) bone to world
     floor: float = 0.0  # height of the floor under the rig at rest, metres
 
     @cached_property
-    def offsets(self) -> NDArray[np.float64]:
+    def offsets(self) -> Float64Array:
         """From the head of each bone's carrier to its own (B, 3), metres, in its axes; undefined
         for roots.
         """
-        out: NDArray[np.float64] = rotated(
+        out: Float64Array = rotated(
             np.swapaxes(self.rotations[self.carriers], 1, 2), self.heads - self.heads[self.carriers]
         )
         return out
 
     @cached_property
-    def rested(self) -> NDArray[np.float64]:
+    def rested(self) -> Float64Array:
         """R_parent0ᵀ R_b0 of each bone (B, 3, 3); undefined without a parent."""
-        out: NDArray[np.float64] = np.swapaxes(self.rotations[self.parents], 1, 2) @ self.rotations
+        out: Float64Array = np.swapaxes(self.rotations[self.parents], 1, 2) @ self.rotations
         return out
 
 
@@ -50,8 +51,8 @@ class Skeleton:
 class Pose:
     """A skeleton's motion in the world frame."""
 
-    rotations: NDArray[np.float64]  # (T, B, 3, 3) bone to world
-    heads: NDArray[np.float64]  # (T, B, 3) metres
+    rotations: Float64Array  # (T, B, 3, 3) bone to world
+    heads: Float64Array  # (T, B, 3) metres
     # Rotation about the vertical from the heading of the rig at rest to that of the body, radians.
     facing: float
 
@@ -61,12 +62,12 @@ class BoneMotion:
     """The channels of one bone, T frames."""
 
     bone: str
-    rotations: NDArray[np.float64]  # (T, 3, 3) relative to parent and rest pose
+    rotations: Float64Array  # (T, 3, 3) relative to parent and rest pose
     # (T, 3) in the axes of the location channel; None: not keyed
-    locations: NDArray[np.float64] | None = None
+    locations: Float64Array | None = None
 
 
-def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
+def basis(rig: Skeleton, world: Float64Array) -> Float64Array:
     """Convert world rotations to the bones' channels: ``B = (R_parent R_parent0ᵀ R_b0)ᵀ R_b``.
 
     :param world: (T, B, 3, 3) bone to world.
@@ -75,11 +76,11 @@ def basis(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
     rested = world[:, rig.parents] @ rig.rested
     roots = rig.parents < 0
     rested[:, roots] = rig.rotations[roots]
-    out: NDArray[np.float64] = np.swapaxes(rested, 2, 3) @ world
+    out: Float64Array = np.swapaxes(rested, 2, 3) @ world
     return out
 
 
-def head_positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.float64]:
+def head_positions(rig: Skeleton, world: Float64Array) -> Float64Array:
     """Return the bones' heads without any translation of the root bone.
 
     :param world: (T, B, 3, 3) bone to world.
@@ -94,7 +95,7 @@ def head_positions(rig: Skeleton, world: NDArray[np.float64]) -> NDArray[np.floa
     return heads
 
 
-def rotated(rotations: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotated(rotations: Float64Array, vectors: Float64Array) -> Float64Array:
     """Return the vectors (..., 3) rotated by (..., 3, 3)."""
-    out: NDArray[np.float64] = (rotations @ vectors[..., None])[..., 0]
+    out: Float64Array = (rotations @ vectors[..., None])[..., 0]
     return out

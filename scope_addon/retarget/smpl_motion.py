@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ...solver.names import BODY_JOINTS
 from ...solver.rotations import log, matrix_from_quaternion
 from ...solver.smpl_family import FACE_JOINTS, HAND_ORDER, SKELETONS, gender_of
+from ..arrays import Float32Array, Float64Array
 from ..errors import MotionFileError
 from ..kinematics.frame_blocks import by_blocks
 from ..untrusted.tables import read_tables
@@ -88,10 +89,10 @@ class SmplMotion:
 
     joint_names: tuple[str, ...]  # J names, the root first
     # (T, J, 3) axis-angle: the root in the file's world, the others relative to parents
-    poses: NDArray[np.float32]
+    poses: Float32Array
     # (T, 3) pelvis minus its rest position J_0(betas); None if the file has none
-    trans: NDArray[np.float64] | None
-    betas: NDArray[np.float64]  # (B,) the mean over the frames; B may be 0
+    trans: Float64Array | None
+    betas: Float64Array  # (B,) the mean over the frames; B may be 0
     rate: float | None  # frames per second; None if the file does not say
     gender: str
     body_model: str  # as our own files name it; empty in those of other tools
@@ -253,7 +254,7 @@ def _models(arrays: Mapping[str, NDArray[Any]], joint_names: Sequence[str]) -> t
 
 def _poses(
     arrays: Mapping[str, NDArray[Any]], path: Path
-) -> tuple[tuple[str, ...], NDArray[np.float32], str]:
+) -> tuple[tuple[str, ...], Float32Array, str]:
     """Return the joints' names, their axis-angle vectors (T, J, 3), and the axis that usually
     points up.
     """
@@ -313,7 +314,7 @@ def _part(
     path: Path,
     *,
     w_last: bool,
-) -> NDArray[np.float32] | None:
+) -> Float32Array | None:
     """Return axis-angle vectors (T, J, 3) of hands or of a part of the face; None for what is left
     out: components of MANO's hands, which are no rotations, and a face that does not fit the body's
     frames, as files without a captured face hold all kinds of numbers there.
@@ -378,9 +379,7 @@ def _has_w_last(*arrays: NDArray[Any]) -> bool:
     return False
 
 
-def _axis_angles(
-    array: NDArray[Any], name: str, path: Path, *, w_last: bool
-) -> NDArray[np.float32]:
+def _axis_angles(array: NDArray[Any], name: str, path: Path, *, w_last: bool) -> Float32Array:
     """Return axis-angle vectors (T, J, 3) of an array of them, of rotation matrices (T, J, 3, 3),
     or of quaternions.
     """
@@ -419,14 +418,14 @@ def _axis_angles(
     )
 
 
-def _from_quaternions(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
+def _from_quaternions(values: Float64Array, name: str, path: Path) -> Float64Array:
     """Return the matrices (T, J, 3, 3) of quaternions (T, J, 4), w first."""
     if np.abs(np.linalg.norm(values, axis=-1) - 1.0).max() > _ORTHONORMAL:
         raise MotionFileError(f"{path}: {name} holds quaternions that are not of length 1")
     return matrix_from_quaternion(values)
 
 
-def _from_six(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float64]:
+def _from_six(values: Float64Array, name: str, path: Path) -> Float64Array:
     """Return the matrices (T, J, 3, 3) of six numbers (T, J, 6): the first two rows one after the
     other, as PyTorch3D has them, or the first two columns row by row, as HMR has them. Only one of
     them has two vectors of length 1 at right angles.
@@ -434,7 +433,7 @@ def _from_six(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.
     in_rows = values.reshape(*values.shape[:-1], 2, 3)
     in_columns = np.swapaxes(values.reshape(*values.shape[:-1], 3, 2), -1, -2)
 
-    def deviation(pairs: NDArray[np.float64]) -> float:
+    def deviation(pairs: Float64Array) -> float:
         gram = pairs @ np.swapaxes(pairs, -1, -2)
         return float(np.abs(gram - np.eye(2)).mean())
 
@@ -444,7 +443,7 @@ def _from_six(values: NDArray[np.float64], name: str, path: Path) -> NDArray[np.
     return matrices if is_rows else np.swapaxes(matrices, -1, -2)
 
 
-def _logarithms(matrices: NDArray[np.float64], name: str, path: Path) -> NDArray[np.float32]:
+def _logarithms(matrices: Float64Array, name: str, path: Path) -> Float32Array:
     gram = np.swapaxes(matrices, -1, -2) @ matrices
     if np.abs(gram - np.eye(3)).max() > _ORTHONORMAL or np.linalg.det(matrices).min() < 0.5:
         raise MotionFileError(
@@ -453,7 +452,7 @@ def _logarithms(matrices: NDArray[np.float64], name: str, path: Path) -> NDArray
     return log(matrices).astype(np.float32)
 
 
-def _numbers(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float64]:
+def _numbers(array: NDArray[Any], name: str, path: Path) -> Float64Array:
     if array.dtype.kind not in "fiu":
         raise MotionFileError(f"{path}: {name} must hold numbers, but holds {array.dtype}")
     array = np.atleast_1d(array)
@@ -465,7 +464,7 @@ def _numbers(array: NDArray[Any], name: str, path: Path) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> NDArray[np.float64]:
+def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> Float64Array:
     key = _first(arrays, _BETAS)
     if key is None:
         return np.zeros(0)

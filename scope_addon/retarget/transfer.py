@@ -15,13 +15,11 @@ them, the palms are aligned too, so that fingers bend about the right axes.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver.body import Body
 from ...solver.rotations import exp, shortest_turn
+from ..arrays import BoolArray, Float64Array, FloatArray, IndexArray
 from ..edit.clip import Clip
 from ..kinematics.axes import R_WORLD_MODEL, UP
 from ..kinematics.smoothing import interpolate_rotations
@@ -36,9 +34,7 @@ _NEXT |= {f"{finger}{k}": f"{finger}{k + 1}" for finger in FINGERS for k in (1, 
 _MAX_PALM_TURN = np.radians(100)
 
 
-def leg_ratio(
-    body: Body, betas: NDArray[np.floating[Any]], rig: Skeleton, bone_map: BoneMap
-) -> float:
+def leg_ratio(body: Body, betas: FloatArray, rig: Skeleton, bone_map: BoneMap) -> float:
     """Return the rig's leg length divided by that of the body with the shape ``betas`` (P,)."""
     rows = {
         part: rig.names.index(bone) for bone, part in bone_map.parts.items() if bone in rig.names
@@ -55,7 +51,7 @@ class Transfer:
     def __init__(
         self,
         body: Body,
-        betas: NDArray[np.floating[Any]],
+        betas: FloatArray,
         rig: Skeleton,
         bone_map: BoneMap,
         *,
@@ -101,7 +97,7 @@ class Transfer:
             else None
         )
 
-    def pose(self, clip: Clip, one_floor: NDArray[np.bool_] | bool = True) -> Pose:
+    def pose(self, clip: Clip, one_floor: BoolArray | bool = True) -> Pose:
         """Compute the rig's motion.
 
         :param one_floor: where feet that are placed are kept above the floor, (T,) or in all of the
@@ -122,11 +118,11 @@ class Transfer:
             place_feet(rig, self._legs, turns, pose, joints, clip.times, held)
         return pose
 
-    def _turns(self, D: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _turns(self, D: Float64Array) -> Float64Array:
         """Return D of each bone (T, B, 3, 3) from D of each joint; spine and neck are distributed
         over their bones.
         """
-        out: NDArray[np.float64] = D[:, self._first]
+        out: Float64Array = D[:, self._first]
         bones = np.flatnonzero(self._shares)
         if len(bones):
             out[:, bones] = interpolate_rotations(
@@ -135,7 +131,7 @@ class Transfer:
         return out
 
 
-def leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
+def leg_length(points: Float64Array, rows: dict[str, int]) -> float:
     """Return the length of both legs, metres; without an ankle, the shin is taken to be as long as
     the thigh.
     """
@@ -151,7 +147,7 @@ def leg_length(points: NDArray[np.float64], rows: dict[str, int]) -> float:
 
 def _between(
     part_of: list[str], index: dict[str, int]
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+) -> tuple[IndexArray, IndexArray, Float64Array]:
     """Return the two joints (B,) that each bone turns between, and its share (B,) of the way to the
     second, below 1.
 
@@ -172,7 +168,7 @@ def _between(
     return first, second, shares
 
 
-def heading_alignment(rig: Skeleton, row: dict[str, int]) -> NDArray[np.float64]:
+def heading_alignment(rig: Skeleton, row: dict[str, int]) -> Float64Array:
     """Return F (3, 3), the rotation about the vertical that turns the rig's left to the body's, +x.
 
     :param row: the rig's bone of each body part.
@@ -185,10 +181,10 @@ def rest_alignment(
     rig: Skeleton,
     part_of: list[str],
     row: dict[str, int],
-    rest: NDArray[np.float64],
+    rest: Float64Array,
     index: dict[str, int],
-    F: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    F: Float64Array,
+) -> Float64Array:
     """Return A_b of every bone.
 
     :param part_of: the body part of each bone.
@@ -231,7 +227,7 @@ def rest_alignment(
     return A
 
 
-def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+def _heading_turn(along: Float64Array, wanted: Float64Array) -> Float64Array:
     """Return the turn (3, 3) about the vertical from one direction (3,) to another; none of a steep
     one.
     """
@@ -240,17 +236,17 @@ def _heading_turn(along: NDArray[np.float64], wanted: NDArray[np.float64]) -> ND
     if np.linalg.norm(flat) <= 0.3 * np.linalg.norm(along):
         return np.eye(3)
     angle = np.arctan2(goal[1], goal[0]) - np.arctan2(flat[1], flat[0])
-    turn: NDArray[np.float64] = exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
+    turn: Float64Array = exp(UP * ((angle + np.pi) % (2 * np.pi) - np.pi))
     return turn
 
 
 def _palm_alignment(
-    heads: NDArray[np.float64],
+    heads: Float64Array,
     row: dict[str, int],
-    rest: NDArray[np.float64],
+    rest: Float64Array,
     index: dict[str, int],
     side: str,
-) -> NDArray[np.float64] | None:
+) -> Float64Array | None:
     """Return the rotation (3, 3) of the rig's palm to the body's, from wrist and knuckles; None
     without fingers.
     """
@@ -267,5 +263,5 @@ def _palm_alignment(
             return None
         axes = np.stack([along, np.cross(normal, along), normal], axis=1)
         palms.append(axes / np.linalg.norm(axes, axis=0))
-    alignment: NDArray[np.float64] = palms[1] @ palms[0].T
+    alignment: Float64Array = palms[1] @ palms[0].T
     return alignment
