@@ -112,6 +112,13 @@ def captured(motion, body=BODY):
     return result.people[0].armature
 
 
+def captured_with(motion):
+    """Return the armature of a capture, as `captured` does, which stores its motion."""
+    armature = captured(motion)
+    pack_motion(armature, motion.to_bytes())
+    return armature
+
+
 def _appended(path, frames):
     """Do what `captured` does, with a capture that was kept."""
     with bpy.data.libraries.load(path) as (there, here):

@@ -13,12 +13,11 @@ import bpy_extras.view3d_utils
 import pytest
 from mathutils import Vector
 from scope.scope_addon.scene.character.correction_list import listed_corrections
-from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui import pin_tool
 from scope.scope_addon.ui.drawing import Pointer
 
 from ...edit.walking import motion_of, walk
-from ...scene.made_rigs import captured
+from ...scene.made_rigs import captured_with
 
 
 class Tool:
@@ -63,8 +62,7 @@ class Tool:
 
 @pytest.fixture
 def rig():
-    armature = captured(motion := motion_of(walk(1.0)))
-    pack_motion(armature, motion.to_bytes())
+    armature = captured_with(motion_of(walk(1.0)))
     bpy.context.scene.frame_set(15)
     return armature
 
