@@ -13,6 +13,7 @@ from scope.scope_addon import cli
 from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.footage import display_text
 from scope.scope_addon.motion import Motion
+from scope.solver.body_file import BUILT_IN
 
 # several would wait for each other in busy loops
 BRIEF = ["--quality", "fast", "--end", "0.1", "--threads", "1"]
@@ -28,21 +29,13 @@ def files_below(folder):
     return sorted(str(p.relative_to(folder)) for p in folder.rglob("*"))
 
 
-BROKEN = {
-    "missing.mp4": None,
-    "empty.mp4": b"",
-    "text.mp4": b"this is not a video\n" * 50,
-    "truncated.mp4": "truncated",
-    "noise.png": bytes(range(256)) * 20,
-}
+BROKEN = {"missing.mp4": None, "text.mp4": b"this is not a video\n" * 50}
 
 
 @pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize("name", BROKEN)
 def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, capsys, name):
     content = BROKEN[name]
-    if content == "truncated":
-        content = SAMPLE.read_bytes()[:4000]
     if content is not None:
         (tmp_path / name).write_bytes(content)
     before = files_below(tmp_path)
@@ -62,7 +55,6 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
     ("argv", "status", "says"),
     [
         (["capture", "-o", "{tmp}/a.xyz"], 2, ".xyz"),
-        (["capture", "-o", "{tmp}/noext"], 2, "suffix"),
         (["capture", "--overlay", "{tmp}/a.avi"], 2, ".avi"),
         (["capture", "--report", "{tmp}/a.pdf"], 2, ".pdf"),
         (["capture", "--report", "{tmp}/none/a.html"], 1, "none"),
@@ -74,9 +66,6 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--overlay", "", "-o", "{tmp}/a.npz"], 2, "--overlay: the path is empty"),
         (["capture", "--calibration=", "-o", "{tmp}/a.npz"], 2, "--calibration: the path is empty"),
         (["capture", "--retarget", "", "-o", "{tmp}/a.glb"], 2, "--retarget: the path is empty"),
-        (["capture", "--bone-map", "", "-o", "{tmp}/a.glb"], 2, "--bone-map: the path is empty"),
-        (["capture", "--detector", "", "-o", "{tmp}/a.npz"], 2, "--detector: the path is empty"),
-        (["capture", "--keypoints", "", "-o", "{tmp}/a.npz"], 2, "--keypoints: the path is empty"),
         (["batch", "", "--out", "{tmp}"], 2, "FOLDER: the path is empty"),
         (["batch", "{tmp}", "--out", ""], 2, "--out: the path is empty"),
         (["capture", "--quality", "superb"], 2, "superb"),
@@ -89,13 +78,13 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         ),
         (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres, such as 175"),
         (["capture", "--body", "nobody", "-o", "{tmp}/a.npz"], 1, "nobody"),
+        (
+            ["capture", "--hands", "--body", str(BUILT_IN["scope"]), "-o", "{tmp}/a.npz"],
+            2,
+            "no finger joints, which capturing hands needs: use scope_h",
+        ),
         (["capture", "--retarget", "{tmp}/rig.glb", "-o", "{tmp}/a.glb"], 1, "rig.glb"),
         (["capture", "--retarget", "{tmp}/rig.obj", "-o", "{tmp}/a.glb"], 2, ".obj"),
-        (
-            ["capture", "--retarget", str(SAMPLE.parent / "LICENSE.md"), "-o", "{tmp}/a.glb"],
-            2,
-            ".md",
-        ),
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (
@@ -118,11 +107,6 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
             "either --shape-keys or --retarget",
         ),
         (
-            ["batch", "{tmp}", "--out", "{tmp}", "--formats", "npz", "--bvh-unit", "m"],
-            2,
-            "-o OUT.bvh",
-        ),
-        (
             ["capture", str(SAMPLE), "second.mp4", "-o", "{tmp}/a.npz"],
             1,
             "second.mp4",
@@ -137,14 +121,12 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "a.mp4", "b.mp4", "--save-calibration", "{tmp}/a.json"], 2, "a.json"),
         (["capture", "--frobnicate"], 2, "--frobnicate (see scope capture --help)"),
         (["capture", "--threads", "-2", "-o", "{tmp}/a.npz"], 2, "--threads"),
-        (["capture", "--start", "", "-o", "{tmp}/a.npz"], 2, "'' is not a valid time"),
         (["capture", "--fps", "", "-o", "{tmp}/a.npz"], 2, "'' is not a frame rate"),
         (
             ["capture", "--start", "00:00:00:99", "-o", "{tmp}/a.npz"],
             2,
             "00:00:00:99 does not exist",
         ),
-        (["capture", "https://example.com/walk.mp4", "-o", "{tmp}/a.npz"], 2, "download"),
         (["frobnicate"], 2, "frobnicate"),
         (["capture", "a.mp4", "--unknown=" + 300 * "x"], 2, "unknown arguments: --unknown=xxx"),
         ([], 2, "COMMAND"),
@@ -299,18 +281,6 @@ def test_a_picture_gives_a_motion_of_one_frame_and_only_json_on_stdout(tmp_path,
     assert motion.valid.all()
     overlay = np.frombuffer((tmp_path / f"{name}.o.png").read_bytes(), np.uint8)
     assert cv2.imdecode(overlay, cv2.IMREAD_COLOR).shape == frame.shape
-
-
-def test_hands_need_a_body_with_fingers(tmp_path, capsys):
-    from scope.solver.body_file import BUILT_IN
-
-    out = tmp_path / "out.npz"
-    status, _, err = run(
-        capsys, "capture", str(SAMPLE), "--hands", "--body", str(BUILT_IN["scope"]), "-o", str(out)
-    )
-    assert status == 2
-    assert "no finger joints" in err
-    assert not out.exists()
 
 
 @pytest.mark.parametrize(

@@ -25,17 +25,8 @@ def amass(tmp_path):
 @pytest.mark.usefixtures("blender_module")
 def test_the_outputs_and_the_report(amass, capfd):
     outputs = [amass.with_name(name) for name in ("out.glb", "out.bvh", "out.blend", "out.npz")]
-    assert (
-        main(
-            [
-                "import",
-                str(amass),
-                *(word for path in outputs for word in ("-o", str(path))),
-                "--json",
-            ]
-        )
-        == 0
-    )
+    argv = ["import", str(amass), "--json"]
+    assert main([*argv, *(word for path in outputs for word in ("-o", str(path)))]) == 0
     out, err = capfd.readouterr()
     report = json.loads(out)
     assert set(report["outputs"]) == {str(path) for path in outputs}
@@ -58,22 +49,15 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
         (["missing.npz"], 1, "does not exist"),
         (["text.npz"], 1, "not a readable motion file (it is no archive, array or pickle)"),
         (["other.npz"], 1, "no SMPL-style motion"),
-        (["walk.npz", "-o", "out.xyz"], 2, ".xyz"),
         (["walk.npz", "-o", "walk.npz"], 2, "is the input itself"),
         (["walk.npz", "--up", "x"], 2, "--up"),
-        (["walk.npz", "--rate", "-1"], 2, "--rate must be from 0"),
         (["walk.npz", "--rate", "nan"], 2, "--rate"),
         (["walk.npz", "--body", "none.npz"], 1, "none.npz"),
-        (["walk.npz", "--bone-map", "bones.json"], 2, "--retarget"),
-        (["walk.npz", "--expression-map", "face.json"], 2, "--retarget"),
-        (["walk.npz", "--retarget", "rig.glb"], 1, "rig.glb"),
         (
             ["walk.npz", "--retarget", "rig.glb", "--expression-map", "face.json"],
             2,
             "expressions, which walk.npz does not have",
         ),
-        (["walk.npz", "--bvh-unit", "m"], 2, "-o OUT.bvh"),
-        (["walk.npz", "--shape-keys", "baked", "-o", "out.bvh"], 2, "-o OUT.glb"),
         (["walk.npz", *TWO_RIGS], 2, "2 rigs need 2 outputs"),
         (["walk.npz", *TWO_RIGS, "-o", "a.glb", "-o", "a.npz"], 2, "but there is 1"),
         (
@@ -81,7 +65,6 @@ def test_without_an_output_a_glb_lies_beside_the_motion(amass):
             2,
             "--rig-object is given 1 times for 2 rigs",
         ),
-        ([""], 2, "MOTION: the path is empty"),
         (["."], 1, "not a readable motion file"),
     ],
 )

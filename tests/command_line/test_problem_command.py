@@ -88,8 +88,8 @@ def test_without_a_capture_the_computer_alone_is_described(tmp_path):
 
 @pytest.mark.parametrize(
     "content",
-    ["", "[1]", "{}", '{"frames": 3}', "not JSON", "[" * 5000, '{"a":' * 5000],
-    ids=["empty", "list", "nothing", "other", "text", "deep list", "deep object"],
+    ["[1]", '{"frames": 3}', "not JSON", "[" * 5000],
+    ids=["list", "other", "text", "deep list"],
 )
 def test_what_is_no_report_is_refused_in_one_sentence_and_nothing_is_written(
     content, tmp_path, capsys, monkeypatch
@@ -104,7 +104,9 @@ def test_what_is_no_report_is_refused_in_one_sentence_and_nothing_is_written(
 @pytest.mark.parametrize(
     "damaged",
     [
-        *(3, "text", [1, "Ann", {"Ann": "Ann"}], {"Ann Smith": "Ann"}, None, [None]),
+        3,
+        [1, "Ann", {"Ann": "Ann"}],
+        {"Ann Smith": "Ann"},
         [{"code": ["Ann"]}, {"code": {"Ann": 1}}],
     ],
 )

