@@ -20,21 +20,6 @@ def person(side_px: float, seen_s: float = 0.0) -> TrackedTarget:
     return TrackedTarget(0, estimate, np.zeros(2), seen_s)
 
 
-def searches(
-    people: int | None, fps: float, seconds: float, live=(), lost=(), start_s: float = 10.0
-) -> list[float]:
-    """Return the times of the searches, seconds after the first frame."""
-    clock = FrameClock()
-    schedule = SearchSchedule(clock, people)
-    found = []
-    for t in range(round(seconds * fps)):
-        clock.advance(start_s + t / fps)
-        if schedule.is_due(IMAGE, live, lost):
-            schedule.begin(IMAGE, live, lost)
-            found.append(t / fps)
-    return found
-
-
 def test_small_people_are_searched_once_a_second_and_only_where_nobody_is_tracked() -> None:
     clock = FrameClock()
     schedule = SearchSchedule(clock, None)

@@ -23,13 +23,11 @@ def at(x: float, confidence: float = 0.9) -> PoseEstimate:
     return PoseEstimate(BODY + [x, 300.0], sure, np.zeros((33, 3)), 0.99, region, region)
 
 
-def walker(frames: int, fps: float, speed_px: float = 12.0) -> TrackedTarget:
-    """A target that was tracked for some frames, predicted at ``frames * speed_px`` in the next
-    one.
-    """
+def walker() -> TrackedTarget:
+    """A target that was tracked for 30 frames, last seen at 348 px, predicted at 360 px."""
     target = TrackedTarget(0, at(0.0), np.zeros(2), 0.0)
-    for t in range(1, frames):
-        target.update(at(speed_px * t), False, t / fps, 1 / fps)
+    for t in range(1, 30):
+        target.update(at(12.0 * t), False, t / 30, 1 / 30)
     return target
 
 
@@ -40,11 +38,11 @@ def walker(frames: int, fps: float, speed_px: float = 12.0) -> TrackedTarget:
 def test_a_jump_with_less_confidence_is_an_occlusion(
     jump: float, confidence: float, occluded: bool
 ) -> None:
-    assert walker(30, 30).becomes_occluded(at(30 * 12.0 + jump, confidence)) == occluded
+    assert walker().becomes_occluded(at(360.0 + jump, confidence)) == occluded
 
 
 def test_a_person_is_predicted_at_constant_velocity() -> None:
-    target = walker(30, 30)  # last seen at 348 px
+    target = walker()
     assert target.prefetch_region.center_px == pytest.approx((360.0, 300.0))
     for lost, x in ((0, 348.0), (1, 360.0), (5, 408.0)):
         target.frames_lost = lost
@@ -54,7 +52,7 @@ def test_a_person_is_predicted_at_constant_velocity() -> None:
 
 
 def test_an_occluder_is_distinguished_by_confidence_and_position() -> None:
-    target = walker(30, 30)
+    target = walker()
     dim = at(360.0, 0.4)
     sure = at(360.0)
     elsewhere = at(360.0 + SIDE, 0.4)

@@ -33,10 +33,6 @@ def tracker(tracker_of_module: PeopleTracker) -> PeopleTracker:
     return tracker_of_module
 
 
-def largest(tracker: PeopleTracker, image: np.ndarray) -> tuple[int, Observation] | None:
-    return max(tracker.step(image), key=lambda entry: entry[1].region.side_px, default=None)
-
-
 @pytest.mark.slow
 def test_a_somersault_is_tracked_all_the_way_round(frames: Frames) -> None:
     """The man turns over once in the air, against the sun, between frames 165 and 183."""
@@ -217,22 +213,6 @@ def test_masks_come_with_the_frame_for_which_they_were_requested(
         .clip(0, 255)
     )
     assert np.median(mask.probability[at[:, 1], at[:, 0]]) > 0.9
-
-
-def test_lost_and_found_again(tracker: PeopleTracker, frames: Frames) -> None:
-    images = list(frames("clips/run_moving_camera", stop=4))
-    blank = np.zeros_like(images[0])
-    before = [largest(tracker, image) for image in images[:2]]
-    assert [tracker.step(blank) for _ in range(3)] == [[]] * 3
-    after = [largest(tracker, image) for image in images[2:]]
-    assert None not in before + after
-    last = before[-1]
-    first = after[0]
-    assert last is not None
-    assert first is not None
-    assert first[1].acquired
-    assert first[0] != last[0]
-    assert first[1].region.resembles(last[1].region, 0.1)
 
 
 def test_odd_images(tracker: PeopleTracker) -> None:

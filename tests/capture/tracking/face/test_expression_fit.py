@@ -4,8 +4,6 @@ see them.
 
 Expressions and gaze of a face that is seen briefly: what the networks make of it; of others,
 the fit's.
-
-A face that was turned, scaled and moved comes back as it was.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from scope.scope_addon.capture.perception.face_record import RECORD, gaze, parts
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking import expression_fit
 from scope.scope_addon.capture.tracking.expression_fit import (
-    aligned,
     fitted,
     is_known,
     load_response,
@@ -216,24 +213,3 @@ def test_the_gap_at_a_cut_is_no_time_for_which_a_face_was_seen(fps, known):
     times = np.arange(20) / fps
     times[7:] += SCENE_GAP_S
     assert is_known(rows, times) == known
-
-
-Y_UP = np.array([1.0, -1.0, -1.0])
-
-
-RNG = np.random.default_rng(0)
-
-
-FACE = RNG.standard_normal((40, 3))
-
-
-SHARES = RNG.dirichlet(np.ones(40))
-
-
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 0.1), (-0.2, 0.5, 1.5)])
-def test_a_transformed_face_comes_back(turn):
-    R_camera_face = exp(np.array(turn, float))
-    pixels = (80.0 * FACE @ R_camera_face.T) * Y_UP + [320, 200, 15]
-    faces = aligned(pixels[None], FACE, SHARES)
-    np.testing.assert_allclose(faces.points[0], FACE, atol=1e-9)
-    np.testing.assert_allclose(faces.turns[0], turn, atol=1e-9)
