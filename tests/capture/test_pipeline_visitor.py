@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.pipeline import Capture, capture
+from scope.scope_addon.capture.pipeline import capture
 from scope.solver.body import Body
 
 from .composites import visit
@@ -36,15 +36,11 @@ def footage(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     return path, np.array(places)
 
 
-@pytest.fixture(scope="module")
-def everybody(footage: tuple[Path, np.ndarray], body: Body) -> Capture:
-    return capture(footage[0], body, CaptureOptions(quality="fast", people="all"))
-
-
 @pytest.mark.slow
 def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
-    everybody: Capture, footage: tuple[Path, np.ndarray]
+    footage: tuple[Path, np.ndarray], body: Body
 ) -> None:
+    everybody = capture(footage[0], body, CaptureOptions(quality="fast", people="all"))
     places = footage[1]
     assert len(everybody.motions) == 2
     stays, visitor = everybody.motions
@@ -59,10 +55,7 @@ def test_the_visitor_is_valid_while_in_the_picture_and_only_then(
         trunk = projected_trunk(motion)
         rows = motion.valid & np.isfinite(at).all(axis=1)
         assert np.percentile(np.linalg.norm(trunk - at, axis=1)[rows], 90) < 40
-
-
-def test_nobody_jumps_when_entering_or_leaving(everybody: Capture) -> None:
-    for motion in everybody.motions:
+        # Nobody jumps when entering or leaving.
         steps = np.linalg.norm(np.diff(motion.joints_cam[:, 0], axis=0), axis=1)
         assert steps.max() < 0.38  # metres a frame; the visitor slides in and out at up to 0.3
         assert (motion.joints_cam[:, 0, 2] > 1.0).all()

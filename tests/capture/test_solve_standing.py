@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the lifting network and the solver make of one second of noisy keypoints of a person who
+"""What the lifting network and the solver make of half a second of noisy keypoints of a person who
 stands with straight or bent knees.
 """
 
@@ -20,7 +20,7 @@ from scope.solver.body_file import load_body
 from .standing_views import K, knee_flexion, standing_views
 
 RATE = 30
-FRAMES = 30
+FRAMES = 16
 NOISE_PX = 3.0
 
 

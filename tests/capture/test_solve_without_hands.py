@@ -12,6 +12,7 @@ import pytest
 from scope.scope_addon.capture.solve import prepare, solve
 from scope.solver.body_file import load_body
 
+from . import standing_people
 from .standing_people import seen, steps
 
 pytestmark = pytest.mark.usefixtures("exact_lifting")
@@ -33,7 +34,8 @@ def with_hands(track, frame=None):
     return replace(track, hands=hands)
 
 
-def test_the_motion_is_that_without_hands_and_its_fingers_are_at_rest(body):
+def test_the_motion_is_that_without_hands_and_its_fingers_are_at_rest(body, monkeypatch):
+    monkeypatch.setattr(standing_people, "STAYS_S", 0.5)
     track = steps(0.0)
     shot = replace(seen(track), body=body)
     (looked_for,), (not_looked_for,) = (

@@ -76,8 +76,9 @@ def found(picture):
     return focal_from_edges(find_segments(picture, []), WIDTH, HEIGHT, ASSUMED)
 
 
-@pytest.mark.parametrize("ratio", [0.7, 1.0, 1.4])
-@pytest.mark.parametrize("turn", [[0.1, 0.6, 0.0], [-0.15, -0.5, 0.1]])
+@pytest.mark.parametrize(
+    ("ratio", "turn"), [(0.7, [0.1, 0.6, 0.0]), (1.0, [-0.15, -0.5, 0.1]), (1.4, [0.1, 0.6, 0.0])]
+)
 def test_a_room_seen_across_its_corner_determines_the_focal_length(ratio, turn):
     R = exp([turn[0], 0, 0]) @ exp([0, 0, turn[2]]) @ exp([0, turn[1], 0])
     estimate = found(room(ratio * ASSUMED, R))
@@ -94,7 +95,7 @@ def test_a_wall_seen_frontally_gives_no_estimate():
     assert found(wall) is None
 
 
-@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
 def test_horizontal_edges_count_at_every_focal_length_without_vertical_ones(ratio):
     """Otherwise, a focal length at which two edges happen to meet vertically above would have no
     competitor.
@@ -117,7 +118,7 @@ def test_no_edges_give_no_estimate():
     assert found(np.full((HEIGHT, WIDTH, 3), 90, np.uint8)) is None
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_random_edges_give_no_estimate(seed):
     rng = np.random.default_rng(seed)
     scribble = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
@@ -245,7 +246,7 @@ def test_a_more_certain_estimate_from_edges_weighs_more(body):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "least", "most"), [(0.01, 1, 1), (1.5, 3, 5), (60.0, 7, 10), (3600.0, 13, 16)]
+    ("seconds", "least", "most"), [(0.01, 1, 1), (60.0, 7, 10), (3600.0, 13, 16)]
 )
 def test_an_hour_takes_few_more_fits_than_a_minute(body, seconds, least, most):
     fits = FocalFits(body)

@@ -106,8 +106,16 @@ def estimate(frames, replayed=(), lag=0, given=None):
     return camera, fits
 
 
-@pytest.mark.parametrize("lag", [0, 1])
-@pytest.mark.parametrize("frames", [len(TIMES), 17, 11, 3])
+def test_an_error_in_a_parallel_thread_is_raised(monkeypatch):
+    def broken(*_):
+        raise ValueError("no edges today")
+
+    monkeypatch.setattr(focal_length, "camera_by_edges", broken)
+    with pytest.raises(ValueError, match="no edges today"):
+        estimate(len(TIMES))
+
+
+@pytest.mark.parametrize(("frames", "lag"), [(len(TIMES), 0), (len(TIMES), 1), (17, 0), (3, 1)])
 def test_the_focal_length_is_the_same_from_frames_that_were_added_and_from_people_at_the_end(
     frames, lag
 ):

@@ -15,7 +15,6 @@ from scope.scope_addon.capture.fitting.hand_measurements import (
     HAND_KEYPOINT_NAMES,
     HandMeasurer,
     finger_joints,
-    require_fingers,
     smooth_fingers,
     with_finger_limits,
 )
@@ -26,7 +25,6 @@ from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER, repair_left_right
 from scope.scope_addon.capture.tracking.track import Tracklet, make_track
-from scope.scope_addon.errors import UsageError
 from scope.solver import (
     Keypoints2D,
     Measurements,
@@ -66,10 +64,18 @@ def somebody(body, grips) -> State:
     return State(R_camera_root, np.array([0.3, 0.1, 2.5]), Omega, np.zeros(body.P))
 
 
-def points_of(body, state):
+def part_poses(body, state):
     R = np.concatenate([state.R_camera_root[None], state.Omega])
     t = state.t_camera_root - body.rest_joints(state.beta)[0]
-    return body.keypoints(*body.forward_kinematics(R, t, state.beta), state.beta)
+    return body.forward_kinematics(R, t, state.beta)
+
+
+def points_of(body, state):
+    return body.keypoints(*part_poses(body, state), state.beta)
+
+
+def joints_of(body, state):
+    return part_poses(body, state)[1]
 
 
 def line_of_sight(points):
@@ -134,10 +140,7 @@ def test_the_fingers_of_a_known_pose_are_recovered(body):
     for side, grip in zip(SIDES, (0.8, 0.3), strict=True):
         assert np.abs(bends(body, found.state.Omega, side) - grip).mean() < 0.12
         joints = finger_joints(body, side)
-        true_R = np.concatenate([truth.R_camera_root[None], truth.Omega])
-        t = body.forward_kinematics(
-            true_R, truth.t_camera_root - body.rest_joints(truth.beta)[0], truth.beta
-        )[1]
+        t = joints_of(body, truth)
         wrist = body.joint_names.index(f"{side}_wrist")
         ours = found.t_camera_part[joints] - found.t_camera_part[wrist]
         assert np.linalg.norm(ours - (t[joints] - t[wrist]), axis=1).mean() < 0.008  # metres
@@ -163,31 +166,23 @@ def test_the_palm_determines_the_wrists_rotation(body):
     truth.Omega[wrist - 1] = exp([0.7, 0.0, 0.3])
     points = points_of(body, truth)
     found = fitted(body, measure(body, points, hands_of(body, points)))
-    R = body.forward_kinematics(
-        np.concatenate([truth.R_camera_root[None], truth.Omega]), np.zeros(3), truth.beta
-    )[0][wrist]
+    R = part_poses(body, truth)[0][wrist]
     assert np.linalg.norm(log(R.T @ found.R_camera_part[wrist])) < 0.2
 
 
 def test_directions_are_rotated_from_the_line_of_sight_to_camera_axes(body):
-    points = points_of(body, somebody(body, grips=(0.5, 0.5)))
+    state = somebody(body, grips=(0.5, 0.5))
+    points = points_of(body, state)
     hands = hands_of(body, points)
     measurer = HandMeasurer(body, K)
     plain = measure(body, points, None)
     field = measurer.add(plain, hands).orientation_field
     first = len(plain.orientation_field.starts)
-    every = np.concatenate([points, _joints(body, somebody(body, grips=(0.5, 0.5)))])
+    every = np.concatenate([points, joints_of(body, state)])
     truth = every[field.ends[first:]] - every[field.starts[first:]]
     ours = field.directions[first:]
     cosine = (truth * ours).sum(1) / np.linalg.norm(truth, axis=1) / np.linalg.norm(ours, axis=1)
     assert cosine.min() > np.cos(0.02)
-
-
-def _joints(body, state):
-    R = np.concatenate([state.R_camera_root[None], state.Omega])
-    return body.forward_kinematics(
-        R, state.t_camera_root - body.rest_joints(state.beta)[0], state.beta
-    )[1]
 
 
 def test_limits_let_fingers_bend_towards_the_palm_only(body):
@@ -197,15 +192,12 @@ def test_limits_let_fingers_bend_towards_the_palm_only(body):
         for joint in finger_joints(body, side)[:12]:
             row = at[joint]
             for angle, allowed in ((1.2, True), (-0.9, False)):
-                part = _bent(exp(sign * angle * np.array([0.0, 0.0, 1.0])), body.P)
+                Omega = exp(sign * angle * np.array([0.0, 0.0, 1.0]))
+                still = np.zeros(3)
+                turned = (np.eye(3), still, np.zeros((3, body.P)), Omega)
+                part = Part(*turned, np.eye(3), still, np.zeros(body.P))
                 r = joint_limits(part, row[:3], row[3], row[4], row[5], row[6], 0.0).r
                 assert (abs(r[0]) < 1e-9) == allowed, body.joint_names[joint]
-
-
-def _bent(Omega, P) -> Part:
-    return Part(
-        np.eye(3), np.zeros(3), np.zeros((3, P)), Omega, np.eye(3), np.zeros(3), np.zeros(P)
-    )
 
 
 def test_unseen_fingers_are_interpolated_over_short_gaps_and_rest_in_long_ones(body):
@@ -250,11 +242,6 @@ def test_fingers_have_the_confidence_of_the_hand_and_other_joints_none(body):
     assert confidence[[0, 2]].max() == 0
     assert confidence[:, body.joint_names.index("right_index1")].max() == 0
     assert confidence[:, body.joint_names.index("left_elbow")].max() == 0
-
-
-def test_a_body_without_fingers_is_refused():
-    with pytest.raises(UsageError, match="scope_h"):
-        require_fingers(load_body("scope"))
 
 
 def test_tracks_keep_hands_in_their_rows_and_swap_them_with_left_and_right():

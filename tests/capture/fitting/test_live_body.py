@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,25 +17,27 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.overlay_video import draw_overlay
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
-from scope.scope_addon.errors import CancelledError
 from scope.solver.body_file import load_body
 
-WANTED = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.8))
+WANTED = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.6))
 LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
 
 
 @pytest.fixture(scope="module")
 def watched(body):
-    """The sample's capture, and the live pose of every fourth frame: (frame index, picture,
-    pose).
+    """The sample's capture, and the live pose of every fourth frame: (frame index, picture, pose),
+    and what becomes of its observation where that is not finite.
     """
     seen = []
+    unusable = []
 
     def watch(frame, people, live):
         if frame.index % 4 == 0 and people:
             seen.append((frame.index, frame.image_rgb, live.fit(people[0])))
+            lost = np.full_like(people[0].keypoints_px, np.nan)
+            unusable.append(live.fit(replace(people[0], keypoints_px=lost)))
 
-    return capture(SAMPLE, body, WANTED, watch=watch), seen
+    return capture(SAMPLE, body, WANTED, watch=watch), seen, unusable
 
 
 def silhouette(image, vertices, body, camera) -> np.ndarray:
@@ -48,8 +51,9 @@ def silhouette(image, vertices, body, camera) -> np.ndarray:
 
 def test_the_body_covers_the_true_joints(watched, body):
     truth = np.load(SAMPLE.with_name("sample_truth.npz"))
-    _, seen = watched
+    _, seen, unusable = watched
     assert len(seen) >= 5
+    assert unusable == [None] * len(seen)
     for index, image, pose in seen:
         joints = truth["joints_cam"][index]
         pixels = joints @ truth["intrinsics"].T
@@ -94,32 +98,9 @@ def test_the_estimated_focal_length_is_nearer_to_the_true_one_than_the_assumed(w
     assert abs(np.log(estimate / truth)) < abs(np.log(assumed / truth))
 
 
-def test_an_error_in_a_parallel_thread_is_raised(body, monkeypatch):
-    def broken(*_):
-        raise ValueError("no edges today")
-
-    monkeypatch.setattr(focal_length, "camera_by_edges", broken)
-    with pytest.raises(ValueError, match="no edges today"):
-        capture(SAMPLE, body, WANTED)
-
-
 @pytest.mark.parametrize("name", ["scope", "scope_h"])
 def test_a_body_is_ready_once_it_is_loaded(name):
     live = LiveBody(load_body(name), choose_camera(640, 480))
     assert not live.is_ready
     live.load()
     assert live.is_ready
-
-
-def test_an_observation_that_is_not_finite_gives_no_body(body, watched):
-    seen = []
-
-    def watch(frame, people, live):
-        if not seen and people:
-            people[0].keypoints_px[5] = np.nan
-            seen.append(live.fit(people[0]))
-            raise CancelledError("enough")
-
-    with pytest.raises(CancelledError):
-        capture(SAMPLE, body, WANTED, watch=watch)
-    assert seen == [None]

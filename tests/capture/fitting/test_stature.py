@@ -15,8 +15,6 @@ from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stag
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions, check_options
 from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.cli import build_parser
-from scope.scope_addon.command_line.arguments import body_and_options
 from scope.scope_addon.errors import UsageError
 from scope.solver import (
     Keypoints2D,
@@ -33,7 +31,7 @@ SIDES = ("left", "right")
 SAMPLE = ASSETS / "sample" / "sample.mp4"
 
 
-@pytest.mark.parametrize("height_m", [1.3, 1.55, 1.7, 1.95, 2.1])
+@pytest.mark.parametrize("height_m", [1.3, 1.7, 2.1])
 def test_the_mean_is_the_most_probable_shape_of_a_height(height_m):
     body = load_body("scope")
     priors = with_stature(default_priors(body), body, height_m)
@@ -71,29 +69,17 @@ def test_an_unknown_stature_depends_less_on_proportions_and_varies_among_people(
 def test_the_mean_of_people_has_the_proportions_of_people(shared):
     """Trunk, upper arm and forearm against the leg: means of six people whose joints are known."""
     body = load_body("scope")
+    assert not mean_shape(replace(body, file="/of/others.npz")).any()
     mean = mean_shape(body)
     assert body.stature(mean) == pytest.approx(body.stature(), abs=0.001)
     J = body.rest_joints(mean)
     ours = proportions(lambda name: J[body.joint_names.index(name)])
     people = shared / "data" / "people" / "truth"
-    truths = [
-        people / f"{name}.npz"
-        for name in (
-            "labval_squat",
-            "labval_walk_ts",
-            "opencap_squat_cam0",
-            "zju_377",
-            "shelf_c3_t1",
-        )
-    ]
+    names = ("labval_squat", "labval_walk_ts", "opencap_squat_cam0", "zju_377", "shelf_c3_t1")
+    truths = [people / f"{name}.npz" for name in names]
     truths.append(shared / "data" / "pose2sim" / "truth_cam1.npz")
     found = np.mean([proportions(truth_joint(np.load(path))) for path in truths], axis=0)
     np.testing.assert_allclose(ours, found, rtol=0.03)
-
-
-def test_bodies_of_others_are_their_own_mean():
-    body = replace(load_body("scope"), file="/somewhere/body.npz")
-    assert not mean_shape(body).any()
 
 
 def truth_joint(truth):
@@ -197,7 +183,7 @@ def trunk(body, betas):
     return J[body.joint_names.index("left_shoulder"), 1] - J[body.joint_names.index("left_hip"), 1]
 
 
-@pytest.mark.parametrize("height_m", [0.8, 0.95, 1.1, 1.3, 1.44])
+@pytest.mark.parametrize("height_m", [0.8, 1.1, 1.44])
 def test_below_the_stature_of_adults_the_most_probable_shape_is_a_childs(height_m):
     """Legs grow faster than the trunk: sitting height is 0.62 of the stature at one year, 0.52 at
     twelve (Fredriks).
@@ -214,7 +200,7 @@ def test_below_the_stature_of_adults_the_most_probable_shape_is_a_childs(height_
     assert hip / height_m == pytest.approx(1.0535 - share, abs=0.04)
 
 
-@pytest.mark.parametrize("height_m", [None, 1.5, 1.8])
+@pytest.mark.parametrize("height_m", [None, 1.8])
 def test_adults_are_the_same_with_the_body_of_all_ages(height_m):
     adult, of_ages = (load_body(name) for name in ("scope", "scope_child"))
     means = []
@@ -247,7 +233,6 @@ def test_adults_are_the_same_with_the_body_of_all_ages(height_m):
         ),
         (0.7, "can be 127 to 213 cm tall, not 70: omit the height"),
         (2.5, "not 250"),
-        (-1.8, "-180"),
     ],
 )
 def test_impossible_heights_are_refused(height_m, says):
@@ -275,25 +260,3 @@ def test_a_known_height_sets_size_and_distance():
         )
         found[height_m] = np.linalg.norm(motion.joints_cam[:, 0], axis=1).mean()
     assert found[1.9] / found[1.5] == pytest.approx(1.9 / 1.5, rel=0.05)
-
-
-def test_the_height_of_a_child_gives_a_child():
-    arguments = [
-        "capture",
-        str(SAMPLE),
-        "--height",
-        "110",
-        "--quality",
-        "fast",
-        "--fov",
-        "60",
-        "--end",
-        "0.5",
-    ]
-    body, options = body_and_options(build_parser().parse_args(arguments))
-    (motion,) = capture(SAMPLE, body, options).motions
-    assert motion.body_model == body.name == "scope_child"
-    assert np.ptp(body.rest_vertices(motion.betas.astype(float))[:, 1]) == pytest.approx(
-        1.1, abs=0.01
-    )
-    assert (np.abs(motion.betas[:-1]) < 4).all()

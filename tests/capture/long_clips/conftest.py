@@ -37,7 +37,7 @@ RED = (220, 30, 30)
 BLUE = (30, 30, 220)
 # three windows: frames 0 to 29, 30 to 59, and the rest
 FPS = 15
-FRAMES = 105
+FRAMES = 90
 WINDOW_S = 2.0
 SMALL = Person(lambda t: (150 + t, 130), RED, size_px=45)
 # Present when the second window's trackers begin, and so large that they would not care about the

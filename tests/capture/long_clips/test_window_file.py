@@ -5,9 +5,7 @@ nothing.
 
 from __future__ import annotations
 
-import gc
 import os
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -105,18 +103,12 @@ def plain(value: Any) -> Any:
 
 def test_everything_is_read_as_it_was_written(tmp_path: Path) -> None:
     made = record()
-    save_window(tmp_path, made)
-    read = load_window(tmp_path, WINDOW)
-    assert read is not None
-    assert plain(read) == plain(made)
-
-
-def test_a_window_without_people_is_read(tmp_path: Path) -> None:
-    empty = replace(record(), tracklets={}, anchor_regions=[], cut_rows=[], warnings=[])
-    save_window(tmp_path, empty)
-    read = load_window(tmp_path, WINDOW)
-    assert read is not None
-    assert read.tracklets == {}
+    nobody = replace(made, tracklets={}, anchor_regions=[], cut_rows=[], warnings=[])
+    for each in (made, nobody):
+        save_window(tmp_path, each)
+        read = load_window(tmp_path, WINDOW)
+        assert read is not None
+        assert plain(read) == plain(each)
 
 
 def test_the_file_of_another_window_counts_for_nothing(tmp_path: Path) -> None:
@@ -153,21 +145,18 @@ def _changed(path: Path, change: Callable[[Observed], object]) -> Observed | Non
     [
         lambda r: r.tracklets[0].values[0].__setitem__((0, 0), np.nan),
         lambda r: r.tracklets[0].rows.__setitem__(-1, FRAMES),
-        lambda r: r.tracklets[0].rows.__setitem__(0, -1),
         lambda r: r.tracklets[0].rows.__setitem__(1, 0),
         lambda r: r.tracklets[0].rows.__setitem__(0, 0.5),
         lambda r: r.tracklets[0].rows.pop(),
         lambda r: r.tracklets[0].hands.pop(),
         lambda r: r.tracklets[4].sides_px.__setitem__(0, 0.0),
         lambda r: r.tracklets[4].references.__setitem__(0, (99, known_reference(None))),
-        lambda r: r.tracklets[4].masks.__setitem__(0, (99, r.tracklets[4].masks[0][1])),
         lambda r: r.anchor_regions.__setitem__(0, Region((0.0, 0.0), -1.0, 0.0)),
         lambda r: r.timestamps.__setitem__(4, 0.0),
         lambda r: r.checksums.pop(),
         lambda r: setattr(r, "background", None),
         lambda r: setattr(r, "first", FRAMES + 1),
         lambda r: r.cut_rows.__setitem__(0, 0),
-        lambda r: r.cut_rows.append(r.cut_rows[-1]),
         lambda r: r.background.bars.__setitem__(0, np.zeros(3)),
         lambda r: r.background.edge_frames.__setitem__(0, FrameEdges(FRAMES, Segments.none())),
         lambda r: setattr(r, "background", replace(r.background, known=np.zeros(FRAMES - 1, bool))),
@@ -190,7 +179,6 @@ def test_numbers_that_do_not_fit_make_a_file_worthless(
     assert _changed(tmp_path, change) is None
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of a file")
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
 def test_what_a_link_of_a_windows_name_leads_to_stays(tmp_path: Path) -> None:
     mine = tmp_path / "mine.npz"
@@ -199,25 +187,6 @@ def test_what_a_link_of_a_windows_name_leads_to_stays(tmp_path: Path) -> None:
     save_window(tmp_path, record())
     assert mine.read_bytes() == b"mine"
     assert load_window(tmp_path, WINDOW) is not None
-
-
-def test_a_full_disk_is_an_error_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A half-written zip file printed a traceback when it was destroyed."""
-    resource = pytest.importorskip("resource")
-    unraisable = list[object]()
-    monkeypatch.setattr(sys, "unraisablehook", unraisable.append)
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
-    try:
-        with pytest.raises(OSError, match="too large"):
-            save_window(tmp_path, record())
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    gc.collect()
-    assert list(tmp_path.iterdir()) == []
-    assert unraisable == []
 
 
 @pytest.mark.parametrize("name", ["cameras.toml", "cameras.toml#left"])

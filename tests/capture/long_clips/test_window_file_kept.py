@@ -159,7 +159,6 @@ def test_a_stopped_clip_whose_middle_is_decoded_to_other_images_goes_on_from_its
 
 def test_windows_are_kept_within_bounds(
     windows_of: Callable[..., list[Track]],
-    undisturbed: Callable[..., list[Track]],
     all_kept: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -169,8 +168,6 @@ def test_windows_are_kept_within_bounds(
     monkeypatch.setattr(kept_estimates, "LARGEST", sizes[0] + sizes[1] // 2)
     windows_of(options(), None, tmp_path / "small")
     assert [file.stat().st_size for file in sorted(tmp_path.glob("small/windows-*/*"))] == sizes[:2]
-    (tmp_path / "file").write_text("in the way")
-    assert_same(windows_of(options(), None, tmp_path / "file"), undisturbed())
 
 
 def test_a_window_that_ended_early_with_the_footage_is_not_kept(

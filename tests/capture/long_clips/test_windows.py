@@ -25,7 +25,7 @@ def video(seconds: float, wanted: VideoRange = ALL) -> Video:
     return Video(Path("clip.mp4"), 640, 480, Fraction(30), round(30 * seconds), wanted=wanted)
 
 
-@pytest.mark.parametrize("seconds", [1, 120, 239])
+@pytest.mark.parametrize("seconds", [1, 239])
 def test_a_clip_shorter_than_two_windows_has_one(seconds: int) -> None:
     (only,) = plan_windows(video(seconds), WINDOW_S)
     assert (only.anchor_s, only.begin_s, only.end_s) == (0.0, 0.0, math.inf)
@@ -58,8 +58,9 @@ def test_short_windows_do_not_warm_up_before_the_one_before() -> None:
     assert all(b.anchor_s > a.begin_s for a, b in zip(windows, windows[1:], strict=False))
 
 
-@pytest.mark.parametrize("suffix", ["mkv", "mp4"])
-@pytest.mark.parametrize(("frames", "days", "most"), [(12, 127, 3), (60, 127, 15), (60, 0.01, 15)])
+@pytest.mark.parametrize(
+    ("suffix", "frames", "days", "most"), [("mkv", 12, 127, 3), ("mp4", 60, 0.01, 15)]
+)
 def test_windows_are_planned_by_frames_not_by_the_time_that_they_span(
     tmp_path: Path, suffix: str, frames: int, days: float, most: int
 ) -> None:

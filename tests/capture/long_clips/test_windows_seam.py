@@ -10,7 +10,6 @@ import pytest
 from scope.scope_addon.capture.camera.background_record import BackgroundRecord
 from scope.scope_addon.capture.frame_observer import Observed
 from scope.scope_addon.capture.long_clips.windows import (
-    distance,
     faded,
     missed_people,
     same_people,
@@ -128,14 +127,6 @@ def test_somebody_is_missed_who_was_followed_throughout_the_shared_frames() -> N
     ]
     assert found == [True, False, False]
     assert not missed_people(*windows({3: throughout}, {0: tracklet(range(40), 100.0)}))
-
-
-def test_distances_are_of_shared_frames() -> None:
-    earlier = tracklet(range(10, 20), 0.0)
-    later = tracklet(range(5), 30.0, 100.0)
-    assert distance(earlier, later, 12, (0, 5)) == pytest.approx(30 * np.sqrt(2) / 100)
-    assert distance(earlier, later, 20, (0, 5)) == np.inf
-    assert distance(earlier, later, 12, (5, 9)) == np.inf
 
 
 def test_keypoints_go_over_evenly() -> None:
