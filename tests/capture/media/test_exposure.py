@@ -26,9 +26,7 @@ def picture(level: float) -> np.ndarray:
     )
 
 
-@pytest.mark.parametrize(
-    ("level", "becomes"), [(6, 96), (10, 160), (25, 200), (60, 200), (100, 200)]
-)
+@pytest.mark.parametrize(("level", "becomes"), [(6, 96), (25, 200), (100, 200)])
 def test_highlights_are_raised(level: int, becomes: int) -> None:
     """Highlights become about 200 of 255, with at most 16-fold gain, and everything else in
     proportion.

@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from contextlib import closing
 from fractions import Fraction
-from pathlib import Path
 
 import av
 import numpy as np
@@ -19,11 +18,10 @@ from scope.scope_addon.capture.media.frame_readers import (
     PyavReader,
     exact_fps,
     packet_rates,
-    upright,
 )
 from scope.scope_addon.errors import VideoError
 
-from .made_video import with_time_table, write_video
+from .made_video import write_video
 
 COUNT = 24
 
@@ -36,32 +34,6 @@ def video(tmp_path_factory):
     """Frames that become lighter by 10 grey levels each."""
     path = tmp_path_factory.mktemp("readers") / "grey.mp4"
     return write_video(path, [np.full((32, 48, 3), 10 * k, np.uint8) for k in range(COUNT)], FPS)
-
-
-def test_images_are_turned_clockwise_after_their_pixels_have_become_square():
-    image = np.zeros((2, 4, 3), np.uint8)
-    image[0, :2] = 255  # top left
-    assert upright(Path("a"), image, 1.0, 0).tolist() == image.tolist()
-    turned = upright(Path("a"), image, 1.0, 90)
-    assert turned.shape == (4, 2, 3)
-    assert turned[:, :, 0].tolist() == [[0, 255], [0, 255], [0, 0], [0, 0]]  # top right
-    assert upright(Path("a"), image, 1.0, -90).tolist() == turned[::-1, ::-1].tolist()
-    assert upright(Path("a"), image, 1.0, 180).tolist() == image[::-1, ::-1].tolist()
-    assert upright(Path("a"), image, 2.0, 270).shape == (8, 2, 3)
-    assert upright(Path("a"), image, 0.5, 0).shape == (4, 4, 3)
-
-
-def shown_s(path: Path) -> float | None:
-    with closing(PyavReader(path)) as reader:
-        return reader.shown_s
-
-
-def test_the_duration_is_that_of_the_time_table(tmp_path, video):
-    assert shown_s(video) == pytest.approx(COUNT / FPS)
-    slow = tmp_path / "slow.mp4"
-    slow.write_bytes(video.read_bytes())
-    with_time_table(slow, 100, [(COUNT, 50)])
-    assert shown_s(slow) == pytest.approx(COUNT * 0.5)
 
 
 @pytest.mark.parametrize("reason", ["only audio", "can be read"])
@@ -88,18 +60,6 @@ def test_a_video_that_is_refused_is_closed(tmp_path, monkeypatch, video, reason)
         PyavReader(path)
     with pytest.raises(AssertionError, match="not open"):
         opened[0].seek(0)
-
-
-@pytest.mark.parametrize("index", [0, 7, COUNT - 1])
-def test_the_frame_after_skipping_is_the_one_at_that_time(video, index):
-    reader = PyavReader(video)
-    try:
-        assert reader.skip_to(index / FPS, Fraction(12))[0] == index
-        time, image = reader.read()
-        assert time == pytest.approx(index / FPS)
-        assert abs(float(image.mean()) - 10 * index) < 3  # lossy, and of the range of video
-    finally:
-        reader.close()
 
 
 def test_without_the_decoder_a_video_is_refused(video, monkeypatch):
@@ -152,12 +112,6 @@ def test_packets_of_fields_are_no_frames(tmp_path, packets_per_s):
     assert frame_readers._frames_before(path, one_second, None) == packets_per_s
 
 
-def test_fields_and_frames_may_alternate():
-    packets_s = [0.0, 0.02, 0.04, 0.08, 0.1, 0.12]
-    times_s = frame_readers._frame_times(packets_s, Fraction(25))
-    assert times_s.tolist() == [0.0, 0.04, 0.08, 0.12]
-
-
 @pytest.mark.parametrize("is_interlaced", [False, True])
 def test_frames_that_are_interlaced_may_have_packets_of_fields(tmp_path, is_interlaced):
     path = tmp_path / "a.ts"
@@ -182,10 +136,7 @@ def test_frames_that_are_interlaced_may_have_packets_of_fields(tmp_path, is_inte
         (30000 / 1001, Fraction(30000, 1001)),
         (29.97, Fraction(2997, 100)),
         (29.9701, Fraction(30000, 1001)),
-        (23.97602, Fraction(24000, 1001)),
-        (12.5, Fraction(25, 2)),
         (29.8, Fraction(149, 5)),
-        (0.0, None),
         (float("nan"), None),
         (90000.0, None),
     ],

@@ -33,9 +33,7 @@ def brightness(path: Path, wanted: VideoRange | None = None) -> list[int]:
         return [int(frame.image_rgb[0, 0, 0]) for frame in video]
 
 
-@pytest.mark.parametrize(
-    "name", ["", "walk_####.png", "walk_%04d.png", "walk_%d.png", "walk_7.png"]
-)
+@pytest.mark.parametrize("name", ["", "walk_####.png", "walk_%d.png", "walk_7.png"])
 def test_pictures_are_in_numerical_order(folder: Path, name: str) -> None:
     wanted = VideoRange(fps=Fraction(12))
     assert brightness(folder / name, wanted) == NUMBERS
@@ -92,30 +90,20 @@ def test_missing_pictures_leave_gaps_and_give_a_warning(
         assert video.expected_frames == len(wanted)
 
 
-@pytest.mark.parametrize("name", ["walk_####_v2.png", "walk_%04d_v2.png"])
-def test_the_number_of_a_pattern_is_where_its_sign_stands(tmp_path: Path, name: str) -> None:
+def test_the_number_of_a_pattern_is_where_its_sign_stands(tmp_path: Path) -> None:
     for number in (98, 99, 101, 102):
         image = np.full((20, 30, 3), number, np.uint8)
         cv2.imwrite(str(tmp_path / f"walk_{number}_v2.png"), image)
-    with open_video(tmp_path / name, VideoRange(fps=Fraction(10))) as video:
+    pattern = tmp_path / "walk_%04d_v2.png"
+    with open_video(pattern, VideoRange(fps=Fraction(10))) as video:
         assert [f.timestamp_s for f in video] == pytest.approx([0.0, 0.1, 0.3, 0.4])
         (warning,) = map(str, video.warnings)
         assert "1 numbers between 98 and 102 have no image" in warning
         assert video.expected_frames == 4
         assert video.length_s == pytest.approx(0.5)
-    assert brightness(tmp_path / name, VideoRange(0.1, 0.35, Fraction(10))) == [99, 101]
-    with open_video(tmp_path / name, VideoRange(0.1, 0.35, Fraction(10))) as video:
+    assert brightness(pattern, VideoRange(0.1, 0.35, Fraction(10))) == [99, 101]
+    with open_video(pattern, VideoRange(0.1, 0.35, Fraction(10))) as video:
         assert video.length_s == pytest.approx(0.3)
-
-
-def test_pictures_are_decoded_alike_alone_and_in_a_sequence(tmp_path: Path) -> None:
-    clear = np.zeros((20, 30, 4), np.uint8)
-    deep = np.full((20, 30, 3), 70 * 257, np.uint16)
-    images: tuple[np.ndarray, ...] = (clear, deep)
-    for number, image in enumerate(images):
-        cv2.imwrite(str(tmp_path / f"a_{number}.png"), image)
-    assert brightness(tmp_path, VideoRange(fps=Fraction(10))) == [255, 70]
-    assert [brightness(tmp_path / f"a_{k}.png") for k in (0, 1)] == [[255], [70]]
 
 
 def test_a_damaged_picture_ends_the_sequence_with_a_warning(folder: Path) -> None:
@@ -165,10 +153,8 @@ def test_a_folder_of_unrelated_pictures_is_refused(folder: Path) -> None:
     ("names", "numbered"),
     [
         (["a_1.png", "a_10.png", "a_2.PNG"], True),
-        (["take2_0001.jpg", "take2_0002.jpg"], True),
         (["take1_0001.jpg", "take2_0001.jpg"], False),
         (["a_1.png", "a_2.jpg"], False),
-        (["a_1.png", "b_1.png"], False),
         (["a_1.png"], False),
         (["one.png", "two.png"], False),
     ],

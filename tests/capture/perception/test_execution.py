@@ -65,13 +65,10 @@ def runtime(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize(
     ("available", "asked", "used"),
     [
-        ((), "auto", "cpu"),
         (("tensorrt", "cuda"), "auto", "cuda"),
         (("tensorrt",), "auto", "cpu"),
-        (("directml",), "auto", "directml"),
         (("coreml",), "auto", "coreml"),
         (("tensorrt", "cuda"), "tensorrt", "tensorrt"),
-        (("cuda",), "cpu", "cpu"),
     ],
 )
 def test_the_best_available_provider_is_used(

@@ -19,26 +19,11 @@ def samples(times, seen, values=None):
     return windows.gather(x, rows, first)[..., 0]
 
 
-def test_samples_are_evenly_spaced_in_time_at_any_frame_rate():
-    for rate in (10, 24, 25, 29.97, 30, 60, 240):
-        times = np.arange(int(4 * rate)) / rate
-        found = samples(times, np.ones(len(times), bool))
-        inside = (times > 0.41) & (times < times[-1] - 0.41)
-        assert np.allclose(found[inside], times[inside, None] + OFFSETS_S, atol=1e-6)
-
-
 def test_frames_of_variable_rate_are_interpolated_in_time():
     times = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.2, 100))
     found = samples(times, np.ones(100, bool))
     expected = np.clip(times[:, None] + OFFSETS_S, times[0], times[-1])
     assert np.allclose(found, expected, atol=1e-6)
-
-
-def test_the_ends_of_a_clip_are_repeated():
-    times = np.arange(90) / 30
-    found = samples(times, np.ones(90, bool))
-    assert np.allclose(found[0, : MIDDLE + 1], 0)
-    assert np.allclose(found[-1, MIDDLE:], times[-1])
 
 
 def test_a_short_gap_is_interpolated_and_a_long_one_ends_the_window():

@@ -59,7 +59,7 @@ def test_where_nothing_moves_every_line_is_kept() -> None:
         assert np.abs(grey(frame) - grey(whole)).max() <= 1
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 7])
+@pytest.mark.parametrize("count", [0, 1, 3])
 def test_no_frame_is_added_or_lost(count: int) -> None:
     woven = with_fields([moving_bar(k) for k in range(2 * count)]) if count else []
     assert times(deinterlaced(woven)) == times(woven)
@@ -95,8 +95,7 @@ def test_images_of_few_lines_stay_as_they_are() -> None:
     assert all(a is b for a, b in zip(deinterlaced(frames), frames, strict=True))
 
 
-@pytest.mark.parametrize("broken", ["vpush", "vpull", "configure"])
-@pytest.mark.parametrize("after", [0, 1, 4])
+@pytest.mark.parametrize(("broken", "after"), [("vpush", 0), ("vpull", 4), ("configure", 0)])
 def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int) -> None:
     class Failing:
         """The graph, one method of which fails from a certain call on."""
@@ -121,7 +120,7 @@ def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int
     monkeypatch.setattr(av.filter, "Graph", Failing)
     shown = list(deinterlaced(woven))
     assert times(shown) == times(woven)
-    assert shown[-1] is woven[-1] or (broken == "configure" and after > 0)  # which is called once
+    assert shown[-1] is woven[-1]
 
 
 def write(

@@ -44,8 +44,7 @@ def test_the_curves_are_those_of_the_standards() -> None:
     assert np.abs(np.diff(slope)).max() < 0.02  # the knee is no edge
 
 
-@pytest.mark.parametrize("bits", [8, 10])
-@pytest.mark.parametrize("transfer", [PQ, HLG])
+@pytest.mark.parametrize(("transfer", "bits"), [(PQ, 10), (HLG, 8)])
 def test_greys_have_the_light_that_they_stand_for(transfer: int, bits: int) -> None:
     shown = {
         light: converted(grey(code, transfer, bits=bits))
@@ -134,7 +133,7 @@ def test_colours_of_p3_come_back(transfer: int, primaries: int, white: tuple[flo
     assert np.abs(error[-1]).max() < 25, error.round()
 
 
-@pytest.mark.parametrize("transfer", [0, 1, 2, 3, 4, 13, 14, 15, 17, 255])
+@pytest.mark.parametrize("transfer", [1, 2, 15, 17])
 def test_other_frames_are_sdr(transfer: int) -> None:
     frame = grey(0.5, transfer)
     assert hdr_rgb(frame) is None
@@ -151,17 +150,21 @@ def picture() -> np.ndarray:
 
 
 FILES = {
-    "phone.mp4": ("libx265", "yuv420p10le", {"x265_params": "log-level=none:lossless=1"}),
-    "eight bits.mp4": ("libx264", "yuv420p", {"crf": "5"}),
-    "tags of the container.webm": ("libvpx-vp9", "yuv420p", {"crf": "5", "deadline": "realtime"}),
-    "editor.mov": ("prores_ks", "yuv422p10le", {}),
+    "phone.mp4": (HLG, "libx265", "yuv420p10le", {"x265_params": "log-level=none:lossless=1"}),
+    "eight bits.mp4": (PQ, "libx264", "yuv420p", {"crf": "5"}),
+    "tags of the container.webm": (
+        PQ,
+        "libvpx-vp9",
+        "yuv420p",
+        {"crf": "5", "deadline": "realtime"},
+    ),
+    "editor.mov": (HLG, "prores_ks", "yuv422p10le", {}),
 }
 
 
-@pytest.mark.parametrize("transfer", [PQ, HLG])
 @pytest.mark.parametrize("name", FILES)
-def test_files_show_what_was_filmed(tmp_path: Path, name: str, transfer: int) -> None:
-    codec, pixels, options = FILES[name]
+def test_files_show_what_was_filmed(tmp_path: Path, name: str) -> None:
+    transfer, codec, pixels, options = FILES[name]
     need_encoder(codec)
     frames = [coded_frame(as_hdr(picture(), transfer), transfer)] * 3
     path = write_frames(tmp_path / name, frames, codec, pixels, 25, **options)

@@ -40,10 +40,10 @@ def jpeg_with_exif(image: np.ndarray, tiff: bytes) -> bytes:
 UPRIGHT = {1: "rgbw", 2: "grwb", 3: "wbgr", 4: "bwrg", 5: "rbgw", 6: "brwg", 7: "wgbr", 8: "gwrb"}
 
 
-@pytest.mark.parametrize("endian", ["<", ">"])
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_exif_orientation_and_focal_length(tmp_path, orientation, endian):
+def test_exif_orientation_and_focal_length(tmp_path, orientation):
     path = tmp_path / "a.jpg"
+    endian = "<" if orientation % 2 else ">"
     path.write_bytes(jpeg_with_exif(corner_image(), exif_block(orientation, 26, endian)))
     video = open_video(path)
     image = next(iter(video)).image_rgb

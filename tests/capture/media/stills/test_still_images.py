@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -57,29 +56,22 @@ def test_avif_in_a_sequence(tmp_path: Path) -> None:
         assert [int(f.image_rgb.mean()) for f in video] == pytest.approx([140, 190], abs=4)
 
 
-def test_damaged_avif(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_damaged_avif(tmp_path: Path) -> None:
     whole = avif(tmp_path / "a.avif", GREY).read_bytes()
     for size in (40, 200, len(whole) - 20):
         (tmp_path / "cut.avif").write_bytes(whole[:size])
         with pytest.raises(VideoError, match=r"cut\.avif is an image that cannot be decoded"):
             open_video(tmp_path / "cut.avif")
-    monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(
-        VideoError,
-        match=r"a\.avif is a video, HEIC or AVIF, which needs the "
-        r"package 'av'.*JPEG",
-    ):
-        open_video(tmp_path / "a.avif")
 
 
-@pytest.mark.parametrize("suffix", [".exr", ".jp2", ".hdr", ".pfm", ".ppm", ".ras"])
+@pytest.mark.parametrize("suffix", [".exr", ".jp2", ".hdr", ".ppm"])
 def test_other_formats_are_refused_with_advice(tmp_path: Path, suffix: str) -> None:
     """A few hundred bytes of JPEG 2000 can take 2 GB, and nobody films in any of these."""
     path = tmp_path / f"render{suffix}"
     if suffix == ".exr":  # OpenCV writes none
         path.write_bytes(b"v/1\x01" + bytes(99))
     else:
-        cv2.imwrite(str(path), GREY.astype(np.float32 if suffix in (".hdr", ".pfm") else np.uint8))
+        cv2.imwrite(str(path), GREY.astype(np.float32 if suffix == ".hdr" else np.uint8))
     with pytest.raises(
         VideoError, match=rf"render\{suffix} is an image in a format that is not supported; .*PNG"
     ):

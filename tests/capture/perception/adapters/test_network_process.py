@@ -185,7 +185,6 @@ def test_messages_arrive_as_they_were_sent():
         ),
         (message({"arrays": [{"dtype": "x(", "shape": [1]}]}), "x|type"),
         (message({"arrays": [{"dtype": "f4,(", "shape": [1]}]}), "."),
-        (message({"arrays": [{"dtype": "<f8", "shape": None}]}), "None"),
     ],
 )
 def test_what_is_no_message_is_refused(stream, words):

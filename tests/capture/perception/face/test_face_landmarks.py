@@ -100,7 +100,6 @@ def painted(skin: int, around_eyes: tuple[int, int]) -> tuple[np.ndarray, np.nda
     [
         (200, (200, 200), 1.0),
         (200, (30, 30), 0.15),
-        (60, (15, 15), 0.25),
         (200, (30, 180), 0.9),
         (4, (0, 0), 1.0),
     ],
@@ -119,12 +118,11 @@ def test_small_eyes_say_nothing():
     assert eye_light(np.ascontiguousarray(image[::4, ::4]), landmarks / 4) == 1.0
 
 
-@pytest.mark.parametrize("number", [33, 50, 151])  # of an eye, a cheek, the forehead
-def test_landmarks_that_are_not_finite_say_nothing(number):
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_landmarks_that_are_not_finite_say_nothing(value):
     image, landmarks = painted(200, (30, 30))
-    for value in (np.nan, np.inf):
-        landmarks[number, :2] = value
-        assert eye_light(image, landmarks) == 1.0
+    landmarks[50, :2] = value
+    assert eye_light(image, landmarks) == 1.0
 
 
 # A frontal head, metres from the middle of the eyes, y down; the person's left is to the right.
@@ -143,7 +141,7 @@ def keypoints(scale: float, angle: float) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.6, -1.2, 3.0])
+@pytest.mark.parametrize("angle", [0.6, 3.0])
 def test_the_body_predicts_a_face_whichever_way_up_it_is(angle):
     region = region_from_body(keypoints(500.0, angle))
     assert region.side_px == pytest.approx(1.5 * 0.185 * 500, rel=0.02)
@@ -188,9 +186,9 @@ def landmarks(direction: np.ndarray, turn: tuple[float, float, float]) -> np.nda
     return 2000 * points @ (R_CAMERA_FRONTAL @ exp(np.array(turn))).T + [400, 300, 0]
 
 
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0.6, 0), (0.3, -0.4, 0.5)])
 @pytest.mark.parametrize(
-    "direction", [(0, 0, 1), (0.4, 0, 0.92), (0.3, 0.2, 0.93), (-0.2, -0.3, 0.93)]
+    ("direction", "turn"),
+    [((0, 0, 1), (0, 0.6, 0)), ((0.3, 0.2, 0.93), (0.3, -0.4, 0.5)), ((-0.4, 0, 0.92), (0, 0, 0))],
 )
 def test_the_gaze_is_where_the_irises_were_turned(direction, turn):
     direction = np.array(direction) / np.linalg.norm(direction)
