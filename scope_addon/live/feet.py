@@ -57,7 +57,7 @@ LONGEST_STRETCH_M = 0.15  # between a held point and where the body has it
 # time constants of the places, while the estimates settle and afterwards
 EARLY_DRIFT_S = 0.5
 DRIFT_S = 3.0
-TRANSITION_HZ = 6.0
+TRANSITION_HZ = 6.0  # ω / 2π
 MOVED_M = 0.06  # in the image since the frame before: more than noise of a foot at rest
 SWING_M_S = 0.7  # in the image, of a foot that swings past the other one
 # for which, and up to which height, the other one is not let go
@@ -106,7 +106,7 @@ class FootHold:
         self._speed: FloatArray = np.zeros(len(SOLES))
         self._points_world: FloatArray | None = None
         self._shift: Float64Array = np.zeros((2, 3))  # of each foot in the last frame, world
-        self._transition = Transition(2, TRANSITION_HZ)
+        self._transition = Transition(2)
         self._probability: FloatArray = np.zeros(n)
 
     @property
@@ -279,13 +279,9 @@ def _rise(lowest: FloatArray) -> FloatArray:
 
 
 class Transition:
-    """The remainders of some offsets (n, 3).
+    """The remainders of some offsets (n, 3)."""
 
-    :param hz: ω / 2π.
-    """
-
-    def __init__(self, n: int, hz: float) -> None:
-        self._omega = 2 * np.pi * hz
+    def __init__(self, n: int) -> None:
         self._r: Float64Array = np.zeros((n, 3))
         self._v = np.zeros((n, 3))
         self._a = np.zeros((n, 3))
@@ -297,7 +293,7 @@ class Transition:
 
     def advance(self, step_s: float) -> None:
         """Let time pass."""
-        w = self._omega
+        w = 2 * np.pi * TRANSITION_HZ
         t = step_s
         c0 = self._r
         c1 = self._v + w * self._r

@@ -7,10 +7,8 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...solver import Body, State
 from ..arrays import Float64Array, FloatArray
@@ -332,9 +330,6 @@ class LiveSession:
         )
         T = level.T_world_camera
         root = state.t_camera_root
-        joints = self._joints(state.beta, rotations, root, T)
-        nothing: tuple[NDArray[Any], ...] = np.zeros(4), np.zeros((33, 3)), np.zeros(body.K + 1)
-        contact, keypoints, confidence = nothing
         return LivePose(
             0,
             0.0,
@@ -344,12 +339,12 @@ class LiveSession:
             rotations,
             root,
             T,
-            joints,
-            contact,
+            self._joints(state.beta, rotations, root, T),
+            np.zeros(4),
             rotations,
             root,
-            keypoints,
-            confidence,
+            np.zeros((33, 3)),
+            np.zeros(body.K + 1),
             is_known=False,
         )
 

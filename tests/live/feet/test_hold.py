@@ -115,7 +115,7 @@ def shown_after_change(at: int, count: int = 400) -> np.ndarray:
     """Return what is shown (count, 3) of an offset that moves at 0.5 m/s, and is 0 from a frame
     on.
     """
-    transition = Transition(2, 6.0)
+    transition = Transition(2)
     shown = []
     where = np.array([True, False])
     for k in range(count):
@@ -141,8 +141,8 @@ def test_position_velocity_and_acceleration_continue() -> None:
 
 
 def test_the_course_does_not_depend_on_the_frame_rate() -> None:
-    coarse = Transition(1, 6.0)
-    fine = Transition(1, 6.0)
+    coarse = Transition(1)
+    fine = Transition(1)
     one = np.array([[1.0, 2.0, 3.0]])
     zero = np.zeros((1, 3))
     for each in (coarse, fine):
