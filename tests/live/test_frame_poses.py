@@ -13,34 +13,26 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.kinematics.axes import world_from_level_camera
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
-from scope.scope_addon.live.pose import LivePose, Presence
+from scope.scope_addon.live.pose import Presence
 from scope.scope_addon.live.recording import Recording, at_frames, in_last_shape
 from scope.solver import rotations
+
+from .test_vmc import pose_of
 
 
 def pose_given(body, index, time_s, delay_s, betas=None):
     """A body that turns by 2 rad/s and moves by 1 m/s, as it was ``delay_s`` before its frame."""
     then = time_s - delay_s
-    R = np.tile(np.eye(3), (body.K + 1, 1, 1))
-    R[0] = rotations.exp([0.0, 0.0, 2.0 * then % (2.0 * np.pi)])
-    nothing = np.zeros((body.K + 1, 3))
-    betas = np.zeros(body.P) if betas is None else betas
-    T = world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.0)
-    return LivePose(
-        index,
-        time_s,
-        Presence.SEEN,
-        True,
-        betas,
-        R,
-        np.array([then, 0.0, 4.0]),
-        T,
-        nothing,
-        np.zeros(4),
-        R,
-        np.zeros(3),
-        np.full((33, 3), index),
-        np.ones(body.K + 1),
+    turned = rotations.exp([0.0, 0.0, 2.0 * then % (2.0 * np.pi)])
+    return replace(
+        pose_of(body, R_world_root=turned, pelvis=(then, 0.0, 4.0)),
+        index=index,
+        timestamp_s=time_s,
+        betas=np.zeros(body.P) if betas is None else betas,
+        T_world_camera=world_from_level_camera(np.array([0.0, -1.0, 0.0]), height=1.0),
+        raw_root_cam=np.zeros(3),
+        keypoints=np.full((33, 3), index),
+        joint_confidence=np.ones(body.K + 1),
     )
 
 
