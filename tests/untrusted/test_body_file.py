@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from scope.scope_addon.untrusted import files
 from scope.scope_addon.untrusted.body_file import is_user_model, load_model
 from scope.solver.errors import ModelFileError
 
@@ -33,8 +32,6 @@ def save(path: Path, tables: dict[str, np.ndarray], **more: ArrayLike) -> Path:
     [
         ("smpl", 10, 10),
         ("smpl", 300, 16),
-        ("smpl", 0, 0),
-        ("smplh", 16, 16),  # AMASS
         ("smplx", 400, 16),  # shape and expression
         ("smplx", 20, 10),  # the older division
         ("star", 300, 16),
@@ -125,20 +122,12 @@ def poke(key, index, value):
 
 BROKEN = {
     "no weights": (without("weights"), "lacks weights"),
-    "no regressor": (without("J_regressor"), "lacks J_regressor"),
     "fewer weights": (put("weights", lambda a: a[:-1]), r"weights must have shape \(300, 24\)"),
-    "flat vertices": (put("v_template", lambda a: a.ravel()), "v_template must have shape"),
     "quads": (put("f", np.zeros((4, 4), np.uint32)), "f must have shape"),
-    "a scalar": (put("v_template", np.float64(3)), "v_template must have shape"),
     "no tree": (
         put("kintree_table", np.int64(3)),
         r"kintree_table must have shape \(2, any\), but "
         r"has \(\)",
-    ),
-    "flat tree": (
-        put("kintree_table", np.arange(24)),
-        r"kintree_table must have shape \(2, any\), "
-        r"but has \(24,\)",
     ),
     "empty": (
         put("v_template", np.zeros((0, 3))),
@@ -149,22 +138,15 @@ BROKEN = {
         "300 vertices and 0 joints do not match any supported body",
     ),
     "flat shapedirs": (put("shapedirs", np.zeros((900, 10))), "shapedirs must have shape"),
-    "text": (put("v_template", np.full((300, 3), "x")), "v_template must hold numbers"),
-    "complex": (put("weights", lambda a: a.astype(complex)), "weights must hold numbers"),
     "fractional tree": (
         put("kintree_table", lambda a: a.astype(float)),
         "kintree_table must hold whole numbers",
     ),
     "NaN vertex": (poke("v_template", (3, 1), np.nan), "v_template contains NaN"),
-    "NaN weight": (poke("weights", (3, 1), np.nan), "weights contains NaN"),
     "infinite shape": (poke("shapedirs", (3, 1, 0), np.inf), "shapedirs contains NaN or infinity"),
-    "NaN regressor": (poke("J_regressor", (0, 0), np.nan), "J_regressor contains NaN"),
     "a loop": (poke("kintree_table", (0, 4), 7), "after its parent"),
-    "its own parent": (poke("kintree_table", (0, 4), 4), "after its parent"),
-    "unknown parent": (poke("kintree_table", (0, 4), 99), "after its parent"),
     "a joint twice": (poke("kintree_table", (1, 4), 3), "twice"),
     "face outside": (poke("f", (0, 0), 300), "f points outside"),
-    "face below zero": (poke("f", (0, 0), -1), "f points outside"),
     "no joint for a vertex": (poke("weights", 5, 0.0), "without a joint"),
     "Python objects": (put("J_regressor", np.array({"a": 1}, dtype=object)), "Object arrays"),
 }
@@ -181,9 +163,7 @@ def test_contradictory_files_are_refused_with_the_reason(tmp_path, tables_of, na
     assert str(path) in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "factors", [(1, 1, 0), (0, 1, 1), (1e-3, 1e-3, 1e-3), (1000, 1000, 1000), (1, 1e30, 1)]
-)
+@pytest.mark.parametrize("factors", [(0, 1, 1), (1e-3, 1e-3, 1e-3), (1000, 1000, 1000)])
 def test_flat_tiny_and_huge_bodies_are_refused(tmp_path, tables_of, factors):
     tables = tables_of("smpl")
     tables["v_template"] = tables["v_template"] * np.array(factors)
@@ -216,13 +196,10 @@ def header(shape: tuple[int, ...], descr: str = "<f8") -> bytes:
     "content",
     [
         header((2**40, 3)),
-        header((2**62, 2**62, 3)),
         header((300, 3)) + b"short",
-        header((-1, 3)),
         header((300, 3), "|V8") + bytes(7200),
         b"\x93NUMPY\x09\x00junk",
         b"\x93NUMPY\x01\x00\xff\xff" + b"(" * 70000,
-        b"",
         b"junk",
     ],
 )
@@ -230,17 +207,6 @@ def test_lying_arrays_are_refused_before_memory_is_taken(tmp_path, tables_of, co
     path = save(tmp_path / "body.npz", tables_of("smpl"))
     rewrite(path, "v_template", content)
     with pytest.raises(ModelFileError):
-        load_model(path)
-
-
-def test_a_zip_bomb_is_refused(tmp_path, monkeypatch, tables_of):
-    monkeypatch.setattr(files, "LARGEST_BYTES", 10_000_000)
-    path = save(tmp_path / "body.npz", tables_of("smpl"))
-    rewrite(
-        path, "weights", header((30_000_000, 1), "|u1") + bytes(30_000_000), zipfile.ZIP_DEFLATED
-    )
-    assert path.stat().st_size < 2_000_000
-    with pytest.raises(ModelFileError, match="would unpack to 30 MiB, too large for a body file"):
         load_model(path)
 
 

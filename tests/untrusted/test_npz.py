@@ -65,27 +65,6 @@ def test_only_what_is_wanted_is_read_so_that_the_rest_may_be_anything(tmp_path):
         read_npz(path, OwnError, "motion file")
 
 
-class Opened:
-    """Would be made when unpickled."""
-
-    made = 0
-
-    def __reduce__(self):
-        return Opened._make, ()
-
-    @staticmethod
-    def _make() -> "Opened":
-        Opened.made += 1
-        return Opened()
-
-
-def test_nothing_is_unpickled(tmp_path):
-    path = saved(tmp_path / "a.npz", pickled=np.array([Opened()], dtype=object))
-    with pytest.raises(OwnError):
-        read_npz(path, OwnError, "motion file", wanted=["pickled"])
-    assert Opened.made == 0
-
-
 def test_what_would_unpack_to_too_much_is_refused_before(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "LARGEST_BYTES", 1 << 20)
     path = tmp_path / "bomb.npz"

@@ -12,7 +12,7 @@ import pytest
 from scope.scope_addon.untrusted.body_file import load_model
 from scope.solver.errors import ModelFileError
 
-PROTOCOLS = range(pickle.HIGHEST_PROTOCOL + 1)
+PROTOCOLS = (0, 2, pickle.HIGHEST_PROTOCOL)
 
 
 def with_state(cls: type, **state: object) -> object:
@@ -89,7 +89,7 @@ def test_plain_arrays_of_python_3(tmp_path, tables_of, protocol):
 
 LAYOUTS = [
     *((protocol, "csc", False) for protocol in PROTOCOLS),
-    *((2, form, private) for form in ("csr", "coo", "new coo") for private in (False, True)),
+    *((2, form, private) for form, private in (("csr", True), ("coo", False), ("new coo", True))),
 ]
 
 
@@ -126,7 +126,7 @@ def test_the_official_layout(tmp_path, monkeypatch, tables_of, stand_ins, protoc
     assert_same_model(tmp_path / "body.pkl", tables)
 
 
-@pytest.mark.parametrize("protocol", [0, 1, 2])
+@pytest.mark.parametrize("protocol", [0, 2])
 def test_python_2_pickles(tmp_path, tables_of, stand_ins, python2, protocol):
     tables = tables_of("smpl")
     shapedirs = with_state(stand_ins("chumpy.ch.Ch"), x=tables["shapedirs"])
@@ -188,7 +188,7 @@ def test_a_sparse_entry_outside_the_matrix_is_refused(tmp_path, tables_of, stand
         load_model(tmp_path / "body.pkl")
 
 
-@pytest.mark.parametrize("family", ["smplh", "smplx", "star"])
+@pytest.mark.parametrize("family", ["smplx", "star"])
 def test_other_families_as_pickles(tmp_path, tables_of, family):
     tables = tables_of(family)
     (tmp_path / "body.pkl").write_bytes(

@@ -62,61 +62,42 @@ def global_call(module: str, name: str, *arguments: str) -> bytes:
     return f"c{module}\n{name}\n(".encode() + b"".join(text(a) for a in arguments) + b"tR."
 
 
-# Code that creates the file SENTINEL when the pickle is really loaded. The third: whether plain
-# Python falls for it.
+# Code that creates the file SENTINEL when the pickle is really loaded.
 WRITE = "open('SENTINEL', 'w').close()"
 TOUCH = global_call("os", "system", "touch SENTINEL")
 RUNS_CODE = {
-    "os.system": (TOUCH, r"os\.system", True),
-    "posix.system": (global_call("posix", "system", "touch SENTINEL"), r"posix\.system", True),
-    "eval": (global_call("builtins", "eval", WRITE), r"builtins\.eval", True),
-    "exec, Python 2 name": (global_call("__builtin__", "exec", WRITE), r"__builtin__\.exec", True),
+    "os.system": (TOUCH, r"os\.system"),
+    "eval": (global_call("builtins", "eval", WRITE), r"builtins\.eval"),
     "stack global": (
         b"\x80\x04" + text("os") + text("system") + b"\x93(" + TOUCH.split(b"(")[1],
         r"os\.system",
-        True,
     ),
-    "inst": (b"(" + text("touch SENTINEL") + b"ios\nsystem\n.", r"os\.system", True),
-    "obj": (b"(cos\nsystem\n" + text("touch SENTINEL") + b"o.", r"os\.system", True),
-    "subprocess": (
-        b"csubprocess\ngetoutput\n(" + text("touch SENTINEL") + b"tR.",
-        r"subprocess\.getoutput",
-        True,
-    ),
+    "inst": (b"(" + text("touch SENTINEL") + b"ios\nsystem\n.", r"os\.system"),
+    "obj": (b"(cos\nsystem\n" + text("touch SENTINEL") + b"o.", r"os\.system"),
     "numpy's own exec": (
         global_call("numpy.testing._private.utils", "runstring", WRITE),
         "runstring",
-        False,
     ),
     "new object": (
         b"\x80\x02csubprocess\nPopen\n(" + text("touch SENTINEL") + b"t\x81.",
         r"subprocess\.Popen",
-        False,
     ),
-    "new object with keywords": (
-        b"\x80\x04csubprocess\nPopen\n)}\x92.",
-        r"subprocess\.Popen",
-        False,
-    ),
-    "hidden in an array's state": (under("f", array(b")", TOUCH[:-1])), r"os\.system", True),
-    "hidden in a table's key": (b"}" + TOUCH[:-1] + b"Ns.", r"os\.system", True),
-    "after the model": (b"}0" + TOUCH, r"os\.system", True),
+    "hidden in an array's state": (under("f", array(b")", TOUCH[:-1])), r"os\.system"),
+    "after the model": (b"}0" + TOUCH, r"os\.system"),
     "dotted name": (
         b"\x80\x04" + text("numpy") + text("ndarray.__class__") + b"\x93.",
         r"ndarray\.__class__",
-        False,
     ),
     "class change": (
         b"cnumpy\nndarray\n}" + text("__class__") + b"Nsb.",
         "sets attributes of a function",
-        False,
     ),
 }
 
 
 @pytest.mark.parametrize("name", RUNS_CODE)
 def test_code_in_a_pickle_never_runs(tmp_path, monkeypatch, name):
-    data, message, _ = RUNS_CODE[name]
+    data, message = RUNS_CODE[name]
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "body.pkl"
     path.write_bytes(data)
@@ -126,32 +107,20 @@ def test_code_in_a_pickle_never_runs(tmp_path, monkeypatch, name):
     assert [p.name for p in tmp_path.iterdir()] == ["body.pkl"]
 
 
-@pytest.mark.parametrize("name", [name for name, (_, _, real) in RUNS_CODE.items() if real])
-def test_the_attacks_are_real(tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    try:
-        pickle.loads(RUNS_CODE[name][0])
-    except (TypeError, ValueError, pickle.UnpicklingError, AttributeError):
-        pass  # after the code has run
-    assert (tmp_path / "SENTINEL").exists()
-
-
 FORBIDDEN = [
-    "numpy.load", "numpy.fromfile", "numpy.save", "numpy.core.multiarray.fromfile",
-    "numpy.core.numeric.ones",
-    "numpy.memmap", "numpy.ndarray.tofile", "numpy.core.records.recarray", "numpy.matrix",
+    "numpy.load",
+    "numpy.ndarray.tofile",
     "builtins.getattr",
-    "builtins.open", "builtins.__import__", "builtins.type", "builtins.dict",
-    "collections.OrderedDict",
-    "copyreg.__newobj__", "functools.partial", "operator.attrgetter", "pickle.loads",
-    "_pickle.Unpickler",
-    "importlib.import_module", "types.FunctionType", "ctypes.CDLL", "scipy.sparse.csc.os",
+    "builtins.dict",
+    "copyreg.__newobj__",
+    "scipy.sparse.csc.os",
     "scipy.sparse.dok_matrix",
-    "scipy.sparse.lil.lil_matrix", "chumpy.ch.ChLambda", "chumpy.ch.wraps", "chumpy.utils.timer",
-    "codecs.encode",
-    "_codecs.decode", "scope.scope_addon.untrusted.body_file.load_model", "pathlib.PosixPath",
-    "bpy.ops.wm.quit_blender", ".", "numpy.",
-]  # fmt: skip
+    "chumpy.ch.ChLambda",
+    "_codecs.decode",
+    "scope.scope_addon.untrusted.body_file.load_model",
+    ".",
+    "numpy.",
+]
 
 
 @pytest.mark.parametrize("dotted", FORBIDDEN)
@@ -172,44 +141,21 @@ TWO_ZEROS = array(b"K\x02\x85", b"U\x10" + bytes(16))
 NO_ARRAYS = (EMPTY_ARRAY,) * 3
 REFUSED = {
     "empty": b"",
-    "text": b"hello, this is not a pickle",
-    "no stop": b"\x80\x02}",
     "not a table": b"]N.",
-    "nothing at all": b"N.",
     "an empty table": b"}.",
-    "stop on an empty stack": b".",
-    "pop on an empty stack": b"0.",
     "missing mark": b"t.",
-    "missing memo": b"h\x05.",
-    "missing operands": b"s.",
-    "reduce nothing": b"R.",
-    "persistent id": b"Pid\n.",
     "binary persistent id": b"NQ.",
-    "extension code 1": b"\x82\x01.",
     "extension code 2": b"\x83\x01\x00.",
-    "extension code 4": b"\x84\x01\x00\x00\x00.",
     "out-of-band buffer": b"\x80\x05\x97.",
-    "read-only buffer": b"\x80\x05N\x98.",
-    "unknown instruction": b"\xff.",
-    "call of a number": b"K\x01)R.",
     "call of a string": under("f", text("os.system") + b")R"),
-    "call with a list": b"cnumpy\ndtype\n]R.",
     "attributes of a table": b"}}" + text("__class__") + b"Nsb.",
-    "attributes of a list": b"]Nb.",
-    "append to a table": b"}Na.",
-    "key in a list": b"]NNs.",
     "key without value": b"}(Nu.",
     "items of a list as a set": b"\x80\x04](N\x90.",
     "array as a key": b"}" + EMPTY_ARRAY + b"Ns.",
     "tuple as a key": b"})Ns.",
-    "tuple of doubling tuples as a key": b"})" + b"2\x86" * 80 + b"Ns.",
-    "deep tuple as a key": b"})" + b"\x85" * DEEP + b"Ns.",
     "deep tuple in a set": b"\x80\x04}\x8f()" + b"\x85" * DEEP + b"\x90Ns.",
-    "doubling tuples in a frozen set": b"\x80\x04}()" + b"2\x86" * 80 + b"\x91Ns.",
     "attributes of a class": b"cchumpy.ch\nCh\nN}" + text("part") + b"Ns\x86b.",
-    "attributes of a set": b"\x80\x04\x8fN}" + text("add") + b"Ns\x86b.",
     "the array class as an instance": b"cnumpy\nndarray\n)\x81.",
-    "the array class called": b"cnumpy\nndarray\n(J\xff\xff\xff\x7ftR.",
     "a subclass to "
     "reconstruct": b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\ndtype\nK\x00\x85U\x01b\x87R.",
     "reconstructor with another "
@@ -221,13 +167,11 @@ REFUSED = {
     "recoding by another codec": b"c_codecs\nencode\n(" + text("abc") + text("zlib_codec") + b"tR.",
     "bytes of a size": b"cbuiltins\nbytes\n(J\xff\xff\xff\x7ftR.",
     "state of an array: none": under("f", RECONSTRUCT + b"Nb"),
-    "state of an array: short": under("f", RECONSTRUCT + b")b"),
     "array without state": under("f", RECONSTRUCT),
     "array without type": under("f", array(b"K\x00\x85", b"U\x00", b"N")),
     "array of objects": under(
         "f", array(b"K\x01\x85", b"](K\x01e", b"cnumpy\ndtype\nU\x02O8K\x00K\x01\x87R")
     ),
-    "array of plain objects": under("f", array(b"K\x01\x85", b"](K\x01e")),
     "type with fields": under("f", array(b")", b"U\x00", b"cnumpy\ndtype\nU\x02V8K\x00K\x01\x87R")),
     "type with fields in the state": under(
         "f", array(b")", b"U\x00", NEW_F8 + b"(K\x03U\x01<N)}K\x08K\x01K\x00tb")
@@ -235,7 +179,6 @@ REFUSED = {
     "type by expression": under(
         "f", array(b")", b"U\x00", b"cnumpy\ndtype\n" + text("f8,O") + b"K\x00K\x01\x87R")
     ),
-    "type as a table": under("f", array(b")", b"U\x00", b"cnumpy\ndtype\n}K\x00K\x01\x87R")),
     "type of deep nesting": under(
         "f", array(b")", b"U\x00", b"cnumpy\ndtype\n" + b"]" + b"\x85" * DEEP + b"\x85R")
     ),
@@ -244,33 +187,19 @@ REFUSED = {
         "f", array(b"(K\x00\x8a\x09" + b"\xff" * 8 + b"\x7ft", b"U\x00")
     ),
     "negative shape": under("f", array(b"J\xff\xff\xff\xff\x85", b"U\x00")),
-    "shape of texts": under("f", array(text("a") + b"\x85", b"U\x00")),
     "too many axes": under("f", array(b"(" + b"K\x01" * 70 + b"t", b"U\x08AAAAAAAA")),
     "less data than the shape": under("f", array(b"K\x02\x85", b"U\x08AAAAAAAA")),
     "bytes that are not there": under("f", b"T" + HUGE),
-    "negative byte count": under("f", b"T\xff\xff\xff\xff"),
     "byte array that is not there": b"\x80\x05\x96" + struct.pack("<Q", 1 << 40),
     "frame that is not there": b"\x80\x04\x95" + b"\xff" * 8 + b"}",
-    "eight-byte count": b"\x80\x04\x8e" + b"\xff" * 8,
     "enormous memo index": b"}r\xff\xff\xff\xff0.",
-    "number of many digits": b"L" + b"9" * 100_000 + b"L\n.",
-    "number of many bytes": b"\x8b" + struct.pack("<I", 200_000) + b"\xff" * 200_000 + b".",
     "memo number of many digits": b"Np" + b"9" * 100_000 + b"\n.",
-    "not a number": b"Iabc\n.",
-    "not a float": b"Fabc\n.",
-    "string without quotes": b"Sabc\n.",
-    "string with a broken escape": b"S'\\x9'\n.",
-    "broken text": b"X\x02\x00\x00\x00\xff\xfe.",
-    "endless line": b"c" + b"a" * 100_000,
-    "deep tuples": under("f", b")" + b"\x85" * DEEP),
     "deep lists": under("f", b"]" * DEEP + b"a" * (DEEP - 1)),
     "deep chumpy": under("f", b"cchumpy.ch\nCh\n)\x81" * 40 + b"N" + b"b" * 40),
     "list in itself": under("f", b"]q\x00h\x00a"),
     "chumpy in itself": under("f", b"cchumpy.ch\nCh\n)\x81q\x00}" + text("x") + b"h\x00sb"),
     "chumpy without data": under("f", b"cchumpy.ch\nCh\n)\x81}b"),
-    "chumpy with a list for state": under("f", b"cchumpy.ch\nCh\n)\x81]b"),
     "too many instructions": b"N0" * 200_000 + b"}.",
-    "billions of lists": b"(" + b"]" * 300_000 + b"l.",
     "repeated recoding": b"X"
     + struct.pack("<I", 1000)
     + b"a" * 1000
@@ -279,8 +208,6 @@ REFUSED = {
     + b".",
     "sparse without state": under("J_regressor", b"cscipy.sparse.csc\ncsc_matrix\n)\x81"),
     "enormous sparse": csc(b"J\xff\xff\xff\x7fJ\xff\xff\xff\x7f\x86", *NO_ARRAYS),
-    "empty but enormous sparse": csc(b"K\x00J\xff\xff\xff\x7f\x86", *NO_ARRAYS),
-    "negative sparse": csc(b"J\xff\xff\xff\xffK\x02\x86", *NO_ARRAYS),
     "sparse shape of a list": csc(b"]", *NO_ARRAYS),
     "sparse with real indices": csc(b"K\x01K\x01\x86", EMPTY_ARRAY, EMPTY_ARRAY, TWO_ZEROS),
     "sparse in itself": under(
@@ -388,7 +315,7 @@ def test_random_damage_never_gives_a_traceback(tmp_path, tables_of, stand_ins):
             for i in range(len(whole))
             if any(word in whole[max(0, i - 60) : i + 60] for word in words)
         ]
-        for _ in range(250):
+        for _ in range(60):
             damaged = bytearray(whole)
             for position in rng.choice(grammar, rng.integers(1, 4)):
                 damaged[position] = rng.integers(0, 256)
