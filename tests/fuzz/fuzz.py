@@ -14,9 +14,11 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from scope.solver.errors import ScopeError
@@ -34,12 +36,19 @@ _STACKED = 0.3  # share of inputs that are damaged again
 _LARGEST_NOISE = 16.0  # of a file of random bytes, in powers of two
 
 
+@cache
+def seeds(name: str) -> list[bytes]:
+    """Return a target's valid inputs, which are made once in a process."""
+    with tempfile.TemporaryDirectory(prefix="scope-fuzz-") as folder:
+        return TARGETS[name].seeds(Path(folder))
+
+
 def inputs(name: str, folder: Path, seed: int) -> Iterator[Path]:
     """Yield a target's past findings, then damaged inputs without end, each as a file."""
     target = TARGETS[name]
     chance = random.Random(f"{name} {seed}")
     pool = [
-        *target.seeds(folder),
+        *seeds(name),
         *(path.read_bytes() for path in sorted(CORPUS.glob(f"{name}-*"))),
     ]
     for data in pool:
@@ -58,7 +67,7 @@ def random_inputs(name: str, folder: Path, seed: int, count: int) -> Iterator[Pa
     """
     target = TARGETS[name]
     chance = random.Random(f"{name} {seed}")
-    pool = target.seeds(folder)
+    pool = seeds(name)
     while count > 0:
         noise = chance.randbytes(min(count, round(2 ** chance.uniform(0, _LARGEST_NOISE))))
         count -= len(noise)

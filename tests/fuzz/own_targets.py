@@ -128,6 +128,7 @@ def find_capture(path: Path) -> None:
     folder = path.with_name("captures") / KEY
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(path, folder / REPORT)
+    (folder / "person1.npz").touch()
     found = Cache(path.parent).find(KEY)
     assert found is None or all(motion.parent == folder for motion in found.motions)
     # which the panel shows
@@ -297,9 +298,7 @@ def estimates(folder: Path) -> list[bytes]:
     return [path.read_bytes()]
 
 
-def cached_reports(folder: Path) -> list[bytes]:
-    (folder / "captures" / KEY).mkdir(parents=True, exist_ok=True)
-    (folder / "captures" / KEY / "person1.npz").touch()
+def cached_reports(_: Path) -> list[bytes]:
     return [json.dumps({"motions": ["person1.npz"], "report": {"fps": {"total": 9.5}}}).encode()]
 
 

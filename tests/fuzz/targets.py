@@ -16,9 +16,38 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
+from scope.scope_addon.capture.media.heif import read_layout
+from scope.scope_addon.capture.media.quicktime import focal_35mm
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.edit.corrected_motion import (
+    corrections_of,
+    uncorrected,
+    with_corrections,
+)
+from scope.scope_addon.edit.corrections import (
+    Contact,
+    DepthFlip,
+    Exchange,
+    FeetOnFloor,
+    Interpolation,
+    Pin,
+    Upright,
+)
+from scope.scope_addon.exif import animation_length, read_exif
+from scope.scope_addon.motion import Motion
+from scope.scope_addon.retarget.bone_map import REQUIRED, load_bone_map
+from scope.scope_addon.retarget.expression_map import load_expression_map
+from scope.scope_addon.retarget.import_motions import import_motions
+from scope.scope_addon.retarget.rig_source import rig_source
+from scope.scope_addon.untrusted.body_file import load_body
+from scope.scope_addon.untrusted.onnx_file import check_onnx_file
 
 from ..capture.camera.test_calibration_tables import EXTRI, FREEMOCAP, INTRI
+from ..capture.small_graphs import simcc
+from ..made_motion import made_face, made_motion
 from ..untrusted.conftest import dump_python2, make_tables
 from . import own_targets as own
 
@@ -37,8 +66,6 @@ class Target:
 
 
 def _open_picture_or_video(path: Path) -> None:
-    from scope.scope_addon.capture.media.video import open_video
-
     with open_video(path) as video:
         for number, _ in enumerate(video):
             if number == 3:
@@ -46,54 +73,25 @@ def _open_picture_or_video(path: Path) -> None:
 
 
 def _read_layout(path: Path) -> None:
-    from scope.scope_addon.capture.media.heif import read_layout
-
     read_layout(path.read_bytes())
 
 
 def _read_exif(path: Path) -> None:
-    from scope.scope_addon.exif import animation_length, read_exif
-
     read_exif(path.read_bytes())
     animation_length(path.read_bytes())
 
 
-def _read_quicktime(path: Path) -> None:
-    from scope.scope_addon.capture.media.quicktime import focal_35mm
-
-    focal_35mm(path)
-
-
-def _load_body(path: Path) -> None:
-    from scope.scope_addon.untrusted.body_file import load_body
-
-    load_body(path)
-
-
 def _load_motion(path: Path) -> None:
-    from scope.scope_addon.edit.corrected_motion import corrections_of, uncorrected
-    from scope.scope_addon.motion import Motion
-
     motion = Motion.load(path)
     corrections_of(motion)
     uncorrected(motion)
 
 
-def _import_smpl_motion(path: Path) -> None:
-    from scope.scope_addon.retarget.import_motions import import_motions
-
-    import_motions(path)
-
-
 def _read_calibration(path: Path) -> None:
-    from scope.scope_addon.capture.camera.calibration import read_calibration
-
     read_calibration(path).intrinsics_for(640, 360)
 
 
 def _place_cameras(path: Path) -> None:
-    from scope.scope_addon.capture.camera.calibration import placed_cameras, read_calibration
-
     if path.suffix == ".yml":  # lenses and places, which have files of their own, in one
         for name in ("intri.yml", "extri.yml"):
             path.with_name(name).write_bytes(path.read_bytes())
@@ -104,27 +102,7 @@ def _place_cameras(path: Path) -> None:
         calibration.intrinsics_for(int(width), int(height))
 
 
-def _load_bone_map(path: Path) -> None:
-    from scope.scope_addon.retarget.bone_map import load_bone_map
-
-    load_bone_map(path)
-
-
-def _check_network(path: Path) -> None:
-    from scope.scope_addon.untrusted.onnx_file import check_onnx_file
-
-    check_onnx_file(path)
-
-
-def _rig_source(path: Path) -> None:
-    from scope.scope_addon.retarget.rig_source import rig_source
-
-    rig_source(path)
-
-
 def _pictures(_: Path) -> list[bytes]:
-    import cv2
-
     picture = (np.indices((24, 32)).sum(axis=0) * 4).astype(np.uint8)[..., None].repeat(3, axis=2)
     return [
         cv2.imencode(suffix, picture)[1].tobytes()
@@ -133,8 +111,6 @@ def _pictures(_: Path) -> list[bytes]:
 
 
 def _videos(folder: Path) -> list[bytes]:
-    import cv2
-
     path = folder / "seed.mp4"
     mp4v = cv2.VideoWriter_fourcc(*"mp4v")  # type: ignore[attr-defined]
     writer = cv2.VideoWriter(str(path), mp4v, 10.0, (64, 48))
@@ -212,20 +188,6 @@ def _pickled_bodies(_: Path) -> list[bytes]:
 
 
 def _motions(_: Path) -> list[bytes]:
-    from scope.scope_addon.edit.corrected_motion import with_corrections
-    from scope.scope_addon.edit.corrections import (
-        Contact,
-        DepthFlip,
-        Exchange,
-        FeetOnFloor,
-        Interpolation,
-        Pin,
-        Upright,
-    )
-    from scope.scope_addon.untrusted.body_file import load_body
-
-    from ..made_motion import made_face, made_motion
-
     poses = np.zeros((6, 72))
     trans = np.zeros((6, 3))
     body = load_body("scope")
@@ -273,7 +235,7 @@ def _smpl_motions(folder: Path) -> list[bytes]:
     seeds = [npz(layout) for layout in layouts]
     (folder / "seed.npz").write_bytes(seeds[0])
     # compiles what it needs, which takes longer than an input may
-    _import_smpl_motion(folder / "seed.npz")
+    import_motions(folder / "seed.npz")
     return seeds
 
 
@@ -293,7 +255,7 @@ def _skeleton_motions(folder: Path) -> list[bytes]:
     seed = f"HIERARCHY\n{root}{legs}{head}}}\nMOTION\nFrames: 2\nFrame Time: 0.033\n{frames}\n"
     path = folder / "seed.bvh"
     path.write_text(seed)
-    _import_smpl_motion(path)
+    import_motions(path)
     return [seed.encode()]
 
 
@@ -330,16 +292,12 @@ def _camera_tables(_: Path) -> list[bytes]:
 
 
 def _bone_maps(_: Path) -> list[bytes]:
-    from scope.scope_addon.retarget.bone_map import REQUIRED
-
     bones = {f"Bone {part}": part for part in REQUIRED}
     return [json.dumps({"format": "scope bone map", "version": 1, "bones": bones}).encode()]
 
 
-def _networks(_: Path) -> list[bytes]:
-    from ..capture.small_graphs import simcc
-
-    return [simcc(_ / "seed.onnx", 17, 32, 32).read_bytes()]
+def _networks(folder: Path) -> list[bytes]:
+    return [simcc(folder / "seed.onnx", 17, 32, 32).read_bytes()]
 
 
 def _rigs(_: Path) -> list[bytes]:
@@ -378,24 +336,24 @@ TARGETS = {
     "video": Target(_open_picture_or_video, (".mp4", ".mov"), _videos),
     "heif": Target(_read_layout, (".heic",), _heif),
     "exif": Target(_read_exif, (".jpg",), _exif),
-    "quicktime": Target(_read_quicktime, (".mov",), _videos),
-    "body": Target(_load_body, (".npz",), _bodies),
-    "pickle": Target(_load_body, (".pkl",), _pickled_bodies),
+    "quicktime": Target(focal_35mm, (".mov",), _videos),
+    "body": Target(load_body, (".npz",), _bodies),
+    "pickle": Target(load_body, (".pkl",), _pickled_bodies),
     "motion": Target(_load_motion, (".npz",), _motions),
-    "smpl_motion": Target(_import_smpl_motion, (".npz",), _smpl_motions),
-    "bvh": Target(_import_smpl_motion, (".bvh",), _skeleton_motions),
+    "smpl_motion": Target(import_motions, (".npz",), _smpl_motions),
+    "bvh": Target(import_motions, (".bvh",), _skeleton_motions),
     "calibration": Target(_read_calibration, (".json",), _calibrations),
     "camera_tables": Target(_place_cameras, (".toml", ".yml", ".pickle"), _camera_tables),
-    "bone_map": Target(_load_bone_map, (".json",), _bone_maps),
-    "network": Target(_check_network, (".onnx",), _networks),
+    "bone_map": Target(load_bone_map, (".json",), _bone_maps),
+    "network": Target(check_onnx_file, (".onnx",), _networks),
     "network_run": Target(own.run_network, (".onnx",), _networks),
-    "rig": Target(_rig_source, (".glb", ".gltf", ".fbx"), _rigs),
+    "rig": Target(rig_source, (".glb", ".gltf", ".fbx"), _rigs),
     "reply": Target(own.read_reply, (".json",), own.replies),
     "request": Target(own.read_request, (".json",), own.requests),
     "answer": Target(own.read_answer, (".bin",), own.answers),
     "recording": Target(own.read_recording, (".recording",), own.recordings),
     "live_reply": Target(own.read_live_reply, (".json",), own.live_replies),
-    "expression_map": Target(own.read_expression_map, (".json",), own.expression_maps),
+    "expression_map": Target(load_expression_map, (".json",), own.expression_maps),
     "description": Target(own.read_description, (".json",), own.descriptions),
     "estimates": Target(own.find_estimates, (".npz",), own.estimates),
     "window": Target(own.load_window, (".npz",), own.windows),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from scope.scope_addon.job.cache import Cache
-from scope.scope_addon.retarget.bone_map import REQUIRED, BoneMap, load_bone_map, save_bone_map
 from scope.solver.body import Body
 from scope.solver.errors import ScopeError
 
@@ -29,21 +28,6 @@ def test_a_motion_is_the_old_or_the_new_one(tmp_path: Path, body: Body) -> None:
         lambda: second.save(tmp_path / "out.npz"), lambda: contents(tmp_path), old, new
     )
     assert count > 4
-
-
-def test_a_bone_map_is_the_old_or_the_new_one(tmp_path: Path) -> None:
-    path = tmp_path / "map.json"
-    first, second = (BoneMap({f"{name} {part}": part for part in REQUIRED}) for name in ("A", "B"))
-    save_bone_map(second, path)
-    new = contents(tmp_path)
-    save_bone_map(first, path)
-    assert (
-        all_faults(
-            lambda: save_bone_map(second, path), lambda: contents(tmp_path), contents(tmp_path), new
-        )
-        > 4
-    )
-    assert load_bone_map(path) == second
 
 
 def test_the_cache_has_the_old_or_the_new_capture(tmp_path: Path) -> None:

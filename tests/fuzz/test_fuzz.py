@@ -14,7 +14,7 @@ from scope.scope_addon.exif import Exif, animation_length, read_exif
 from scope.scope_addon.job.job_progress import load_stage_times
 from scope.solver.errors import ScopeError
 
-from .fuzz import CORPUS, check, inputs, random_inputs
+from .fuzz import CORPUS, check, inputs, random_inputs, seeds
 from .own_targets import KEY
 from .targets import TARGETS
 
@@ -90,7 +90,7 @@ def test_hostile_times_of_earlier_captures_count_as_absent(tmp_path: Path, path:
 def test_what_is_damaged_was_whole(tmp_path: Path, name: str) -> None:
     """Otherwise all would be refused at the door."""
     target = TARGETS[name]
-    for data in target.seeds(tmp_path):
+    for data in seeds(name):
         accepted = []
         for suffix in target.suffixes:
             path = tmp_path / f"input{suffix}"
