@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawn walkers: feet that stand do not move, and pictures show the body where the truth says."""
 
-from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,10 +9,8 @@ from scope.benchmarks.drawn.footage import (
     FOCAL_PX,
     HEIGHT,
     READOUT_BANDS,
-    WIDTH,
     Camera,
     draw_clip,
-    intrinsics_of,
 )
 from scope.benchmarks.drawn.surroundings import Surroundings
 from scope.benchmarks.drawn.view_scenes import FIRST, SECOND
@@ -41,23 +38,6 @@ def test_feet_that_stand_stay_where_they_are(body, walk):
     assert travelled == pytest.approx(walk.speed_m_s * 59 / 30, rel=0.2)
 
 
-def test_a_box_is_drawn_where_it_is():
-    walls = np.zeros((4, 8, 8, 3), np.float32)
-    walls[1] = 200.0
-    shell = np.array([[-5.0, -5.0, 0.0], [5.0, 5.0, 300.0]])
-    box = np.array([[[-0.5, 1.0, 0.0], [0.5, 2.0, 2.0]]])
-    scene = Surroundings(shell, box, np.array([1]), (walls,) * 7, is_plain=False)
-    camera = Camera(lambda _: np.array([0.0, -4.0, 1.0]), lambda _: np.array([0.0, 0.0, 1.0]))
-    R, centers = camera.path(np.zeros(1))
-    focal_px = 400.0
-    image = scene.draw(R[0], centers[0], intrinsics_of(focal_px), WIDTH, HEIGHT)
-    rows, columns = np.nonzero(image[..., 0])
-    half = focal_px * 0.5 / 5.0  # of the near side, five metres away
-    assert columns.min() == pytest.approx(WIDTH / 2 - half, abs=1.5)
-    assert columns.max() == pytest.approx(WIDTH / 2 + half, abs=1.5)
-    assert rows.min() == pytest.approx(HEIGHT / 2 - focal_px * 1.0 / 5.0, abs=1.5)
-
-
 def test_rows_that_are_read_out_later_show_a_later_moment(tmp_path):
     walls = np.zeros((4, 8, 8, 3), np.float32)
     walls[1] = 200.0
@@ -80,11 +60,6 @@ def test_rows_that_are_read_out_later_show_a_later_moment(tmp_path):
     # that of the last one.
     share = (READOUT_BANDS - 1) / READOUT_BANDS
     assert left[0] - left[1] == pytest.approx(FOCAL_PX * turn_rad_s * 0.03 * share, abs=1.5)
-
-
-def test_a_camera_has_the_frames_of_its_own_clock():
-    camera = Camera(lambda _: np.zeros(3), lambda _: np.ones(3), Fraction(60), start_s=-0.5)
-    np.testing.assert_allclose(camera.times(1.0)[[0, 1, -1]], [-0.5, -0.5 + 1 / 60, 0.5 - 1 / 60])
 
 
 def test_score_of_a_camera():

@@ -107,11 +107,6 @@ def test_an_interrupted_run_goes_on(tmp_path, capsys, monkeypatch):
     [
         (["3dpw", "{0}/nowhere"], 2, "nowhere is not a folder"),
         (["3dpw", "{0}"], 1, "sequenceFiles/test/*.pkl matches no file"),
-        (["emdb", "{0}"], 1, "P*/*/*_data.pkl matches no file"),
-        (["rich", "{0}"], 1, "images/test does not exist"),
-        (["bedlam", "{0}"], 1, "all_npz_12_validation/*.npz matches no file"),
-        (["h36m", "{0}"], 1, "S9/Videos does not exist"),
-        (["3dhp", "{0}"], 1, "TS1 does not exist"),
         (["3dpw", "{0}", "--smpl", "{0}/none"], 1, "none is not a folder"),
         (["3dpw", "{0}", "--regressor", "{0}/none.npy"], 1, "none.npy does not exist"),
         (["3dpw", "{0}", "--body", "{0}/none.npz"], 1, "none.npz' was not found"),
