@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.solver.body_file import BUILT_IN, CHILDREN, growth_of, load_body
+from scope.solver.rotations import exp
 from scope.tools.build_body.build import ShapedMesh, rig_body, shape_mesh
 from scope.tools.build_body.geometry.expressions import build_expressions
 from scope.tools.build_body.geometry.growth import with_growth
@@ -37,35 +38,6 @@ def shaped() -> ShapedMesh:
 def committed(name):
     with np.load(BUILT_IN[name]) as file:
         return {key: file[key] for key in file.files}
-
-
-def random_rotations(rng, count):
-    """Rotations of up to about 70°, by Rodrigues' formula."""
-    vectors = rng.normal(size=(count, 3)) * 0.4
-    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
-    x, y, z = (vectors / angle[:, :, 0]).T
-    zero = np.zeros_like(x)
-    k = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * (k @ k)
-
-
-def winding_number(points, vertices, triangles):
-    """Solid angle of the surface around each point over 4π (van Oosterom and Strackee): 1 inside, 0
-    outside.
-
-    With a, b, c the corners seen from a point p, the products are expanded by powers of p, so that
-    (points, triangles) matrices are products of small ones: a·(b×c) = A·(B×C) - p·(B×C + C×A +
-    A×B), a·b = A·B - p·(A + B) + p·p.
-    """
-    A, B, C = (vertices[triangles[:, k]] for k in range(3))
-    BC = np.cross(B, C)
-    triple = (A * BC).sum(1) - points @ (BC + np.cross(C, A) + np.cross(A, B)).T
-    distances = np.linalg.norm(vertices - points[:, None], axis=2)
-    la, lb, lc = (distances[:, triangles[:, k]] for k in range(3))
-    square = (points**2).sum(1)[:, None]
-    ab, bc, ca = ((X * Y).sum(1) - points @ (X + Y).T + square for X, Y in ((A, B), (B, C), (C, A)))
-    below = la * lb * lc + ab * lc + bc * la + ca * lb
-    return 2.0 * np.arctan2(triple, below).sum(axis=1) / (4.0 * np.pi)
 
 
 # The files
@@ -100,6 +72,7 @@ def test_rebuilding_gives_the_committed_file(shaped, name):
             np.testing.assert_array_equal(kept[key], value, err_msg=key)
 
 
+@pytest.mark.slow
 def test_the_expressions_are_those_of_the_source(shaped):
     """Rebuilt, and compared with the wheel's text by another reader."""
     built = build_expressions(
@@ -124,20 +97,11 @@ def test_the_expressions_are_those_of_the_source(shaped):
             )
 
 
-def test_files_are_small_and_carry_their_licence(body):
-    assert BUILT_IN[body.name].stat().st_size < 2e6
-    assert "CC0 1.0" in body.license
-    assert body.license in (BUILT_IN[body.name].parent / "LICENSE.md").read_text("utf-8")
-
-
-# People
-# --------------------------------------------------------------------------------------------------
-
-
 # The mesh
 # --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_left_and_right_are_mirror_images(body, shaped):
     other = shaped.mesh.mirror
     np.testing.assert_allclose(body.v_template[other] * MIRROR, body.v_template, atol=2e-6)
@@ -151,13 +115,6 @@ def test_left_and_right_are_mirror_images(body, shaped):
     dense = np.zeros((len(body.v_template), body.K + 1))
     np.add.at(dense, (np.arange(len(dense))[:, None], body.skin_joints), body.skin_weights)
     np.testing.assert_allclose(dense[other][:, joint], dense, atol=1e-6)
-
-
-def test_skin_weights_are_a_partition_of_at_most_four(body):
-    assert body.skin_joints.shape == body.skin_weights.shape == (len(body.v_template), 4)
-    assert body.skin_weights.min() >= 0.0
-    assert body.skin_joints.max() <= body.K
-    np.testing.assert_allclose(body.skin_weights.sum(axis=1), 1.0, atol=1e-6)
 
 
 def test_faces_wind_outward_and_enclose_a_plausible_volume(body):
@@ -180,29 +137,7 @@ def test_faces_wind_outward_and_enclose_a_plausible_volume(body):
 # --------------------------------------------------------------------------------------------------
 
 
-def test_people_of_one_stature_have_longer_and_shorter_limbs(body):
-    """Some 3 %, once what goes with stature is taken away."""
-    betas = np.random.default_rng(5).normal(size=(500, body.P))
-    J = body.J_template + np.einsum("jxp,np->njx", body.J_shapedirs, betas)
-    top = body.v_template[:, 1].argmax()
-    bottom = body.v_template[:, 1].argmin()
-    rise = body.shapedirs[top, 1] - body.shapedirs[bottom, 1]
-    stature = np.log(body.v_template[top, 1] - body.v_template[bottom, 1] + betas @ rise)
-    columns = np.stack([stature, np.ones_like(stature)], axis=1)
-    at = {name: J[:, i] for i, name in enumerate(body.joint_names)}
-    for first, second in (
-        ("left_shoulder", "left_elbow"),
-        ("left_elbow", "left_wrist"),
-        ("left_hip", "left_knee"),
-        ("pelvis", "neck"),
-    ):
-        length = np.log(np.linalg.norm(at[first] - at[second], axis=1))
-        left_over = length - columns @ np.linalg.lstsq(columns, length, rcond=None)[0]
-        assert 0.022 < left_over.std() < 0.055, (first, second)
-
-
-@pytest.mark.parametrize("number", [0, 1, 2])
-@pytest.mark.parametrize("deviations", [-2.0, 0.0, 2.0])
+@pytest.mark.parametrize(("number", "deviations"), [(0, 0.0), (0, 2.0), (1, -2.0), (2, 2.0)])
 def test_the_rest_pose_stands_upright(body, number, deviations):
     """Marker-based models of four people lean back by 4.7 to 5.2°, SMPL by 4.3 to 4.4°; standing
     knees are straight.
@@ -254,6 +189,7 @@ def test_trunks_and_legs_vary_against_each_other_as_in_surveys(body):
     assert -0.5 < np.corrcoef(ratio, stature)[0, 1] < -0.1
 
 
+@pytest.mark.slow
 def test_bone_lengths_are_those_of_the_source_pose_for_every_shape(body, shaped):
     """Rotations keep lengths: this fails if the T-pose were only approximately linear in β."""
     skeleton = make_skeleton(shaped.source, with_hands=body.name == "scope_h")
@@ -302,8 +238,6 @@ def test_growth_leads_from_the_adult_to_a_child_of_six_years(name):
     ]
     # as broad as the head, with parts of the ears
     assert np.ptp(head[:, 0]) == pytest.approx(0.143, abs=0.015)
-    inside = winding_number(J, v, body.triangles())
-    assert inside.min() > 0.8
 
 
 # Keypoints
@@ -332,6 +266,7 @@ def test_keypoints_lie_where_their_names_say(body):
         assert reach == sorted(reach), finger
 
 
+@pytest.mark.slow
 def test_surface_keypoints_move_with_the_skin(body, shaped):
     """Rigid attachment (Assumption 1) against linear blend skinning of the vertices themselves, 30
     random poses.
@@ -344,7 +279,9 @@ def test_surface_keypoints_move_with_the_skin(body, shaped):
     worst = 0.0
     for _ in range(30):
         betas = rng.normal(size=body.P)
-        R, t = body.forward_kinematics(random_rotations(rng, body.K + 1), rng.normal(size=3), betas)
+        R, t = body.forward_kinematics(
+            exp(0.4 * rng.normal(size=(body.K + 1, 3))), rng.normal(size=3), betas
+        )
         skinned = body.skin(R, t, betas)
         rigid = body.keypoints(R, t, betas)
         for name, vertices in sources.items():
@@ -357,18 +294,17 @@ def test_surface_keypoints_move_with_the_skin(body, shaped):
 
 
 @pytest.fixture(scope="module")
-def mouth(shaped):
-    """The built arrays of teeth and tongue, and those of the committed file."""
+def mouth():
+    """The committed arrays of teeth and tongue."""
     with np.load(BUILT_IN["scope"].with_name("mouth.npz")) as file:
-        kept = {key: file[key] for key in file.files}
-    wheel = fetch_wheel()
-    grown = with_growth(shaped, read_survey_targets(wheel, shaped.source))
-    return build_mouth(wheel, grown), kept
+        return {key: file[key] for key in file.files}
 
 
 @pytest.mark.slow
-def test_teeth_and_tongue_are_rebuilt(mouth):
-    built, kept = mouth
+def test_teeth_and_tongue_are_rebuilt(mouth, shaped):
+    wheel = fetch_wheel()
+    built = build_mouth(wheel, with_growth(shaped, read_survey_targets(wheel, shaped.source)))
+    kept = mouth
     assert set(kept) == set(built)
     for key, value in built.items():
         if value.dtype.kind == "f":
@@ -390,7 +326,7 @@ def mouth_move(arrays, name):
 
 @pytest.mark.parametrize("jaw", ["upper", "lower"])
 def test_teeth_are_symmetric_and_face_outwards(mouth, jaw):
-    _, kept = mouth
+    kept = mouth
     V = kept["v_template"].astype(float)
     faces = kept["faces"]
     of_jaw = np.linalg.norm(mouth_move(kept, "jawOpen"), axis=1)[faces].min(axis=1) < 1e-9

