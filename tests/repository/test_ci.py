@@ -33,14 +33,6 @@ def test_every_script_of_the_local_run_is_in_the_hosted_one() -> None:
     )
 
 
-def test_all_that_is_run_exists() -> None:
-    assert [
-        name
-        for name in scripts((ROOT / ".ci" / "run").read_text("utf-8"))
-        if not (ROOT / name).is_file()
-    ] == []
-
-
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
 def test_actions_of_others_are_pinned_by_hash(workflow: Path) -> None:
     """A tag can be moved to other code."""

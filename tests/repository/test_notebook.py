@@ -46,6 +46,7 @@ def run(cells: list[dict[str, Any]], names: dict[str, Any]) -> list[Any]:
     return values
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("display")
 def test_the_notebook_captures_shows_fits_and_plots(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -152,6 +152,7 @@ def test_the_wheel_has_every_package_of_the_product_and_its_data(wheel):
     assert names - modules == DATA
 
 
+@pytest.mark.slow
 def test_the_version_is_stated_in_the_manifest_alone(wheel):
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["version"]
     assert wheel.name == f"scope_mocap-{version}-py3-none-any.whl"
@@ -167,6 +168,7 @@ def test_every_folder_of_modules_is_a_package():
     ] == []
 
 
+@pytest.mark.slow
 def test_the_wheel_requires_only_numpy_and_numba(wheel):
     with zipfile.ZipFile(wheel) as archive:
         metadata = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
@@ -188,6 +190,7 @@ def test_the_extras_contain_every_package_of_a_missing_module():
     assert set(EXTRAS) == {*CAPTURE_MODULES, "pythonosc", "distributed"}
 
 
+@pytest.mark.slow
 def test_the_solver_fits_with_only_numpy_and_numba(installed):
     """A body at rest, whose joints are known without the solver. With the command line's package,
     it finds the machine code that other tests have compiled.
@@ -198,6 +201,7 @@ def test_the_solver_fits_with_only_numpy_and_numba(installed):
     assert float(done.stdout) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [["capture", "walk.mp4", "-o", "walk.npz"], ["batch", ".", "--out", "."]]
 )

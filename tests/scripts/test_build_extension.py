@@ -191,14 +191,6 @@ def test_the_manifest_names_licences_and_holders_of_all_that_the_zip_contains(bu
     assert validate is None or validate(manifest["copyright"], True) is None
 
 
-def test_every_permission_has_a_reason_that_the_platform_accepts():
-    permissions = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))["permissions"]
-    assert set(permissions) == {"files", "camera", "network"}
-    for reason in permissions.values():
-        assert 10 < len(reason) <= 64, reason
-        assert not reason.endswith("."), reason
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("networks")
 def test_six_zips_with_empty_wheels(with_empty_wheels, monkeypatch, capsys, tmp_path):
