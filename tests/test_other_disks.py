@@ -65,10 +65,6 @@ def no_syncing(number: int) -> Callable[[Patch], None]:
     return lambda patch: refuse(patch, os, "fsync", number)
 
 
-def no_permissions(number: int) -> Callable[[Patch], None]:
-    return lambda patch: refuse(patch, os, "chmod", number)
-
-
 def other_numbers(patch: Patch) -> None:
     """Give a file another number each time it is asked."""
     numbers = itertools.count(1 << 40)
@@ -89,14 +85,9 @@ def other_numbers(patch: Patch) -> None:
 
 DISKS = {
     "locks that are not available": no_locks(errno.ENOLCK),
-    "locks that are not supported": no_locks(errno.EOPNOTSUPP),
-    "locks that are not permitted": no_locks(errno.EPERM),
-    "locks that are denied": no_locks(errno.EACCES),
     "locks that are always taken": no_locks(errno.EWOULDBLOCK),
     "no syncing": no_syncing(errno.EINVAL),
-    "no syncing in user space": no_syncing(errno.ENOSYS),
-    "no permissions": no_permissions(errno.EPERM),
-    "no permissions in user space": no_permissions(errno.ENOSYS),
+    "no permissions": lambda patch: refuse(patch, os, "chmod", errno.EPERM),
     "permissions that are ignored": lambda patch: patch.setattr(os, "chmod", lambda *_, **__: None),
     "other numbers": other_numbers,
 }
@@ -244,7 +235,7 @@ def test_footage_of_another_number_is_the_same_if_its_content_is(
         watched.check()
 
 
-@pytest.mark.parametrize("number", [errno.ESTALE, errno.EIO, errno.ETIMEDOUT, errno.EACCES])
+@pytest.mark.parametrize("number", [errno.ESTALE, errno.EACCES])
 def test_a_server_that_is_gone_for_a_while_costs_no_capture(
     tmp_path: Path, monkeypatch: Patch, number: int
 ) -> None:

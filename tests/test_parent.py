@@ -75,8 +75,9 @@ on_linux = pytest.mark.skipif(sys.platform != "linux", reason="asks Linux about 
 
 
 @on_linux
-@pytest.mark.parametrize("swallowed", ["ZeroDivisionError", "KeyboardInterrupt"])
-@pytest.mark.parametrize("inherited", [False, True])
+@pytest.mark.parametrize(
+    ("swallowed", "inherited"), [("ZeroDivisionError", False), ("KeyboardInterrupt", True)]
+)
 def test_it_ends_and_leaves_no_partial_file_when_its_parent_is_killed(
     tmp_path, swallowed, inherited
 ):

