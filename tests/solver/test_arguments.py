@@ -115,7 +115,7 @@ def _checked(**arguments: Any) -> Any:
     return solver.check_residual(**({"body": BODY, "name": "test_arguments"} | arguments))
 
 
-HOW = {"priors": PRIORS, "options": SHORT}
+HOW: dict[str, Any] = {"priors": PRIORS, "options": SHORT}
 CLIPS = {"body": BODY, "temporal": Temporal(), "focal": False, "focal_weight": 1.0} | HOW
 PIXELS = {"indices": np.arange(M), "pixels": project(POINTS), "confidence": np.ones(M)}
 STATE = {"R_camera_root": TURN, "t_camera_root": np.ones(3)}
