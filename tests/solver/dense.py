@@ -4,7 +4,6 @@ complex steps.
 """
 
 import numpy as np
-from scope.solver.part import GRADIENT, SHAPE
 
 from .synthetic import INTRINSICS, forward
 
@@ -94,37 +93,3 @@ def robust_factors(raw, sigmas, weights):
         factors.append(np.sqrt(weight) * k)
         cost += 0.5 * np.sum(weight * s * k)
     return factors, cost
-
-
-def random_coupling(rng, tree, blocks, t, origin):
-    """Add random residuals r(T_i, Omega_i, beta) on every joint to the blocks; return their dense
-    rows J and r.
-    """
-    n = len(tree.parents)
-    P = tree.shape
-    K = n - 1
-    rows = []
-    values = []
-    chain = [np.hstack([np.eye(6), np.zeros((6, 3 * K + P))])]
-    for i in range(1, n):
-        U = np.vstack([np.eye(3), hat(t[i] - origin)])
-        dx = chain[tree.parents[i]].copy()
-        dx[:, 6 + 3 * (i - 1) : 6 + 3 * i] += U
-        chain.append(dx)
-        J_x, J_u, J_b, r = (rng.standard_normal(s) for s in ((4, 6), (4, 3), (4, P), (4,)))
-        J = J_x @ dx
-        J[:, 6 + 3 * (i - 1) : 6 + 3 * i] += J_u
-        J[:, 6 + 3 * K :] += J_b
-        rows.append(J)
-        values.append(r)
-        blocks.A[i, :, :6] += J_x.T @ J_x
-        blocks.A[i, :, SHAPE : SHAPE + P] += J_x.T @ J_b
-        blocks.A[i, :, GRADIENT] += J_x.T @ r
-        blocks.H_u[i, :, :6] += J_u.T @ J_x
-        blocks.H_u[i, :, SHAPE : SHAPE + P] += J_u.T @ J_b
-        blocks.H_u[i, :, GRADIENT] += J_u.T @ r
-        blocks.H_uu[i] += J_u.T @ J_u
-        blocks.C[:P, :P] += J_b.T @ J_b
-        blocks.c[:P] += J_b.T @ r
-    blocks.cross[0] = 1
-    return np.vstack(rows), np.concatenate(values)

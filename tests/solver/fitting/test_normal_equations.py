@@ -17,6 +17,7 @@ from scope.solver import (
     Weights,
     gauss_newton_step,
     linearize,
+    register_residual,
     rotations,
 )
 
@@ -45,6 +46,29 @@ def test_they_equal_dense_ones(K, P, M):
         np.testing.assert_allclose(step.direction, expected, rtol=0, atol=1e-8 * largest)
         quadratic = -(J.T @ r) @ expected - 0.5 * expected @ (J.T @ J) @ expected
         assert step.predicted_decrease == pytest.approx(quadratic, rel=1e-9)
+
+
+def test_the_step_solves_equations_that_couple_a_joint_with_its_part():
+    """As residuals of one's own do, whose derivatives test_residual_check.py compares."""
+    _, body, state, *_, priors, _, seen = problem(4, 7, 5, 24)
+
+    def coupled(part, ints, floats):
+        turn = rotations.log(part.R @ part.Omega)
+        return floats[0] * np.concatenate([part.t, part.beta, turn, part.beta.sum() * turn])
+
+    register_residual("coupled", function=coupled)
+    rows = np.arange(8)[:, None], np.linspace(3.0, 9.0, 8)[:, None]
+    seen = replace(seen, tables={"coupled": rows})
+    start = State(*state)
+    equations = linearize(body, seen, start, priors=priors, options=OPTIONS)
+    for damping in (0.0, 40.0):
+        step = gauss_newton_step(body, seen, start, priors=priors, options=OPTIONS, damping=damping)
+        root = np.full(3, damping / OPTIONS.root_length**2)
+        Lambda = np.concatenate([np.full(3, damping), root, np.full(21, damping), np.zeros(5)])
+        expected = -np.linalg.solve(equations.H + np.diag(Lambda), equations.g)
+        np.testing.assert_allclose(
+            step.direction, expected, rtol=0, atol=1e-8 * np.abs(expected).max()
+        )
 
 
 def test_the_moved_state_follows_the_direction():

@@ -51,7 +51,7 @@ def keypoint2d(part, v_bar, V, uv, weight=1.0, focal=1.0):
 
 
 def keypoint3d(part, v_bar, V, point, weight=1.0):
-    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives.
+    """Return r sqrt(weight) (3 rows), without robust kernel, and its derivatives; of a contact too.
 
     :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
     :param point: (3,) where it was measured, metres, camera frame.
@@ -81,18 +81,6 @@ def orientation_field(part, v_bar, V, direction, weight=1.0):
         zeros,
         G @ part.R @ V,
     )
-
-
-def foot_contact(part, v_bar, V, p_stand, weight=1.0):
-    """Return the residual (3 rows) times sqrt(weight) and its derivatives.
-
-    :param v_bar, V: (3,), (3, P) of the point relative to its part's origin, metres.
-    :param p_stand: (3,) where the point rests, metres, camera frame.
-    """
-    p = part.R @ (V @ part.beta + v_bar) + part.t
-    J_x, J_beta = point_jacobian(part, p, V)
-    g = np.sqrt(weight)
-    return Linearization(g * (p - p_stand), g * J_x, np.zeros((3, 3)), g * J_beta)
 
 
 def floor(

@@ -96,7 +96,7 @@ CASES = {
     "keypoint2d": lambda part, w: ref.keypoint2d(part, V_BAR, V, np.array([0.1, 0.2]), w, 1.2),
     "keypoint3d": lambda part, w: ref.keypoint3d(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
     "orientation_field": lambda part, w: ref.orientation_field(part, V_BAR, V, AXIS, w),
-    "foot_contact": lambda part, w: ref.foot_contact(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
+    "foot_contact": lambda part, w: ref.keypoint3d(part, V_BAR, V, np.array([0.1, 0.2, 3.1]), w),
     "floor": lambda part, w: ref.floor(part, V_BAR, V, AXIS, 9.0, 2.0, 0.0, w),
     "floor_above": lambda part, w: ref.floor(part, V_BAR, V, AXIS, -9.0, 2.0, 3.0, w),
     "outline": lambda part, w: ref.outline(part, V_BAR, V, CONTOUR, NORMAL, w),
@@ -221,11 +221,11 @@ def rows_and_residuals(i, k, part, v_bar, shape, w):
         ),
         "foot_contact": (
             foot_contact.pack([k], place[None], [2.0]),
-            ref.foot_contact(part, v_bar, shape, place, 2.0 * w),
+            ref.keypoint3d(part, v_bar, shape, place, 2.0 * w),
         ),
         "foot_contact of a joint": (
             foot_contact.pack([10 + i], place[None], [2.0]),
-            ref.foot_contact(part, np.zeros(3), np.zeros((3, P)), place, 2.0 * w),
+            ref.keypoint3d(part, np.zeros(3), np.zeros((3, P)), place, 2.0 * w),
         ),
     }
     for side, offset in (("below", 9.0), ("above", -9.0)):
