@@ -43,6 +43,12 @@ def joints(body, states):
     return np.array([placed(body, s)[1] for s in states])
 
 
+def solved(body, frames, times, init=None, **given):
+    """A motion whose priors hardly weigh anything."""
+    given = {"priors": Priors(), "options": TIGHT} | given
+    return fit_motion(body, frames, times, init=init, **given)
+
+
 def smooth_walk(rng, frames, rate):
     """A body, its states in a smooth motion, and their times."""
     body, (first,), _ = walk(rng, 1, random_body(rng, K, P, MARKERS))
@@ -89,16 +95,8 @@ def test_covariance_and_estimate_of_linear_motion_in_closed_form():
     init = [State(np.eye(3), p, np.zeros((0, 3, 3)), np.zeros(1)) for p in y]
     prior = replace(SMOOTH, root_position=w_a)
     exact = replace(TIGHT, robust_keypoints3d=np.inf)
-    found = fit_motion(
-        body,
-        frames,
-        np.arange(T) * h,
-        init=init,
-        priors=Priors(),
-        options=exact,
-        motion=prior,
-        covariance=True,
-    )
+    times = np.arange(T) * h
+    found = solved(body, frames, times, init, options=exact, motion=prior, covariance=True)
     second = np.diff(np.eye(T), 2, axis=0)
     A = weight * np.eye(T) + w_a / h**3 * second.T @ second
     np.testing.assert_allclose(found.t_world_part[:, 0], np.linalg.solve(A, weight * y), atol=1e-8)
@@ -118,17 +116,9 @@ def test_reversed_in_time_the_motion_is_the_same():
     body, states, times = smooth_walk(rng, 20, 30.0)
     frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng)]
     stands = rng.uniform(0.0, 1.0, (20, 1))
-    forwards = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT,
-                          stands=StandingPoints([2], stands))  # fmt: skip
-    backwards = fit_motion(
-        body,
-        frames[::-1],
-        -times[::-1],
-        init=states[::-1],
-        priors=Priors(),
-        options=TIGHT,
-        stands=StandingPoints([2], stands[::-1]),
-    )
+    forwards = solved(body, frames, times, states, stands=StandingPoints([2], stands))
+    reversed_stands = StandingPoints([2], stands[::-1])
+    backwards = solved(body, frames[::-1], -times[::-1], states[::-1], stands=reversed_stands)
     np.testing.assert_allclose(backwards.t_world_part[::-1], forwards.t_world_part, atol=1e-6)
     np.testing.assert_allclose(backwards.beta, forwards.beta, atol=1e-5)
     assert forwards.status is Status.CONVERGED
@@ -139,14 +129,9 @@ def test_windows_agree_with_the_whole_clip(known):
     rng = np.random.default_rng(2)
     body, states, times = smooth_walk(rng, 120, 15.0)
     frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng)]
-    given = {
-        "init": states,
-        "priors": Priors(),
-        "options": TIGHT,
-        "shape": states[0].beta if known else None,
-    }
-    whole = fit_motion(body, frames, times, **given)
-    cut = fit_motion(body, frames, times, window=3.0, overlap=1.0, **given)
+    shape = states[0].beta if known else None
+    whole = solved(body, frames, times, states, shape=shape)
+    cut = solved(body, frames, times, states, shape=shape, window=3.0, overlap=1.0)
     difference = np.linalg.norm(cut.t_world_part - whole.t_world_part, axis=-1)
     assert difference.max() < 1e-4
     assert 0.0 < difference.max()  # they were cut
@@ -179,12 +164,8 @@ def test_moved_with_its_cameras_the_motion_moves_along():
     starts = [
         State(G @ s.R_camera_root, G @ s.t_camera_root + g, s.Omega, s.beta) for s in clip.starts
     ]
-    still = fit_motion(
-        clip.body, frames, clip.times, init=clip.starts, priors=Priors(), options=TIGHT
-    )
-    turned = fit_motion(
-        clip.body, elsewhere, clip.times, init=starts, priors=Priors(), options=TIGHT
-    )
+    still = solved(clip.body, frames, clip.times, clip.starts)
+    turned = solved(clip.body, elsewhere, clip.times, starts)
     np.testing.assert_allclose(turned.t_world_part, still.t_world_part @ G.T + g, atol=1e-6)
 
 
@@ -199,7 +180,7 @@ def test_markers_come_and_go():
         if f % 3 and frames[f] and f not in range(15, 21):
             keep = rng.permutation(MARKERS)[: MARKERS // 2]
             frames[f] = Measurements(keypoints3d=Keypoints3D(keep, measured[f].points[keep]))
-    found = fit_motion(body, frames, times, priors=Priors(), options=TIGHT)
+    found = solved(body, frames, times)
     error = np.linalg.norm(found.t_world_part - joints(body, states), axis=-1)
     assert error[:15].max() < 0.02
     assert error[15:21, 0].max() < 0.02
@@ -216,30 +197,18 @@ def test_several_cameras_without_a_state_to_start_from():
     for views in frames:
         views[0] = replace(views[0], measurements=replace(views[0].measurements, keypoints3d=None))
     loose = MotionPrior(joints=0.01, root_rotation=0.01, root_position=0.1)  # the walk is jerky
-    found = fit_motion(clip.body, frames, clip.times, priors=Priors(), options=TIGHT, motion=loose)
+    found = solved(clip.body, frames, clip.times, motion=loose)
     error = np.linalg.norm(found.t_world_part - joints(clip.body, clip.starts), axis=-1)
     assert np.median(error) < 0.03
     # one camera elsewhere in the world, alone
-    alone = [
-        [
-            replace(
-                v[1],
-                measurements=replace(
-                    v[1].measurements,
-                    keypoints3d=Keypoints3D(
-                        np.arange(M),
-                        clip.points[f] @ np.asarray(v[1].R_camera_world).T + v[1].t_camera_world,
-                        np.ones(M),
-                    ),
-                ),
-            )
-        ]
-        for f, v in enumerate(frames)
-    ]
-    one = fit_motion(clip.body, alone, clip.times, priors=Priors(), options=TIGHT, motion=loose)
-    assert (
-        np.median(np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)) < 0.05
-    )
+    alone = []
+    for f, (_, view) in enumerate(frames):
+        in_camera = clip.points[f] @ np.asarray(view.R_camera_world).T + view.t_camera_world
+        points = Keypoints3D(np.arange(M), in_camera)
+        alone.append([replace(view, measurements=replace(view.measurements, keypoints3d=points))])
+    one = solved(clip.body, alone, clip.times, motion=loose)
+    error = np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)
+    assert np.median(error) < 0.05
 
 
 def test_a_standing_point_stands():
@@ -247,17 +216,8 @@ def test_a_standing_point_stands():
     body, states, times = smooth_walk(rng, 20, 30.0)
     frames = [Measurements(keypoints3d=m) for m in markers(body, states, rng, noise=0.003)]
     held = StandingPoints([3], np.ones((20, 1)))
-    found = fit_motion(
-        body,
-        frames,
-        times,
-        init=states,
-        priors=Priors(),
-        options=TIGHT,
-        stands=held,
-        motion=MotionPrior(contact=1e7),
-    )
-    loose = fit_motion(body, frames, times, init=states, priors=Priors(), options=TIGHT)
+    found = solved(body, frames, times, states, stands=held, motion=MotionPrior(contact=1e7))
+    loose = solved(body, frames, times, states)
     steps = []
     for each in (found, loose):
         point = np.array([placed(body, s)[2][3] for s in each.states])
@@ -330,16 +290,7 @@ def test_a_state_of_no_number_gives_a_status_and_no_covariances(window):
     body, states, times = smooth_walk(rng, 20, 30.0)
     frames = [Measurements(keypoints3d=points) for points in markers(body, states, rng)]
     states[1] = replace(states[1], t_camera_root=np.full(3, np.nan))
-    found = fit_motion(
-        body,
-        frames,
-        times,
-        init=states,
-        priors=Priors(),
-        covariance=True,
-        window=window,
-        overlap=0.0,
-    )
+    found = solved(body, frames, times, states, covariance=True, window=window, overlap=0.0)
     assert found.status is Status.NON_FINITE
     assert np.isnan(found.joint_covariance[1]).all()
     assert np.isnan(found.covariance_from_root[1]).all()
@@ -361,14 +312,8 @@ def test_what_nothing_fixes_is_not_taken_for_known_beside_what_is_known_well():
     body = RandomBody(parents, np.zeros((3, 3, 0)), offsets, part, levers, np.zeros((4, 3, 0)))
     state = State.rest(2, 0)
     seen = Measurements(keypoints3d=Keypoints3D(np.arange(4), placed(body, state)[2], sigma_m=1e-4))
-    found = fit_motion(
-        body,
-        [seen],
-        [0.5],
-        init=[state],
-        priors=Priors(joint_weights=np.zeros(2)),
-        covariance=True,
-    )
+    free = Priors(joint_weights=np.zeros(2))
+    found = fit_motion(body, [seen], [0.5], init=[state], priors=free, covariance=True)
     known = found.joint_covariance[0, 1]
     assert np.trace(known) < 1e-6
     axis = lever / np.linalg.norm(lever)

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.solver.motion.fit import Window, combined, overlapping, tiles
+from scope.solver.motion.fit import Window, combined, overlapping
 
 
 def frames_kept(windows: list[Window]) -> list[int]:
@@ -56,11 +56,6 @@ def test_windows_without_overlap_lose_no_frame_to_rounding(rate: float, length: 
         times = np.arange(count) / rate
         windows = overlapping(times, length, 0.0)
         assert frames_kept(windows) == list(range(count))
-
-
-def test_tiles_are_what_is_kept() -> None:
-    windows = overlapping(np.arange(900) / 30, 8.0, 2.0)
-    assert [(t.frames, t.kept) for t in tiles(windows)] == [(w.kept, w.kept) for w in windows]
 
 
 def test_a_shape_that_nothing_measures_stays_where_it_was() -> None:
