@@ -94,22 +94,16 @@ def test_flow_tables_of_another_body_are_refused(body):
 def test_a_prior_is_read_anew_where_its_file_is_another_and_belongs_to_its_reader(
     tmp_path, monkeypatch
 ):
+    once = load_joint_prior()
     with np.load(BUILT_IN) as file:
         arrays = dict(file)
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        np.savez(tmp_path / folder / "prior.npz", **arrays)
-        arrays["parameters"] = 2.0 * arrays["parameters"]
-    once = load_joint_prior()
-    monkeypatch.chdir(tmp_path / "a")
-    first = load_joint_prior("prior.npz")
-    monkeypatch.chdir(tmp_path / "b")
-    second = load_joint_prior("prior.npz")
-    np.testing.assert_array_equal(second.parameters, 2.0 * first.parameters)
-    np.savez("prior.npz", **arrays, more=np.zeros(1))
-    again = load_joint_prior("prior.npz")
-    np.testing.assert_array_equal(again.parameters, 4.0 * first.parameters)
-    expected = again.parameters.copy()
-    again.parameters[:] = 0.0
-    np.testing.assert_array_equal(load_joint_prior("prior.npz").parameters, expected)
+    for folder, factor, more in (("a", 1.0, 0), ("b", 2.0, 0), ("b", 4.0, 1)):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        monkeypatch.chdir(tmp_path / folder)
+        changed = {**arrays, "parameters": factor * arrays["parameters"]}
+        np.savez("prior.npz", **changed, more=np.zeros(more))
+        for _ in range(2):
+            found = load_joint_prior("prior.npz").parameters
+            np.testing.assert_array_equal(found, factor * once.parameters)
+            found[:] = 0.0
     np.testing.assert_array_equal(load_joint_prior().parameters, once.parameters)

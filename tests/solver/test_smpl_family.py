@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from scope.solver.smpl_family import LANDMARK_VERTICES, SKELETONS, recognise_skeleton
+from scope.solver.smpl_family import recognise_skeleton
 
 # kintree_table[0] of SMPL
 BODY = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
@@ -31,26 +31,3 @@ def test_a_tree_that_differs_in_one_joint_is_not(name: str) -> None:
         other = list(KINTREES[name])
         other[i] = other[i] - 1 if other[i] > 0 else 1
         assert recognise_skeleton(np.array(other)) is None
-
-
-def test_left_and_right_have_the_same_joints() -> None:
-    for skeleton in SKELETONS.values():
-        sides = [
-            {n.split("_", 1)[1] for n in skeleton.joint_names if n.startswith(s)}
-            for s in ("left_", "right_")
-        ]
-        assert sides[0] == sides[1]
-        for i, name in enumerate(skeleton.joint_names):
-            parent = skeleton.joint_names[skeleton.parents[i]]
-            if name.startswith("left_") and parent.startswith(("left_", "right_")):
-                assert parent.startswith("left_")
-
-
-@pytest.mark.parametrize("count", [6890, 10475])
-def test_landmarks_are_vertices_of_the_template_and_each_has_its_mirror(count: int) -> None:
-    found = LANDMARK_VERTICES[count]
-    assert all(0 <= vertex < count for vertex in found.values())
-    assert len(set(found.values())) == len(found)
-    for name in found:
-        if name.startswith("left_"):
-            assert name.replace("left_", "right_") in found

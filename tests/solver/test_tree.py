@@ -21,7 +21,6 @@ from scope.solver import (
     validation,
 )
 from scope.solver.gauss_newton.optimizer import optimize
-from scope.solver.gauss_newton.terms import pack_priors
 from scope.solver.residuals import joint_flow, joint_limits
 
 from .synthetic import (
@@ -79,17 +78,22 @@ def test_many_shape_coefficients():
     assert found.state.beta.shape == (100,)
 
 
-def test_measurements_that_cannot_be_written_to_need_no_other_machine_code():
+def test_arrays_that_cannot_be_written_to_need_no_other_machine_code():
+    """Numba compiles anew for them, which takes minutes; and a body's own arrays may change."""
     body = random_body(np.random.default_rng(3), 4, 2, 6)
     points = forward(body, *random_state(np.random.default_rng(4), 4, 2))[2]
+    indices = np.arange(6)
+    pixels = project(points)
     confidence = np.full(6, 0.5)
-    arrays = [np.arange(6), INTRINSICS.copy(), project(points), confidence, points]
-    indices, K, pixels, confidence, points = arrays
+    intrinsics = INTRINSICS.copy()
+    limits = joint_limits.pack(np.array([2]), np.eye(3)[:1], *np.ones((5, 1)))
+    flow = joint_flow.pack([1], random_flow(np.random.default_rng(5), np.eye(3)), [1.0])
+    priors = Priors(limits=limits, flow=flow)
 
     def fitted():
         seen2d = Keypoints2D(indices, pixels, confidence)
         seen3d = Keypoints3D(indices, points, confidence)
-        return fit(body, Measurements(K, keypoints2d=seen2d, keypoints3d=seen3d))
+        return fit(body, Measurements(intrinsics, seen2d, seen3d), priors=priors)
 
     kernels = [
         each
@@ -98,32 +102,15 @@ def test_measurements_that_cannot_be_written_to_need_no_other_machine_code():
         if hasattr(each, "signatures")
     ]
     expected = fitted()
-    compiled = [len(each.signatures) for each in kernels]
-    assert len(kernels) > 5
-    for array in arrays:
-        array.flags.writeable = False
-    found = fitted()
-    assert [len(each.signatures) for each in kernels] == compiled
-    np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
-
-
-def test_arrays_that_cannot_be_written_to_need_no_other_machine_code():
-    """Numba compiles anew for them, which takes minutes; and a body's own arrays may change."""
-    body = random_body(np.random.default_rng(3), 4, 2, 6)
-    points = forward(body, *random_state(np.random.default_rng(4), 4, 2))[2]
-    seen = Measurements(keypoints3d=Keypoints3D(np.arange(6), points))
-    limits = joint_limits.pack(np.array([2]), np.eye(3)[:1], *np.ones((5, 1)))
-    flow = joint_flow.pack([1], random_flow(np.random.default_rng(5), np.eye(3)), [1.0])
-    expected = fit(body, seen, priors=Priors(limits=limits, flow=flow))
-    compiled = len(optimize.signatures)
     body.parents = body.parents.astype(np.int64)
-    for array in (body.parents, *limits, *flow):
-        array.flags.writeable = False
-    tree = make_tree(body)
-    assert tree.parents.flags.writeable
-    assert not np.shares_memory(tree.parents, body.parents)
-    packed = pack_priors(tree, Priors(limits=limits, flow=flow)).tables
-    assert all(each.flags.writeable for table in packed.values() for each in table)
-    found = fit(body, seen, priors=Priors(limits=limits, flow=flow))
-    assert len(optimize.signatures) == compiled
-    np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
+    for arrays, called in (
+        ((indices, pixels, points, confidence, intrinsics), kernels),
+        ((body.parents, *limits, *flow), [optimize]),
+    ):
+        compiled = [len(each.signatures) for each in called]
+        for array in arrays:
+            array.flags.writeable = False
+        found = fitted()
+        assert [len(each.signatures) for each in called] == compiled
+        np.testing.assert_array_equal(found.t_camera_part, expected.t_camera_part)
+    assert not np.shares_memory(make_tree(body).parents, body.parents)

@@ -80,14 +80,6 @@ def test_angles_place_and_length_come_out():
     np.testing.assert_allclose(found.t_camera_part[0], PLACE, atol=1e-3)
 
 
-def test_without_priors_of_its_own_a_body_without_names_is_drawn_to_its_rest():
-    """Unlike a person's, whose joints have names, its joints have no learned prior."""
-    seen = Measurements(keypoints3d=Keypoints3D(np.arange(12), markers(ANGLES, PLACE, 0.0)))
-    found = fit(Arm(), seen)
-    assert (np.abs(angle(found.state.Omega)) < np.abs(ANGLES[1:])).all()
-    np.testing.assert_allclose(angle(found.state.Omega), ANGLES[1:], atol=0.02)
-
-
 def test_clips_and_motions_share_the_length():
     turns = np.linspace(0.0, 0.5, 6)
     clip = np.array([markers(np.add(ANGLES, turn), PLACE, LONGER_M) for turn in turns])
