@@ -8,7 +8,7 @@ Guessing from names of shape keys, reading, writing. Of faces that bones move, s
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -29,27 +29,28 @@ TURNED = ("pitch", "yaw", "roll")
 _KIND = "expression map"
 # With so many keys of ARKit's names, others, such as visemes, are left alone.
 _MIN_ARKIT = 5
-_BOTH_BLINK = {"eyeBlinkLeft": 0.5, "eyeBlinkRight": 0.5}
+
+
+def _both(*expressions: str, factor: float = 0.5) -> dict[str, float]:
+    """Return the same factor for both sides of expressions."""
+    return {f"{name}{side}": factor for name in expressions for side in ("Left", "Right")}
+
+
+_BOTH_BLINK = _both("eyeBlink")
 _LEFT_BLINK = {"eyeBlinkLeft": 1.0}
 _RIGHT_BLINK = {"eyeBlinkRight": 1.0}
-_SMILE = {"mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
-_STRETCH = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}
-_PRESS = {
-    "mouthPressLeft": 0.5,
-    "mouthPressRight": 0.5,
-    "mouthRollLower": 0.5,
-    "mouthRollUpper": 0.5,
-}
+_SMILE = _both("mouthSmile")
+_PRESS = {"mouthRollLower": 0.5, "mouthRollUpper": 0.5} | _both("mouthPress")
 _ROUND = {"mouthFunnel": -0.8, "mouthPucker": -0.8}
-_BROWS_DOWN = {"browDownLeft": 0.5, "browDownRight": 0.5}
+_BROWS_DOWN = _both("browDown")
 # An open mouth that neither rounds nor widens, in a scale where talk reaches 1.
 _A = {"jawOpen": 1.5, "mouthClose": -1.5} | _ROUND
 # Sounds that lips and jaw show; those of the tongue alone (TH, DD, kk, nn, RR) are not captured.
 _OCULUS = {
     "aa": _A,
-    "e": {"jawOpen": 0.5} | {name: 0.7 for name in _STRETCH} | _ROUND,
-    "i": {name: 0.6 for name in _SMILE} | _ROUND,
-    "ih": {name: 0.6 for name in _SMILE} | _ROUND,
+    "e": {"jawOpen": 0.5} | _both("mouthStretch", factor=0.7) | _ROUND,
+    "i": _both("mouthSmile", factor=0.6) | _ROUND,
+    "ih": _both("mouthSmile", factor=0.6) | _ROUND,
     "o": {"mouthFunnel": 1.2},
     "oh": {"mouthFunnel": 1.2},
     "u": {"mouthPucker": 1.2},
@@ -57,7 +58,7 @@ _OCULUS = {
     "pp": _PRESS,
     "ff": {"mouthRollLower": 0.8, "mouthUpperUpLeft": 0.4, "mouthUpperUpRight": 0.4},
     "ch": {"mouthFunnel": 0.5, "mouthShrugUpper": 0.4},
-    "ss": {name: 0.3 for name in _STRETCH},
+    "ss": _both("mouthStretch", factor=0.3),
 }
 _VRM = {
     "aa": _A,
@@ -78,16 +79,9 @@ _VRM = {
     "angry": _BROWS_DOWN,
     "sad": {"browInnerUp": 1.0},
     "sorrow": {"browInnerUp": 1.0},
-    "surprised": {
-        "eyeWideLeft": 0.5,
-        "eyeWideRight": 0.5,
-        "browOuterUpLeft": 0.3,
-        "browOuterUpRight": 0.3,
-    },
-    **{
-        f"look{way}": {f"eyeLook{way.title()}Left": 0.5, f"eyeLook{way.title()}Right": 0.5}
-        for way in ("up", "down")
-    },
+    "surprised": _both("eyeWide") | _both("browOuterUp", factor=0.3),
+    "lookup": _both("eyeLookUp"),
+    "lookdown": _both("eyeLookDown"),
     "lookleft": {"eyeLookOutLeft": 0.5, "eyeLookInRight": 0.5},
     "lookright": {"eyeLookInLeft": 0.5, "eyeLookOutRight": 0.5},
 }
@@ -101,7 +95,7 @@ _VROID = {
     "brwangry": _BROWS_DOWN,
     "brwsorrow": {"browInnerUp": 1.0},
     "eyesurprised": _VRM["surprised"],
-    "brwsurprised": {"browOuterUpLeft": 0.5, "browOuterUpRight": 0.5},
+    "brwsurprised": _both("browOuterUp"),
 }
 _ARKIT = {name.lower(): name for name in EXPRESSIONS}
 
@@ -148,16 +142,20 @@ class ExpressionMap:
 
         :param weights: (T, 52) in the order of `EXPRESSIONS`.
         """
-        place = {name: k for k, name in enumerate(EXPRESSIONS)}
         return {
-            key: np.clip(
-                sum(f * weights[:, place[name]].astype(float) for name, f in factors.items()),
-                0.0,
-                1.0,
-            )
+            key: np.clip(weighted_sum(factors, weights), 0.0, 1.0)
             for key, factors in self.keys.items()
             if factors
         }
+
+
+def weighted_sum(factors: Mapping[str, float], weights: FloatArray) -> Float64Array:
+    """Return Σ factor · weight, (T,), of some expressions.
+
+    :param weights: (T, 52) in the order of `EXPRESSIONS`.
+    """
+    columns = [EXPRESSIONS.index(name) for name in factors]
+    return weights[:, columns].astype(float) @ np.array(list(factors.values()))
 
 
 def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:

@@ -27,8 +27,7 @@ import numpy as np
 from ...solver.errors import InputError
 from ...solver.rotations import exp
 from ..arrays import Float64Array, FloatArray
-from ..kinematics.face import EXPRESSIONS
-from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map
+from .expression_map import MOVED, TURNED, ExpressionMap, load_expression_map, weighted_sum
 from .skeleton import BoneMotion
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "face" / "controls"
@@ -78,15 +77,12 @@ def control_motions(
     :raises InputError: the rig's face cannot be measured.
     """
     frame = measure_face(bones)
-    place = {name: k for k, name in enumerate(EXPRESSIONS)}
     motions = []
     for bone, channels in expression_map.controls.items():
         if bone not in bones or not any(channels.values()):
             continue
         sums = {
-            channel: np.sum(
-                [f * weights[:, place[name]].astype(float) for name, f in factors.items()], axis=0
-            )
+            channel: weighted_sum(factors, weights)
             for channel, factors in channels.items()
             if factors
         }
