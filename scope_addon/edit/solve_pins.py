@@ -114,6 +114,7 @@ class _Track:
     points: list[dict[str, Points]]
     cameras: list[Camera | None]
     reach: Float64Array  # (H,) seconds
+    span: IndexArray  # keys that change, without gaps between the first and the last
 
 
 def resolve(
@@ -145,9 +146,9 @@ def resolve(
                 _Correction(refit, out, [track], slack, floor).run()
         if contact.part in FEET:
             span = keys_of_span(out, contact.first, contact.last, shot)
-            stands[np.ix_(span, _soles_of_foot(refit, contact.part))] = True
+            stands[np.ix_(span, _soles_of_foot(contact.part))] = True
     tracks = _pin_tracks(refit, out, [c for c in corrections if isinstance(c, Pin)], shot)
-    for together in _clusters(out, tracks):
+    for together in _clusters(tracks):
         _Correction(refit, out, together, slack, floor, stands).run()
     return out
 
@@ -192,10 +193,9 @@ class _Correction:
         self._clip = clip
         self._tracks = tracks
         self._slack = slack
-        self._spans = [_keys_within_reach(clip, track) for track in tracks]
         times = clip.times
-        first = min(s[0] for s in self._spans)
-        last = max(s[-1] for s in self._spans)
+        first = min(track.span[0] for track in tracks)
+        last = max(track.span[-1] for track in tracks)
         around = np.flatnonzero(
             (times >= times[first] - _AROUND_S) & (times <= times[last] + _AROUND_S)
         )
@@ -204,8 +204,6 @@ class _Correction:
         # Feet may not go below the floor, or below where they were if that is lower.
         self._floor = np.full(len(clip), lowest)
         self._floor[around] = np.minimum(lowest, refit.skin.heights(R, at, UP).min(axis=1))
-        # Tracks whose pins have been moved to where the limb can reach them.
-        self._limited: set[int] = set()
         self._standing = np.zeros((len(clip), soles.shape[1]))
         self._standing[around] = standing_probability(
             soles, UP, times[around], uneven_ground=not np.isfinite(floor)
@@ -216,36 +214,35 @@ class _Correction:
         """Treat every joint from the trunk outwards, then each limb as a whole until all are where
         they should be.
         """
-        for index, track in enumerate(self._tracks):
+        for track in self._tracks:
+            self._limit(track)
             for joint in track.joints:
-                self._treat(index, [joint])
+                self._treat(track, [joint])
         for _ in range(_SWEEPS):
             if self._all_met():
                 return
-            for index, track in enumerate(self._tracks):
-                self._treat(index, track.joints)
+            for track in self._tracks:
+                self._treat(track, track.joints)
 
-    def _treat(self, index: int, joints: list[str]) -> None:
+    def _treat(self, track: _Track, joints: list[str]) -> None:
         """Correct joints of a limb by the keys at which any of them is pinned."""
-        track = self._tracks[index]
-        span = self._spans[index]
+        span = track.span.tolist()
         clip = self._clip
-        before = clip.rows(span)  # A copy, as every selection by indices.
+        before = clip.rows(track.span)  # A copy, as every selection by indices.
         _, at, soles = self._refit.place(before.rotations, before.root)
-        self._limit(index, at)
-        held = [self._held(index, key, at[k], soles[k]) for k, key in enumerate(span.tolist())]
+        held = [self._held(track, key, at[k], soles[k]) for k, key in enumerate(span)]
         hard = [
             h for h, points in enumerate(track.points) if any(joint in points for joint in joints)
         ]
-        turn, shift = self._changes(track, hard, span, before, held)
+        turn, shift = self._changes(track, hard, before, held)
         known = clip.times[[track.keys[h] for h in hard]]
         reach = track.reach[hard]
         rotations = before.rotations @ exp(faded(before.times, known, turn, reach))
         root = before.root + faded(before.times, known, shift, reach)
         R, at, soles = self._refit.place(rotations, root)
-        rise = self._rise(track, span, self._refit.skin.heights(R, at, UP))
+        rise = self._rise(track, self._refit.skin.heights(R, at, UP))
         pinned = {track.keys[h]: h for h in hard}
-        for k, key in enumerate(span.tolist()):
+        for k, key in enumerate(span):
             camera = None
             if key in pinned:
                 camera = track.cameras[pinned[key]]
@@ -257,27 +254,20 @@ class _Correction:
             pose = self._refit.solve(rotations[k], root[k], tuple(track.joints), points, camera)
             clip.rotations[key], clip.root[key] = pose
 
-    def _limit(self, index: int, at: Float64Array) -> None:
+    def _limit(self, track: _Track) -> None:
         """Move the pins of a limb that are out of its reach to where it can reach them, before it
         is first treated.
-
-        :param at: (T, K+1, 3) the joints at the keys of the limb's span, world.
         """
-        if index in self._limited:
-            return
-        self._limited.add(index)
-        track = self._tracks[index]
-        first = self._spans[index][0]
-        for h, key in enumerate(track.keys):
+        at = self._refit.place(self._clip.rotations[track.keys], self._clip.root[track.keys])[1]
+        for h, camera in enumerate(track.cameras):
             pinned: dict[str, Float64Array] = {}
             moved: dict[str, Points] = {}
             for joint in (joint for joint in track.joints if joint in track.points[h]):
                 points = track.points[h][joint]
                 moved[joint] = points
                 if len(points.numbers) == 1:  # A foot that stands has several.
-                    places = at[key - first], pinned
                     reached = within_reach(
-                        self._refit, joint, points.values[0], places, track.cameras[h], self._slack
+                        self._refit, joint, points.values[0], (at[h], pinned), camera, self._slack
                     )
                     moved[joint] = Points(points.numbers, [reached], points.weights)
                     if len(reached) == 3:
@@ -288,7 +278,6 @@ class _Correction:
         self,
         track: _Track,
         hard: list[int],
-        span: IndexArray,
         before: Clip,
         held: list[Points],
     ) -> tuple[Float64Array, Float64Array]:
@@ -298,7 +287,7 @@ class _Correction:
         turns = []
         shifts = []
         for h in hard:
-            k = int(track.keys[h] - span[0])
+            k = int(track.keys[h] - track.span[0])
             points = _with_pins(held[k], track, h)
             pose = before.rotations[k], before.root[k]
             rotations, root = self._refit.solve(
@@ -308,10 +297,10 @@ class _Correction:
             shifts.append(root - before.root[k])
         return np.array(turns), np.array(shifts)
 
-    def _held(self, index: int, key: int, joints: Float64Array, soles: Float64Array) -> Points:
+    def _held(self, track: _Track, key: int, joints: Float64Array, soles: Float64Array) -> Points:
         """Return the points of other limbs, which stay where they are while a limb is corrected."""
         refit = self._refit
-        own = self._tracks[index].joints
+        own = track.joints
         points = Points()
         limb = limb_of(own[0])
         if not limb.endswith("arm") and np.isfinite(self._floor[key]):
@@ -329,14 +318,14 @@ class _Correction:
         for name in () if moves_trunk else refit.ends:
             if limb_of(name) != limb:
                 points.add(refit.number(name), joints[refit.joint(name)], HELD)
-        for other, track in enumerate(self._tracks):
-            share = self._share(other, key) if other != index else 0.0
+        for other in self._tracks:
+            share = self._share(other, key) if other is not track else 0.0
             if share > 0.0:
-                for name in track.joints:
+                for name in other.joints:
                     points.add(refit.number(name), joints[refit.joint(name)], PINNED * share)
         return points
 
-    def _rise(self, track: _Track, span: IndexArray, heights: Float64Array) -> Float64Array:
+    def _rise(self, track: _Track, heights: Float64Array) -> Float64Array:
         """Return by how much, (T, 3), the points of a leg have to be higher for its foot to be
         above the floor.
 
@@ -344,12 +333,11 @@ class _Correction:
         """
         own = [k for k, part in enumerate(FOOT_PARTS) if limb_of(part) == limb_of(track.joints[0])]
         lowest = heights[:, own].min(axis=1, initial=np.inf)
-        rise: Float64Array = np.maximum(self._floor[span] - lowest, 0.0)[:, None] * UP
+        rise: Float64Array = np.maximum(self._floor[track.span] - lowest, 0.0)[:, None] * UP
         return rise
 
-    def _share(self, index: int, key: int) -> float:
+    def _share(self, track: _Track, key: int) -> float:
         """Return 1 at a track's pinned keys, fading to 0 at the ends of its span."""
-        track = self._tracks[index]
         times = self._clip.times
         ones = np.ones(len(track.keys))
         return float(faded(times[key : key + 1], times[track.keys], ones, track.reach)[0])
@@ -411,13 +399,11 @@ def _with_pins(held: Points, track: _Track, h: int) -> Points:
     return points
 
 
-def _keys_within_reach(clip: Clip, track: _Track) -> IndexArray:
+def _span_within_reach(clip: Clip, keys: list[int], reach: Float64Array) -> IndexArray:
     """Return the keys that a track changes, without gaps between the first and the last."""
-    known = clip.times[track.keys]
-    first = (known - track.reach).min()
-    last = (known + track.reach).max()
-    inside = (clip.times > first) & (clip.times < last)
-    inside[track.keys] = True
+    known = clip.times[keys]
+    inside = (clip.times > (known - reach).min()) & (clip.times < (known + reach).max())
+    inside[keys] = True
     return np.flatnonzero(inside)
 
 
@@ -461,12 +447,12 @@ def _pin_tracks(refit: PoseRefit, clip: Clip, pins: list[Pin], shot: Shot) -> li
         begins = 1 + np.flatnonzero(are_far_apart(times, reach))
         for part in np.split(np.arange(len(keys)), begins):
             own = {keys[k]: by_key[keys[k]] for k in part}
-            tracks.append(_pin_track(refit, own, reach[part], shot))
+            tracks.append(_pin_track(refit, clip, own, reach[part], shot))
     return tracks
 
 
 def _pin_track(
-    refit: PoseRefit, by_key: dict[int, list[Pin]], reach: Float64Array, shot: Shot
+    refit: PoseRefit, clip: Clip, by_key: dict[int, list[Pin]], reach: Float64Array, shot: Shot
 ) -> _Track:
     """Return the track of a limb's pins.
 
@@ -474,7 +460,8 @@ def _pin_track(
     :param reach: (H,) of these, seconds.
     """
     joints = sorted({pin.joint for here in by_key.values() for pin in here}, key=refit.joint)
-    track = _Track(joints, list(by_key), [], [], reach)
+    keys = list(by_key)
+    track = _Track(joints, keys, [], [], reach, _span_within_reach(clip, keys, reach))
     for pins in by_key.values():
         track.points.append({pin.joint: _measured(refit, pin) for pin in pins})
         in_image = [pin for pin in pins if pin.pixel is not None]
@@ -489,64 +476,65 @@ def _measured(refit: PoseRefit, pin: Pin) -> Points:
     return Points([number], [np.array(pin.position)], [PINNED])
 
 
-def _clusters(clip: Clip, tracks: list[_Track]) -> list[list[_Track]]:
+def _clusters(tracks: list[_Track]) -> list[list[_Track]]:
     """Group the tracks whose spans overlap."""
-    spans = [_keys_within_reach(clip, track)[[0, -1]] for track in tracks]
-    groups: list[tuple[int, int, list[_Track]]] = []
-    for (first, last), track in sorted(
-        zip(spans, tracks, strict=True), key=lambda pair: int(pair[0][0])
-    ):
-        if groups and first <= groups[-1][1]:
-            begin, end, together = groups.pop()
-            groups.append((begin, max(end, int(last)), [*together, track]))
-        else:
-            groups.append((int(first), int(last), [track]))
+    groups: list[list[_Track]] = []
+    end = -1
+    for track in sorted(tracks, key=lambda track: int(track.span[0])):
+        if track.span[0] > end:
+            groups.append([])
+        groups[-1].append(track)
+        end = max(end, int(track.span[-1]))
     # The trunk first: how far the limbs reach depends on where it is.
-    return [
-        sorted(together, key=lambda t: limb_of(t.joints[0]) != "trunk") for _, _, together in groups
-    ]
+    return [sorted(group, key=lambda t: limb_of(t.joints[0]) != "trunk") for group in groups]
 
 
 def _contact_track(
     refit: PoseRefit, clip: Clip, contact: Contact, shot: Shot, floor: float
 ) -> _Track | None:
-    """Return the track of a foot that stands: its sole stays at its median position, on the floor
-    if that is near. Other parts rest as `_resting_track` says.
+    """Return the track of a foot that stands, or of another part that rests; None where the clip
+    has no key.
     """
     span = keys_of_span(clip, contact.first, contact.last, shot)
     if not len(span):
         return None
-    if contact.part not in FEET:
-        return _resting_track(refit, clip, contact.part, span, floor)
-    which = _soles_of_foot(refit, contact.part)
+    if contact.part in FEET:
+        joints = [f"{contact.part}_foot"]
+        points = [{joints[0]: _standing_points(refit, clip, contact.part, span, floor)}] * len(span)
+    else:
+        joints = resting_joints(contact.part)
+        points = _resting_points(refit, clip, joints, span, floor)
+    keys = span.tolist()
+    reach = np.full(len(span), _CONTACT_REACH_S)
+    around = _span_within_reach(clip, keys, reach)
+    return _Track(joints, keys, points, [None] * len(span), reach, around)
+
+
+def _soles_of_foot(side: str) -> IndexArray:
+    return np.flatnonzero([name.startswith(f"sole/{side}") for name in SOLES])
+
+
+def _standing_points(
+    refit: PoseRefit, clip: Clip, side: str, span: IndexArray, floor: float
+) -> Points:
+    """Return the points of a sole at their median position, on the floor if that is near."""
+    which = _soles_of_foot(side)
     soles = refit.place(clip.rotations[span], clip.root[span])[2][:, which]
     where = np.median(soles, axis=0)
     lowest = float(where[:, 2].min()) - floor
     if abs(lowest) < _FLOOR_M:
         where[:, 2] -= lowest
     numbers = [refit.number(SOLES[k]) for k in which]
-    points = Points(numbers, list(where), [PINNED] * len(which))
-    n = len(span)
-    joint = f"{contact.part}_foot"
-    reach = np.full(n, _CONTACT_REACH_S)
-    return _Track([joint], span.tolist(), [{joint: points}] * n, [None] * n, reach)
+    return Points(numbers, list(where), [PINNED] * len(which))
 
 
-def _soles_of_foot(refit: PoseRefit, side: str) -> IndexArray:
-    return np.flatnonzero([name.startswith(f"sole/{side}") for name in SOLES])
-
-
-def _resting_track(
-    refit: PoseRefit, clip: Clip, part: str, span: IndexArray, floor: float
-) -> _Track:
-    """Return the track of a part that rests: its joints stay at their median position, as high as
-    the lowest skin that moves with them has to be moved to the floor. Without a floor, that skin
-    stays at its median height.
-
-    :param part: one of `RESTING_PARTS`.
-    :param span: keys in which it rests.
+def _resting_points(
+    refit: PoseRefit, clip: Clip, joints: list[str], span: IndexArray, floor: float
+) -> list[dict[str, Points]]:
+    """Return the points of joints that rest, at each key of a span: at their median position, as
+    high as the lowest skin that moves with them has to be moved to the floor. Without a floor, that
+    skin stays at its median height.
     """
-    joints = resting_joints(part)
     at = refit.place(clip.rotations[span], clip.root[span])[1]
     points: list[dict[str, Points]] = [{} for _ in span]
     for joint in joints:
@@ -556,8 +544,7 @@ def _resting_track(
         places[:, 2] = at[:, refit.joint(joint), 2] + ground - lowest
         for by_joint, place in zip(points, places, strict=True):
             by_joint[joint] = Points([refit.number(joint)], [place], [PINNED])
-    n = len(span)
-    return _Track(joints, span.tolist(), points, [None] * n, np.full(n, _CONTACT_REACH_S))
+    return points
 
 
 def resting_joints(part: str) -> list[str]:
