@@ -8,9 +8,9 @@ smoothing or frame rate the keys have.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -227,30 +227,35 @@ class Floor:
         return out
 
 
+Kind = TypeVar("Kind", bound=Any)
 Correction = Pin | Contact | Exchange | DepthFlip | Interpolation | Upright | Floor | FeetOnFloor
 
 
-def world_of(corrections: Iterable[Correction]) -> Float64Array | None:
+def world_of(corrections: Sequence[Correction]) -> Float64Array | None:
     """Return the transform (4, 4) of the captured world by the upright line, then the floor; None
     without both.
     """
     out: Float64Array | None = None
-    for c in sorted(
-        (c for c in corrections if isinstance(c, Upright | Floor)),
-        key=lambda c: isinstance(c, Floor),
-    ):
-        out = c.transform if out is None else c.transform @ out
+    for c in (_only(corrections, Upright), _only(corrections, Floor)):
+        if c is not None:
+            out = c.transform if out is None else c.transform @ out
     return out
+
+
+def _only(corrections: Iterable[Correction], kind: type[Kind]) -> Kind | None:
+    """Return the correction of a kind of which there is one at most; None without it."""
+    return next((c for c in corrections if isinstance(c, kind)), None)
 
 
 def floor_height(corrections: Iterable[Correction]) -> float:
     """Return the floor's height in metres, 0 where it was not corrected."""
-    return next((c.height for c in corrections if isinstance(c, Floor)), 0.0)
+    floor = _only(corrections, Floor)
+    return floor.height if floor else 0.0
 
 
 def feet_on_floor(corrections: Iterable[Correction]) -> FeetOnFloor | None:
     """Return how feet are put on the floor; None where they are not."""
-    return next((c for c in corrections if isinstance(c, FeetOnFloor)), None)
+    return _only(corrections, FeetOnFloor)
 
 
 def _check_span(first: int, last: int) -> None:
@@ -360,8 +365,8 @@ def _moved_on(corrections: tuple[Correction, ...], new: Upright | Floor) -> tupl
 
     What is upright by a line is not levelled by the feet any more.
     """
-    floor = next((c for c in corrections if isinstance(c, Floor)), None)
-    upright = next((c for c in corrections if isinstance(c, Upright)), None)
+    floor = _only(corrections, Floor)
+    upright = _only(corrections, Upright)
     if isinstance(new, Floor):
         floor = Floor(new.frame, new.height + (floor.height if floor else 0.0))
     else:

@@ -188,21 +188,13 @@ def faded(
     :return: (T, ...).
     """
     flat = values.reshape(len(values), -1)
-    zero = np.zeros((1, flat.shape[1]))
-    at = [np.array([known[0] - reach[0]])]
-    rows = [zero]
     far = are_far_apart(known, reach)
-    for k in range(len(known)):
-        at.append(known[k : k + 1])
-        rows.append(flat[k : k + 1])
-        is_far = k + 1 < len(known) and far[k]
-        if is_far or k + 1 == len(known):
-            at.append(known[k : k + 1] + reach[k])
-            rows.append(zero)
-        if is_far:
-            at.append(known[k + 1 : k + 2] - reach[k + 1])
-            rows.append(zero)
-    inside: Float64Array = _monotone_cubic(times, np.concatenate(at), np.concatenate(rows))
+    begins = (known - reach)[np.append(True, far)]
+    ends = (known + reach)[np.append(far, True)]
+    at = np.concatenate([known, begins, ends])
+    rows = np.concatenate([flat, np.zeros((len(begins) + len(ends), flat.shape[1]))])
+    order = np.argsort(at)
+    inside = _monotone_cubic(times, at[order], rows[order])
     return inside.reshape(len(times), *values.shape[1:])
 
 
