@@ -159,10 +159,7 @@ def upper_floors(
     :param times: (T,) seconds.
     :return: the first row and the row after the last one of each span.
     """
-    rests = (contact > 0.5).any(axis=1) & (heights.min(axis=1) > LEVEL_M)
-    return [
-        (first, end) for first, end in runs(rests) if times[end - 1] - times[first] >= MIN_REST_S
-    ]
+    return _rests((contact > 0.5).any(axis=1) & (heights.min(axis=1) > LEVEL_M), times)
 
 
 def steps(
@@ -183,10 +180,16 @@ def steps(
     found = [
         (first, float(np.median(heights[first:end, point])))
         for point in range(contact.shape[1])
-        for first, end in runs(contact[:, point] > 0.5)
-        if times[end - 1] - times[first] >= MIN_REST_S
+        for first, end in _rests(contact[:, point] > 0.5, times)
     ]
     return sorted((first, height) for first, height in found if STEP_M < abs(height) <= LEVEL_M)
+
+
+def _rests(mask: BoolArray, times: Float64Array) -> list[tuple[int, int]]:
+    """Return the runs of True in ``mask`` (T,) that last as long as a rest, of frames at ``times``
+    (T,).
+    """
+    return [run for run in runs(mask) if times[run[1] - 1] - times[run[0]] >= MIN_REST_S]
 
 
 def _duration(mask: BoolArray, times: Float64Array) -> float:

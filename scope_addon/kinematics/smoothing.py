@@ -35,11 +35,7 @@ def fill_gaps(values: FloatArray, valid: BoolArray, times: Float64Array) -> Floa
     if valid.all():
         return values
     flat = values.reshape(len(values), -1)
-    good = np.flatnonzero(valid)
-    out = np.stack(
-        [np.interp(times, times[good], flat[good, k]) for k in range(flat.shape[1])], axis=1
-    )
-    return out.reshape(values.shape)
+    return interpolated_places(flat[valid], times[valid], times).reshape(values.shape)
 
 
 def continuous_quaternions(R: FloatArray) -> Float64Array:
@@ -96,11 +92,9 @@ def interpolated_rotations(R: Float64Array, at: Float64Array, times: Float64Arra
     return interpolate_rotations(R[k], R[k + 1], share)
 
 
-def interpolated_places(
-    places: Float64Array, at: Float64Array, times: Float64Array
-) -> Float64Array:
-    """Return places (N, 3) at the times ``at`` (N,), on lines between them at others (T,)."""
-    return np.stack([np.interp(times, at, places[:, axis]) for axis in range(3)], axis=1)
+def interpolated_places(places: FloatArray, at: Float64Array, times: Float64Array) -> Float64Array:
+    """Return places (N, D) at the times ``at`` (N,), on lines between them at others (T,)."""
+    return np.stack([np.interp(times, at, coordinate) for coordinate in places.T], axis=1)
 
 
 def _joint_blocks(R: FloatArray) -> list[slice]:
