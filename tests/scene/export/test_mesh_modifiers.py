@@ -84,8 +84,7 @@ def test_a_modifier_that_moves_by_itself_is_said(tmp_path):
     assert "mouth" in assert_shows(tmp_path / "rig.fbx", shown).shape_keys.key_blocks
 
 
-@pytest.mark.parametrize("has_other_key", [False, True])
-@pytest.mark.parametrize("suffix", [".glb", ".fbx"])
+@pytest.mark.parametrize(("suffix", "has_other_key"), [(".glb", True), (".fbx", False)])
 def test_a_shape_key_with_which_modifiers_make_other_faces_is_left_out(
     tmp_path, suffix, has_other_key
 ):

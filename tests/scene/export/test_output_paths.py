@@ -22,46 +22,41 @@ def test_the_check_needs_no_blender():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "error", "message"),
-    [
+def test_what_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder.glb").mkdir()
+    (tmp_path / "link.glb").symlink_to(tmp_path / "gone" / "walk.glb")
+    refused = (
         ("walk.mp4", UsageError, "suffix must be one of .glb"),
         ("walk", UsageError, "suffix must be one of .glb"),
         ("folder", UsageError, "it is a folder; name a file in it"),
         ("folder.glb", OutputError, "a folder of that name exists"),
         ("nowhere/walk.glb", OutputError, "nowhere does not exist"),
         ("link.glb", OutputError, "a link into"),
-        ("w" * 300 + ".glb", OutputError, "walk|w+.glb: .*name too long|too long"),
-    ],
-)
-def test_what_cannot_be_written_is_refused(tmp_path, name, error, message):
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "folder.glb").mkdir()
-    (tmp_path / "link.glb").symlink_to(tmp_path / "gone" / "walk.glb")
-    with pytest.raises(error, match=f"(?i){message}"):
-        check_output(tmp_path / name)
+        ("w" * 300 + ".glb", OutputError, "too long"),
+    )
+    for name, error, message in refused:
+        with pytest.raises(error, match=f"(?i){message}"):
+            check_output(tmp_path / name)
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".FBX", ".blend", ".bvh", ".usdc", ".npz"])
-def test_the_check_writes_nothing(tmp_path, suffix):
-    assert check_output(str(tmp_path / f"walk{suffix}")) == tmp_path / f"walk{suffix}"
+def test_the_check_writes_nothing(tmp_path):
+    for name in ("walk.glb", "walk.FBX", "walk.npz"):
+        assert check_output(str(tmp_path / name)) == tmp_path / name
     assert os.listdir(tmp_path) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "people", "separate", "expected"),
-    [
+def test_people_get_files_of_their_own_where_a_format_has_one_person(tmp_path):
+    files = (
         ("a.b.bvh", 1, True, ["a.b.bvh"]),
         ("a.b.bvh", 2, False, ["a.b.person1.bvh", "a.b.person2.bvh"]),
         ("a.NPZ", 2, False, ["a.person1.NPZ", "a.person2.NPZ"]),
         ("a.glb", 2, False, ["a.glb"]),
         ("a.glb", 2, True, ["a.person1.glb", "a.person2.glb"]),
-    ],
-)
-def test_people_get_files_of_their_own_where_a_format_has_one_person(
-    tmp_path, name, people, separate, expected
-):
-    assert person_paths(tmp_path / name, people, separate) == [tmp_path / path for path in expected]
+    )
+    for name, people, separate, expected in files:
+        paths = [tmp_path / path for path in expected]
+        assert person_paths(tmp_path / name, people, separate) == paths
 
 
 CHECKS = {".blend": is_whole_blend, ".usdc": is_whole_crate}
