@@ -11,7 +11,6 @@ from scope.solver.errors import InputError
 from scope.solver.rotations import exp
 
 from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
-from ..retarget.naming_schemes import SCHEMES
 from .made_rigs import ARMS, FBX, FRAMES, LEGS, build_rig, captured, seen, truth
 
 
@@ -47,8 +46,7 @@ def run(source, rig, bone_map=None, **options):
     )
 
 
-@pytest.mark.parametrize("scheme", ["mixamo", "unreal"])
-@pytest.mark.parametrize("feet", [False, True])
+@pytest.mark.parametrize(("scheme", "feet"), [("mixamo", False), ("unreal", True)])
 def test_limbs_point_where_the_body_points(source, scheme, feet):
     rig, bone_of = build_rig(scheme, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig, feet=feet)
@@ -70,16 +68,13 @@ def _in_a_hidden_collection(rig):
     hidden.hide_viewport = True
 
 
-def _in_rest_position(rig):
+def _disabled_in_viewports_at_rest(rig):
     rig.data.pose_position = "REST"
-
-
-def _disabled_in_viewports(rig):
     rig.hide_viewport = True
 
 
 @pytest.mark.parametrize(
-    "hide", [_in_rest_position, _in_edit_mode, _disabled_in_viewports, _in_a_hidden_collection]
+    "hide", [_in_edit_mode, _disabled_in_viewports_at_rest, _in_a_hidden_collection]
 )
 def test_a_hidden_or_edited_rig_moves(source, hide):
     rig, bone_of = build_rig("mixamo")
@@ -106,10 +101,9 @@ def test_a_blocked_bone_is_named_and_nothing_changes(source):
     assert rig.animation_data is None
 
 
-@pytest.mark.parametrize("scale", [(0, 0, 0), (1, 1, 0)])
-def test_a_rig_without_size_or_bones_is_refused(source, scale):
+def test_a_rig_without_size_or_bones_is_refused(source):
     rig, _ = build_rig("mixamo")
-    rig.scale = scale
+    rig.scale = (1, 1, 0)
     with pytest.raises(InputError, match="'mixamo' is scaled to 0"):
         run(source, rig)
     empty = bpy.data.objects.new("Empty", bpy.data.armatures.new("Empty"))
@@ -150,19 +144,6 @@ def test_rigify(rigify_rigs):
     assert guess_bone_map(metarig).parts == {f"DEF-{bone}": part for bone, part in before.items()}
 
 
-@pytest.mark.parametrize("scheme", sorted(SCHEMES))
-def test_bones_are_guessed(scheme):
-    rig, bone_of = build_rig(scheme)
-    found = guess_bone_map(rig)
-    wrong = {
-        bone: found.parts.get(bone)
-        for part, bone in bone_of.items()
-        if found.parts.get(bone) != part
-    }
-    assert not wrong
-    assert all(0 < c <= 1 for c in found.confidence.values())
-
-
 def test_the_rigs_own_action_stays(source):
     rig, bone_of = build_rig("unreal")
     rig.pose.bones[0].keyframe_insert("location", frame=3)
@@ -177,11 +158,8 @@ def _tweaked(animation):
     animation.use_tweak_mode = True
 
 
-def _added(animation):
+def _added_faintly(animation):
     animation.action_blend_type = "ADD"
-
-
-def _faint(animation):
     animation.action_influence = 0.3
 
 
@@ -189,7 +167,7 @@ def _solo(animation):
     animation.nla_tracks[0].is_solo = True
 
 
-@pytest.mark.parametrize("prepare", [_tweaked, _added, _faint, _solo])
+@pytest.mark.parametrize("prepare", [_tweaked, _added_faintly, _solo])
 def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
     rig, bone_of = build_rig("unreal")
     knee = rig.pose.bones[bone_of["left_knee"]]
@@ -207,13 +185,9 @@ def test_a_rig_whose_nla_plays_moves_as_captured(source, prepare):
     assert [strip.action for strip in track.strips] == [own]
 
 
-def _posed(bone):
+def _keyed(bone):
     bone.location = (0.1, 0.0, 0.05)
     bone.scale = (1.3, 1.0, 1.2)
-
-
-def _keyed(bone):
-    _posed(bone)
     for channel in ("location", "scale"):
         bone.keyframe_insert(channel, frame=1)
 
@@ -225,7 +199,7 @@ def _in_the_nla(bone):
     animation.action = None
 
 
-@pytest.mark.parametrize("pose", [_posed, _keyed, _in_the_nla])
+@pytest.mark.parametrize("pose", [_keyed, _in_the_nla])
 def test_bones_that_were_moved_and_scaled_before_follow_as_at_rest(source, pose):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
@@ -238,15 +212,7 @@ def test_bones_that_were_moved_and_scaled_before_follow_as_at_rest(source, pose)
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=1e-5)
 
 
-@pytest.mark.parametrize(
-    "step",
-    [
-        "rig_retarget.Transfer",
-        "rig_retarget.probe",
-        "rig_action.channel_of_rotation",
-        "rig_retarget.remove_root_object",
-    ],
-)
+@pytest.mark.parametrize("step", ["rig_retarget.probe", "rig_retarget.remove_root_object"])
 def test_a_failure_leaves_the_rig_unchanged(source, monkeypatch, step):
     rig, _ = build_rig("unreal")
     bone = rig.pose.bones[3]

@@ -88,15 +88,14 @@ def check_contacts(rig, spell):
             assert abs(np.linalg.norm(second - first) - scale * STRIDE) < 0.02
 
 
-@pytest.mark.parametrize(("scheme", "size"), [("mixamo", 1.3), ("mixamo", 0.7), ("unreal", 1.0)])
+@pytest.mark.parametrize(("scheme", "size"), [("mixamo", 0.7), ("unreal", 1.0)])
 def test_feet_in_contact_stay_in_place(source, scheme, size):
     rig, bone_of = build_rig(scheme, size=size, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig)
     check_contacts(rig, lambda side, part: bone_of[f"{side}_{PART[part]}"])
 
 
-@pytest.mark.parametrize("loose", [("thigh",), ("",)], ids=["thighs", "every bone"])
-def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(loose):
+def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do():
     clip = walk(2.0)
     frames = range(1, 60, 6)
     clip.rotations[:, 0] = (
@@ -107,7 +106,7 @@ def test_a_rig_whose_bones_do_not_inherit_rotation_moves_as_one_whose_bones_do(l
     run(source, rig)
     wanted = seen(rig, bone_of.values(), frames)
     for bone in rig.data.bones:
-        bone.use_inherit_rotation = not bone.name.startswith(loose)
+        bone.use_inherit_rotation = False
     run(source, rig)
     np.testing.assert_allclose(seen(rig, bone_of.values(), frames), wanted, atol=1e-3)
 

@@ -158,15 +158,14 @@ def check_hands(rig, bone_of):
         assert angles(np.cross(i - w, p - w), np.cross(I - W, P - W)).max() < 1.0, side
 
 
-@pytest.mark.parametrize("scheme", sorted(SPELL))
-def test_fingers_are_guessed(scheme):
-    rig, bone_of = build_hands(scheme)
-    found = guess_bone_map(rig).parts
-    assert {bone: part for part, bone in bone_of.items()} == found
+def test_fingers_are_guessed():
+    for scheme in SPELL:
+        rig, bone_of = build_hands(scheme)
+        found = guess_bone_map(rig).parts
+        assert {bone: part for part, bone in bone_of.items()} == found, scheme
 
 
-@pytest.mark.parametrize("scheme", ["mixamo", "unreal", "mpfb"])
-@pytest.mark.parametrize("twist", [-0.6, 0.9])
+@pytest.mark.parametrize(("scheme", "twist"), [("mixamo", 0.9), ("unreal", -0.6)])
 def test_fingers_point_where_the_body_points(source, scheme, twist):
     rig, bone_of = build_hands(scheme, twist, matrix=FBX if scheme == "mixamo" else None)
     run(source, rig)
@@ -205,13 +204,12 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
     assert rig.animation_data.action == done.action
 
 
-@pytest.mark.parametrize("unseen", [("left",), ("left", "right")])
-def test_fingers_of_a_hand_that_was_not_seen_stay_as_they_are(unseen: tuple[str, ...]) -> None:
+def test_fingers_of_a_hand_that_was_not_seen_stay_as_they_are() -> None:
     """The body has fingers, but those of such a hand are at rest in every frame."""
     clip = gesture()
     for i, name in enumerate(HANDS.joint_names):
         side, _, part = name.partition("_")
-        if side in unseen and part[:-1] in FINGERS:
+        if side == "left" and part[:-1] in FINGERS:
             clip.rotations[:, i] = np.eye(3)
     source = captured(motion_of(clip, body=HANDS), HANDS)
     rig, bone_of = build_hands("unreal")
@@ -225,9 +223,9 @@ def test_fingers_of_a_hand_that_was_not_seen_stay_as_they_are(unseen: tuple[str,
         for finger in FINGERS:
             for k in (1, 2, 3):
                 path = bone_path(bone_of[f"{side}_{finger}{k}"], "rotation_quaternion")
-                assert (path in keyed) == (side not in unseen)
+                assert (path in keyed) == (side == "right")
         is_curled = np.allclose(rig.pose.bones[bone_of[f"{side}_ring2"]].matrix_basis, curled)
-        assert is_curled == (side in unseen)
+        assert is_curled == (side == "left")
 
 
 def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):

