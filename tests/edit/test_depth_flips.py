@@ -35,25 +35,24 @@ def posed(**rotations):
     return Clip(clip.times, still @ sway, clip.root)
 
 
-def shot():
-    return shot_of(motion_of(walk(2.0, speed=0.0)))
+SHOT = shot_of(motion_of(walk(2.0, speed=0.0)))
 
 
 def flip(clip, part, first=FIRST, last=LAST):
-    return flipped(clip, BODY, BETAS, [DepthFlip(first, last, part)], shot())
+    return flipped(clip, BODY, BETAS, [DepthFlip(first, last, part)], SHOT)
 
 
 def seen(clip):
     """Return pixels (T, K+1, 2) and depths (T, K+1) along the rays, metres, of all joints."""
-    camera = shot().world_from_camera[0]
+    camera = SHOT.world_from_camera[0]
     at = (clip.joints(BODY, BETAS) - camera[:3, 3]) @ camera[:3, :3]
-    pixels = at @ shot().intrinsics[0].T
+    pixels = at @ SHOT.intrinsics[0].T
     return pixels[..., :2] / pixels[..., 2:], np.linalg.norm(at, axis=-1)
 
 
 def depth_of_bone(clip, start, end):
     """Return by how much (T,) a bone points away from the camera, along the ray of its end."""
-    camera = shot().world_from_camera[0, :3, 3]
+    camera = SHOT.world_from_camera[0, :3, 3]
     joints = clip.joints(BODY, BETAS)
     a, b = (joints[:, NAMES.index(name)] for name in (start, end))
     ray = (b - camera) / np.linalg.norm(b - camera, axis=1, keepdims=True)
@@ -99,7 +98,7 @@ def test_a_person_who_is_turned_around_is_the_mirror_image_with_the_other_side()
         pelvis=[0, 0.5, 0], left_hip=[-0.9, 0, 0.2], left_knee=[0.6, 0, 0], head=[0, 0.4, 0]
     )
     out = flip(clip, "body")
-    camera = shot().world_from_camera[0, :3, 3]
+    camera = SHOT.world_from_camera[0, :3, 3]
     sight = (clip.root - camera) * [1.0, 1.0, 0.0]
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
     joints = clip.joints(BODY, BETAS)

@@ -42,19 +42,6 @@ def test_the_height_is_that_of_the_lowest_skin_of_the_foot(foot, parts):
     assert height == pytest.approx(lowest, abs=1e-6)
 
 
-def test_the_foot_rests_on_the_floor_and_the_body_stays_in_the_image():
-    floor = measured(MOTION)
-    fixed = with_corrections(MOTION, BODY, (floor,))
-    assert foot_heights(fixed, BODY)[20].min() == pytest.approx(0.0, abs=1e-6)
-    np.testing.assert_array_equal(fixed.joints_cam, MOTION.joints_cam)
-    np.testing.assert_allclose(
-        fixed.world_from_camera, raised(-floor.height) @ MOTION.world_from_camera, atol=1e-12
-    )
-    np.testing.assert_allclose(
-        fixed.trans - MOTION.trans, np.tile([0, 0, -floor.height], (len(MOTION), 1)), atol=1e-6
-    )
-
-
 def test_the_floor_moves_every_smoothing_alike():
     floor = measured(MOTION)
     plain, moved = (smoothed(BODY, with_corrections(MOTION, BODY, c), 2.5) for c in ((), (floor,)))

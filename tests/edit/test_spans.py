@@ -30,6 +30,12 @@ def test_a_broken_span_is_gone_over_as_the_neighbours_move():
         spans.interpolate(clip, 50.0, 60.0)
 
 
+def bone(joints, side, start, end):
+    """Return the directions (T, 3) of a bone of joints (T, K+1, 3)."""
+    along = joints[:, NAMES.index(f"{side}_{end}")] - joints[:, NAMES.index(f"{side}_{start}")]
+    return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
 @pytest.mark.parametrize("limbs", ["arms", "both"])
 def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
     clip = walk(1.0)
@@ -47,16 +53,8 @@ def test_swapping_puts_each_limb_where_the_other_one_was(limbs):
     ):
         for a, b in zip(chain, chain[1:], strict=False):
             for side, other in (("left", "right"), ("right", "left")):
-
-                def bone(joints, which, a=a, b=b):
-                    d = (
-                        joints[:, NAMES.index(f"{which}_{b}")]
-                        - joints[:, NAMES.index(f"{which}_{a}")]
-                    )
-                    return d / np.linalg.norm(d, axis=1, keepdims=True)
-
                 source = other if limbs in (kind, "both") else side
-                cosine = (bone(after, side) * bone(before, source)).sum(1)[span]
+                cosine = (bone(after, side, a, b) * bone(before, source, a, b)).sum(1)[span]
                 assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 12.0, (a, b, side)
     np.testing.assert_array_equal(out.rotations[~span], clip.rotations[~span])
     again = spans.swap_sides(out, BODY, 0.2, 0.5, limbs)

@@ -14,6 +14,17 @@ from scope.solver.body_file import load_body
 FPS = 30.0
 
 
+def placing(body):
+    """Return the body with contact points, and what both people's `place` is."""
+    supported = with_contact_points(body, np.zeros(body.P))
+
+    def place(local, root):
+        R, t = body.forward_kinematics(local, root)
+        return R, t, contact_point_positions(supported, R, t)
+
+    return supported, place
+
+
 def stepping_person():
     """Return a person who raises the left foot for a second, 4 m from a camera 1.5 m high.
 
@@ -34,12 +45,7 @@ def stepping_person():
         omega[:, names.index(f"{side}_ankle")] = rotations.exp(-0.06 * x)
     facing = rotations.exp(np.array([np.pi / 2, 0, 0]))  # model y up to world z up
     omega[:, 0] = R_camera_world @ facing
-    supported = with_contact_points(body, np.zeros(body.P))
-
-    def place(local, root):
-        R, t = body.forward_kinematics(local, root)
-        return R, t, contact_point_positions(supported, R, t)
-
+    supported, place = placing(body)
     root_world = np.tile([0.0, 4.0, 0.0], (T, 1))
     lowest = place(omega, np.zeros((T, 3)))[2][:, 2:4] @ T_world_camera[2, :3]
     root_world[:, 2] = -lowest.min(1)
@@ -52,7 +58,7 @@ def plank_person():
     high.
     """
     body = load_body("scope")
-    supported = with_contact_points(body, np.zeros(body.P))
+    supported, place = placing(body)
     times = np.arange(60) / FPS
     T_world_camera = world_from_level_camera(np.array([0.0, -1.0, -0.2]), height=1.5)
     omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
@@ -60,13 +66,7 @@ def plank_person():
         omega[body.joint_names.index(f"{side}_shoulder")] = rotations.exp([0, -sign * np.pi / 2, 0])
         omega[body.joint_names.index(f"{side}_wrist")] = rotations.exp([0, 0, sign * np.pi / 2])
         omega[body.joint_names.index(f"{side}_ankle")] = rotations.exp([0.5, 0, 0])
-    # model z down
-    down = rotations.exp(np.array([np.pi / 2, 0, 0])) @ rotations.exp(np.array([np.pi / 2, 0, 0]))
-
-    def place(local, root):
-        R, t = body.forward_kinematics(local, root)
-        return R, t, contact_point_positions(supported, R, t)
-
+    down = rotations.exp(np.array([np.pi, 0, 0]))  # model z down
     pitch = 0.0
     for _ in range(30):  # until toes and palms are level
         omega[0] = (

@@ -34,22 +34,14 @@ def test_ankles_arrive_and_everything_else_stays(body):
     omega = random_legs(body, 40, 1)
     shift = 0.02 * np.random.default_rng(2).normal(size=(40, 2, 3)) + [0, 0.06, 0]
     (R, t), (R_new, t_new) = moved(body, omega, shift)
+    moves = [name.endswith(("knee", "ankle", "foot")) for name in body.joint_names]
+    np.testing.assert_allclose(t_new[:, np.invert(moves)], t[:, np.invert(moves)])
     for side, name in enumerate(("left", "right")):
         hip, knee, ankle, foot = (
             body.joint_names.index(f"{name}_{part}") for part in ("hip", "knee", "ankle", "foot")
         )
         np.testing.assert_allclose(t_new[:, ankle], t[:, ankle] + shift[:, side], atol=2e-3)
         np.testing.assert_allclose(R_new[:, [ankle, foot]], R[:, [ankle, foot]], atol=1e-9)
-        others = [k for k in range(body.K + 1) if k not in (knee, ankle, foot)]
-        legs = [
-            body.joint_names.index(f"{s}_{p}")
-            for s in ("left", "right")
-            for p in ("knee", "ankle", "foot")
-        ]
-        np.testing.assert_allclose(
-            t_new[:, [k for k in others if k not in legs]],
-            t[:, [k for k in others if k not in legs]],
-        )
         np.testing.assert_allclose(
             np.linalg.norm(t_new[:, knee] - t_new[:, hip], axis=1),
             np.linalg.norm(t[:, knee] - t[:, hip], axis=1),

@@ -96,34 +96,29 @@ def test_a_motion_of_our_body_is_not_changed(tmp_path):
     assert found.notes == []
 
 
-@pytest.mark.parametrize("key", ["poses", "timestamps"])
-def test_a_damaged_file_of_our_own_is_an_error(tmp_path, key):
-    own = motion_of(CLIP)
-    setattr(own, key, getattr(own, key) * np.nan)
-    own.save(tmp_path / "own.npz")
-    with pytest.raises(MotionFileError, match="NaN|frame rate"):
-        import_motion(tmp_path / "own.npz")
-
-
 @pytest.mark.parametrize(
     ("key", "value"),
     [
+        ("poses", np.nan * MOTION.poses),
         ("mocap_framerate", 1e-300),
+        ("timestamps", np.nan * MOTION.timestamps),
         ("timestamps", np.arange(len(MOTION)) * 1e37),
         ("betas", np.full(BODY.P, 1e6)),
     ],
 )
-def test_numbers_for_which_formats_have_no_room_are_an_error(tmp_path, key, value):
+def test_numbers_that_no_motion_has_are_an_error(tmp_path, key, value):
     own = motion_of(CLIP)
     setattr(own, key, value)
     own.save(tmp_path / "own.npz")
-    with pytest.raises(MotionFileError, match="frame rate|betas"):
+    with pytest.raises(MotionFileError, match="NaN|frame rate|betas"):
         import_motion(tmp_path / "own.npz")
-    arrays = {"body_model": np.array("scope"), "betas": np.zeros(BODY.P), **in_file("z")}
-    np.savez(tmp_path / "other.npz", **arrays | {key: value})
-    if key != "timestamps":  # which those of other tools have not
-        with pytest.raises(MotionFileError, match="frames per second|betas"):
-            import_motion(tmp_path / "other.npz")
+
+
+def test_a_body_of_another_tool_that_is_nobodys_is_an_error(tmp_path):
+    arrays = {"body_model": np.array("scope"), "betas": np.full(BODY.P, 1e6), **in_file("z")}
+    np.savez(tmp_path / "other.npz", **arrays)
+    with pytest.raises(MotionFileError, match="betas"):
+        import_motion(tmp_path / "other.npz")
 
 
 def test_fingers_choose_the_body_with_fingers(tmp_path):

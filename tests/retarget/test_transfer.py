@@ -77,21 +77,13 @@ def test_travel_scales_positions_on_the_floor_and_legs_scale_heights(feet: bool)
         )
 
 
-def test_feet_go_below_the_floor_only_on_uneven_ground_and_a_lower_floor() -> None:
-    """A walk one metre down, as at the foot of stairs: hips and ankles of the rig are lower by its
-    own metre.
-    """
+def test_feet_go_below_the_floor_on_uneven_ground() -> None:
+    """A walk one metre down: hips and ankles of the rig are lower by its own metre."""
     lower = Clip(CLIP.times, CLIP.rotations, CLIP.root - VERTICAL)
     rig = body_rig(scale=1.7)
-    ankles = [MAPPED.index(f"{side}_ankle") for side in ("left", "right")]
     above = Transfer(BODY, BETAS, rig, same_names()).pose(CLIP).heads
     below = Transfer(BODY, BETAS, rig, same_names()).pose(lower, one_floor=False).heads
     np.testing.assert_allclose(below, above - 1.7 * VERTICAL, atol=0.05)
-    held = Transfer(BODY, BETAS, rig, same_names()).pose(lower).heads
-    assert held[:, ankles, 2].min() > 0.0
-    stage = Transfer(BODY, BETAS, rig, same_names())
-    on_it = stage.pose(lower, frames_on_one_floor(lower, BODY, BETAS)).heads
-    np.testing.assert_allclose(on_it, below, atol=1e-9)
 
 
 def test_feet_are_kept_above_the_floor_before_they_go_down_to_a_lower_one() -> None:
