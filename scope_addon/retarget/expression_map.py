@@ -155,7 +155,8 @@ def weighted_sum(factors: Mapping[str, float], weights: FloatArray) -> Float64Ar
     :param weights: (T, 52) in the order of `EXPRESSIONS`.
     """
     columns = [EXPRESSIONS.index(name) for name in factors]
-    return weights[:, columns].astype(float) @ np.array(list(factors.values()))
+    summed: Float64Array = weights[:, columns].astype(float) @ np.array(list(factors.values()))
+    return summed
 
 
 def guess_expression_map(keys: Iterable[str]) -> ExpressionMap:
