@@ -28,7 +28,7 @@ from scope.scope_addon.ui import (
     preferences,
     translations,
 )
-from scope.solver import body_file
+from scope.scope_addon.untrusted import body_file
 from scope.solver.body import Body
 from scope.solver.body_file import load_body
 
@@ -39,8 +39,8 @@ ROOT = Path(scope.__file__).resolve().parent
 
 @cache
 def built_in_body(name: str) -> Body:
-    """A built-in body with some of the faces of its feet and fewer others: Blender builds and
-    writes it sooner.
+    """A built-in body with the faces of its feet and few others: Blender builds and writes it
+    sooner.
     """
     whole = load_body(name)
     assert whole.uv_faces is not None
@@ -52,7 +52,7 @@ def built_in_body(name: str) -> Body:
     ]
     of_feet = np.isin(whole.strongest_joints, feet)[whole.faces].all(axis=1)
     number = np.arange(len(whole.faces))
-    chosen = np.flatnonzero((of_feet & (number % 6 == 0)) | (number % 48 == 0))
+    chosen = np.flatnonzero(of_feet | (number % 48 == 0))
     used, faces = np.unique(whole.faces[chosen], return_inverse=True)
     return replace(
         whole,
@@ -64,11 +64,6 @@ def built_in_body(name: str) -> Body:
         skin_joints=whole.skin_joints[used],
         skin_weights=whole.skin_weights[used],
     )
-
-
-def load_body_once(which: str | Path = "scope") -> Body:
-    """Load a body; a built-in one, which operators read from its file each time, only once."""
-    return built_in_body(str(which)) if str(which) in body_file.BUILT_IN else load_body(which)
 
 
 @pytest.fixture(scope="session")
@@ -95,7 +90,7 @@ def registered(tmp_path, monkeypatch):
     solver.
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    monkeypatch.setattr(body_file, "load_body", load_body_once)
+    monkeypatch.setattr(body_file, "load_trusted_body", built_in_body)
     monkeypatch.setattr(preferences, "user_folder", lambda: tmp_path / "user")
     # What this process compiles later would lie in a test's folder, where nobody finds it again.
     monkeypatch.setattr(code_folders, "keep_in", lambda folder: None)
@@ -115,15 +110,21 @@ def registered(tmp_path, monkeypatch):
         attach()
 
 
-@pytest.fixture
-def footage(tmp_path) -> Path:
-    """The first frame of the sample as a picture file."""
+@pytest.fixture(scope="session")
+def first_frame() -> bytes:
+    """The first frame of the sample as a PNG file."""
     import cv2
 
     ok, image = cv2.VideoCapture(str(ROOT / "assets" / "sample" / "sample.mp4")).read()
     assert ok
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+@pytest.fixture
+def footage(tmp_path, first_frame) -> Path:
+    """The first frame of the sample as a picture file."""
     path = tmp_path / "person.png"
-    cv2.imwrite(str(path), image)
+    path.write_bytes(first_frame)
     return path
 
 
@@ -180,6 +181,24 @@ def fake_worker(tmp_path, monkeypatch, standing):
         monkeypatch.setattr(capture_job, "START_SCRIPT", script)
 
     return use
+
+
+@pytest.fixture(scope="session")
+def file_of_one(tmp_path_factory) -> Path:
+    """Where the first test that asks for `one` saves it."""
+    return tmp_path_factory.mktemp("captures") / "one.blend"
+
+
+@pytest.fixture
+def one(fake_worker, footage, file_of_one) -> bpy.types.Collection:
+    """The capture of a file with one, of one person, which is built once."""
+    if not file_of_one.exists():
+        fake_worker("finish()")
+        bpy.context.scene.scope.footage = str(footage)
+        assert bpy.ops.scope.capture() == {"FINISHED"}
+        bpy.ops.wm.save_as_mainfile(filepath=str(file_of_one))
+    bpy.ops.wm.open_mainfile(filepath=str(file_of_one))
+    return bpy.context.scene.scope.capture
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from scope.scope_addon.ui.frame_rate_operators import keyed_for
 
 from ..edit.walking import NAMES, motion_of, walk
 from ..scene import made_rigs
-from ..scene.made_rigs import captured
+from ..scene.made_rigs import captured_with
 
 VALUES = {
     "text": "abc",
@@ -36,7 +36,7 @@ VALUES = {
     "frames": "1 2",
     "many": "9999999999 9999999999 -9999999999 99999999999999999999999",
 }
-KINDS = ("text", "list", "group", "nan", "huge", "number")
+KINDS = ("list", "nan", "number")
 PROPERTIES = (
     "scope_start",
     "scope_rate",
@@ -53,11 +53,8 @@ PROPERTIES = (
 
 
 @pytest.fixture
-def rig(tmp_path):
-    armature = captured(motion := motion_of(walk(1.0)))
-    motion.save(tmp_path / "person1.npz")
-    armature["scope_motion"] = str(tmp_path / "person1.npz")
-    armature["scope_body_file"] = "scope"
+def rig():
+    armature = captured_with(motion_of(walk(1.0)))
     bpy.context.scene.scope.result.footage_rate = 25.0
     bpy.context.scene.frame_set(10)
     return armature
@@ -125,18 +122,17 @@ def test_keys_beside_a_changed_start_are_said_and_stay(rig, kind):
     assert keys[0, 0] == 1.0
 
 
-@pytest.mark.parametrize("value", VALUES.values(), ids=VALUES)
-def test_a_changed_cycle_leaves_the_frame_range(rig, value):
+@pytest.mark.parametrize("kind", ["group", "frames", "many"])
+def test_a_changed_cycle_leaves_the_frame_range(rig, kind):
     scene = bpy.context.scene
     scene.frame_start = 3
     scene.frame_end = 20
-    rig["scope_cycle"] = value
+    rig["scope_cycle"] = VALUES[kind]
     bpy.ops.scope.smooth(strength=1.0)
     assert (scene.frame_start, scene.frame_end) == (3, 20)
 
 
 def test_a_person_without_a_body_is_said(rig):
-    del rig["scope_body_file"]
     for value in (5, [1.0, 2.0]):
         rig["scope_body"] = value
         assert "does not store which body it is" in tried(bpy.ops.scope.smooth)
@@ -144,10 +140,7 @@ def test_a_person_without_a_body_is_said(rig):
     assert "does not store which body it is" in tried(bpy.ops.scope.smooth)
 
 
-@pytest.mark.parametrize(
-    "value",
-    [VALUES["text"], VALUES["group"], [1.0, 2.0, 3.0], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]],
-)
+@pytest.mark.parametrize("value", [VALUES["group"], [5.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0]])
 def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, value):
     before = made_rigs.seen(rig, NAMES, [5, 20])
     bpy.ops.scope.root_motion(mode="IN_PLACE")
@@ -160,10 +153,7 @@ def test_a_changed_trajectory_is_said_and_smoothing_restores_the_motion(rig, val
     np.testing.assert_allclose(made_rigs.seen(rig, NAMES, [5, 20]), before, atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    "value",
-    [VALUES["text"], VALUES["list"], VALUES["group"], [0.0] * 16, [1.0] * 15],
-)
+@pytest.mark.parametrize("value", [VALUES["text"], [0.0] * 16])
 @pytest.mark.parametrize("name", ["scope_place", "scope_root"])
 def test_a_changed_root_object_goes_with_smoothing(rig, name, value):
     before = made_rigs.seen(rig, NAMES, [5, 20])
@@ -199,13 +189,12 @@ def test_a_changed_rate_is_the_scenes(rig):
         assert keyed_rate(rig, scene) == (7.0 if value == 7 else 30.0)
 
 
-@pytest.mark.parametrize("value", [VALUES["text"], VALUES["group"]])
-def test_a_changed_person_of_a_rig_is_none(rig, tmp_path, value):
+def test_a_changed_person_of_a_rig_is_none(rig, tmp_path):
     own, _ = made_rigs.build_rig("unreal")
     bpy.context.scene.scope_retarget.rig = own
     bpy.context.view_layer.objects.active = rig
     bpy.ops.scope.retarget()
-    own["scope_person"] = value
+    own["scope_person"] = VALUES["text"]
     assert bpy.ops.scope.export(filepath=str(tmp_path / "a.fbx"), format="FBX", which="RIG") == {
         "FINISHED"
     }

@@ -151,6 +151,8 @@ def test_an_unchanged_panel_requests_the_defaults(footage):
         ({"lens": "FILE", "calibration_file": "/a/lens.json"}, "calibration", "/a/lens.json"),
         ({"calibration_file": "/a/lens.json"}, "calibration", None),
         ({"range_start": 2.0}, "start", None),
+        ({"height_cm": 110.0}, "body", "scope_child"),
+        ({"height_cm": 182.0}, "heights_m", pytest.approx((1.82,))),
         ({"hands": "ON"}, "body", "scope_h"),
         ({"hands": "AUTO"}, "body", "scope_h"),
         ({"body": "FILE", "body_file": "/a/smpl.npz"}, "body", "/a/smpl.npz"),

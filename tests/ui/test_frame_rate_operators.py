@@ -95,8 +95,7 @@ def test_keys_return_to_whole_frames_and_other_animation_stays(scene):
 
 
 @pytest.mark.skipif(not has_slots(), reason="this Blender has no slots")
-@pytest.mark.parametrize("in_nla", [False, True])
-def test_another_slot_of_the_captures_action_keeps_its_frames(scene, in_nla):
+def test_another_slot_of_the_captures_action_keeps_its_frames(scene):
     person = built()
     action = person.animation_data.action
     prop = bpy.data.objects.new("prop", None)
@@ -106,8 +105,7 @@ def test_another_slot_of_the_captures_action_keeps_its_frames(scene, in_nla):
     for frame in (10, 40):
         prop.keyframe_insert("location", index=0, frame=frame)
     curves = fcurves(person)
-    if in_nla:
-        push_to_nla(person)
+    push_to_nla(person)
     bpy.ops.scope.match_frame_rate()
     assert key_times(prop) == [[10, 40]]
     for curve in curves:
@@ -160,25 +158,6 @@ def test_a_frame_range_of_the_users_stays(scene):
     scene.frame_end = 250
     bpy.ops.scope.match_frame_rate()
     assert (scene.frame_start, scene.frame_end) == (1, 250)
-
-
-def test_edited_keys_keep_their_edits(scene):
-    person = built()
-    bpy.ops.scope.interpolate_span(start=20, end=30)
-    before = at_times(person, NAMES)
-    bpy.ops.scope.match_frame_rate()
-    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
-
-
-@pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
-def test_root_motion_on_an_object_moves_along(scene, mode):
-    person = built()
-    bpy.ops.scope.root_motion(mode=mode)
-    before = at_times(person, NAMES)
-    bpy.ops.scope.match_frame_rate()
-    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
-    bpy.ops.scope.root_motion(mode="BONES")
-    assert np.ptp(at_times(person, ["pelvis"])[:, 0, 1]) > 1.5
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "IN_PLACE"])
@@ -286,16 +265,15 @@ def test_a_strip_that_plays_the_action_of_a_library_stays_with_its_keys(scene, t
     np.testing.assert_array_equal([read_keys(curve) for curve in fcurves_of(linked)], keys)
 
 
-@pytest.mark.parametrize("root", ["bone", "object"])
-def test_only_animation_that_was_not_captured_is_said_to_play_faster(scene, capfd, root):
+def test_only_animation_that_was_not_captured_is_said_to_play_faster(scene, capfd):
     person = built()
     bpy.data.objects.remove(scene["cube"])
     rig, _ = build_rig("mixamo")
     scene.scope_retarget.rig = rig
-    scene.scope_retarget.root = root
+    scene.scope_retarget.root = "object"
     bpy.context.view_layer.objects.active = person
     bpy.ops.scope.retarget()
-    assert (rig.parent is None) == (root == "bone")
+    assert rig.parent is not None
     bpy.ops.scope.match_frame_rate()
     said = capfd.readouterr().out
     assert "30 frames/s, like the motion" in said
@@ -303,11 +281,8 @@ def test_only_animation_that_was_not_captured_is_said_to_play_faster(scene, capf
 
 
 # below the captured armature, with keys of all names that a captured body has
-@pytest.mark.parametrize("is_below", [False, True])
-@pytest.mark.parametrize("in_nla", [False, True])
-def test_a_retargeted_face_moves_along_in_the_nla_too(
-    scene: bpy.types.Scene, *, in_nla: bool, is_below: bool
-) -> None:
+@pytest.mark.parametrize(("in_nla", "is_below"), [(False, True), (True, False)])
+def test_a_retargeted_face_moves_along_in_the_nla_too(scene, in_nla, is_below):
     person = built()
     face = scene["cube"]
     for name in ("Basis", "A", *(EXPRESSIONS if is_below else ("jawOpen",))):
@@ -353,17 +328,11 @@ def test_review_frames_and_corrections_name_the_moved_frames(scene):
     assert not scene.timeline_markers
 
 
-@pytest.mark.parametrize("is_beside", [True, False])
-def test_the_users_own_camera_keeps_its_keys(scene, is_beside):
+def test_the_users_own_camera_keeps_its_keys(scene):
     built()
-    capture = scene.scope.capture
-    shot = bpy.data.collections.new("Shot")
-    scene.collection.children.link(shot)
-    scene.collection.children.unlink(capture)
-    shot.children.link(capture)
     data = bpy.data.cameras.new("own")
     camera = bpy.data.objects.new("own", data)
-    (shot if is_beside else capture).objects.link(camera)
+    scene.scope.capture.objects.link(camera)
     for frame in (3, 40):
         camera.keyframe_insert("location", index=0, frame=frame)
         data.keyframe_insert("lens", frame=frame)
@@ -397,14 +366,6 @@ def test_a_capture_of_another_rate_keeps_its_warning_with_the_new_rate(scene):
     scene.scope.capture = other
     bpy.ops.scope.match_frame_rate()
     assert texts(other) == []
-
-
-def test_a_rate_that_was_changed_by_hand_is_taken_into_account(scene):
-    person = built()
-    before = at_times(person, NAMES)
-    scene.render.fps = 60  # the keys stay, so the motion plays three times as fast
-    bpy.ops.scope.match_frame_rate()
-    np.testing.assert_allclose(at_times(person, NAMES), before, atol=1e-4)
 
 
 def test_a_picture_has_no_frame_rate(scene, standing):

@@ -7,11 +7,10 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.ui.action_operators import SCOPE_OT_mark_asset
 
 from ...edit.walking import motion_of, walk
-from ...scene.made_rigs import build_rig, captured
+from ...scene.made_rigs import build_rig, captured, captured_with
 
 
 @pytest.fixture
@@ -24,9 +23,7 @@ def motion():
 
 @pytest.fixture
 def rig(motion):
-    armature = captured(motion)
-    pack_motion(armature, motion.to_bytes())
-    return armature
+    return captured_with(motion)
 
 
 def picture(action):

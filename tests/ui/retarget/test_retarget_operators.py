@@ -7,30 +7,19 @@ import pytest
 from scope.scope_addon.retarget import bone_map
 from scope.scope_addon.retarget.bone_map import PARTS
 from scope.scope_addon.scene.character.root_object import root_object
+from scope.scope_addon.scene.packed_motion import pack_motion
 from scope.scope_addon.scene.visibility import hide_again, show
 from scope.scope_addon.ui.captured_person import captured_armature, retargeted_from, stored_person
 from scope.scope_addon.ui.retarget_panel import offered_parts
 
-from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
-from ...retarget.naming_schemes import PLACES
+from ...edit.walking import RATE, motion_of, walk
 from ...scene.exported import read_back
 from ...scene.made_rigs import build_rig, captured, seen
 
 
-def leg_length(joints):
-    return np.linalg.norm(np.diff(joints, axis=0), axis=1).sum()
-
-
-LEG = ("hip", "knee", "ankle")
-# The legs of a rig of size 1 over those of the body.
-LEG_RATIO = leg_length([PLACES[joint] for joint in LEG])
-LEG_RATIO /= leg_length(BODY.rest_joints()[[NAMES.index(f"left_{joint}") for joint in LEG]])
-
-
 @pytest.fixture
 def rig():
-    source = captured(motion_of(walk(2.0)))
-    source["scope_body_file"] = "scope"
+    captured(motion_of(walk(2.0)))
     rig, _ = build_rig("unreal")
     bpy.context.scene.scope_retarget.rig = rig
     return rig
@@ -51,7 +40,7 @@ def test_guess_keep_and_retarget(rig, tmp_path):
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0  # it walks
 
 
-@pytest.mark.parametrize("root", ["bone", "object", "in-place"])
+@pytest.mark.parametrize("root", ["bone", "in-place"])
 def test_the_scale_of_the_path_is_reported_where_there_is_a_path(rig, capfd, root):
     bpy.context.scene.scope_retarget.root = root
     bpy.ops.scope.retarget()
@@ -173,13 +162,11 @@ def test_side_by_side_is_as_far_for_a_person_of_a_scene_in_centimetres(rig):
     np.testing.assert_allclose(seen(rig, ["pelvis"]) - there, expected, atol=1e-2)
 
 
-@pytest.mark.parametrize("captured", ["hide", "beside"])
-def test_the_captured_persons_collection_may_be_excluded_from_the_view_layer(rig, captured):
+def test_the_captured_persons_collection_may_be_excluded_from_the_view_layer(rig):
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
     layers = bpy.context.view_layer.layer_collection.children
     next(c for c in layers if c.collection in source.users_collection).exclude = True
     bpy.context.scene.scope.capture = source.users_collection[0]
-    bpy.context.scene.scope_retarget.captured = captured
     assert bpy.ops.scope.retarget() == {"FINISHED"}
     assert np.ptp(seen(rig, ["pelvis"])[:, 0, 1]) > 1.0
 
@@ -210,10 +197,9 @@ def test_a_hidden_body_is_shown_temporarily_for_comparison(rig):
     assert not source.hide_get()
 
 
-def test_retargeting_again_after_an_edit_updates_the_rig(rig, tmp_path):
+def test_retargeting_again_after_an_edit_updates_the_rig(rig):
     source = next(obj for obj in bpy.context.scene.objects if "scope_source" in obj)
-    motion_of(walk(2.0), noise=0.1).save(tmp_path / "person1.npz")
-    source["scope_motion"] = str(tmp_path / "person1.npz")
+    pack_motion(source, motion_of(walk(2.0), noise=0.1).to_bytes())
     bpy.ops.scope.retarget()
     before = seen(rig, ["upperarm_l", "hand_l"])
     count = len(bpy.data.actions)
@@ -269,7 +255,6 @@ def test_with_several_people_the_panels_ask_for_a_selection(rig):
         next(obj for obj in bpy.context.scene.objects if "scope_source" in obj),
         captured(motion_of(walk(2.0))),
     ]
-    people[1]["scope_body_file"] = "scope"
     panels = (bpy.types.SCOPE_PT_retarget, bpy.types.SCOPE_PT_edit)
     layer = bpy.context.view_layer
     layer.objects.active = rig
@@ -301,8 +286,7 @@ def test_a_bone_map_without_legs_is_an_error(rig):
     assert rig.animation_data is None or rig.animation_data.action is None
 
 
-@pytest.mark.parametrize("operator", ["guess_bones", "retarget"])
-@pytest.mark.parametrize("listed", [True, False])
+@pytest.mark.parametrize(("operator", "listed"), [("guess_bones", False), ("retarget", True)])
 def test_a_rig_of_thousands_of_bones_is_refused(rig, monkeypatch, operator, listed):
     """Whether the map is listed or guessed, and before anything is posed."""
     if listed:
@@ -322,23 +306,7 @@ def test_what_fails_leaves_the_bone_list_empty(rig):
     assert len(settings.pairs) == 0
 
 
-def test_undo_removes_the_motion(rig):
-    name = rig.name
-    bpy.ops.scope.guess_bones()
-    bpy.ops.ed.undo_push(message="before")
-    bpy.ops.scope.retarget()
-    bpy.ops.ed.undo_push(message="Retarget")  # an operator called by a script pushes none itself
-    assert bpy.data.objects[name].animation_data.action is not None
-    bpy.ops.ed.undo()
-    rig = bpy.data.objects[name]
-    assert rig.animation_data is None or rig.animation_data.action is None
-    assert len(bpy.context.scene.scope_retarget.pairs) == 22
-    bpy.ops.ed.redo()
-    assert bpy.data.objects[name].animation_data.action is not None
-
-
-@pytest.mark.parametrize("kind", ["glb", "bvh"])
-def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path, kind):
+def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path):
     """The captured body is not exported, and the scene does not change."""
     mesh = bpy.data.meshes.new("skin")
     mesh.from_pydata([(0, 0, 1), (0.1, 0, 1), (0, 0.1, 1)], [], [(0, 1, 2)])
@@ -349,22 +317,19 @@ def test_the_rig_is_exported_with_its_animation_and_only_its_mesh(rig, tmp_path,
     bpy.ops.scope.retarget()
     there = seen(rig, ["pelvis"])[:, 0]
     before = sorted(c.name for c in bpy.data.collections)
-    path = tmp_path / f"hero.{kind}"
-    assert bpy.ops.scope.export(filepath=str(path), format=kind.upper(), which="RIG") == {
-        "FINISHED"
-    }
+    path = tmp_path / "hero.glb"
+    assert bpy.ops.scope.export(filepath=str(path), format="GLB", which="RIG") == {"FINISHED"}
     assert sorted(c.name for c in bpy.data.collections) == before
     read_back(path, RATE)
     moved = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
     assert len(moved) == 1
     meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.find_armature()]
-    assert len(meshes) == (0 if kind == "bvh" else 1)
+    assert len(meshes) == 1
     way = seen(moved[0], ["pelvis"])[:, 0]
     assert np.ptp(way, axis=0).max() == pytest.approx(np.ptp(there, axis=0).max(), rel=0.05)
 
 
-@pytest.mark.parametrize("shape", ["AUTO", "BAKED"])
-def test_the_shape_keys_of_the_rigs_own_face_move_in_usd(rig, tmp_path, shape):
+def test_the_shape_keys_of_the_rigs_own_face_move_in_usd(rig, tmp_path):
     mesh = bpy.data.meshes.new("head")
     mesh.from_pydata([(0, 0, 1.6), (0.1, 0, 1.6), (0, 0, 1.7)], [], [(0, 1, 2)])
     face = bpy.data.objects.new("head", mesh)
@@ -378,9 +343,7 @@ def test_the_shape_keys_of_the_rigs_own_face_move_in_usd(rig, tmp_path, shape):
         mesh.shape_keys.key_blocks["Fcl_MTH_A"].value = value
         mesh.shape_keys.keyframe_insert('key_blocks["Fcl_MTH_A"].value', frame=frame)
     path = tmp_path / "hero.usdc"
-    assert bpy.ops.scope.export(filepath=str(path), format="USDC", which="RIG", shape=shape) == {
-        "FINISHED"
-    }
+    assert bpy.ops.scope.export(filepath=str(path), format="USDC", which="RIG") == {"FINISHED"}
     read_back(path, RATE)
     (read,) = (obj for obj in bpy.data.objects if obj.type == "MESH")
     for frame, value in ((1, 0.0), (41, 0.8)):
@@ -421,7 +384,6 @@ def _linked_character(folder, person=""):
     rig, _ = build_rig("unreal")
     if person:
         source = captured(motion_of(walk(1.0)))
-        source["scope_body_file"] = "scope"
         source.name = person
         bpy.context.scene.scope_retarget.rig = rig
         bpy.ops.scope.retarget()
@@ -429,7 +391,7 @@ def _linked_character(folder, person=""):
     character.objects.link(rig)
     bpy.data.libraries.write(str(folder / "hero.blend"), {character})
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    captured(motion_of(walk(2.0)))["scope_body_file"] = "scope"
+    captured(motion_of(walk(2.0)))
     with bpy.data.libraries.load(str(folder / "hero.blend"), link=True) as (_, here):
         here.collections = ["Character"]
     bpy.context.scene.collection.children.link(here.collections[0])
@@ -443,12 +405,11 @@ def test_retargeting_to_a_linked_rig_is_an_error_that_says_what_to_do(tmp_path):
         bpy.ops.scope.retarget()
 
 
-@pytest.mark.parametrize("root", ["bone", "object"])
-def test_a_library_override_is_animated_and_saved(tmp_path, root):
+def test_a_library_override_is_animated_and_saved(tmp_path):
     _linked_character(tmp_path).override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
     settings = bpy.context.scene.scope_retarget
     settings.rig = next(obj for obj in bpy.context.scene.objects if obj.override_library)
-    settings.root = root
+    settings.root = "object"
     bpy.ops.scope.retarget()
     moving = seen(settings.rig, ["pelvis", "hand_l"])
     assert np.ptp(moving[:, 0, 1]) > 1.0
@@ -459,9 +420,8 @@ def test_a_library_override_is_animated_and_saved(tmp_path, root):
     assert retargeted_from(bpy.context.scene, rig) == bpy.data.objects["walk"]
 
 
-@pytest.mark.parametrize("name", ["walk", "run"])
-def test_an_override_of_a_retargeted_rig_has_the_person_of_its_own_action(tmp_path, name):
-    character = _linked_character(tmp_path, name)
+def test_an_override_of_a_retargeted_rig_has_the_person_of_its_own_action(tmp_path):
+    character = _linked_character(tmp_path, "walk")
     scene = bpy.context.scene
     character.override_hierarchy_create(scene, bpy.context.view_layer)
     rig = next(obj for obj in scene.objects if obj.override_library)

@@ -11,6 +11,7 @@ import pytest
 from mathutils import Euler, Matrix
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.camera import view_number
+from scope.scope_addon.scene.capture_parts import tag_part
 from scope.scope_addon.ui import comparison
 from scope.scope_addon.ui.view_operators import show_new_capture
 from scope.solver import load_body
@@ -82,6 +83,7 @@ def capture_with_camera(name):
     collection = bpy.data.collections.new(name)
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
     collection["scope_capture"] = 1
+    tag_part(camera)
     collection.objects.link(camera)
     bpy.context.scene.collection.children.link(collection)
     return collection, camera
