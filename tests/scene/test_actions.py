@@ -16,35 +16,6 @@ def cube() -> bpy.types.Object:
     return obj
 
 
-def test_keys_drive_the_object_with_fractions_and_linear_steps(cube):
-    frames = np.array([1.0, 2.5, 7.25])
-    values = np.array([[0.0, 1, 2], [3, 1, 2], [-5, 1, 2]])
-    actions.Channels(cube, bpy.data.actions.new("a")).write(
-        "location", frames, values, group="Object Transforms"
-    )
-    bpy.context.scene.frame_set(2, subframe=0.5)
-    np.testing.assert_allclose(cube.location, [3, 1, 2], atol=1e-6)
-    bpy.context.scene.frame_set(2)
-    np.testing.assert_allclose(cube.location, [2, 1, 2], atol=1e-6)
-    curves = actions.fcurves(cube)
-    assert [(c.data_path, c.array_index) for c in curves] == [("location", i) for i in range(3)]
-    assert {k.interpolation for c in curves for k in c.keyframe_points} == {"LINEAR"}
-    assert {c.group.name for c in curves} == {"Object Transforms"}
-    np.testing.assert_allclose(
-        actions.read_keys(curves[0]), np.stack([frames, values[:, 0]], axis=1)
-    )
-
-
-def test_constant_keys_hold(cube):
-    keys = cube.data.shape_keys
-    channels = actions.Channels(keys, bpy.data.actions.new("a"))
-    channels.write(
-        actions.shape_key_path("Wide"), np.array([1.0, 5.0]), np.array([0.2, 0.8]), "CONSTANT"
-    )
-    bpy.context.scene.frame_set(4)
-    assert keys.key_blocks["Wide"].value == pytest.approx(0.2)
-
-
 def test_one_action_serves_an_object_and_its_shape_keys(cube):
     action = bpy.data.actions.new("a")
     actions.Channels(cube, action).write("location", np.array([0.0]), np.array([[1.0, 2.0, 3.0]]))
@@ -82,13 +53,6 @@ def test_the_older_interface_writes_the_same_keys(cube, monkeypatch):
     assert channels.action != action
     assert channels.action.id_root == "KEY"
     assert len(actions.fcurves(cube.data.shape_keys)) == 1
-
-
-def test_frame_range_spans_all_datablocks(cube):
-    action = bpy.data.actions.new("a")
-    actions.Channels(cube, action).write("location", np.array([3.0, 8.5]), np.zeros((2, 3)))
-    assert actions.frame_range([cube]) == (3.0, 8.5)
-    assert actions.frame_range([cube.data.shape_keys]) is None
 
 
 @pytest.mark.parametrize(("moving", "last"), [("location", 31.0), ("scale", 200.0)])

@@ -7,7 +7,6 @@ import pytest
 from scope.scope_addon.errors import MotionFileError
 from scope.scope_addon.scene import actions
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.character.body_mesh import mixed_vertices
 
 
 def test_names_range_and_values(body, make_motion):
@@ -27,16 +26,6 @@ def test_one_constant_key_each_at_the_first_frame(body, make_motion):
     for curve, beta in zip(curves, motion.betas, strict=True):
         np.testing.assert_allclose(actions.read_keys(curve), [[2.0 * rate, beta]], atol=1e-4)
         assert curve.keyframe_points[0].interpolation == "CONSTANT"
-
-
-@pytest.mark.parametrize("value", [-2.5, 1.5])
-def test_a_slider_moves_the_mesh_along_its_direction(body, make_motion, value):
-    mesh = build_scene([make_motion(body, betas=[0.0] * 10)], body).people[0].mesh
-    before = mixed_vertices(mesh)
-    mesh.data.shape_keys.key_blocks["Shape001"].value = value
-    moved = mixed_vertices(mesh) - before
-    x, y, z = (value * body.shapedirs[:, :, 1]).T
-    np.testing.assert_allclose(moved, np.stack([x, -z, y], axis=1), atol=1e-5)
 
 
 def test_betas_beyond_blenders_sliders_are_refused_or_baked(body, make_motion):

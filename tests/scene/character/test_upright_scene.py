@@ -27,15 +27,6 @@ def scene():
     return camera, armature
 
 
-def test_a_camera_returns_to_where_it_was(scene):
-    camera, armature = scene
-    turn_camera(camera, armature, TURN, to_captured=False)
-    assert camera.location[:] == pytest.approx((-2.0, 1.0, 3.0))
-    turn_camera(camera, armature, np.eye(4), to_captured=True)
-    assert camera.location[:] == (1.0, 2.0, 3.0)
-    assert upright_scene._TURNED not in camera
-
-
 def test_a_place_that_is_none_is_ignored(scene):
     camera, armature = scene
     numbers = ([1, 2], ["x"] * 13, [10**400] * 13, [float("nan")] * 13)
