@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Float64Array, FloatArray, Uint8Array
 from ...kinematics.face import EXPRESSIONS
 from .landmark_network import KEYPOINT_NAMES
-from .region import Region, box_along
+from .region import Region, box_along, rotation_towards
 from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 256
@@ -131,11 +131,9 @@ def region_from_body(keypoints_px: Float64Array) -> Region:
     # The vector from the right eye to the left one points right in an image of a front view.
     dx, dy = eyes[0] - eyes[1]
     up = (middle - mouth) + np.array([dy, -dx])
-    center = middle + _MIDDLE * (mouth - middle)
+    x, y = middle + _MIDDLE * (mouth - middle)
     side = _SCALE * FACE_M * pixels_per_metre(keypoints_px)
-    return Region(
-        (float(center[0]), float(center[1])), side, math.atan2(float(up[0]), -float(up[1]))
-    )
+    return Region((x, y), side, rotation_towards(up))
 
 
 def facing(world_landmarks: Float64Array) -> float:
@@ -165,9 +163,9 @@ def region_from_landmarks(landmarks_px: Float64Array) -> Region:
     :param landmarks_px: pixels.
     """
     dx, dy = landmarks_px[_OUTER_EYES[1]] - landmarks_px[_OUTER_EYES[0]]
-    rotation = math.atan2(float(dy), float(dx))
+    rotation = math.atan2(dy, dx)
     (x, y), sides = box_along(landmarks_px, rotation)
-    return Region((float(x), float(y)), _SCALE * float(sides.max()), rotation)
+    return Region((x, y), _SCALE * float(sides.max()), rotation)
 
 
 class ExpressionNetwork:

@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Float64Array, Uint8Array
 from .landmark_network import KEYPOINT_NAMES, disagreement
 from .person_detector import decode, make_anchors, merge_overlapping
-from .region import Region, box_along
+from .region import Region, box_along, rotation_towards
 from .sessions import Execution, network_path, open_session
 
 INPUT_SIZE = 224
@@ -157,11 +157,7 @@ def _in_image(values: Float64Array, square: Region) -> Region:
     unit = values / PALM_INPUT_SIZE
     in_square = region_from_palm(unit[:4], unit[4:].reshape(-1, 2))
     x, y = square.image_from_crop(np.array(in_square.center_px))
-    return Region(
-        (float(x), float(y)),
-        in_square.side_px * square.side_px,
-        in_square.rotation + square.rotation,
-    )
+    return Region((x, y), in_square.side_px * square.side_px, in_square.rotation + square.rotation)
 
 
 def pixels_per_metre(keypoints_px: Float64Array, world_landmarks: Float64Array) -> float:
@@ -202,8 +198,8 @@ def region_from_body(keypoints_px: Float64Array, scale: float, side: int) -> Reg
     reach *= min(1.0, longest / max(float(np.linalg.norm(reach)), 1e-9))
     forearm = wrist - elbow
     up = reach / max(0.5 * length, 1e-9) + 0.5 * forearm / max(float(np.linalg.norm(forearm)), 1e-9)
-    center = wrist + reach * (_MIDDLE / 0.5)
-    return Region((float(center[0]), float(center[1])), _BODY_SCALE * length, _rotation(up))
+    x, y = wrist + reach * (_MIDDLE / 0.5)
+    return Region((x, y), _BODY_SCALE * length, rotation_towards(up))
 
 
 def region_from_palm(box_px: Float64Array, points_px: Float64Array) -> Region:
@@ -215,7 +211,8 @@ def region_from_palm(box_px: Float64Array, points_px: Float64Array) -> Region:
     """
     size = float(max(box_px[2] - box_px[0], box_px[3] - box_px[1]))
     up = points_px[2] - points_px[0]
-    return _shifted((box_px[:2] + box_px[2:]) / 2, size, _rotation(up), _PALM_SCALE, _PALM_SHIFT)
+    center = (box_px[:2] + box_px[2:]) / 2
+    return _shifted(center, size, rotation_towards(up), _PALM_SCALE, _PALM_SHIFT)
 
 
 def region_from_landmarks(keypoints_px: Float64Array) -> Region:
@@ -226,7 +223,7 @@ def region_from_landmarks(keypoints_px: Float64Array) -> Region:
     moving fingers do not move the region.
     """
     up = 0.25 * (keypoints_px[5] + keypoints_px[13]) + 0.5 * keypoints_px[9] - keypoints_px[0]
-    rotation = _rotation(up)
+    rotation = rotation_towards(up)
     center, sides = box_along(keypoints_px[_RIGID], rotation)
     return _shifted(center, float(sides.max()), rotation, _TRACK_SCALE, _TRACK_SHIFT)
 
@@ -237,9 +234,4 @@ def _shifted(
     """Build a region ``scale`` times ``size``, shifted up (in its own axes) by ``shift`` sizes."""
     up = np.array([math.sin(rotation), -math.cos(rotation)])
     x, y = center + shift * size * up
-    return Region((float(x), float(y)), scale * size, rotation)
-
-
-def _rotation(up: Float64Array) -> float:
-    """Calculate the rotation of a region in which the image direction ``up`` (2,) points up."""
-    return math.atan2(float(up[0]), -float(up[1]))
+    return Region((x, y), scale * size, rotation)

@@ -161,7 +161,7 @@ class Region:
     def moved(self, motion_px: FloatArray) -> Region:
         """Return the square moved by (2,) pixels."""
         x, y = np.asarray(self.center_px) + motion_px
-        return replace(self, center_px=(float(x), float(y)))
+        return replace(self, center_px=(x, y))
 
     def is_near(self, other: Region) -> bool:
         """Check if a person in one may occlude one in the other: centres within three quarters of a
@@ -216,15 +216,20 @@ def region_from_points(center_px: Float64Array, top_px: Float64Array) -> Region:
     """Calculate the region of a person, centred on the hips, with ``top_px`` straight above in the
     crop.
 
-    side = 2 · |top − center| · 1.25; the rotation makes center → top point up: atan2(dx, −dy).
+    side = 2 · |top − center| · 1.25; the rotation makes center → top point up.
 
     :param center_px: (2,) hip centre, pixels.
     :param top_px: (2,) on the circle around the hips that encloses the whole person (MediaPipe's
         second detection point and auxiliary landmark).
     """
-    dx, dy = (np.asarray(top_px, float) - np.asarray(center_px, float)).tolist()
-    side = 2.0 * MARGIN * math.hypot(dx, dy)
-    return Region((float(center_px[0]), float(center_px[1])), side, math.atan2(dx, -dy))
+    x, y = center_px
+    up = top_px - center_px
+    return Region((x, y), 2.0 * MARGIN * math.hypot(*up), rotation_towards(up))
+
+
+def rotation_towards(up: FloatArray) -> float:
+    """Calculate the rotation of a region in which the image direction ``up`` (2,) points up."""
+    return math.atan2(up[0], -up[1])
 
 
 def box_along(points: FloatArray, rotation: float) -> tuple[FloatArray, FloatArray]:

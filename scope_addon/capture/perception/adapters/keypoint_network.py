@@ -33,7 +33,7 @@ import numpy as np
 from .....solver.errors import ModelFileError
 from ....arrays import BoolArray, Float64Array, Uint8Array
 from ..landmark_network import HIPS, KEYPOINT_NAMES, LEGS, SHOULDERS, TRUNK, PoseEstimate
-from ..region import Region, box_along
+from ..region import Region, box_along, rotation_towards
 from ..sessions import Execution
 from .description import (
     COCO_17,
@@ -217,13 +217,12 @@ class KeypointNetwork:
         if seen.sum() < MIN_KEYPOINTS:
             return region
         trunk = points[SHOULDERS].mean(axis=0) - points[HIPS].mean(axis=0)
-        upright = math.atan2(float(trunk[0]), float(-trunk[1]))
-        rotation = upright if seen[TRUNK].all() else region.rotation
+        rotation = rotation_towards(trunk) if seen[TRUNK].all() else region.rotation
         (x, y), sides = box_along(points[seen], rotation)
         shape = np.array([self._graph.width, self._graph.height]) / self._side
         around = MARGIN * float((sides / shape).max())
         side = max(around, MAX_SHRINK * region.side_px, MIN_STATURE * _stature(points, seen))
-        return Region((float(x), float(y)), side, rotation)
+        return Region((x, y), side, rotation)
 
 
 def _stature(points: Float64Array, seen: BoolArray) -> float:
