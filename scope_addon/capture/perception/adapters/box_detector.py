@@ -113,9 +113,7 @@ def _yolox(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
 
 
 def cells(width: int, height: int) -> Float64Array:
-    """List column, row and side in pixels (N, 3) of every cell of YOLOX, in the order of the
-    output's rows.
-    """
+    """List column, row and side in pixels (N, 3) of every cell in the order of the rows."""
     grids = []
     for side in _CELL_SIDES:
         row, column = np.meshgrid(
@@ -133,9 +131,7 @@ def cells(width: int, height: int) -> Float64Array:
 
 def _is_yolov8(graph: Graph) -> bool:
     numbers, boxes = _table_of(graph)
-    return numbers >= 5 and boxes == sum(
-        (graph.width // s) * (graph.height // s) for s in _CELL_SIDES
-    )
+    return numbers >= 5 and boxes == len(cells(graph.width, graph.height))
 
 
 def _yolov8(outputs: Outputs, graph: Graph, description: Description) -> Boxes:
