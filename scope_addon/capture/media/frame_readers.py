@@ -32,13 +32,10 @@ if TYPE_CHECKING:
 
 # Formats that footage comes in. Others may name further files, or devices.
 _FORMATS = (
-    "mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf",
-    "gif", "apng", "mjpeg",
-    "h264", "hevc", "m4v", "av1", "obu", "ivf", "yuv4mpegpipe", "dv", "wtv", "nut", "gxf", "rm",
-    "webp_pipe", "nsv",
-    "jpeg_pipe", "vc1", "dnxhd", "h263", "h261", "vvc",
-)  # fmt: skip
-_ONLY = {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
+    "mov,matroska,webm,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,mxf,gif,apng,mjpeg,h264,hevc,m4v,av1,"
+    "obu,ivf,yuv4mpegpipe,dv,wtv,nut,gxf,rm,webp_pipe,nsv,jpeg_pipe,vc1,dnxhd,h263,h261,vvc"
+)
+_ONLY = {"protocol_whitelist": "file", "format_whitelist": _FORMATS}
 _MIN_SEEK_S = 20.0  # start from which seeking is tried
 # Where Android's phones write at how many frames per second they recorded.
 _RECORDED_RATE = "com.android.capture.fps"
@@ -422,21 +419,26 @@ def _frames_before(path: Path, pts: int, interlaced_fps: Fraction | None) -> int
     :param pts: the time in units of the stream.
     :param interlaced_fps: see `_frame_times`.
     """
+    times_s: list[float] = []
+    for packet in _packets(path):
+        if packet.dts is not None and packet.dts >= pts:
+            break
+        first = packet.stream.start_time or 0
+        if packet.pts is not None and first <= packet.pts < pts:
+            times_s.append(packet.pts * float(packet.time_base or 0))
+    return len(_frame_times(times_s, interlaced_fps))
+
+
+def _packets(path: Path) -> Iterator[av.Packet[av.VideoStream]]:
+    """Iterate over the packets of the film in a file, which are not decoded, up to a damaged one;
+    none if it cannot be read.
+
+    :raises VideoError: PyAV is not installed, or there is no film in the file.
+    """
     failure, container = open_with_pyav(path)
-    if container is None:
-        return 0
-    times: list[int] = []
-    base = 0.0
-    with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
-        stream = film_of(path, container)
-        first = stream.start_time or 0
-        base = float(stream.time_base or 0)
-        for packet in container.demux(stream):
-            if packet.dts is not None and packet.dts >= pts:
-                break
-            if packet.pts is not None and first <= packet.pts < pts:
-                times.append(packet.pts)
-    return len(_frame_times(np.multiply(times, base), interlaced_fps))
+    if container is not None:
+        with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
+            yield from container.demux(film_of(path, container))
 
 
 def _frame_times(times_s: ArrayLike, interlaced_fps: Fraction | None) -> Float64Array:
@@ -494,16 +496,12 @@ def packet_rates(
     :param may_have_field_packets: see `PyavReader`.
     :raises VideoError: PyAV is not installed, or there is no video in the file.
     """
-    failure, container = open_with_pyav(path)
-    if container is None:
-        return stated_fps, stated_fps
     times_s: list[float] = []
-    with container, suppress(failure, OSError, ValueError, EOFError, IndexError):
-        for packet in container.demux(film_of(path, container)):
-            if packet.pts is not None and packet.time_base:
-                times_s.append(float(packet.pts * packet.time_base))
-            if len(times_s) == _TIMED_PACKETS:
-                break
+    for packet in _packets(path):
+        if packet.pts is not None and packet.time_base:
+            times_s.append(float(packet.pts * packet.time_base))
+        if len(times_s) == _TIMED_PACKETS:
+            break
     steps_s = np.diff(_frame_times(times_s, stated_fps if may_have_field_packets else None))
     steps_s = steps_s[steps_s > 1e-4]
     if not len(steps_s):
