@@ -304,7 +304,7 @@ class PeopleTracker:
             estimate is not None
             and estimate.presence >= _MIN_HIDDEN_PRESENCE
             and target.innovation(estimate) <= _MAX_HIDDEN_INNOVATION
-            and not any(is_same_body(estimate, f.estimate) for f in kept)
+            and not _is_tracked(estimate, kept)
         )
         return estimate if is_seen else None
 
@@ -326,9 +326,7 @@ class PeopleTracker:
         regions = self._given
         self._given = []
         for estimate in self._estimator.estimate(image_rgb, regions) if regions else ():
-            if estimate is not None and not any(
-                is_same_body(estimate, f.estimate) for f in self._live
-            ):
+            if estimate is not None and not _is_tracked(estimate, self._live):
                 self._live.append(self._start(estimate))
 
     def _novelty(self, target: TrackedTarget) -> float:
@@ -500,15 +498,21 @@ class PeopleTracker:
             is_same = region.resembles(tracked, _SAME_TARGET) and region.difference(tracked) <= lost
             if is_same and not detection.is_beside(_detection_of(f.estimate)):
                 return False
-        largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
-        return not self._largest_only or region.side_px >= RIVAL_SIDE * largest
+        return self._is_rival(region)
+
+    def _is_rival(self, region: Region) -> bool:
+        """Return whether whoever is in a region may become the most prominent one, if only that one
+        is wanted.
+        """
+        largest_px = max((f.estimate.region.side_px for f in self._live), default=0.0)
+        return not self._largest_only or region.side_px >= RIVAL_SIDE * largest_px
 
     def _add(self, body: _DetectedBody) -> None:
         """Start a tracklet, unless the body is tracked already or enough people of at least its
         size are.
         """
         estimate = body.estimate
-        if any(is_same_body(estimate, f.estimate) for f in self._live):
+        if _is_tracked(estimate, self._live):
             return
         if any(f.is_occluded_by(estimate) for f in self._lost):
             return
@@ -521,8 +525,7 @@ class PeopleTracker:
         )
         if not body.is_sure and any(share > MAX_SHARE_WITHIN for share in overlaps):
             return
-        largest = max((f.estimate.region.side_px for f in self._live), default=0.0)
-        if self._largest_only and estimate.region.side_px < RIVAL_SIDE * largest:
+        if not self._is_rival(estimate.region):
             return
         if len(self._live) >= self._max_live:
             smallest = min(self._live, key=lambda f: f.estimate.region.side_px)
@@ -600,6 +603,11 @@ class PeopleTracker:
         )
 
 
+def _is_tracked(estimate: PoseEstimate, live: Sequence[TrackedTarget]) -> bool:
+    """Return whether a body is that of somebody who is tracked."""
+    return any(is_same_body(estimate, target.estimate) for target in live)
+
+
 def _shoulders_off(detection: Detection, estimate: PoseEstimate) -> float:
     """Return how far a body's shoulders are from the detected ones, in sides of the region."""
     off_px = math.dist(detection.points_px[2], estimate.keypoints_px[SHOULDERS].mean(axis=0))
@@ -645,16 +653,13 @@ def redetect_rotated(
     ]
     regions = [region for region in candidates if is_in_image(region, image_rgb)]
     found = [
-        e for e in landmarks.estimate(image_rgb, regions) if e.presence >= _MIN_REDETECTION_PRESENCE
+        e
+        for e in landmarks.estimate(image_rgb, regions)
+        if e.presence >= _MIN_REDETECTION_PRESENCE
+        and e.spread >= CURLED_SPREAD
+        and e.disagreement <= DISAGREEMENT_THRESHOLD
+        and is_center_in_image(e, image_rgb)
+        and not _is_tracked(e, live)
+        and lost.innovation(e) <= _MAX_REDETECTION_INNOVATION
     ]
-    found = [
-        e for e in found if e.spread >= CURLED_SPREAD and e.disagreement <= DISAGREEMENT_THRESHOLD
-    ]
-    found = [e for e in found if is_center_in_image(e, image_rgb)]
-    found = [e for e in found if not any(is_same_body(e, target.estimate) for target in live)]
-    nearest = min(found, key=lost.innovation, default=None)
-    return (
-        nearest
-        if nearest is not None and lost.innovation(nearest) <= _MAX_REDETECTION_INNOVATION
-        else None
-    )
+    return min(found, key=lost.innovation, default=None)
