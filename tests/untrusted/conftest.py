@@ -16,22 +16,12 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scope.solver.body_file import load_body
+from scope.solver.names import BODY_PARENTS
 
-# Rest joints of a person of 1.7 m in T-pose, the pelvis at the origin: SMPL's 22 body joints.
-BODY = np.array(
-    [
-        (0, 0, 0), (0.07, -0.09, 0), (-0.07, -0.09, 0), (0, 0.11, -0.02), (0.1, -0.47, 0),
-        (-0.1, -0.47, 0),
-        (0, 0.25, 0), (0.09, -0.87, -0.03), (-0.09, -0.87, -0.03), (0, 0.3, 0.02),
-        (0.12, -0.92, 0.09),
-        (-0.12, -0.92, 0.09), (0, 0.51, -0.02), (0.08, 0.42, -0.01), (-0.08, 0.42, -0.01),
-        (0, 0.58, 0.02),
-        (0.19, 0.45, -0.03), (-0.19, 0.45, -0.03), (0.45, 0.44, -0.05), (-0.45, 0.44, -0.05),
-        (0.7, 0.44, -0.05),
-        (-0.7, 0.44, -0.05),
-    ]
-)  # fmt: skip
-BODY_PARENTS = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
+# Rest joints of a person in T-pose, the pelvis at the origin: SMPL's 22 body joints.
+BODY = load_body("scope").rest_joints()[: len(BODY_PARENTS)]
+BODY = BODY - BODY[0]
 
 
 def _fingers(first: int) -> tuple[list[tuple[float, float, float]], list[int]]:
@@ -57,7 +47,7 @@ def skeleton(family: str) -> tuple[np.ndarray, list[int]]:
         ]
     if family == "smplh":
         joints, parents = _fingers(22)
-        return np.vstack([BODY, joints]), BODY_PARENTS + parents
+        return np.vstack([BODY, joints]), [*BODY_PARENTS, *parents]
     if family == "smplx":
         joints, parents = _fingers(25)
         face = [(0, 0.6, 0.06), (0.03, 0.65, 0.1), (-0.03, 0.65, 0.1)]
