@@ -8,32 +8,11 @@ from scope.benchmarks.evaluation.files import DatasetError
 from scope.benchmarks.evaluation.models import Models
 from scope.benchmarks.evaluation.readers.mpi_inf_3dhp import clips
 
-from ..made_data import K, write_3dhp
+from ..made_data import write_3dhp
 
 JOINTS = np.random.default_rng(0).normal(scale=500, size=(4, 17, 3)) + [0, 0, 4000]
 VALID = np.array([1, 0, 1, 1])
 FILE = "mpi_inf_3dhp_test_set/TS3/annot_data.mat"
-
-
-def test_valid_frames_of_the_universal_joints_in_metres(tmp_path):
-    write_3dhp(tmp_path, JOINTS, VALID)
-    for root in (tmp_path, tmp_path / "mpi_inf_3dhp_test_set"):
-        found = clips(root, Models())
-        assert [clip.name for clip in found] == ["TS1", "TS2", "TS3", "TS4", "TS5", "TS6"]
-        truth = found[2].truth()
-        (person,) = truth.people
-        assert person.rows.tolist() == [0, 2, 3]
-        # The data set's order of joints: head top, neck, right arm, left arm, right leg, left leg,
-        # pelvis, …
-        for name, number in {
-            "head_top": 0,
-            "right_wrist": 4,
-            "left_shoulder": 5,
-            "left_ankle": 13,
-            "pelvis": 14,
-        }.items():
-            assert np.allclose(person.camera.joints([name])[1, 0], 0.9 * JOINTS[2, number] / 1000)
-        assert np.allclose(truth.intrinsics, K)  # from the joints of true size
 
 
 def test_an_array_that_claims_more_than_memory_is_not_read(tmp_path):

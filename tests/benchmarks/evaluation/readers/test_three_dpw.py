@@ -6,13 +6,13 @@ import pickle
 import numpy as np
 import pytest
 from scope.benchmarks.evaluation.files import DatasetError
-from scope.benchmarks.evaluation.joint_sets import LSP14, REGRESSED17, SMPL24
+from scope.benchmarks.evaluation.joint_sets import LSP14, REGRESSED17
 from scope.benchmarks.evaluation.models import Models
 from scope.benchmarks.evaluation.readers.three_dpw import clips
 from scope.solver.rotations import exp
 
 from ....untrusted.conftest import make_tables, smpl_formula
-from ..made_data import K, rigid, table_3dpw, write_3dpw, write_models, write_regressor
+from ..made_data import rigid, table_3dpw, write_3dpw, write_models, write_regressor
 
 COUNT = 5
 
@@ -24,28 +24,6 @@ def table():
     table = table_3dpw("downtown_arguing_00", joints, rigid(COUNT))
     table["campose_valid"][1][2:4] = False
     return table
-
-
-def test_joints_are_in_the_camera_of_their_frames(tmp_path, table):
-    write_3dpw(tmp_path, table)
-    (clip,) = clips(tmp_path, Models())
-    assert (clip.name, clip.protocols, clip.rate, len(clip.pictures)) == (
-        "downtown_arguing_00",
-        ("3dpw",),
-        30,
-        COUNT,
-    )
-    assert not clip.alone
-    truth = clip.truth()
-    assert np.allclose(truth.intrinsics, K)
-    first, second = truth.people
-    assert first.rows.tolist() == [0, 1, 2, 3, 4]
-    assert second.rows.tolist() == [0, 1, 4]
-    wrist = SMPL24.index("left_wrist")
-    for row, frame in enumerate(second.rows):
-        T = table["cam_poses"][frame]
-        expected = T @ np.append(table["jointPositions"][1][frame].reshape(24, 3)[wrist], 1)
-        assert np.allclose(second.camera.joints(["left_wrist"])[row, 0], expected[:3])
 
 
 def test_with_smpl_and_a_regressor_joints_are_those_of_the_mesh(tmp_path, table):
