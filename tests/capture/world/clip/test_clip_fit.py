@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.benchmarks.ablation import ROWS, replaced
 from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
 from scope.scope_addon.capture.world import clip_fit
@@ -33,12 +32,34 @@ from .waving_person import (
     fit,
     joints,
     keypoints,
+    moving_path,
     person,
     prepare,
 )
 
 
-@pytest.mark.parametrize("flipped", [1, 4, 8])
+def stance_of(true, resting=(0.0,) * 6):
+    """Somebody upright far above the floor, whose contact points rest with these probabilities."""
+    T = len(true.t_camera_root)
+    return Stance(
+        true.t_camera_root,
+        np.tile(np.eye(3), (T, 1, 1)),
+        np.tile([0.0, -1.0, 0.0], (T, 1)),
+        np.full(T, -5.0),
+        np.zeros((T, 6)),
+        np.tile(resting, (T, 1)),
+    )
+
+
+LEFT_FOOT = (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def shaken(track, deviation_px, seed):
+    noise = np.random.default_rng(seed).normal(0.0, deviation_px, track.keypoints_px.shape)
+    return replace(track, keypoints_px=track.keypoints_px + noise)
+
+
+@pytest.mark.parametrize("flipped", [1, 8])
 def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_it_was(flipped):
     """The image shows a leg bent towards the camera as one bent away; the lifter is half as sure
     where it is wrong.
@@ -64,16 +85,13 @@ def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_i
 
 
 def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
-    track, true = person(48)
-    rng = np.random.default_rng(0)
-    noisy = replace(
-        track, keypoints_px=track.keypoints_px + rng.normal(0.0, 4.0, track.keypoints_px.shape)
-    )
+    track, true = person(32)
+    rng = np.random.default_rng(1)
     lifted = track.world_landmarks + rng.normal(0.0, 0.03, track.world_landmarks.shape)
-    prepared = prepare(noisy, lifted)
+    prepared = prepare(shaken(track, 4.0, seed=0), lifted)
     together = fit(prepared, true)
-    some = range(0, 48, 4)
-    alone = [fit(prepared, replace(true, valid=np.arange(48) == k)) for k in some]
+    some = range(2, 32, 4)
+    alone = [fit(prepared, replace(true, valid=np.arange(32) == k)) for k in some]
     wrist = BODY.joint_names.index("left_wrist")
     truth = joints(true)
     one_by_one = np.array([joints(each)[k] for k, each in zip(some, alone, strict=True)])
@@ -97,66 +115,33 @@ def test_a_limb_that_nothing_shows_has_larger_deviations_than_its_twin():
     assert (left[:6] < 1.5 * right[:6]).all()
 
 
-def test_windows_agree_on_the_deviations(monkeypatch):
-    track, true = person(40)
-    whole = fit(prepare(track), true).joint_sigma_m
-    monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 24 * 3 * (BODY.K + 2))
-    monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
-    np.testing.assert_allclose(fit(prepare(track), true).joint_sigma_m[4:-4], whole[4:-4], rtol=0.3)
-
-
 def test_soles_that_rest_stay_in_place():
     track, true = person()
-    rng = np.random.default_rng(1)
-    shaken = replace(
-        track, keypoints_px=track.keypoints_px + rng.normal(0.0, 6.0, track.keypoints_px.shape)
-    )
-    stance = Stance(
-        true.t_camera_root,
-        np.tile(np.eye(3), (FRAMES, 1, 1)),
-        np.tile([0.0, -1.0, 0.0], (FRAMES, 1)),
-        np.full(FRAMES, -5.0),
-        np.zeros((FRAMES, 6)),
-        np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (FRAMES, 1)),
-    )
+    unsteady = prepare(shaken(track, 6.0, seed=1))
     slides = []
-    for resting in (np.zeros((FRAMES, 6)), stance.resting):
-        prepared = prepare(shaken).with_stance(replace(stance, resting=resting), true.betas)
+    for stance in (stance_of(true), stance_of(true, LEFT_FOOT)):
+        prepared = unsteady.with_stance(stance, true.betas)
         soles = place_track(BODY, track, fit(prepared, true), smoothing=False).soles[:, :2]
         slides.append(np.linalg.norm(np.diff(soles, axis=0), axis=-1).mean())
     assert slides[0] > 5e-4
     assert slides[1] < 0.2 * slides[0]
 
 
-@pytest.mark.parametrize("moves", [False, True])
-def test_soles_that_rest_do_not_drift(moves):
-    angle = 0.1 * np.sin(np.arange(60) / 5.0) * moves
-    path = CameraPath(
-        exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(60), [0.02, 0.0, 0.01]) * moves
-    )
+def test_soles_that_rest_do_not_drift():
+    path = moving_path(60)
     track, first = person(60, path)
     true = path.to_frames(first)
     track.keypoints_px[..., 0] += np.linspace(-4.0, 4.0, 60)[:, None]  # 2 cm at 4 m
-    stance = Stance(
-        true.t_camera_root,
-        np.tile(np.eye(3), (60, 1, 1)),
-        np.tile([0.0, -1.0, 0.0], (60, 1)),
-        np.full(60, -5.0),
-        np.zeros((60, 6)),
-        np.tile([1.0, 1.0, 0.0, 0.0, 0.0, 0.0], (60, 1)),
-    )
-    found = fit(prepare(track).with_stance(stance, true.betas), true, path)
+    prepared = prepare(track).with_stance(stance_of(true, LEFT_FOOT), true.betas)
+    found = fit(prepared, true, path)
     soles = place_track(BODY, track, found, smoothing=False, path=path).soles[:, :2]
     assert np.linalg.norm(soles[-1] - soles[0], axis=-1).max() < 0.004
 
 
 def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
-    angle = 0.1 * np.sin(np.arange(FRAMES) / 5.0)
-    path = CameraPath(
-        exp(angle[:, None] * [0.0, 1.0, 0.0]), np.outer(np.arange(FRAMES), [0.02, 0.0, 0.01])
-    )
-    (still, true) = person()
-    (moved, _) = person(path=path)
+    path = moving_path()
+    still, true = person()
+    moved, _ = person(path=path)
     static = fit(prepare(still), true)
     start = path.to_frames(true)
     assert np.abs(start.t_camera_root - true.t_camera_root).max() > 0.2
@@ -169,20 +154,17 @@ def test_a_moving_camera_gives_the_same_motion_as_a_static_one():
 
 
 def test_windows_agree_with_the_whole_and_join_smoothly(monkeypatch):
-    track, true = person(90)
-    rng = np.random.default_rng(2)
-    prepared = prepare(
-        replace(track, keypoints_px=track.keypoints_px + rng.normal(0.0, 3.0, (90, JOINTS, 2)))
-    )
-    whole = joints(fit(prepared, true))
-    monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 40 * 3 * (BODY.K + 2))
+    track, true = person(60)
+    prepared = prepare(shaken(track, 3.0, seed=2))
+    whole = fit(prepared, true)
+    monkeypatch.setattr(clip_fit, "WINDOW_UNKNOWNS", 34 * 3 * (BODY.K + 2))
     monkeypatch.setattr(clip_fit, "OVERLAP", 8 * 3 * (BODY.K + 2))
-    parts = joints(fit(prepared, true))
-    assert (
-        np.linalg.norm(parts - whole, axis=-1).max() < 0.008
-    )  # metres; the whole itself is only that near to its minimum
-    jerk = [np.abs(np.diff(J, n=3, axis=0)).max() for J in (whole, parts)]
+    parts = fit(prepared, true)
+    off_m = np.linalg.norm(joints(parts) - joints(whole), axis=-1)
+    assert off_m.max() < 0.008  # the whole itself is only that near to its minimum
+    jerk = [np.abs(np.diff(joints(each), n=3, axis=0)).max() for each in (whole, parts)]
     assert jerk[1] < 1.5 * jerk[0]
+    np.testing.assert_allclose(parts.joint_sigma_m[4:-4], whole.joint_sigma_m[4:-4], rtol=0.35)
 
 
 def test_windows_cover_all_frames_and_overlap():
@@ -212,12 +194,15 @@ def test_longer_gaps_separate_what_is_fitted_together():
     assert len(slow) == 4
 
 
-def test_frames_that_were_not_seen_stay_as_they_are():
+def test_frames_that_were_not_seen_and_the_states_to_start_from_stay_as_they_are():
     track, true = person()
     start = replace(true, valid=np.arange(FRAMES) < 12)
+    before = start.rotations.copy(), start.t_camera_root.copy()
     found = fit(prepare(track), start)
     np.testing.assert_array_equal(found.rotations[12:], start.rotations[12:])
     np.testing.assert_array_equal(found.valid, start.valid)
+    np.testing.assert_array_equal(start.rotations, before[0])
+    np.testing.assert_array_equal(start.t_camera_root, before[1])
 
 
 def test_acceleration_weighs_more_the_more_frames_there_are():
@@ -236,23 +221,9 @@ def test_the_second_fit_lets_go_of_what_is_three_times_as_fast_as_usual():
     spine, knee = (BODY.joint_names.index(name) - 1 for name in ("spine2", "left_knee"))
     for prior in (first, second):  # a knee accelerates more than a spine
         assert np.asarray(prior.joints)[spine] > 5 * np.asarray(prior.joints)[knee]
-    sigmas = np.asarray(second.robust_joints)
-    legs = np.array([name.endswith(("hip", "knee", "ankle")) for name in BODY.joint_names[1:]])
-    # legs may accelerate more for the same weight
-    lifted = np.asarray(second.joints) * np.where(legs, 2.0, 1.0)
-    np.testing.assert_allclose(lifted * sigmas, lifted[0] * sigmas[0])
 
 
-def test_the_states_to_start_from_stay_as_they_are():
-    track, true = person()
-    before = true.rotations.copy(), true.t_camera_root.copy()
-    clip_fit.fit_clip(prepare(track), true, CameraPath.static(FRAMES), lambda *_: None)
-    np.testing.assert_array_equal(true.rotations, before[0])
-    np.testing.assert_array_equal(true.t_camera_root, before[1])
-
-
-@pytest.mark.parametrize("left_out", [False, True])
-def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
+def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it():
     """The image does not show the left arm, and the lifting network has it hanging through the
     hips.
     """
@@ -263,28 +234,16 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it(left_out):
     track.confidence[:, ARM] = 0.0
     points = keypoints(start.rotations, start.t_camera_root)
     inside = points - points[:, HIPS].mean(axis=1, keepdims=True)
-    up = np.tile([0.0, -1.0, 0.0], (FRAMES, 1))
-    nothing = np.zeros((FRAMES, 6))
-    stance = Stance(
-        true.t_camera_root,
-        np.tile(np.eye(3), (FRAMES, 1, 1)),
-        up,
-        np.full(FRAMES, -5.0),
-        nothing,
-        nothing,
-    )
-    prepared = prepare(track, inside).with_stance(stance, true.betas)
-    with replaced(ROWS["without the body's own surface"]["replacements"] if left_out else ()):
-        found = fit(prepared, start)
     surface = BodySurface(with_arm_points(BODY), np.zeros(BODY.P))
-    R, t = BODY.forward_kinematics(
-        found.rotations, found.t_camera_root - BODY.rest_joints()[0], np.zeros(BODY.P)
-    )
-    lowest = surface.planes(R, t).height.min(axis=1)
-    if left_out:
-        assert lowest.max() < -0.03
-    else:
-        assert lowest.min() > -0.015
+
+    def lowest(states):
+        root = states.t_camera_root - BODY.rest_joints()[0]
+        poses = BODY.forward_kinematics(states.rotations, root)
+        return surface.planes(*poses).height.min(axis=1)
+
+    assert lowest(start).max() < -0.03
+    found = fit(prepare(track, inside).with_stance(stance_of(true), true.betas), start)
+    assert lowest(found).min() > -0.015
 
 
 def _covariances(sights, along_m, across_m):

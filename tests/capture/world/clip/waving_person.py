@@ -61,6 +61,13 @@ def person(frames: int = FRAMES, path: CameraPath | None = None) -> tuple[Track,
     return track, FittedTrack(rotations, root, np.zeros(BODY.P), np.ones(frames, bool), seen, 1.0)
 
 
+def moving_path(frames: int = FRAMES) -> CameraPath:
+    """The path of a camera that turns to and fro while it travels."""
+    angle = 0.1 * np.sin(np.arange(frames) / 5.0)
+    center = np.outer(np.arange(frames), [0.02, 0.0, 0.01])
+    return CameraPath(exp(angle[:, None] * [0.0, 1.0, 0.0]), center)
+
+
 def keypoints(rotations: np.ndarray, root: np.ndarray) -> np.ndarray:
     """The network's keypoints (T, J, 3) of states, in their axes."""
     R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
