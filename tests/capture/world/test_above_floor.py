@@ -6,14 +6,12 @@ skinning.
 import numpy as np
 import pytest
 from scope.scope_addon.capture.world.above_floor import raise_body
-from scope.scope_addon.capture.world.placement import PlacedTrack
-from scope.scope_addon.kinematics import standing
 from scope.scope_addon.kinematics.axes import transform_points
-from scope.scope_addon.kinematics.contact_points import contact_point_positions
 from scope.scope_addon.kinematics.leg_reach import ARMS, move_ends
 from scope.solver import rotations
 
 from ...kinematics.posed_people import plank_person, stepping_person
+from .placed_people import placed_track
 
 
 @pytest.fixture(scope="module")
@@ -21,31 +19,22 @@ def step():
     return stepping_person()
 
 
-def raised(person, omega, root, visible=1.0):
+def raised(person, omega, root):
     """The given motion as a track, and the result."""
-    supported, _, _, _, T_world_camera, times = person
+    supported, T_world_camera = person[0], person[4]
     R, t = supported.forward_kinematics(omega, root - supported.rest_joints()[0])
-    points = contact_point_positions(supported, R, t)
-    seen = np.full((len(root), 6), visible)
-    betas = np.zeros(supported.P)
-    valid = np.ones(len(root), bool)
-    placed = PlacedTrack(
-        supported, betas, times, valid, omega, root, t, points, seen, np.zeros((len(root), 3))
-    )
-    contact = (
-        standing.resting_probability(points, T_world_camera[2, :3], times, np.zeros(3)) * visible
-    )
-    return placed, raise_body(placed, contact, T_world_camera)
+    placed = placed_track(supported, R, t, omega)
+    return placed, raise_body(placed, placed.contact(T_world_camera[2, :3]), T_world_camera)
 
 
 def skin_heights(person, omega, root):
-    """(T, V) heights of every vertex above the floor."""
+    """(T / 3, V) heights of every vertex above the floor, in every third frame."""
     supported, _, _, _, T_world_camera, _ = person
     pelvis_at_rest = supported.rest_joints()[0]
     up = T_world_camera[2, :3]
     poses = [
         supported.forward_kinematics(o, r - pelvis_at_rest)
-        for o, r in zip(omega, root, strict=True)
+        for o, r in zip(omega[::3], root[::3], strict=True)
     ]
     return np.stack([supported.skin(*pose) @ up for pose in poses]) + T_world_camera[2, 3]
 

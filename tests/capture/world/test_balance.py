@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.world.balance import balancing_rotations, center_of_mass
-from scope.scope_addon.capture.world.placement import PlacedTrack
-from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import load_body, rotations
 
-UP = np.array([0.0, -1.0, 0.0])  # camera axes, level camera
+from .placed_people import UP, first_frame, placed_track
+
 AWAY = np.array([0.0, 0.0, 1.0])
 T = 60
 TIMES = np.arange(T) / 30
@@ -25,7 +24,6 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
     hips, knees and so on, degrees about the joint's x axis.
     """
     body = load_body("scope")
-    supported = with_contact_points(body, np.zeros(body.P))
     omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
     for side, sign in (("left", -1), ("right", 1)):
         omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp(
@@ -38,26 +36,10 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
     upright = rotations.exp([np.pi, 0.0, 0.0])  # model y up to camera y down
     lean = rotations.exp(np.radians(lean_deg) * np.array(axis))
     omega[:, 0] = lean @ upright
-    J0 = body.rest_joints()[0]
-
-    def place(root):
-        R, t = body.forward_kinematics(omega, root - J0)
-        return t, contact_point_positions(supported, R, t)
-
-    root = np.zeros((T, 3))
-    joints, contact_points = place(root)
-    root += (
-        np.array([0, 1.0, 4.0])
-        - contact_points[:, :4].mean(axis=(0, 1))
-        + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
-    )
-    joints, contact_points = place(root)
-    seen = np.ones((T, 6))
-    center = np.zeros((T, 3))
-    every = np.ones(T, bool)
-    return PlacedTrack(
-        supported, np.zeros(body.P), TIMES, every, omega, root, joints, contact_points, seen, center
-    )
+    R, joints = body.forward_kinematics(omega, np.zeros((T, 3)))
+    feet = placed_track(body, R, joints).soles.mean(axis=(0, 1))
+    root = [0, 1.0, 4.0] - feet + speed_m_s * TIMES[:, None] * [1.0, 0, 0]
+    return placed_track(body, R, joints + root[:, None], omega)
 
 
 def turned_deg(turn):
@@ -186,16 +168,7 @@ def test_a_body_on_hands_and_feet_is_not_rotated():
 
 
 def test_a_still_image_is_balanced_without_accelerations():
-    placed = standing(20.0)
-    one = PlacedTrack(
-        *(
-            getattr(placed, n)
-            if n in ("body", "betas", "uneven_ground", "contradicts")
-            else getattr(placed, n)[:1]
-            for n in placed.__dataclass_fields__
-        )
-    )
-    turn, _ = balancing_rotations(one, FEET[:1], UP)
+    turn, _ = balancing_rotations(first_frame(standing(20.0)), FEET[:1], UP)
     assert turned_deg(turn)[0] < -3.0
 
 

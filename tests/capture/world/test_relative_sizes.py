@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.world.relative_sizes import Stander, relative_sizes, stander
 
-from .test_stance import TRUTH, UP, stands_at
+from .placed_people import TRUTH, UP, stands_at
 
 NOWHERE = float("nan")
 

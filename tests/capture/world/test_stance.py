@@ -8,43 +8,12 @@ import numpy as np
 import pytest
 from scope.benchmarks.ablation import ROWS, replaced
 from scope.scope_addon.capture.world import stance
-from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.capture.world.stance import stance_on_ground
 from scope.scope_addon.kinematics import standing
 from scope.scope_addon.kinematics.axes import world_from_level_camera
-from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
-from scope.solver.body_file import load_body
-from scope.solver.rotations import exp
 
 from ...kinematics.posed_people import stepping_person
-
-UP = np.array([0.0, -1.0, 0.0])  # OpenCV's axes, a level camera
-
-
-TRUTH = np.array([0.3, 1.2, 4.0])  # the pelvis, seen from above
-
-
-def stands_at(root: np.ndarray, T: int = 30) -> PlacedTrack:
-    """The body in rest pose at (3,), in front of a static camera."""
-    body = load_body("scope")
-    supported = with_contact_points(body, np.zeros(body.P))
-    rotations = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
-    rotations[:, 0] = exp([np.pi, 0.0, 0.0])
-    R, joints = supported.forward_kinematics(rotations, np.tile(root, (T, 1)))
-    contact_points = contact_point_positions(supported, R, joints)
-    every = np.ones(T, bool)
-    return PlacedTrack(
-        supported,
-        np.zeros(body.P),
-        np.arange(T) / 30,
-        every,
-        rotations,
-        joints[:, 0],
-        joints,
-        contact_points,
-        np.ones((T, 6)),
-        np.zeros((T, 3)),
-    )
+from .placed_people import TRUTH, UP, stands_at
 
 
 @pytest.mark.parametrize("error_m", [-0.25, 0.0, 0.25])

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Up direction and floor from bodies placed in a known world."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.world.placement import PlacedTrack
 from scope.scope_addon.capture.world.world_frame import (
     _first_contact,
     find_world,
@@ -22,6 +21,8 @@ from scope.scope_addon.kinematics.axes import (
 from scope.scope_addon.kinematics.contact_points import contact_point_positions, with_contact_points
 from scope.solver import rotations
 from scope.solver.body_file import load_body
+
+from .placed_people import first_frame, placed_track
 
 
 def walk(body, T=60, lean_deg=0.0):
@@ -49,24 +50,8 @@ def seen_by(body, R, t, camera_from_world):
     """The motion of part poses in the world as seen by a camera, 30 frames per second, everything
     visible.
     """
-    soled = with_contact_points(body, np.zeros(body.P))
-    T = len(t)
-    joints = transform_points(camera_from_world, t)
     R_camera = camera_from_world[:3, :3] @ R
-    contact_points = contact_point_positions(soled, R_camera, joints)
-    every = np.ones(T, bool)
-    return PlacedTrack(
-        soled,
-        np.zeros(body.P),
-        np.arange(T) / 30,
-        every,
-        R_camera,
-        joints[:, 0],
-        joints,
-        contact_points,
-        np.ones((T, 6)),
-        np.zeros((T, 3)),
-    )
+    return placed_track(body, R_camera, transform_points(camera_from_world, t))
 
 
 @pytest.mark.parametrize("pitch_deg", [-20.0, 0.0, 15.0])
@@ -197,13 +182,7 @@ def test_a_single_moment_does_not_use_the_centre_of_mass():
     R, t = walk(body, T=60, lean_deg=12.0)
     camera_from_world = np.linalg.inv(world_from_level_camera(np.array([0, -1.0, 0]), height=1.6))
     placed = seen_by(body, R, t + np.array([0, 5.0, 0]), camera_from_world)
-    of_clip = ("body", "betas", "uneven_ground", "contradicts")
-    one = PlacedTrack(
-        *(
-            getattr(placed, f.name)[:1] if f.name not in of_clip else getattr(placed, f.name)
-            for f in fields(placed)
-        )
-    )
+    one = first_frame(placed)
     np.testing.assert_allclose(up_from_bodies([one]), up_from_standing([one]), atol=1e-9)
     assert np.abs(up_from_bodies([placed]) - up_from_standing([placed])).max() > 1e-3
 
