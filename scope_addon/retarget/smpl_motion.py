@@ -190,7 +190,7 @@ def smpl_motion(arrays: Mapping[str, NDArray[Any]], path: Path) -> SmplMotion:
     trans = _first(arrays, _TRANS)
     position = None
     if trans is not None:
-        position = _numbers(arrays[trans], trans, path)
+        position = _numbers(arrays[trans], f"{path}: {trans}")
         if position.shape == (count, 1, 3):
             position = position[:, 0]
         if position.shape != (count, 3):
@@ -262,7 +262,7 @@ def _poses(
     root = _first(arrays, _ROOT)
     body = _first(arrays, _BODY)
     if key is not None:
-        poses = _axis_angles(arrays[key], key, path, w_last=_has_w_last(arrays[key]))
+        poses = _axis_angles(arrays[key], f"{path}: {key}", w_last=_has_w_last(arrays[key]))
         skeleton = SKELETONS.get(poses.shape[1])
         if skeleton is None and poses.shape[1] != len(BODY_JOINTS):
             known = ", ".join(f"{3 * n} ({s.name})" for n, s in SKELETONS.items())
@@ -282,7 +282,7 @@ def _poses(
         )
     # The root, which may face any way, and hands follow the body.
     w_last = _has_w_last(arrays[body], arrays[root])
-    parts = [_axis_angles(arrays[name], name, path, w_last=w_last) for name in (root, body)]
+    parts = [_axis_angles(arrays[name], f"{path}: {name}", w_last=w_last) for name in (root, body)]
     if parts[0].shape[1] != 1 or parts[1].shape[1] not in _JOINTS_OF_BODY:
         raise MotionFileError(
             f"{path}: {root} must have 1 joint and {body} 21 or 23, but they have "
@@ -294,7 +294,7 @@ def _poses(
         found = _first(arrays, of_part)
         if found is None or joints[0] in names:
             continue
-        part = _part(arrays[found], found, joints, len(parts[0]), path, w_last=w_last)
+        part = _part(arrays[found], f"{path}: {found}", joints, len(parts[0]), w_last=w_last)
         if part is not None:
             parts.append(part)
             names += joints
@@ -307,13 +307,7 @@ def _poses(
 
 
 def _part(
-    array: NDArray[Any],
-    name: str,
-    joints: Sequence[str],
-    frames: int,
-    path: Path,
-    *,
-    w_last: bool,
+    array: NDArray[Any], what: str, joints: Sequence[str], frames: int, *, w_last: bool
 ) -> Float32Array | None:
     """Return axis-angle vectors (T, J, 3) of hands or of a part of the face; None for what is left
     out: components of MANO's hands, which are no rotations, and a face that does not fit the body's
@@ -323,10 +317,10 @@ def _part(
         return None
     is_face = joints[0] in FACE_JOINTS
     try:
-        part = _axis_angles(array, name, path, w_last=w_last)
+        part = _axis_angles(array, what, w_last=w_last)
         if part.shape[1] != len(joints):
             raise MotionFileError(
-                f"{path}: {name} must have {len(joints)} "
+                f"{what} must have {len(joints)} "
                 f"joint{'s' if len(joints) > 1 else ''}, but has {part.shape[1]}"
             )
     except MotionFileError:
@@ -379,25 +373,26 @@ def _has_w_last(*arrays: NDArray[Any]) -> bool:
     return False
 
 
-def _axis_angles(array: NDArray[Any], name: str, path: Path, *, w_last: bool) -> Float32Array:
+def _axis_angles(array: NDArray[Any], what: str, *, w_last: bool) -> Float32Array:
     """Return axis-angle vectors (T, J, 3) of an array of them, of rotation matrices (T, J, 3, 3),
     or of quaternions.
+
+    :param what: names the array in messages.
     """
     if array.ndim == 0 or len(array) == 0:
-        raise MotionFileError(f"{path}: {name} has no frames; choose another file")
+        raise MotionFileError(f"{what} has no frames; choose another file")
     if len(array) > MAX_FRAMES:
         raise MotionFileError(
-            f"{path}: {name} has {len(array)} frames, but at most {MAX_FRAMES} can be imported; "
-            "cut it"
+            f"{what} has {len(array)} frames, but at most {MAX_FRAMES} can be imported; cut it"
         )
-    values = _numbers(array, name, path)
+    values = _numbers(array, what)
     if (
         values.ndim >= 3
         and values.shape[-2:] == (3, 3)
         and (values.ndim == 4 or values.shape[1:] == (3, 3))
     ):
         matrices = values.reshape(len(values), -1, 3, 3)
-        return by_blocks(lambda block: (_logarithms(block, name, path),), matrices)[0]
+        return by_blocks(lambda block: (_logarithms(block, what),), matrices)[0]
     if values.ndim == 2 and values.shape[1] and values.shape[1] % 3 == 0:
         return values.reshape(len(values), -1, 3).astype(np.float32)
     if values.ndim == 3 and values.shape[2] == 3 and values.shape[1]:
@@ -407,25 +402,23 @@ def _axis_angles(array: NDArray[Any], name: str, path: Path, *, w_last: bool) ->
         if values.shape[2] == 4:
             to_matrices = _from_quaternions
             values = np.roll(values, 1, axis=-1) if w_last else values
-        return by_blocks(
-            lambda block: (_logarithms(to_matrices(block, name, path), name, path),), values
-        )[0]
+        return by_blocks(lambda block: (_logarithms(to_matrices(block, what), what),), values)[0]
     raise MotionFileError(
-        f"{path}: {name} has shape {array.shape}, but must hold one person's axis-angle vectors, "
+        f"{what} has shape {array.shape}, but must hold one person's axis-angle vectors, "
         "(frames, 3 x joints), "
         "rotation matrices, (frames, joints, 3, 3), two of their columns or rows, (frames, joints, "
         "6), or quaternions, (frames, joints, 4)"
     )
 
 
-def _from_quaternions(values: Float64Array, name: str, path: Path) -> Float64Array:
+def _from_quaternions(values: Float64Array, what: str) -> Float64Array:
     """Return the matrices (T, J, 3, 3) of quaternions (T, J, 4), w first."""
     if np.abs(np.linalg.norm(values, axis=-1) - 1.0).max() > _ORTHONORMAL:
-        raise MotionFileError(f"{path}: {name} holds quaternions that are not of length 1")
+        raise MotionFileError(f"{what} holds quaternions that are not of length 1")
     return matrix_from_quaternion(values)
 
 
-def _from_six(values: Float64Array, name: str, path: Path) -> Float64Array:
+def _from_six(values: Float64Array, what: str) -> Float64Array:
     """Return the matrices (T, J, 3, 3) of six numbers (T, J, 6): the first two rows one after the
     other, as PyTorch3D has them, or the first two columns row by row, as HMR has them. Only one of
     them has two vectors of length 1 at right angles.
@@ -443,23 +436,21 @@ def _from_six(values: Float64Array, name: str, path: Path) -> Float64Array:
     return matrices if is_rows else np.swapaxes(matrices, -1, -2)
 
 
-def _logarithms(matrices: Float64Array, name: str, path: Path) -> Float32Array:
+def _logarithms(matrices: Float64Array, what: str) -> Float32Array:
     gram = np.swapaxes(matrices, -1, -2) @ matrices
     if np.abs(gram - np.eye(3)).max() > _ORTHONORMAL or np.linalg.det(matrices).min() < 0.5:
-        raise MotionFileError(
-            f"{path}: {name} holds matrices that are not rotations; choose another file"
-        )
+        raise MotionFileError(f"{what} holds matrices that are not rotations; choose another file")
     return log(matrices).astype(np.float32)
 
 
-def _numbers(array: NDArray[Any], name: str, path: Path) -> Float64Array:
+def _numbers(array: NDArray[Any], what: str) -> Float64Array:
     if array.dtype.kind not in "fiu":
-        raise MotionFileError(f"{path}: {name} must hold numbers, but holds {array.dtype}")
+        raise MotionFileError(f"{what} must hold numbers, but holds {array.dtype}")
     array = np.atleast_1d(array)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=tuple(range(1, array.ndim))))
     if len(bad):
         raise MotionFileError(
-            f"{path}: {name} contains NaN or infinity, first in frame {bad[0]}; repair or cut it"
+            f"{what} contains NaN or infinity, first in frame {bad[0]}; repair or cut it"
         )
     return array.astype(np.float64)
 
@@ -468,7 +459,7 @@ def _betas(arrays: Mapping[str, NDArray[Any]], count: int, path: Path) -> Float6
     key = _first(arrays, _BETAS)
     if key is None:
         return np.zeros(0)
-    values = _numbers(arrays[key], key, path)
+    values = _numbers(arrays[key], f"{path}: {key}")
     if (
         values.ndim > 2
         or values.shape[-1] > _MAX_BETAS
