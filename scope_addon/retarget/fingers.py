@@ -6,6 +6,7 @@ where mapped bones end, of which hands end at the knuckles.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -29,14 +30,18 @@ _NUMBERED = re.compile(r"finger[ _.-]*(\d)", re.IGNORECASE)
 _PHALANGES = 3
 
 
-def find_fingers(rest: RestPose, wrists: dict[str, int]) -> dict[str, str]:
+def find_fingers(rest: RestPose, parts: Mapping[str, str]) -> dict[str, str]:
     """Find the bones of the fingers below each wrist.
 
-    :param wrists: index of the hand's bone, by side.
+    :param parts: bone name -> part; those of the wrists matter.
     :return: bone name -> part (``left_index1``, ...).
     """
     found: dict[str, str] = {}
-    for side, wrist in wrists.items():
+    for bone, part in parts.items():
+        side, _, kind = part.partition("_")
+        if kind != "wrist":
+            continue
+        wrist = rest.names.index(bone)
         below = rest.below(wrist)
         chains = _by_name(rest, below) or _by_geometry(rest, wrist, below)
         for finger, chain in chains.items():
@@ -49,11 +54,9 @@ def find_fingers(rest: RestPose, wrists: dict[str, int]) -> dict[str, str]:
 def bone_ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> Float64Array:
     """Return where the bones end (B, 3), metres; hands end at the knuckles of the long fingers."""
     row = {name: index for index, name in enumerate(rest.names)}
-    wrists = {
-        part.partition("_")[0]: row[name] for name, part in parts.items() if part.endswith("_wrist")
-    }
-    phalanges = find_fingers(rest, wrists)
+    phalanges = find_fingers(rest, parts)
     bone_of = {part: row[name] for name, part in parts.items()}
+    knuckle_of = {part: row[name] for name, part in phalanges.items()}
     forward = np.zeros(3)
     if {"left_hip", "right_hip"} <= bone_of.keys():
         left = rest.heads[bone_of["left_hip"]] - rest.heads[bone_of["right_hip"]]
@@ -62,12 +65,15 @@ def bone_ends(rest: RestPose, names: list[str], parts: dict[str, str]) -> Float6
     ends = []
     for name in names:
         side, _, kind = parts[name].partition("_")
-        knuckles = []
-        if kind == "wrist":
-            of_part = {part: row[bone] for bone, part in phalanges.items()}
-            long = [f"{side}_{finger}1" for finger in ("middle", "index", "ring", "pinky")]
-            knuckles = [of_part[part] for part in long if part in of_part][:1]
-        ends.append(rest.end(row[name], knuckles, forward if kind == "ankle" else None))
+        long = [f"{side}_{finger}1" for finger in ("middle", "index", "ring", "pinky")]
+        knuckles = [knuckle_of[part] for part in long if part in knuckle_of][:1]
+        ends.append(
+            rest.end(
+                row[name],
+                knuckles if kind == "wrist" else (),
+                forward if kind == "ankle" else None,
+            )
+        )
     return np.array(ends).reshape(-1, 3)
 
 

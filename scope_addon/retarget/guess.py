@@ -68,7 +68,8 @@ def guess(rest: RestPose, *, is_mirrored: bool = False) -> BoneMap:
     if is_exchanged:
         parts = {bone: other_side(part) for bone, part in parts.items()}
     if rigify is None:
-        parts |= _fingers(rest, parts)
+        for bone, part in find_fingers(rest, parts).items():
+            parts.setdefault(bone, part)
     impossible = {part for fault in rest_faults(_heads_of(rest, parts)) for part in fault.parts}
     confidence = {
         bone: IMPOSSIBLE
@@ -163,17 +164,6 @@ def _limb_of(part: str) -> str:
     if kind:
         return f"{side} arm"
     return "spine" if part in SPINE else part
-
-
-def _fingers(rest: RestPose, parts: dict[str, str]) -> dict[str, str]:
-    """Find the fingers below the wrists of a map."""
-    wrists = {
-        part.partition("_")[0]: rest.names.index(bone)
-        for bone, part in parts.items()
-        if part.endswith("_wrist")
-    }
-    found = find_fingers(rest, wrists)
-    return {bone: part for bone, part in found.items() if bone not in parts}
 
 
 def _rigify(bones: list[str]) -> dict[str, str] | None:

@@ -10,6 +10,7 @@ import pytest
 from scope.scope_addon.retarget.fingers import find_fingers
 from scope.scope_addon.retarget.rest_pose import RestPose
 
+HAND = {"hand_l": "left_wrist"}
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 # Names that have those of two fingers, of each finger and its three phalanges from the knuckle on.
 # Those of common tools: tests/scene/test_rig_retarget_fingers.py.
@@ -53,7 +54,7 @@ def expected(names: list[str]) -> dict[str, str]:
 def test_fingers_are_found_by_their_names(tool):
     names, parents, heads = hand(*NAMES[tool])
     heads[:] = 0.0  # so that nothing but the names can tell
-    assert find_fingers(RestPose(names, parents, heads), {"left": 0}) == expected(names)
+    assert find_fingers(RestPose(names, parents, heads), HAND) == expected(names)
 
 
 @pytest.mark.parametrize("turn", [0.0, 3.0])
@@ -62,9 +63,9 @@ def test_fingers_without_names_are_found_by_their_shape_in_any_order(turn):
     c = np.cos(turn)
     s = np.sin(turn)
     heads = heads @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    assert find_fingers(RestPose(names, parents, heads), {"left": 0}) == expected(names)
+    assert find_fingers(RestPose(names, parents, heads), HAND) == expected(names)
     order = [0, *(1 + 3 * f + k for f in (3, 0, 4, 2, 1) for k in range(3))]
     place = {old: new for new, old in enumerate(order)}
     shuffled = np.array([place.get(int(parents[old]), -1) for old in order])
     rest = RestPose([names[old] for old in order], shuffled, heads[order])
-    assert find_fingers(rest, {"left": 0}) == expected(names)
+    assert find_fingers(rest, HAND) == expected(names)
