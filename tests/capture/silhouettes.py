@@ -7,12 +7,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scope.benchmarks.scenes.garments import Garment
-from scope.scope_addon.capture.perception.landmark_network import HIPS, KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import PersonMask
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver import Body, State
 from scope.solver.rotations import exp
+
+from .exact_tracks import track_of_points
 
 SIZE = (640, 480)
 K = np.array([[700.0, 0, 320], [0, 700, 240], [0, 0, 1]])
@@ -79,22 +81,11 @@ def seen_in(body: Body, betas: NDArray[np.float64], garment: Garment | None) -> 
     at = body.keypoint_set("blazepose")
     states = standing(body)
     order = [at[name] for name in KEYPOINT_NAMES]
-    count = len(states)
     points = np.array(
         [body.keypoints(*posed(body, state, betas), betas)[order] for state in states]
     )
-    pixels = points @ K.T
     masks = [PersonMask(REGION, mask_of(body, state, betas, garment), SIZE) for state in states]
-    return Track(
-        frames=np.arange(count),
-        times=np.arange(count) / 6.0,
-        seen=np.ones(count, bool),
-        keypoints_px=pixels[..., :2] / pixels[..., 2:],
-        confidence=np.ones(points.shape[:2]),
-        world_landmarks=points - points[:, HIPS].mean(axis=1, keepdims=True),
-        acquired=np.zeros(count, bool),
-        masks=tuple(enumerate(masks)),
-    )
+    return track_of_points(points, K, 6.0, masks=tuple(enumerate(masks)))
 
 
 def surface_error(body: Body, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

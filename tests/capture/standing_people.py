@@ -10,7 +10,6 @@ from fractions import Fraction
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.camera.line_segments import Lines
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
@@ -18,8 +17,9 @@ from scope.scope_addon.kinematics.axes import transform_points, world_from_level
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
+from .exact_tracks import network_points, track_of_points
+
 BODY = load_body("scope")
-BLAZEPOSE = list(BODY.keypoint_set("blazepose").values())
 RATE = 15.0
 STAYS_S = 1.5
 STEPS_S = 0.4
@@ -73,23 +73,13 @@ def track_of(
     :param rotations: (T, K + 1, 3, 3), of which the root's are replaced.
     :param trans: (T, 3) in the world, as SMPL means it.
     """
-    times = np.arange(len(trans)) / RATE
     rotations = rotations.copy()
     rotations[:, 0] = T_camera_world[..., :3, :3] @ facing
     pelvis = BODY.rest_joints(betas)[0]
     root = transform_points(T_camera_world, (trans + pelvis)[:, None])[:, 0]
     poses = BODY.forward_kinematics(rotations, root - pelvis, betas)
-    points = with_keypoint_offsets(BODY).keypoints(*poses, betas)[:, BLAZEPOSE]
-    pixels = points @ K.T
-    return Track(
-        frames=np.arange(len(times)),
-        times=times,
-        seen=np.ones(len(times), bool),
-        keypoints_px=pixels[..., :2] / pixels[..., 2:],
-        confidence=np.full((len(times), 33), 0.9),
-        world_landmarks=points - points[:, [23, 24]].mean(axis=1, keepdims=True),
-        acquired=np.arange(len(times)) == 0,
-    )
+    points = network_points(BODY, *poses, betas)
+    return track_of_points(points, K, RATE, confidence=np.full(points.shape[:2], 0.9))
 
 
 def seen(track: Track, uneven_ground: bool = False) -> Shot:

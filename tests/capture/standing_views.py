@@ -11,6 +11,8 @@ from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.solver import Body
 from scope.solver.rotations import exp
 
+from .exact_tracks import centred, pixels_of
+
 # degrees; of cameras around the person, and downwards
 AZIMUTHS = (0, 30, 60, 90, 150, 180)
 PITCHES = (0, 12)
@@ -31,8 +33,7 @@ class StandingView:
     @property
     def pixels(self) -> np.ndarray:
         """(33, 2) exact keypoints in the image of a camera K."""
-        projected = (self.points + [0.0, 0.0, DISTANCE_M]) @ K.T
-        return projected[:, :2] / projected[:, 2:]
+        return pixels_of(self.points + [0.0, 0.0, DISTANCE_M], K)
 
 
 def standing_views(
@@ -99,6 +100,4 @@ def _pose(body: Body, bend_deg: float, betas: np.ndarray) -> np.ndarray:
 def _keypoints(body: Body, pose: np.ndarray, betas: np.ndarray) -> np.ndarray:
     R, t = body.forward_kinematics(exp(pose)[None], np.zeros((1, 3)), betas)
     at = body.keypoint_set("blazepose")
-    points: np.ndarray = body.keypoints(R, t, betas)[0][[at[name] for name in KEYPOINT_NAMES]]
-    hips = points[[KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]]
-    return points - hips.mean(axis=0)
+    return centred(body.keypoints(R, t, betas)[0][[at[name] for name in KEYPOINT_NAMES]])

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import warnings
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -116,39 +114,6 @@ def test_a_detector_of_upright_boxes_finds_people_who_are_not_upright(
             assert off_px.mean() < 0.02 * expected.region.side_px
 
 
-@pytest.mark.slow
-def test_left_right_swaps_of_a_users_network_are_repaired(shared: Path, tmp_path: Path) -> None:
-    """BlazePose-full swaps them in 29 of 100 frames of this clip, in which the man's face is hardly
-    visible.
-    """
-    spec = importlib.util.spec_from_file_location("evaluate", shared / "tools/evaluate.py")
-    assert spec is not None
-    assert spec.loader is not None
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    keypoints = coco_simcc(tmp_path / "full.onnx", "pose_landmark_full")
-    options = CaptureOptions(keypoints=keypoints, threads=1, wanted=VideoRange(end_s=0.8))
-    found = capture(shared / "data/pose2sim/cam2.mp4", load_body("scope"), options)
-    found.motions[0].save(tmp_path / "cam2.npz")
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        figures = tool.evaluate(
-            str(shared / "data/pose2sim/truth_cam2.npz"), str(tmp_path / "cam2.npz")
-        )
-    assert max(figures[key] for key in ("lr_swap", "mirror", "mirror_swap")) <= 0.01
-    assert figures["mpjpe_root"] < 90
-
-
-def test_two_people_keep_their_identities(own_networks: tuple[Path, Path], frames: Frames) -> None:
-    tracker = PeopleTracker(
-        "fast", 1, people=4, detector=own_networks[0], keypoints=own_networks[1]
-    )
-    for image in frames("clips/two_people_portrait", stop=8):
-        seen = dict(tracker.step(image))
-        assert sorted(seen) == [0, 1]
-    assert abs(seen[0].region.center_px[0] - seen[1].region.center_px[0]) > 200
-
-
 def test_a_runner_is_tracked_at_a_low_frame_rate(
     own_networks: tuple[Path, Path], frames: Frames
 ) -> None:
@@ -165,17 +130,3 @@ def test_a_runner_is_tracked_at_a_low_frame_rate(
         )
         assert ((in_region > 0.03) & (in_region < 0.97)).all()
     assert numbers == {0}
-
-
-@pytest.mark.slow
-def test_the_track_of_a_person_who_leaves_the_image_ends(
-    own_networks: tuple[Path, Path], frames: Frames
-) -> None:
-    """The woman on the grass leaves at the left edge between frames 195 and 207."""
-    tracker = PeopleTracker("fast", 1, people=2, keypoints=own_networks[1])
-    woman = []
-    for index, image in enumerate(frames("clips/walk_side_static", start=185, stop=210), 185):
-        seen = tracker.step(image)
-        woman += [index for _, observation in seen if observation.keypoints_px[:, 0].mean() < 200]
-    assert len(woman) >= 10
-    assert 195 <= woman[-1] <= 207

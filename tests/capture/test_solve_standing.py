@@ -12,12 +12,12 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.camera.line_segments import Lines
 from scope.scope_addon.capture.solve import solve
-from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.solver.body_file import load_body
 
-from .standing_views import K, knee_flexion, standing_views
+from .exact_tracks import track_of_points
+from .standing_views import DISTANCE_M, K, knee_flexion, standing_views
 
 RATE = 30
 FRAMES = 16
@@ -28,15 +28,14 @@ def captured_flexion(body, view, rng):
     """The knees' flexion of the captured motion's median pose; the network sees no world
     landmarks.
     """
-    pixels = view.pixels + rng.normal(size=(FRAMES, *view.pixels.shape)) * NOISE_PX
-    track = Track(
-        frames=np.arange(FRAMES),
-        times=np.arange(FRAMES) / RATE,
-        seen=np.ones(FRAMES, bool),
-        keypoints_px=pixels,
+    points = np.tile(view.points + [0.0, 0.0, DISTANCE_M], (FRAMES, 1, 1))
+    track = track_of_points(
+        points,
+        K,
+        RATE,
+        keypoints_px=view.pixels + rng.normal(size=(FRAMES, *view.pixels.shape)) * NOISE_PX,
         confidence=np.full((FRAMES, len(view.points)), 0.95),
-        world_landmarks=np.zeros((FRAMES, len(view.points), 3)),
-        acquired=np.arange(FRAMES) == 0,
+        world_landmarks=np.zeros(points.shape),
     )
     camera = Camera(K, np.zeros(5), "given")
     shot = Shot(

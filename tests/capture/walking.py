@@ -6,10 +6,13 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
+
+from .exact_tracks import centred, network_points, pixels_of
+
+K = np.array([[1100.0, 0, 640], [0, 1100.0, 360], [0, 0, 1]])
 
 
 @cache
@@ -20,10 +23,7 @@ def someone_walking(
     per second.
     """
     body = load_body("scope")
-    seen = with_keypoint_offsets(body)
-    at = list(body.keypoint_set("blazepose").values())
-    pixels = []
-    world = []
+    poses = []
     for k in range(frames):
         swing = 0.5 * np.sin(2 * np.pi * k / rate)
         pose = np.zeros((body.K + 1, 3))
@@ -40,10 +40,10 @@ def someone_walking(
             pose[body.joint_names.index(name), axis] += angle
         R = exp(pose)
         R[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading + turn * k / rate, 0])) @ R[0]
-        points = seen.keypoints(*body.forward_kinematics(R, np.array([0.3, 0.1, 4.0])))[at]
-        world.append(points - points[[23, 24]].mean(axis=0))
-        pixels.append(points[:, :2] / points[:, 2:] * 1100.0 + [640.0, 360.0])
-    walk = np.array(pixels), np.array(world)
+        poses.append(R)
+    pelvis = np.tile([0.3, 0.1, 4.0], (frames, 1))
+    points = network_points(body, *body.forward_kinematics(np.array(poses), pelvis))
+    walk = pixels_of(points, K), centred(points)
     for values in walk:
         values.setflags(write=False)  # the next test gets them, too
     return walk

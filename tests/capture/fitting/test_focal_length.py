@@ -21,15 +21,15 @@ from scope.scope_addon.capture.fitting.focal_length import (
     camera_by_fits,
     focal_from_edges,
 )
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.landmark_network import HIPS, KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
 from scope.solver.rotations import exp
+
+from ..exact_tracks import centred, network_points, pixels_of
 
 WIDTH = 1280
 
@@ -49,16 +49,8 @@ def room(focal_px, R_camera_room, clutter=20, seed=0):
     def line(a, b, colour):
         ends = np.array([a, b]) @ R_camera_room.T + [0, 0, 7.0]
         if (ends[:, 2] > 0.5).all():
-            pixels = ends @ K.T
-            pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
-            cv2.line(
-                picture,
-                tuple(map(int, pixels[0])),
-                tuple(map(int, pixels[1])),
-                colour,
-                3,
-                cv2.LINE_AA,
-            )
+            first, last = np.round(pixels_of(ends, K)).astype(int).tolist()
+            cv2.line(picture, first, last, colour, 3, cv2.LINE_AA)
 
     for axis in range(3):
         for _ in range(14):
@@ -158,6 +150,7 @@ FITS_HEIGHT = 1920
 
 
 FITS_ASSUMED = assumed_camera(FITS_WIDTH, FITS_HEIGHT, float(FITS_HEIGHT))
+ASSUMED_PX = FITS_ASSUMED.intrinsics[0, 0]
 
 
 POSES = [  # axis-angle of joints; arms and legs reach towards the camera and away from it
@@ -177,27 +170,19 @@ POSES = [  # axis-angle of joints; arms and legs reach towards the camera and aw
 ]
 
 
-def observe(body, pose, ratio: float, distance_m: float, pitch: float = 0.35) -> Observation:
+def observe(body, joints, ratio: float, distance_m: float, pitch: float = 0.35) -> Observation:
     """The body seen by a camera with ``ratio`` times the assumed focal length that looks down on
     it.
     """
     rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
     rotations[0] = exp([pitch, 0, 0]) @ np.diag([1.0, -1.0, -1.0])
-    for joint, vector in pose.items():
+    for joint, vector in joints.items():
         rotations[body.joint_names.index(joint)] = exp(np.array(vector, float))
-    R, t = body.forward_kinematics(rotations, np.array([0, 0, distance_m]), np.zeros(body.P))
-    at = body.keypoint_set("blazepose")
-    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[
-        [at[name] for name in KEYPOINT_NAMES]
-    ]
-    pixels = (
-        points[:, :2] / points[:, 2:] * ratio * FITS_ASSUMED.intrinsics[0, 0]
-        + FITS_ASSUMED.intrinsics[:2, 2]
-    )
+    pose = body.forward_kinematics(rotations, np.array([0, 0, distance_m]), np.zeros(body.P))
+    points = network_points(body, *pose)
+    pixels = pixels_of(points, pinhole(FITS_WIDTH, FITS_HEIGHT, ratio * ASSUMED_PX))
     region = Region((FITS_WIDTH / 2, FITS_HEIGHT / 2), float(FITS_HEIGHT), 0.0)
-    return Observation(
-        pixels, np.ones(len(points)), points - points[HIPS].mean(0), 1.0, region, acquired=True
-    )
+    return Observation(pixels, np.ones(len(points)), centred(points), 1.0, region, acquired=True)
 
 
 def found_by_fits(body, ratio: float, distance_m: float):
@@ -216,9 +201,7 @@ def test_a_nearby_person_determines_the_focal_length(body):
     """
     ratios = [0.6, 1.0, 1.6]
     log_f = [
-        np.log(
-            found_by_fits(body, ratio, 2.2 * ratio).intrinsics[0, 0] / FITS_ASSUMED.intrinsics[0, 0]
-        )
+        np.log(found_by_fits(body, ratio, 2.2 * ratio).intrinsics[0, 0] / ASSUMED_PX)
         for ratio in ratios
     ]
     assert log_f[0] < log_f[1] - 0.1 < log_f[2] - 0.2
@@ -229,7 +212,7 @@ def test_a_nearby_person_determines_the_focal_length(body):
 
 def test_a_distant_person_does_not_change_the_focal_length(body):
     camera = found_by_fits(body, 8.0, 60.0)
-    assert abs(np.log(camera.intrinsics[0, 0] / FITS_ASSUMED.intrinsics[0, 0])) < 0.15
+    assert abs(np.log(camera.intrinsics[0, 0] / ASSUMED_PX)) < 0.15
     assert 0.2 < camera.focal_deviation <= 0.25
 
 
@@ -238,9 +221,8 @@ def test_a_more_certain_estimate_from_edges_weighs_more(body):
     sure = camera_by_fits(FITS_ASSUMED, FITS_ASSUMED, costs, float(FITS_HEIGHT))
     by_edges = type(FITS_ASSUMED)(FITS_ASSUMED.intrinsics, FITS_ASSUMED.dist, "estimated", 0.03)
     both = camera_by_fits(by_edges, FITS_ASSUMED, costs, float(FITS_HEIGHT))
-    assumed_px = FITS_ASSUMED.intrinsics[0, 0]
-    assert sure.intrinsics[0, 0] < 0.95 * assumed_px
-    assert both.intrinsics[0, 0] == pytest.approx(assumed_px, rel=0.03)
+    assert sure.intrinsics[0, 0] < 0.95 * ASSUMED_PX
+    assert both.intrinsics[0, 0] == pytest.approx(ASSUMED_PX, rel=0.03)
     assert both.focal_deviation == pytest.approx(0.03, rel=0.05)
     assert camera_by_fits(by_edges, FITS_ASSUMED, [], float(FITS_HEIGHT)) is by_edges
 

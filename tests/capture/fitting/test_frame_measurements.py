@@ -5,16 +5,6 @@ import numpy as np
 from scope.scope_addon.capture.fitting.frame_measurements import place
 
 
-def test_points_move_onto_their_lines_of_sight():
-    rng = np.random.default_rng(0)
-    points = rng.normal(scale=0.5, size=(33, 3))
-    t = np.array([0.4, -0.2, 4.0])
-    seen = points + t
-    np.testing.assert_allclose(
-        place(points, seen[:, :2] / seen[:, 2:], rng.uniform(size=33)), t, atol=1e-9
-    )
-
-
 def test_contradicting_points_are_weighted_by_confidence():
     rng = np.random.default_rng(1)
     points = rng.normal(size=(33, 3))

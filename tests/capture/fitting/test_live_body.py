@@ -14,10 +14,12 @@ from scope.scope_addon.capture.fitting.focal_length import FocalFits
 from scope.scope_addon.capture.fitting.live_body import LiveBody
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.overlay_video import draw_overlay
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.cli import SAMPLE
+from scope.scope_addon.job.preview import LONGER_SIDE, draw
 from scope.solver.body_file import load_body
+
+from ..exact_tracks import pixels_of
 
 WANTED = CaptureOptions(quality="fast", wanted=VideoRange(end_s=0.6))
 LIMBS = [1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21]
@@ -33,34 +35,25 @@ def watched(body):
 
     def watch(frame, people, live):
         if frame.index % 4 == 0 and people:
-            seen.append((frame.index, frame.image_rgb, live.fit(people[0])))
+            seen.append((frame.index, frame.image_rgb, people, [live.fit(people[0])]))
             lost = np.full_like(people[0].keypoints_px, np.nan)
             unusable.append(live.fit(replace(people[0], keypoints_px=lost)))
 
     return capture(SAMPLE, body, WANTED, watch=watch), seen, unusable
 
 
-def silhouette(image, vertices, body, camera) -> np.ndarray:
-    black = np.zeros_like(image)
-    white = np.ones((len(body.faces), 3))
-    drawn = draw_overlay(
-        black, [vertices], body.faces, camera.intrinsics, camera.dist, [white], [1.0]
-    )
-    return drawn.max(axis=2) > 60
-
-
-def test_the_body_covers_the_true_joints(watched, body):
+def test_the_previews_body_covers_the_true_joints(watched):
     truth = np.load(SAMPLE.with_name("sample_truth.npz"))
     _, seen, unusable = watched
     assert len(seen) >= 5
     assert unusable == [None] * len(seen)
-    for index, image, pose in seen:
-        joints = truth["joints_cam"][index]
-        pixels = joints @ truth["intrinsics"].T
-        pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)[LIMBS]
-        drawn = silhouette(image, pose.vertices_cam, body, pose.camera)
+    for index, image, people, poses in seen:
+        scale = LONGER_SIDE / max(image.shape)
+        pixels = scale * pixels_of(truth["joints_cam"][index][LIMBS], truth["intrinsics"])
+        drawn = (draw(image, people[:1], poses) != draw(image, [])).any(axis=2)
         assert 0.005 < drawn.mean() < 0.5
-        near = [drawn[max(v - 8, 0) : v + 9, max(u - 8, 0) : u + 9].any() for u, v in pixels]
+        at = pixels.round().astype(int)
+        near = [drawn[max(v - 3, 0) : v + 4, max(u - 3, 0) : u + 4].any() for u, v in at]
         assert np.mean(near) > 0.9, index
 
 

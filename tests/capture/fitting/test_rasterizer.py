@@ -85,28 +85,6 @@ def test_a_silhouette_covers_the_pixels_that_opencv_fills_but_for_their_edge():
     assert not nothing.any()
 
 
-def test_triangles_cover_the_pixels_of_opencv_polygons():
-    rng = np.random.default_rng(3)
-    for _ in range(40):
-        corners = rng.uniform([-20, -20], [WIDTH + 20, HEIGHT + 20], (3, 2))
-        if np.linalg.det(np.stack([corners[1] - corners[0], corners[2] - corners[0]])) > 0:
-            corners = corners[::-1]
-        z = rng.uniform(0.5, 4, 3)
-        points = np.stack(
-            [(corners[:, 0] - K[0, 2]) / K[0, 0] * z, (corners[:, 1] - K[1, 2]) / K[1, 1] * z, z],
-            -1,
-        )
-        canvas = Canvas.blank(WIDTH, HEIGHT)
-        rasterize(canvas, points, np.array([[0, 1, 2]]), RED, K)
-        margin = 24  # so that erosion sees edges just outside the picture too
-        polygon = np.zeros((HEIGHT + 2 * margin, WIDTH + 2 * margin), np.uint8)
-        cv2.fillConvexPoly(polygon, np.round((corners + margin) * 256).astype(np.int32), 1, shift=8)
-        thick = cv2.dilate(polygon, np.ones((3, 3)))[margin:-margin, margin:-margin] > 0
-        thin = cv2.erode(polygon, np.ones((3, 3)))[margin:-margin, margin:-margin] > 0
-        assert not (canvas.coverage & ~thick).any()
-        assert canvas.coverage[thin].all()
-
-
 def test_neighbouring_triangles_leave_no_gap_and_a_slanted_plane_is_exact():
     n = np.array([0.3, -0.4, -1.0])  # the plane n · p = -2
     uv = np.array([[20.0, 15.0], [140.0, 10.0], [150.0, 110.0], [10.0, 100.0], [77.7, 63.1]])

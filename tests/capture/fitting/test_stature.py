@@ -11,21 +11,15 @@ from scope.scope_addon.capture.fitting.stature import (
     with_stature,
     with_unknown_stature,
 )
-from scope.scope_addon.capture.fitting.weights import ROBUST, WEIGHTS, cold_stages
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions, check_options
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.errors import UsageError
 from scope.solver import (
-    Keypoints2D,
-    Measurements,
-    OrientationField,
     default_priors,
-    fit_clip,
     load_body,
 )
 from scope.solver.body_file import ASSETS, CHILD_BELOW_M
-from scope.solver.rotations import exp
 
 SIDES = ("left", "right")
 SAMPLE = ASSETS / "sample" / "sample.mp4"
@@ -110,77 +104,6 @@ def proportions(joint):
     leg = limb("hip", "knee") + limb("knee", "ankle")
     trunk = length(middle("shoulder"), middle("hip"))
     return np.array([trunk, limb("shoulder", "elbow"), limb("elbow", "wrist")]) / leg
-
-
-def test_a_long_trunk_is_found_and_does_not_make_a_person_short():
-    """A trunk that is 12 % longer on average legs, from keypoints alone: the trunk's share of the
-    stature grows.
-    """
-    body = load_body("scope")
-    person = longer_trunk(body, 1.12)
-    weights = replace(WEIGHTS, shape=WEIGHTS.shape * 8)
-    measured = [seen_from(person, 0.9 * k) for k in range(8)]
-    fitted = fit_clip(
-        body,
-        measured,
-        priors=with_unknown_stature(default_priors(body), body),
-        options=replace(ROBUST, stages=cold_stages(weights)),
-    )
-    assert body.stature(fitted.beta) > body.stature() - 0.02
-    share = trunk(body, fitted.beta) / body.stature(fitted.beta)
-    mean, true = (trunk(each, np.zeros(body.P)) / each.stature() for each in (body, person))
-    assert share - mean > 0.3 * (true - mean)
-
-
-def longer_trunk(body, factor):
-    hip, shoulder = (
-        body.J_template[body.joint_names.index(f"left_{joint}"), 1] for joint in ("hip", "shoulder")
-    )
-
-    def lift(points):
-        out = points.copy()
-        out[:, 1] += (factor - 1) * (points[:, 1] - hip).clip(0, shoulder - hip)
-        return out
-
-    return replace(
-        body,
-        v_template=lift(body.v_template),
-        J_template=lift(body.J_template),
-        keypoint_template=lift(body.keypoint_template),
-    )
-
-
-def seen_from(person, heading):
-    """2D keypoints and limb directions of a person standing 4.5 m from the camera, arms hanging."""
-    K = np.array([[1000.0, 0, 640], [0, 1000, 480], [0, 0, 1]])
-    names = person.joint_names
-    rotations = np.tile(np.eye(3), (person.K + 1, 1, 1))
-    rotations[0] = np.diag([1.0, -1.0, -1.0]) @ exp(np.array([0, heading, 0]))
-    for side, sign in (("left", -1), ("right", 1)):
-        rotations[names.index(f"{side}_shoulder")] = exp(np.array([0, 0, sign * 1.2]))
-    R, t = person.forward_kinematics(rotations, np.array([0, 0, 4.5]))
-    at = np.array(sorted(person.keypoint_set("blazepose").values()))
-    pixels = person.keypoints(R, t)[at] @ K.T
-    bones = [
-        (f"{s}_{a}", f"{s}_{b}")
-        for s in ("left", "right")
-        for a, b in (("shoulder", "elbow"), ("hip", "knee"))
-    ]
-    ends = np.array([[names.index(name) for name in bone] for bone in bones])
-    return Measurements(
-        intrinsics=K,
-        keypoints2d=Keypoints2D(at, pixels[:, :2] / pixels[:, 2:], np.ones(len(at))),
-        orientation_field=OrientationField(
-            *(len(person.keypoint_names) + ends.T),
-            t[ends[:, 1]] - t[ends[:, 0]],
-            np.ones(len(ends)),
-        ),
-    )
-
-
-def trunk(body, betas):
-    J = body.rest_joints(betas)
-    return J[body.joint_names.index("left_shoulder"), 1] - J[body.joint_names.index("left_hip"), 1]
 
 
 @pytest.mark.parametrize("height_m", [0.8, 1.1, 1.44])

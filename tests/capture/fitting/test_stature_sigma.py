@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import prepare_track
 from scope.scope_addon.capture.fitting.track_fit import fit_track
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.tracking.track import Track
 from scope.solver import load_body
 from scope.solver.rotations import exp
+
+from ..exact_tracks import centred, network_points, pixels_of, track_of_points
 
 PEOPLE = 24
 FRAMES = 4
@@ -27,31 +27,18 @@ def _track(rng: np.random.Generator, betas: np.ndarray) -> Track:
     noise.
     """
     flip = np.diag([1.0, -1.0, -1.0])
-    J = len(KEYPOINT_NAMES)
     rotations = np.tile(np.eye(3), (FRAMES, BODY.K + 1, 1, 1))
     rotations[:, 0] = flip @ exp(
         np.outer(rng.uniform(-1.0, 1.0) + 0.1 * np.arange(FRAMES), [0.0, 1.0, 0.0])
     )
-    R, t = BODY.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (FRAMES, 1)), betas)
-    at = BODY.keypoint_set("blazepose")
-    points = with_keypoint_offsets(BODY).keypoints(
-        R, t, betas, [at[name] for name in KEYPOINT_NAMES]
-    )
-    pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
-    hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
-    landmarks = (
-        (points - points[:, hips].mean(axis=1, keepdims=True))
-        * BODY.stature()
-        / BODY.stature(betas)
-    )
-    return Track(
-        frames=np.arange(FRAMES),
-        times=np.arange(FRAMES) / 30.0,
+    pose = BODY.forward_kinematics(rotations, np.tile([0.0, 0.0, 4.0], (FRAMES, 1)), betas)
+    points = network_points(BODY, *pose, betas)
+    pixels = pixels_of(points, CAMERA.intrinsics)
+    return track_of_points(
+        points,
+        CAMERA.intrinsics,
         keypoints_px=pixels + rng.normal(0.0, 4.0, pixels.shape),
-        confidence=np.ones((FRAMES, J)),
-        world_landmarks=landmarks,
-        seen=np.ones(FRAMES, bool),
-        acquired=np.arange(FRAMES) == 0,
+        world_landmarks=centred(points) * BODY.stature() / BODY.stature(betas),
     )
 
 

@@ -10,12 +10,11 @@ import pytest
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting import track_fit
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import Stance, prepare_track
 from scope.scope_addon.capture.perception.face_landmarks import FACE_POINTS, FaceEstimate
 from scope.scope_addon.capture.perception.face_record import record
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
-from scope.scope_addon.capture.perception.lifter import Lifted, Lifter
+from scope.scope_addon.capture.perception.lifter import Lifted
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.several_views.bundle import CameraPlace
@@ -29,36 +28,25 @@ from scope.scope_addon.live.causal_fit import CausalFit
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
+from ..exact_tracks import network_points, track_of_points
+
 FRAMES = 4
+CAMERA = choose_camera(1080, 1920)
+LEG = [KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")]
 FEET = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0])  # stand, and hands do not
 
 
-def _standing_track(body, camera, bent=()) -> Track:
+def _standing_track(body, bent=()) -> Track:
     """A person upright, 4 m in front of the camera, in the rest pose except for ``bent`` (joint,
     radians about x).
     """
-    flip = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
-    rotations = np.tile(np.eye(3), (1, body.K + 1, 1, 1))
-    rotations[:, 0] = flip
+    rotations = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    rotations[0] = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
     for joint, angle in bent:
-        rotations[:, body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
-    R, t = body.forward_kinematics(rotations, np.array([[0.0, 0.0, 4.0]]), np.zeros(body.P))
-    at = body.keypoint_set("blazepose")
-    points = with_keypoint_offsets(body).keypoints(R, t, np.zeros(body.P))[
-        0, [at[name] for name in KEYPOINT_NAMES]
-    ]
-    pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
-    hips = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
-    J = len(KEYPOINT_NAMES)
-    return Track(
-        frames=np.arange(FRAMES),
-        times=np.arange(FRAMES) / 30.0,
-        keypoints_px=np.tile(pixels, (FRAMES, 1, 1)),
-        confidence=np.ones((FRAMES, J)),
-        world_landmarks=np.tile(points - points[hips].mean(0), (FRAMES, 1, 1)),
-        seen=np.ones(FRAMES, bool),
-        acquired=np.arange(FRAMES) == 0,
-    )
+        rotations[body.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
+    pose = body.forward_kinematics(rotations, np.array([0.0, 0.0, 4.0]), np.zeros(body.P))
+    points = np.tile(network_points(body, *pose), (FRAMES, 1, 1))
+    return track_of_points(points, CAMERA.intrinsics)
 
 
 def _stance(fit: FittedTrack, contact: float = 0.0, floor_m: float = 0.0) -> Stance:
@@ -87,8 +75,7 @@ def test_a_child_is_lifted_in_its_size():
     was trained on.
     """
     body = load_body("scope_child")
-    camera = choose_camera(1080, 1920)
-    prepared = prepare_track(body, _standing_track(body, camera), camera, height_m=1.1)
+    prepared = prepare_track(body, _standing_track(body), CAMERA, height_m=1.1)
     ends = [KEYPOINT_NAMES.index(f"left_{joint}") for joint in ("hip", "knee", "ankle")]
     leg = np.linalg.norm(np.diff(prepared.lifted.points[:, ends], axis=1), axis=2).sum(axis=1)
     rest = body.rest_joints()[
@@ -100,18 +87,16 @@ def test_a_child_is_lifted_in_its_size():
 
 def test_another_camera_lifts_a_child_in_its_size_too():
     body = load_body("scope_child")
-    camera = choose_camera(1080, 1920)
-    track = _standing_track(body, camera)
-    prepared = prepare_track(body, track, camera, height_m=1.1)
-    other = other_view(prepared, track, camera, CameraPlace.first())
+    track = _standing_track(body)
+    prepared = prepare_track(body, track, CAMERA, height_m=1.1)
+    other = other_view(prepared, track, CAMERA, CameraPlace.first())
     np.testing.assert_array_equal(other.lifted.points, prepared.lifted.points)
 
 
 def test_a_live_capture_finds_a_child_who_sits_at_its_distance():
     body = load_body("scope_child")
-    camera = choose_camera(1080, 1920)
-    track = _standing_track(body, camera, [("left_hip", -1.5), ("right_hip", -1.5)])
-    priors = prepare_track(body, track, camera, height_m=0.85).priors
+    track = _standing_track(body, [("left_hip", -1.5), ("right_hip", -1.5)])
+    priors = prepare_track(body, track, CAMERA, height_m=0.85).priors
     observation = Observation(
         track.keypoints_px[0],
         track.confidence[0],
@@ -120,7 +105,7 @@ def test_a_live_capture_finds_a_child_who_sits_at_its_distance():
         Region((540.0, 960.0), 1000.0, 0.0),
         acquired=True,
     )
-    live = CausalFit(body, observation, camera, height_m=0.85)
+    live = CausalFit(body, observation, CAMERA, height_m=0.85)
     live.set_shape(priors.shape_mean)
     fitted = live.fit(0.0, observation)
     assert fitted is not None
@@ -128,37 +113,11 @@ def test_a_live_capture_finds_a_child_who_sits_at_its_distance():
     assert fitted.root_cam[2] == pytest.approx(4.0 * 0.85 / body.stature(), rel=0.05)
 
 
-def test_the_lifting_network_runs_once_for_all_fits(monkeypatch):
-    body = load_body("scope")
-    camera = choose_camera(1080, 1920)
-    track = _standing_track(body, camera)
-    lifts = []
-
-    lift = Lifter.lift
-
-    def counted(self, *arguments):
-        lifts.append(1)
-        return lift(self, *arguments)
-
-    monkeypatch.setattr(Lifter, "lift", counted)
-    prepared = prepare_track(body, track, camera)
-    first = track_fit.fit_track(prepared, lambda *_: None)
-    second = _refit(prepared, first, _stance(first))
-    assert len(lifts) == 1
-    np.testing.assert_allclose(second.betas, first.betas, atol=0.2)  # in standard deviations
-    placed = place_track(body, track, second, smoothing=False)
-    np.testing.assert_allclose(placed.joints[:, 0], second.t_camera_root, atol=1e-9)
-    # metres; one view tells the distance by the body's size
-    assert abs(placed.joints[:, 0, 2].mean() - 4.0) < 0.6
-
-
-def test_a_person_nearer_than_first_estimated_is_smaller():
+def test_a_person_nearer_than_first_estimated_is_smaller(body):
     """The floor that others stand on determines the distance, and so the size; the image stays the
     same.
     """
-    body = load_body("scope")
-    camera = choose_camera(1080, 1920)
-    prepared = prepare_track(body, _standing_track(body, camera), camera)
+    prepared = prepare_track(body, _standing_track(body), CAMERA)
     first = track_fit.fit_track(prepared, lambda *_: None)
 
     def leg(fit):
@@ -175,11 +134,9 @@ def test_a_person_nearer_than_first_estimated_is_smaller():
         assert abs(leg(second) / leg(first) / moved - 1) < 0.03
 
 
-def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_is_upright():
-    body = load_body("scope")
-    camera = choose_camera(1080, 1920)
+def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_is_upright(body):
     lean_deg = 15.0
-    track = _standing_track(body, camera)
+    track = _standing_track(body)
     response = load_response()
     face = 30.0 * response.reference @ exp(np.radians([0.0, 0.0, lean_deg])).T * [1, -1, -1]
     landmarks = np.tile([*track.keypoints_px[0, :11].mean(axis=0), 0.0], (FACE_POINTS, 1))
@@ -189,7 +146,7 @@ def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_
         (track, 0.0),
         (replace(track, face=np.tile(row, (FRAMES, 1))), lean_deg),
     ):
-        prepared = prepare_track(body, each, camera)
+        prepared = prepare_track(body, each, CAMERA)
         first = track_fit.fit_track(prepared, lambda *_: None)
         for fit in (first, _refit(prepared, first, _stance(first))):
             R = body.forward_kinematics(fit.rotations, fit.t_camera_root, fit.betas)[0][
@@ -199,24 +156,19 @@ def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_
             np.testing.assert_allclose(lean, expected, atol=4)
 
 
-def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
+def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well(body):
     """A leg in front of the body looks like one behind it, and the first frames are lifted to the
     wrong one.
     """
-    body = load_body("scope")
-    camera = choose_camera(1080, 1920)
-    track = _standing_track(body, camera, (("right_hip", 0.15), ("right_knee", 0.9)))
-    prepared = prepare_track(body, track, camera)
-    leg = [
-        KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")
-    ]
+    track = _standing_track(body, (("right_hip", 0.15), ("right_knee", 0.9)))
+    prepared = prepare_track(body, track, CAMERA)
     hip = KEYPOINT_NAMES.index("right_hip")
     truth = track.world_landmarks.copy()
     sigma = np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     lifted = truth.copy()
     # the leg's mirror image in depth
-    lifted[:2, leg, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, leg, 2]
-    sigma[:2, leg] = 0.25
+    lifted[:2, LEG, 2] = 2 * truth[:2, hip, None, 2] - truth[:2, LEG, 2]
+    sigma[:2, LEG] = 0.25
     prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
 
     first = track_fit.fit_track(prepared, lambda *_: None)
@@ -229,33 +181,20 @@ def test_a_confident_direction_corrects_a_limb_in_earlier_frames_as_well():
             np.testing.assert_allclose(joints[:, k, 2] - joints[:, at_hip, 2], there, atol=0.2)
 
 
-def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact():
+def test_a_leg_at_a_wrong_depth_moves_to_the_floor_only_while_in_contact(body):
     """Seen from above, a foot lifted too near is in the air; the image alone does not show this."""
-    body = load_body("scope")
-    camera = choose_camera(1080, 1920)
     down = exp(np.array([0.35, 0.0, 0.0]))  # the camera looks down on the person
-    level = _standing_track(body, camera)
-    points = level.world_landmarks[0] + [0.0, 0.0, 4.0]
-    points = (points - [0.0, 0.0, 4.0]) @ down.T + [0.0, 0.0, 4.0]
-    pixels = points[:, :2] / points[:, 2:] * camera.intrinsics[0, 0] + camera.intrinsics[:2, 2]
-    world = points - [0.0, 0.0, 4.0]
-    track = replace(
-        level,
-        keypoints_px=np.tile(pixels, (FRAMES, 1, 1)),
-        world_landmarks=np.tile(world, (FRAMES, 1, 1)),
-    )
+    landmarks = _standing_track(body).world_landmarks
+    track = track_of_points(landmarks @ down.T + [0.0, 0.0, 4.0], CAMERA.intrinsics)
     up = down @ [0.0, -1.0, 0.0]
-    prepared = prepare_track(body, track, camera)
-    leg = [
-        KEYPOINT_NAMES.index(f"right_{name}") for name in ("knee", "ankle", "heel", "foot_index")
-    ]
+    prepared = prepare_track(body, track, CAMERA)
     lifted = track.world_landmarks.copy()
     sigma = np.full((FRAMES, len(KEYPOINT_NAMES)), 0.1)
     good = track_fit.fit_track(
         replace(prepared, lifted=Lifted(lifted.copy(), sigma, sigma)), lambda *_: None
     )
     floor_m = (place_track(body, track, good, smoothing=False).soles @ up).min(axis=1)
-    lifted[:, leg, 2] -= [0.2, 0.4, 0.4, 0.4]
+    lifted[:, LEG, 2] -= [0.2, 0.4, 0.4, 0.4]
     prepared = replace(prepared, lifted=Lifted(lifted, sigma, sigma))
     first = track_fit.fit_track(prepared, lambda *_: None)
 

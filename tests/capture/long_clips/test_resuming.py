@@ -67,23 +67,3 @@ def test_a_stopped_capture_continues_to_the_same_result(tmp_path, body, networks
     # what was under way at the stop is run again
     assert len(runs) - before - after > before > 2 * after > 0
     assert_same(resumed, whole)
-
-
-@pytest.mark.slow
-def test_a_stopped_capture_of_a_long_clip_goes_on_in_its_middle(tmp_path, body, networks, runs):
-    """Three windows of 0.2 s, of which two are finished, without the estimates that would give the
-    same.
-    """
-    options = CaptureOptions(quality="fast", threads=1, window_s=0.2, wanted=VideoRange(0.0, 0.6))
-    folder = tmp_path / "unfinished"
-    with pytest.raises(CancelledError):
-        capture(SAMPLE, body, options, stop_at(FRAMES - 5), observe_frames=lasting(folder))
-    assert len(list(folder.glob("windows-*/*.npz"))) == 2
-    for estimates in folder.glob("*.npz"):
-        estimates.unlink()
-    before = len(runs)
-    resumed = capture(SAMPLE, body, options, observe_frames=lasting(folder)).motions[0]
-    after = len(runs) - before
-    whole = capture(SAMPLE, body, options, observe_frames=lasting()).motions[0]
-    assert 2 * after < len(runs) - before - after
-    assert_same(resumed, whole)

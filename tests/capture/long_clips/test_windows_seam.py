@@ -66,26 +66,6 @@ def test_people_in_the_same_places_are_the_same_whatever_their_numbers() -> None
     assert same_people(*windows(before, after)) == {0: 5, 1: 3}
 
 
-@pytest.mark.parametrize(
-    ("x", "sides", "is_same"),
-    [
-        (119.0, (SIDE, SIDE), True),
-        (123.0, (SIDE, SIDE), False),
-        (119.0, (SIDE, 60.0), False),
-        (119.0, (60.0, SIDE), False),
-    ],
-)
-def test_how_near_is_measured_by_the_smaller_region(
-    x: float, sides: tuple[float, float], is_same: bool
-) -> None:
-    """Keypoints lie 1.41 times as far apart as their coordinates: 0.15 of 200 pixels are 21 in
-    each.
-    """
-    before = tracklet(range(BEFORE), 100.0, sides[0])
-    after = tracklet(range(40), x, sides[1])
-    assert same_people(*windows({3: before}, {0: after})) == ({0: 3} if is_same else {})
-
-
 def test_only_the_last_frames_are_compared_and_both_must_last() -> None:
     met = {3: tracklet(range(BEFORE), 100.0)}
     late = tracklet(range(40), 100.0)
@@ -99,16 +79,6 @@ def test_only_the_last_frames_are_compared_and_both_must_last() -> None:
         )
         == {}
     )
-
-
-def test_windows_that_do_not_share_their_frames_share_nobody() -> None:
-    before, after = windows({3: tracklet(range(BEFORE), 100.0)}, {0: tracklet(range(40), 100.0)})
-    before.anchor += 1
-    assert same_people(before, after) == {}
-    before.anchor = BEFORE
-    after.first = 0
-    assert same_people(before, after) == {}
-    assert not missed_people(before, after)
 
 
 def test_somebody_is_missed_who_was_followed_throughout_the_shared_frames() -> None:
