@@ -57,26 +57,19 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "-o", "{tmp}/a.xyz"], 2, ".xyz"),
         (["capture", "--overlay", "{tmp}/a.avi"], 2, ".avi"),
         (["capture", "--report", "{tmp}/a.pdf"], 2, ".pdf"),
-        (["capture", "--report", "{tmp}/none/a.html"], 1, "none"),
         (["capture", "-o", "{tmp}/none/a.npz"], 1, "none"),
-        (["capture", "-o", "{tmp}"], 2, "suffix"),
         (["capture", "", "-o", "{tmp}/a.npz"], 2, "VIDEO: the path is empty"),
         (["capture", "-o", ""], 2, "--output: the path is empty"),
         (["capture", "https://a.b/c.mp4"], 2, "https://a.b/c.mp4 is an address"),
-        (["capture", "--overlay", "", "-o", "{tmp}/a.npz"], 2, "--overlay: the path is empty"),
-        (["capture", "--calibration=", "-o", "{tmp}/a.npz"], 2, "--calibration: the path is empty"),
         (["capture", "--retarget", "", "-o", "{tmp}/a.glb"], 2, "--retarget: the path is empty"),
         (["batch", "", "--out", "{tmp}"], 2, "FOLDER: the path is empty"),
-        (["batch", "{tmp}", "--out", ""], 2, "--out: the path is empty"),
         (["capture", "--quality", "superb"], 2, "superb"),
         (["capture", "--fov", "60", "--focal-mm", "26", "-o", "{tmp}/a.npz"], 2, "contradict"),
-        (["capture", "--fov", "wide"], 2, "wide"),
         (
             ["capture", "--height", "1,82", "-o", "{tmp}/a.npz"],
             2,
             "a height of 1 cm is not plausible",
         ),
-        (["capture", "--height", "tall", "-o", "{tmp}/a.npz"], 2, "centimetres, such as 175"),
         (["capture", "--body", "nobody", "-o", "{tmp}/a.npz"], 1, "nobody"),
         (
             ["capture", "--hands", "--body", str(BUILT_IN["scope"]), "-o", "{tmp}/a.npz"],
@@ -86,7 +79,6 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
         (["capture", "--retarget", "{tmp}/rig.glb", "-o", "{tmp}/a.glb"], 1, "rig.glb"),
         (["capture", "--retarget", "{tmp}/rig.obj", "-o", "{tmp}/a.glb"], 2, ".obj"),
         (["capture", "--bone-map", "{tmp}/map.json", "-o", "{tmp}/a.glb"], 2, "--retarget"),
-        (["capture", "--rig-object", "Rig", "-o", "{tmp}/a.glb"], 2, "--retarget"),
         (
             [
                 *("capture", "--retarget", "{tmp}/rig.glb", "--expression-map", "{tmp}/face.json"),
@@ -96,7 +88,6 @@ def test_unreadable_footage_gives_one_sentence_status_1_and_no_file(tmp_path, ca
             "only --face captures",
         ),
         (["capture", "--bvh-unit", "m", "-o", "{tmp}/a.glb"], 2, "-o OUT.bvh"),
-        (["capture", "--shape-keys", "baked", "-o", "{tmp}/a.npz"], 2, "-o OUT.glb"),
         (["capture", "--shape-keys", "baked", "-o", "{tmp}/a.bvh"], 2, "-o OUT.glb"),
         (
             [

@@ -7,20 +7,16 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scope.scope_addon.cli import PROGRAM, SAMPLE, main
-from scope.scope_addon.cluster.runner import MAX_WINDOWS, Divisions, window_ranges
+from scope.scope_addon.cluster.runner import MAX_WINDOWS, window_ranges
 from scope.scope_addon.job.batch import REPORT_NAME
-from scope.scope_addon.job.clip_task import CaptureSettings, ClipTask
 
-from ..job.processes import runs, wait_for
-from .test_runner import calls, files, run
+from .test_runner import files, run
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
 
@@ -73,24 +69,6 @@ def test_windows_become_tasks_of_at_most_some_windows() -> None:
     )
 
 
-def test_the_last_part_of_a_clip_is_followed_by_its_capture(tmp_path: Path) -> None:
-    task = ClipTask("a", "a.mp4", "a.mp4", "out", "basis", CaptureSettings({}, (".npz",)))
-    divisions = Divisions()
-    parts = divisions.begin(task, {"windows": 3, "key": "abc"}, tmp_path / "windows0", 2)
-    assert [part.windows for part in parts] == ["0:1", "1:2", "2:3"]
-    entry = {"report": {"frames": 100}, "seconds": 2.0}
-    assert divisions.ended(parts[1], "tcp://a", entry) == []
-    assert divisions.ended(parts[0], "tcp://b", None) == []
-    (last,) = divisions.ended(parts[2], "tcp://a", entry)
-    assert (last.windows, last.windows_folder, last.key) == ("", str(tmp_path / "windows0"), "abc")
-    assert divisions.close(last) == (
-        200,
-        {"windows": 3, "window_seconds": 4.0, "window_workers": ["tcp://a"]},
-    )
-    assert not (tmp_path / "windows0").exists()
-    assert divisions.close(last) == (0, {})
-
-
 def test_a_long_clip_is_captured_in_windows_and_counted_once(cluster: Any, folder: Path) -> None:
     (folder / "a.mp4").write_text("7")
     (folder / "b.mp4").write_text("1")
@@ -137,32 +115,3 @@ def test_real_windows_of_two_workers_give_the_result_in_one_piece(
         assert set(one.files) == set(other.files)
         different = [name for name in one.files if not np.array_equal(one[name], other[name])]
     assert set(different) <= {"source", "report"}
-
-
-@pytest.mark.slow
-def test_the_windows_of_a_killed_worker_are_observed_by_another(cluster: Any, folder: Path) -> None:
-    clip = folder / "a.mp4"
-    clip.write_text("6")
-    clip.with_suffix(".hangs").write_text("4")
-
-    def kill() -> None:
-        wait_for(lambda: calls(clip) and not clip.with_suffix(".hangs").exists())
-        (hung,) = [
-            c
-            for c in calls(clip)
-            if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))
-        ]
-        os.kill(hung["parent"], signal.SIGKILL)
-        wait_for(lambda: not runs(hung["pid"]))
-
-    thread = threading.Thread(target=kill)
-    thread.start()
-    status, report = run(cluster, folder, program=CLIP)
-    thread.join()
-    assert status == 0
-    assert result(folder, "a") == "0 1 2 3 4 5 "
-    assert sum(row["attempts_lost"] for row in report["workers"]) == 1
-    assert sum(row["frames"] for row in report["workers"]) == 18
-    again = [call["windows"] for call in calls(clip) if ":" in call["windows"]]
-    assert len(again) == len(set(again)) + 1  # nothing else was repeated
-    assert any("a.mp4 (windows" in event["event"] for event in report["log"])

@@ -43,7 +43,7 @@ def store(monkeypatch):
     serving.stop()
 
 
-def test_clips_on_s3_are_captured_once(store, tmp_path):
+def test_clips_on_s3_are_captured_once(store, tmp_path, capsys):
     for name, text in {"a": "a", "b": "broken", "below/d": "d"}.items():
         store.pipe_file(f"studio/clips/{name}.mp4", text.encode())
     program = [
@@ -60,6 +60,9 @@ def test_clips_on_s3_are_captured_once(store, tmp_path):
             store.invalidate_cache()
             report = json.loads(store.cat_file(f"studio/out/{REPORT_NAME}"))
             assert report["counts"] == {**counts, "no_person": 0, "failed": 1}
+            assert report["folder"] == "s3://studio/clips"
+            said = capsys.readouterr().err.splitlines()
+            assert said[-1].endswith(f"report in s3://studio/out/{REPORT_NAME}")
             results = {"a.npz": "a", "below/d.npz": "d"}
             assert store.find("studio/out") == sorted(
                 f"studio/out/{name}" for name in [*results, REPORT_NAME]

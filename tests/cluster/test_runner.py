@@ -229,9 +229,10 @@ def test_workers_of_another_version_get_no_clips(cluster, folder, monkeypatch, c
     [
         ({"folder": "/no/such/clips"}, "it has no folder /no/such/clips"),
         ({"token": "other"}, "it does not see the output"),
+        ({"basis": "other"}, "or one to which it refers, is missing or different there"),
     ],
 )
-def test_workers_that_see_other_folders_get_no_clips(
+def test_workers_that_see_other_folders_or_files_get_no_clips(
     cluster, folder, monkeypatch, capsys, asked, says
 ):
     (folder / "a.mp4").write_text("a")
@@ -293,50 +294,6 @@ def test_workers_know_a_clip_by_the_files_to_which_a_rig_refers(
         assert len(calls(folder / "a.mp4")) == count
         if capsys.readouterr().err.splitlines()[0].endswith(" skipped"):
             (folder.parent / "texture.png").write_text("blue")
-
-
-def test_workers_without_a_file_to_which_a_rig_refers_get_no_clips(
-    cluster, folder, monkeypatch, capsys
-):
-    (folder / "a.mp4").write_text("a")
-    (folder.parent / "texture.png").write_text("red")
-    from scope.scope_addon.cluster.runner import DaskRunner
-
-    ask = DaskRunner._wanted
-
-    def wanted(self, task):
-        (folder.parent / "texture.png").unlink()
-        return ask(self, task)
-
-    monkeypatch.setattr(DaskRunner, "_wanted", wanted)
-    rig = SimpleNamespace(files=[folder.parent / "texture.png"])
-    monkeypatch.setattr("scope.scope_addon.cli.checked_rigs", lambda *_: [rig])
-    assert run(cluster, folder) == (1, None)
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert "or one to which it refers, is missing or different there" in said
-
-
-def test_footage_and_results_may_be_at_urls(cluster, folder, capsys):
-    for name, text in {"a.mp4": "a", "b.mp4": "broken", "below/d.mp4": "d"}.items():
-        (folder / name).write_text(text)
-    out = folder.parent / "out"
-    argv = ["batch", folder.as_uri(), "--out", out.as_uri(), "--formats", "npz", "--recursive"]
-    argv += ["--scheduler", cluster.scheduler_address]
-    program = [
-        sys.executable,
-        "-c",
-        PROGRAM.replace('clip.with_suffix(".calls")', 'pathlib.Path("/dev/null")'),
-    ]
-    for counts in ({"done": 2, "skipped": 0}, {"done": 0, "skipped": 2}):
-        assert main(argv, program=program) == 1
-        report = json.loads((out / REPORT_NAME).read_text("utf-8"))
-        assert report["counts"] == {**counts, "no_person": 0, "failed": 1}
-        assert report["folder"] == folder.as_uri()
-        assert files(folder) == ["a.npz", "below", "below/d.npz", REPORT_NAME]
-        assert (out / "below" / "d.npz").read_text("utf-8") == "result of d"
-    assert (
-        capsys.readouterr().err.splitlines()[-1].endswith(f"report in {out.as_uri()}/{REPORT_NAME}")
-    )
 
 
 @pytest.mark.slow

@@ -547,25 +547,6 @@ def test_invalid_options_are_reported_once_before_the_first_clip(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
-def test_the_real_capture_of_a_folder(tmp_path, capfd):
-    clips = tmp_path / "clips"
-    clips.mkdir()
-    shutil.copy(SAMPLE, clips / "walk.mp4")
-    (clips / "text.mp4").write_text("this is not a video")
-    argv = ["batch", str(clips), "--out", str(tmp_path / "out"), "--jobs", "2", "--formats", "npz"]
-    argv += ["--quality", "fast", "--end", "0.1", "--threads", "1", "--json"]
-    assert main(argv) == 1
-    report = json.loads(capfd.readouterr().out)
-    entries = {e["file"]: e for e in report["files"]}
-    assert entries["walk.mp4"]["status"] == "done", entries
-    assert entries["walk.mp4"]["outputs"] == ["walk.npz"]
-    assert entries["walk.mp4"]["report"]["people"] == 1
-    assert "text.mp4" in entries["text.mp4"]["message"]
-    assert report["options"] == {"--quality": "fast", "--end": "0.1", "--threads": "1"}
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [REPORT_NAME, "walk.npz"]
-
-
 def test_the_views_of_a_take_are_captured_together_and_once(tmp_path):
     take = tmp_path / "clips" / "walk"
     take.mkdir(parents=True)

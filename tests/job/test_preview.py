@@ -6,15 +6,10 @@ is.
 import threading
 
 import numpy as np
-import pytest
 from scope.scope_addon.capture.media.frame import Frame
-from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.cli import SAMPLE
 from scope.scope_addon.job import preview
 from scope.scope_addon.job.preview import FILE, LONGER_SIDE, PreviewWriter, draw
 
@@ -146,32 +141,3 @@ def test_previews_do_not_wait_for_the_rasterizer_to_compile(tmp_path, monkeypatc
             assert sent == expected
             compiled.set()
             writer._rasterizer.result()
-
-
-@pytest.mark.slow
-def test_the_preview_shows_the_body_at_the_ground_truth(body):
-    """The image has the body's colour at the joints, and is unchanged away from them."""
-    truth = np.load(SAMPLE.with_name("sample_truth.npz"))
-    checked = []
-
-    def watch(frame, seen, live):
-        bare = draw(frame.image_rgb, [])
-        shown = draw(frame.image_rgb, seen, [live.fit(person) for person in seen])
-        changed = (bare != shown).any(axis=2)
-        pixels = truth["joints_cam"][frame.index] @ truth["intrinsics"].T
-        pixels = pixels[:, :2] / pixels[:, 2:] * (LONGER_SIDE / max(frame.image_rgb.shape))
-        left, top = np.floor(pixels.min(axis=0)).astype(int) - 12
-        right, bottom = np.ceil(pixels.max(axis=0)).astype(int) + 12
-        near = [
-            changed[max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3].any()
-            for u, v in pixels.round().astype(int)
-        ]
-        outside = changed.copy()
-        outside[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = False
-        checked.append((np.mean(near), outside.sum() / changed.sum()))
-
-    capture(SAMPLE, body, CaptureOptions(quality="fast", wanted=VideoRange(0.0, 1.0)), watch=watch)
-    assert len(checked) >= 20
-    met, strayed = np.array(checked).T
-    assert met.mean() > 0.95
-    assert strayed.max() < 0.05

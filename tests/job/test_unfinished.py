@@ -175,19 +175,6 @@ def test_a_video_that_only_grows_stays_the_same(tmp_path, footage):
         capture.footage.check()
 
 
-def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
-    folders = [tmp_path / FOLDER / name_of(digit) for digit in range(4)]
-    for folder, age_s in zip(folders, (0, 3600, 7200, 30 * 86400), strict=True):
-        folder.mkdir(parents=True)
-        (folder / "0.npz").write_bytes(bytes(1000))
-        os.utime(folder, (time.time() - age_s,) * 2)
-    end(tmp_path, footage)
-    assert [folder.exists() for folder in folders] == [True, True, True, False]
-    monkeypatch.setattr(unfinished, "_LARGEST", 2500)
-    end(tmp_path, footage)
-    assert [folder.exists() for folder in folders] == [True, True, False, False]
-
-
 def test_the_lock_of_a_killed_capture_without_a_folder_is_removed_by_the_next_one(
     tmp_path, footage
 ):
@@ -206,7 +193,7 @@ def test_the_lock_of_a_killed_capture_without_a_folder_is_removed_by_the_next_on
     release(held)
 
 
-def test_folders_in_it_count_by_their_size_and_time(tmp_path, footage, monkeypatch):
+def test_what_is_old_or_too_much_is_removed(tmp_path, footage, monkeypatch):
     folders = [tmp_path / FOLDER / name_of(digit) for digit in range(3)]
     for folder, age_s, inner_s in zip(
         folders, (3600, 86400, 30 * 86400), (3600, 0, 30 * 86400), strict=True

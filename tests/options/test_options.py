@@ -9,9 +9,6 @@ import dataclasses
 import json
 import subprocess
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import ClassVar
 
 import pytest
 from scope.scope_addon import options as declarations
@@ -32,7 +29,6 @@ from scope.scope_addon.errors import UsageError
 from scope.scope_addon.job.request import JobRequest
 from scope.scope_addon.options import OPTIONS, Argument, Option, Place, option, options_at
 from scope.scope_addon.options.capture import AUTO, OFF, ON
-from scope.scope_addon.options.record import declared, options_of
 from scope.scope_addon.retarget.rig_source import ROOTS
 from scope.solver.body_file import load_body
 
@@ -210,26 +206,6 @@ def test_a_new_option_needs_only_its_record(monkeypatch, capsys):
     with pytest.raises(UsageError, match="stride must be int, not 'x'"):
         JobRequest("walk.mp4", stride="x")
     assert EXTRA.range_error(0) == "must be at least 1, not 0"
-
-
-def test_a_field_declares_an_option():
-    @dataclasses.dataclass(frozen=True)
-    class Declaration:
-        stride: int = declared(1, Place.WORKER, "capture every Nth frame", minimum=1)
-        names: Sequence[str] = declared((), Place.WORKER, "names")
-        file: Path | None = declared(None, Place.WORKER, "a file")
-        count: int | str = declared("all", Place.WORKER, "how many")
-        shown: ClassVar[Option] = EXTRA
-
-    *options, shown = options_of(Declaration)
-    assert shown is EXTRA
-    found = {each.name: each for each in options}
-    assert Declaration(stride=3).stride == 3
-    assert found["stride"].range_error(0) == "must be at least 1, not 0"
-    assert (found["names"].value_type, found["names"].several) == (str, True)
-    assert (found["file"].value_type, found["file"].several) == (Path, False)
-    assert found["count"].value_type == (int, str)
-    assert all(Place.CAPTURE in found[name].places for name in ("stride", "names", "file", "count"))
 
 
 def test_enumerations_number_every_choice_once():

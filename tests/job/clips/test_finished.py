@@ -4,10 +4,8 @@
 import json
 import os
 import sys
-from pathlib import Path
 
 import pytest
-from scope.scope_addon.job.batch import REPORT_NAME, Batch
 from scope.scope_addon.job.finished_clip import (
     finished_file,
     read_finished,
@@ -107,44 +105,3 @@ def test_a_record_that_cannot_be_written_is_left_out(tmp_path):
     write_finished(finished_file(tmp_path, "a" * 250, KEY), {"outputs": [], "warnings": []})
     remove_finished(tmp_path / "missing", "a")
     assert list(tmp_path.iterdir()) == []
-
-
-# Captures a clip, and leaves a record.
-PROGRAM = """
-import json, pathlib, sys
-output = sys.argv[sys.argv.index("-o") + 1]
-(record,) = (each.partition("=")[2] for each in sys.argv if each.startswith("--finished-file="))
-for path in (output, record):
-    pathlib.Path(path).write_text("written")
-print(json.dumps({"frames": 3, "outputs": [output], "warnings": []}))
-"""
-
-
-def test_a_batch_removes_the_records_without_a_search_of_its_folder(tmp_path, monkeypatch):
-    """A search for each of ten thousand clips takes minutes."""
-    clips = tmp_path / "clips"
-    out = tmp_path / "out"
-    (clips / "below").mkdir(parents=True)
-    for name in ("a.mp4", "b[1].mp4", "below/a.mp4"):
-        (clips / name).write_text(name)
-    batch = Batch(clips, out, [sys.executable, "-c", PROGRAM], {}, (".npz",))
-    results = ["a.npz", "b[1].npz", "below", "below/a.npz", REPORT_NAME]
-
-    def there():
-        return sorted(path.relative_to(out).as_posix() for path in out.rglob("*"))
-
-    report = batch.run(1, recursive=True)
-    assert report["counts"]["done"] == 3
-    assert there() == results
-
-    for entry in report["files"]:  # a batch that was killed after it had written its report
-        finished_file(out, entry["name"], entry["key"]).write_text("{}")
-    searched = []
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "glob", lambda _, pattern: searched.append(pattern) or iter(()))
-        report = Batch(clips, out, [sys.executable, "-c", PROGRAM], {}, (".npz",)).run(
-            1, recursive=True
-        )
-    assert report["counts"]["skipped"] == 3
-    assert [pattern for pattern in searched if "finished" in pattern] == []
-    assert there() == results
