@@ -153,6 +153,8 @@ REFUSED = {
     "items of a list as a set": b"\x80\x04](N\x90.",
     "array as a key": b"}" + EMPTY_ARRAY + b"Ns.",
     "tuple as a key": b"})Ns.",
+    "tuple of doubling tuples as a key": b"})" + b"2\x86" * 80 + b"Ns.",
+    "doubling tuples in a frozen set": b"\x80\x04}()" + b"2\x86" * 80 + b"\x91Ns.",
     "deep tuple in a set": b"\x80\x04}\x8f()" + b"\x85" * DEEP + b"\x90Ns.",
     "attributes of a class": b"cchumpy.ch\nCh\nN}" + text("part") + b"Ns\x86b.",
     "the array class as an instance": b"cnumpy\nndarray\n)\x81.",
