@@ -39,6 +39,15 @@ def placed_track(
     )
 
 
+def bent(body: Body, degrees: dict[str, float]) -> np.ndarray:
+    """The rotations (K+1, 3, 3) of a body both of whose hips, knees and so on are bent about x."""
+    omega = np.tile(np.eye(3), (body.K + 1, 1, 1))
+    for name, angle in degrees.items():
+        for side in ("left", "right"):
+            omega[body.joint_names.index(f"{side}_{name}")] = exp(np.radians([angle, 0, 0]))
+    return omega
+
+
 def first_frame(placed: PlacedTrack) -> PlacedTrack:
     """The motion of its first frame alone."""
     of_frames = (

@@ -8,7 +8,7 @@ import pytest
 from scope.scope_addon.capture.world.balance import balancing_rotations, center_of_mass
 from scope.solver import load_body, rotations
 
-from .placed_people import UP, first_frame, placed_track
+from .placed_people import UP, bent, first_frame, placed_track
 
 AWAY = np.array([0.0, 0.0, 1.0])
 T = 60
@@ -16,7 +16,7 @@ TIMES = np.arange(T) / 30
 FEET = np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 0.0], (T, 1))  # stand, and hands do not
 
 
-def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 60.0), bends=()):
+def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 60.0), bends=None):
     """A person standing 4 m away with arms down, leaning as a whole about the feet, and moving at
     ``speed_m_s``.
 
@@ -24,15 +24,10 @@ def standing(lean_deg=0.0, axis=(1.0, 0.0, 0.0), speed_m_s=0.0, arms=(0.0, 0.0, 
     hips, knees and so on, degrees about the joint's x axis.
     """
     body = load_body("scope")
-    omega = np.tile(np.eye(3), (T, body.K + 1, 1, 1))
+    omega = np.tile(bent(body, bends or {}), (T, 1, 1, 1))
     for side, sign in (("left", -1), ("right", 1)):
-        omega[:, body.joint_names.index(f"{side}_shoulder")] = rotations.exp(
-            sign * np.radians(arms)
-        )
-        for name, degrees in bends:
-            omega[:, body.joint_names.index(f"{side}_{name}")] = rotations.exp(
-                np.radians([degrees, 0, 0])
-            )
+        shoulder = body.joint_names.index(f"{side}_shoulder")
+        omega[:, shoulder] = rotations.exp(sign * np.radians(arms))
     upright = rotations.exp([np.pi, 0.0, 0.0])  # model y up to camera y down
     lean = rotations.exp(np.radians(lean_deg) * np.array(axis))
     omega[:, 0] = lean @ upright
@@ -66,13 +61,9 @@ def test_a_body_out_of_balance_is_rotated_back_over_the_feet(lean):
     assert np.sign(angle) == -np.sign(lean)
     assert 3.0 < abs(angle) < 10.5
     np.testing.assert_allclose(pivot, placed.soles.mean(axis=1), atol=1e-9)
-    turned = pivot + np.einsum(
-        "tij,tj->ti", turn, center_of_mass(placed.body, placed.joints) - pivot
-    )
-    before, after = (
-        (c - pivot)[T // 2] @ AWAY for c in (center_of_mass(placed.body, placed.joints), turned)
-    )
-    assert abs(after) < 0.75 * abs(before)
+    before = (center_of_mass(placed.body, placed.joints) - pivot)[T // 2]
+    after = turn[T // 2] @ before
+    assert abs(after @ AWAY) < 0.75 * abs(before @ AWAY)
 
 
 @pytest.mark.parametrize("lean", [-20.0, 20.0])
@@ -96,13 +87,9 @@ def test_a_body_whose_mass_is_where_quiet_people_have_it_is_not_rotated():
     bodies = [standing(lean) for lean in leans]
     ahead = np.array([ahead_of_ankles(each) for each in bodies])
     turns = [turned_deg(balancing_rotations(each, FEET, UP)[0])[T // 2] for each in bodies]
-    quiet = np.interp(0.05, *sorted_by_first(ahead, np.array(turns)))
+    order = np.argsort(ahead)
+    quiet = np.interp(0.05, ahead[order], np.array(turns)[order])
     assert abs(quiet) < 0.5
-
-
-def sorted_by_first(a, b):
-    order = np.argsort(a)
-    return a[order], b[order]
 
 
 @pytest.mark.parametrize("lean", [-6.0, 6.0])
@@ -139,13 +126,13 @@ def test_a_body_that_moves_or_is_in_the_air_is_not_rotated():
     assert np.abs(turned_deg(turn)).max() < 1e-6
 
 
-SITS = (("hip", -85), ("knee", 85))
-KNEELS = (("knee", 90), ("ankle", 50))
-BENDS = (("hip", -20), ("knee", 40))
+SITS = {"hip": -85, "knee": 85}
+KNEELS = {"knee": 90, "ankle": 50}
+BENDS = {"hip": -20, "knee": 40}
 
 
 @pytest.mark.parametrize("bends", [SITS, KNEELS], ids=["sits", "kneels"])
-@pytest.mark.parametrize("lean", [-10.0, 0.0, 10.0])
+@pytest.mark.parametrize("lean", [-10.0, 10.0])
 def test_a_body_on_a_chair_or_on_its_shins_is_not_rotated(bends, lean):
     turn, _ = balancing_rotations(standing(lean, bends=bends), FEET, UP)
     assert np.abs(turned_deg(turn)).max() < 0.1

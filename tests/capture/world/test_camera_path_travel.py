@@ -30,14 +30,17 @@ def steps(speed, period=1.0, duty=0.6):
     return soles
 
 
-def seen_from(soles, center, noise=0.0):
-    return soles - center[:, None] + noise * np.random.default_rng(0).standard_normal(soles.shape)
+def travel(soles, center, noise=0.0, times=TIMES):
+    """The travel found of a camera that is at ``center`` (T, 3) in truth."""
+    noise_m = noise * np.random.default_rng(0).standard_normal(soles.shape)
+    seen = soles - center[:, None] + noise_m
+    return camera_travel(seen, np.ones(len(times), bool), UP, times)
 
 
-@pytest.mark.parametrize("speed", [0.8, 1.4, 3.0])
+@pytest.mark.parametrize("speed", [0.8, 3.0])
 def test_a_camera_that_follows_a_walker(speed):
     center = np.stack([speed * TIMES, 0 * TIMES, 0.1 * TIMES], axis=1)
-    found = camera_travel(seen_from(steps(speed), center, 0.004), np.ones(T, bool), UP, TIMES)
+    found = travel(steps(speed), center, 0.004)
     assert np.linalg.norm(found[-1] - center[-1]) < 0.1 * np.linalg.norm(center[-1])
     np.testing.assert_array_equal(found[0], 0.0)
     assert np.abs(found @ UP).max() < 1e-9  # over the floor, not up
@@ -45,30 +48,27 @@ def test_a_camera_that_follows_a_walker(speed):
 
 def test_a_camera_that_speeds_up():
     center = np.stack([0.8 * TIMES + 0.1 * TIMES**2, 0 * TIMES, 0 * TIMES], axis=1)
-    found = camera_travel(seen_from(steps(1.2), center), np.ones(T, bool), UP, TIMES)
+    found = travel(steps(1.2), center)
     assert np.abs(found - center)[:, 0].max() < 0.15 * center[-1, 0]
 
 
 def test_a_camera_does_not_travel_from_one_scene_into_the_next():
     center = np.stack([1.4 * TIMES, 0 * TIMES, 0 * TIMES], axis=1)
     times = TIMES + np.where(np.arange(T) < T // 2, 0.0, 10.0)
-    found = camera_travel(seen_from(steps(1.4), center), np.ones(T, bool), UP, times)
+    found = travel(steps(1.4), center, times=times)
     assert np.linalg.norm(np.diff(found, axis=0), axis=1).max() < 2 * 1.4 / FPS
     assert abs(found[-1, 0] - center[-1, 0]) < 0.1 * center[-1, 0]
 
 
 def test_feet_at_rest_imply_a_static_camera():
-    found = camera_travel(
-        seen_from(steps(1.4), np.zeros((T, 3)), 0.004), np.ones(T, bool), UP, TIMES
-    )
-    np.testing.assert_array_equal(found, 0.0)
+    np.testing.assert_array_equal(travel(steps(1.4), np.zeros((T, 3)), 0.004), 0.0)
 
 
 def test_feet_that_slide_in_all_directions_give_no_travel():
     rng = np.random.default_rng(1)
     soles = np.cumsum(0.05 * rng.standard_normal((T, 4, 3)), axis=0) + [0, 1.0, 4.0]
-    np.testing.assert_array_equal(camera_travel(soles, np.ones(T, bool), UP, TIMES), 0.0)
-    np.testing.assert_array_equal(camera_travel(soles[:5], np.ones(5, bool), UP, TIMES[:5]), 0.0)
+    np.testing.assert_array_equal(travel(soles, np.zeros((T, 3))), 0.0)
+    np.testing.assert_array_equal(travel(soles[:5], np.zeros((5, 3)), times=TIMES[:5]), 0.0)
 
 
 def test_transforming_along_a_path_and_back():
