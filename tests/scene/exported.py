@@ -9,6 +9,10 @@ import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 from scope.scope_addon.scene import actions
+from scope.scope_addon.scene.export import fbx_file
+
+from ..required import package
+from .conftest import Blender, truth_of
 
 # metres
 JOINT_TOLERANCE = 1e-3
@@ -87,9 +91,58 @@ def corresponding(mesh: bpy.types.Object, body, betas: np.ndarray) -> np.ndarray
     return match
 
 
-def glb_json(path: Path) -> dict:
-    """Return the JSON of a binary glTF."""
+def assert_joints(path: Path, body, motion, row: int, rate: float = 30.0) -> None:
+    """Check that a file has the joints of a row of the motion in that row's frame."""
+    Blender.go_to(read_back(path, rate) + row)
+    joints = Blender.joints(Blender.only("ARMATURE"), body.joint_names)
+    np.testing.assert_allclose(joints, truth_of(body, motion).joints[row], atol=JOINT_TOLERANCE)
+
+
+def read_glb(path: Path) -> tuple[dict, bytearray]:
+    """Return the JSON and the binary part of a binary glTF."""
     data = path.read_bytes()
-    assert data[:4] == b"glTF"
-    length = struct.unpack("<I", data[12:16])[0]
-    return json.loads(data[20 : 20 + length])
+    magic, version, length, json_bytes = struct.unpack_from("<4sIII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    return json.loads(data[20 : 20 + json_bytes]), bytearray(data[28 + json_bytes :])
+
+
+def write_glb(path: Path, gltf: dict, binary: bytes) -> None:
+    """Write a binary glTF."""
+    text = json.dumps(gltf).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = ((b"JSON", text), (b"BIN\0", binary))
+    whole = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(whole)) + whole)
+
+
+def glb_values(gltf: dict, binary: bytearray, accessor: int) -> np.ndarray:
+    """Return the floats (N,) of an accessor; they can be changed."""
+    entry = gltf["accessors"][accessor]
+    start = gltf["bufferViews"][entry["bufferView"]].get("byteOffset", 0)
+    parts = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}[entry["type"]]
+    start += entry.get("byteOffset", 0)
+    return np.frombuffer(binary, "<f4", parts * entry["count"], start)
+
+
+def fbx_objects(path: Path) -> dict[bytes, list]:
+    """Return the object nodes of an FBX file by their kinds, and under b"" its root."""
+    root, version = package("io_scene_fbx.parse_fbx").parse(str(path))
+    assert version == 7400
+    found: dict[bytes, list] = {b"": [root]}
+    for objects in fbx_file.below(root, b"Objects"):
+        for node in objects.elems:
+            found.setdefault(node.id, []).append(node)
+    return found
+
+
+def fbx_properties(node) -> dict[str, list]:
+    """Return the values of an FBX node's properties by name."""
+    return {entry.props[0].decode(): entry.props[4:] for entry in fbx_file.properties(node)}
+
+
+def fbx_models(path: Path) -> dict[str, dict[str, list]]:
+    """Return the properties of each model of an FBX file, by its name."""
+    return {
+        node.props[1].split(b"\0")[0].decode(): fbx_properties(node)
+        for node in fbx_objects(path)[b"Model"]
+    }

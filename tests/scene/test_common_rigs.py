@@ -5,8 +5,6 @@ own joints.
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import replace
 from itertools import product
 
@@ -25,6 +23,7 @@ from scope.scope_addon.scene.rig_retarget import retarget, usable_guess
 from scope.solver.errors import InputError
 
 from ..edit.walking import BETAS, BODY, NAMES, RATE, motion_of, walk
+from .exported import fbx_models, read_glb, write_glb
 from .made_rigs import captured, truth
 
 MOTION = motion_of(walk(0.5, bent=0.2))
@@ -98,19 +97,6 @@ def lowest_of_body(source):
     return np.array(heights)
 
 
-def read_chunk(data):
-    """Return the JSON of a .glb, and what comes after it."""
-    (length,) = struct.unpack_from("<I", data, 12)
-    return json.loads(data[20 : 20 + length]), data[20 + length :]
-
-
-def write_chunk(gltf, rest):
-    text = json.dumps(gltf).encode()
-    text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A)
-    return head + text + rest
-
-
 @pytest.mark.parametrize("version", [0, 1])
 def test_an_avatar_is_read_by_its_humanoid_table(tmp_path, version):
     """Its bones have names that say nothing."""
@@ -132,7 +118,7 @@ def test_an_avatar_is_read_by_its_humanoid_table(tmp_path, version):
                  enumerate(("spine", "chest", "upperChest"), 1)}  # fmt: skip
     path = tmp_path / "avatar.vrm"
     formats.write_glb(tmp_path / "avatar.glb")
-    gltf, rest = read_chunk((tmp_path / "avatar.glb").read_bytes())
+    gltf, binary = read_glb(tmp_path / "avatar.glb")
     node_of = {node.get("name"): index for index, node in enumerate(gltf["nodes"])}
     nodes = {part: node_of[bone] for part, bone in bone_of.items()}
     if version == 1:
@@ -144,26 +130,11 @@ def test_an_avatar_is_read_by_its_humanoid_table(tmp_path, version):
             nodes[f"{side}ThumbProximal"] = nodes.pop(f"{side}ThumbMetacarpal")
         entries = [{"bone": part, "node": node} for part, node in nodes.items()]
         gltf["extensions"] = {"VRM": {"humanoid": {"humanBones": entries}}}
-    path.write_bytes(write_chunk(gltf, rest))
+    write_glb(path, gltf, binary)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     source = rig_source(path)
     armature = load_rig(source, bpy.context.scene.collection)
     assert rig_bone_map(source, armature).parts == expected
-
-
-def fbx_models(path):
-    """Return the node of each model of an FBX file by its name, and of each its properties."""
-    formats.enable_addon("io_scene_fbx")
-    from io_scene_fbx import parse_fbx
-
-    root, _ = parse_fbx.parse(str(path))
-    objects = next(each for each in root.elems if each.id == b"Objects")
-    models = {}
-    for model in (each for each in objects.elems if each.id == b"Model"):
-        block = next(each for each in model.elems if each.id == b"Properties70")
-        values = {entry.props[0].decode(): entry.props[4:] for entry in block.elems}
-        models[model.props[1].split(b"\0")[0].decode()] = values
-    return models
 
 
 def test_a_rig_in_centimetres_is_the_same_in_an_fbx_file_as_one_in_metres(tmp_path):

@@ -2,7 +2,6 @@
 """Retargeting from a rig file to exported files."""
 
 import json
-import struct
 from dataclasses import replace
 
 import bpy
@@ -24,7 +23,7 @@ from scope.solver.errors import InputError
 
 from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ..retarget.naming_schemes import names_of
-from .exported import read_back
+from .exported import glb_values, read_back, read_glb, write_glb
 from .made_rigs import ARMS, build_rig, captured, seen, truth
 
 MOTION = motion_of(walk(0.5))
@@ -275,20 +274,10 @@ def test_a_map_of_another_rig_is_refused(tmp_path):
 def test_bones_that_are_nowhere_are_refused(tmp_path):
     """The inverse bind matrices, 24 of them, are the only matrices in the file."""
     path = save_rig(tmp_path / "rig.glb")
-    data = bytearray(path.read_bytes())
-    (length,) = struct.unpack_from("<I", data, 12)
-    gltf = json.loads(data[20 : 20 + length])
-    accessor = next(each for each in gltf["accessors"] if each["type"] == "MAT4")
-    at = (
-        28
-        + length
-        + gltf["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
-        + accessor.get("byteOffset", 0)
-    )
-    data[at : at + 64 * accessor["count"]] = np.full(
-        16 * accessor["count"], np.nan, "<f4"
-    ).tobytes()
-    path.write_bytes(data)
+    gltf, binary = read_glb(path)
+    (matrices,) = (k for k, each in enumerate(gltf["accessors"]) if each["type"] == "MAT4")
+    glb_values(gltf, binary, matrices)[:] = np.nan
+    write_glb(path, gltf, binary)
     with pytest.raises(
         InputError,
         match=r"rig\.glb: .*(bones of 'Rig0' have positions that are not "

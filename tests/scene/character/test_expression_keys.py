@@ -5,8 +5,6 @@ files.
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from scope.scope_addon.scene.character.body_mesh import mixed_vertices
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
 
 from ...made_motion import made_face
+from ..exported import glb_values, read_glb
 
 JAW = np.array([0.0, 0.3, 0.9, 0.2])
 
@@ -87,10 +86,7 @@ def morph_animation(path: Path) -> dict[str, np.ndarray]:
     """The (T,) animated weights of a .glb by target, read without Blender: the file is JSON and
     float32 arrays.
     """
-    data = path.read_bytes()
-    length = struct.unpack("<I", data[12:16])[0]
-    gltf = json.loads(data[20 : 20 + length])
-    binary = data[28 + length :]
+    gltf, binary = read_glb(path)
     (mesh,) = [m for m in gltf["meshes"] if "extras" in m]
     (animation,) = gltf["animations"]
     (sampler,) = [
@@ -98,10 +94,7 @@ def morph_animation(path: Path) -> dict[str, np.ndarray]:
         for c in animation["channels"]
         if c["target"]["path"] == "weights"
     ]
-    accessor = gltf["accessors"][sampler["output"]]
-    view = gltf["bufferViews"][accessor["bufferView"]]
-    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    values = np.frombuffer(binary, "<f4", accessor["count"], start)
+    values = glb_values(gltf, binary, sampler["output"])
     names = mesh["extras"]["targetNames"]
     return dict(zip(names, values.reshape(-1, len(names)).T, strict=True))
 

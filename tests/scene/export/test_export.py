@@ -14,10 +14,18 @@ from scope.scope_addon.scene.build import NEW_SCENE, build_scene
 from scope.scope_addon.scene.datablocks import captures_of
 from scope.scope_addon.scene.export import formats, usd_file
 from scope.scope_addon.scene.export.export import ExportOptions, export, export_motions
+from scope.scope_addon.scene.export.fbx_file import below
 
 from ...made_motion import made_views
-from ...required import package
-from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, glb_json, read_back
+from ..exported import (
+    JOINT_TOLERANCE,
+    SKIN_TOLERANCE,
+    corresponding,
+    fbx_objects,
+    glb_values,
+    read_back,
+    read_glb,
+)
 
 SCENE_SUFFIXES = [suffix for suffix in SUFFIXES if suffix not in WITHOUT_SCENE]
 
@@ -107,7 +115,7 @@ def test_the_camera_keeps_its_field_of_view_in_a_scene_of_another_shape(
     assert bpy.context.scene.render.resolution_x == 1920
     expected = 2 * np.arctan([320 / fx, 240 / fy])
     if suffix == ".glb":
-        lens = glb_json(path)["cameras"][0]["perspective"]
+        lens = read_glb(path)[0]["cameras"][0]["perspective"]
         found = 2 * np.arctan(np.tan(lens["yfov"] / 2) * lens["aspectRatio"]), lens["yfov"]
     else:
         read_back(path)
@@ -126,7 +134,7 @@ def test_every_camera_of_a_glb_has_a_field_of_view_of_its_own(body, make_motion,
     captures_of(bpy.context.scene)[0].objects.link(bpy.data.objects.new("own", own))
     path = tmp_path / "walk.glb"
     export(path, options=ExportOptions(camera=True))
-    lenses = {each["name"]: each["perspective"] for each in glb_json(path)["cameras"]}
+    lenses = {each["name"]: each["perspective"] for each in read_glb(path)[0]["cameras"]}
     assert lenses.pop("own")["aspectRatio"] == pytest.approx(640 / 480)
     first, second = (lenses[name] for name in sorted(lenses))
     for lens, width, height, focal in (
@@ -199,7 +207,6 @@ def test_a_file_for_each_of_several_people(body, make_motion, tmp_path, blender,
 
 def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motion, tmp_path):
     """Read from the files themselves, because importers move and rename animation."""
-    parser = package("io_scene_fbx.parse_fbx")
     built = build_scene(
         [make_motion(body, 5, rate=20.0)],
         body,
@@ -208,27 +215,22 @@ def test_fbx_and_glb_begin_at_zero_and_are_named_after_the_clip(body, make_motio
     )
     export(tmp_path / "out.glb", [built.collection])
     export(tmp_path / "out.fbx", [built.collection])
-    gltf = glb_json(tmp_path / "out.glb")
-    assert [animation["name"] for animation in gltf["animations"]] == ["A walk"]
-    inputs = [gltf["accessors"][s["input"]] for s in gltf["animations"][0]["samplers"]]
-    assert min(a["min"][0] for a in inputs) == 0.0
-    assert max(a["max"][0] for a in inputs) == pytest.approx(0.2)
-    root, _ = parser.parse(str(tmp_path / "out.fbx"))
-    objects, takes = ([e for e in root.elems if e.id == name][0] for name in (b"Objects", b"Takes"))
+    gltf, binary = read_glb(tmp_path / "out.glb")
+    (animation,) = gltf["animations"]
+    assert animation["name"] == "A walk"
+    times_s = [glb_values(gltf, binary, s["input"]) for s in animation["samplers"]]
+    assert min(each[0] for each in times_s) == 0.0
+    assert max(each[-1] for each in times_s) == pytest.approx(0.2)
+    objects = fbx_objects(tmp_path / "out.fbx")
     second = 46186158000
-    times = [
-        t
-        for e in objects.elems
-        if e.id == b"AnimationCurve"
-        for k in e.elems
-        if k.id == b"KeyTime"
-        for t in k.props[0]
-    ]
+    curves = objects[b"AnimationCurve"]
+    times = [t for e in curves for k in below(e, b"KeyTime") for t in k.props[0]]
     assert min(times) == 0
     assert max(times) / second == pytest.approx(0.2)
-    (stack,) = (e for e in objects.elems if e.id == b"AnimationStack")
+    (stack,) = objects[b"AnimationStack"]
     assert stack.props[1] == b"A walk\0\x01AnimStack"
-    (take,) = (e for e in takes.elems if e.id == b"Take")
+    (takes,) = below(objects[b""][0], b"Takes")
+    (take,) = below(takes, b"Take")
     assert take.props == [b"A walk"]
-    span = next(e.props for e in take.elems if e.id == b"LocalTime")
-    assert span == [0, pytest.approx(0.2 * second)]
+    (span,) = below(take, b"LocalTime")
+    assert span.props == [0, pytest.approx(0.2 * second)]

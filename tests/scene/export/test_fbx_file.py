@@ -6,16 +6,14 @@ The key times of a glTF file are those of the footage.
 BVH: axes, units and offsets, read from the text.
 """
 
-import struct
-
 import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.export.export import ExportOptions, export_motions
+from scope.scope_addon.scene.export.fbx_file import below
 from scope.scope_addon.scene.rig_export import export_rig
 
-from ...required import package
-from ..exported import glb_json, read_back
+from ..exported import fbx_models, fbx_objects, fbx_properties, glb_values, read_back, read_glb
 from ..made_rigs import build_rig
 
 
@@ -23,26 +21,13 @@ def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
     """Read with Blender's parser. Unreal interprets lengths as centimetres, whatever unit the file
     states.
     """
-    parser = package("io_scene_fbx.parse_fbx")
     path = tmp_path / "walk.fbx"
     motion = make_motion(body, 4)
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
-    root, version = parser.parse(str(path))
-    assert version == 7400
-
-    def below(elem, *names):
-        return [e for e in elem.elems if e.id.decode() in names]
-
-    def properties(elem):
-        return {
-            p.props[0].decode(): p.props[4:]
-            for block in below(elem, "Properties70")
-            for p in block.elems
-        }
-
-    assert properties(below(root, "GlobalSettings")[0])["UnitScaleFactor"] == [1.0]
-    objects = below(root, "Objects")[0]
-    models = {e.props[1].split(b"\0")[0].decode(): properties(e) for e in below(objects, "Model")}
+    objects = fbx_objects(path)
+    (settings,) = below(objects[b""][0], b"GlobalSettings")
+    assert fbx_properties(settings)["UnitScaleFactor"] == [1.0]
+    models = fbx_models(path)
     for name, values in models.items():
         np.testing.assert_allclose(
             values.get("Lcl Scaling", [1, 1, 1]), 1.0, atol=1e-4, err_msg=name
@@ -51,20 +36,22 @@ def test_fbx_is_in_centimetres_without_any_scaling(body, make_motion, tmp_path):
     knee, hip = (body.joint_names.index(f"left_{part}") for part in ("knee", "hip"))
     shin = np.linalg.norm(models["left_knee"]["Lcl Translation"])
     assert shin == pytest.approx(100 * np.linalg.norm(joints[knee] - joints[hip]), rel=1e-4)
-    mesh = next(e for e in below(objects, "Geometry") if e.props[2] == b"Mesh")
-    heights = np.reshape(below(mesh, "Vertices")[0].props[0], (-1, 3))
-    assert 100 < np.ptp(heights, axis=0).max() < 250
-    shapes = [e for e in below(objects, "Geometry") if e.props[2] == b"Shape"]
-    largest = max(np.abs(below(e, "Vertices")[0].props[0]).max() for e in shapes)
+    vertices = {
+        kind: [
+            np.array(next(below(node, b"Vertices")).props[0])
+            for node in objects[b"Geometry"]
+            if node.props[2] == kind
+        ]
+        for kind in (b"Mesh", b"Shape")
+    }
+    assert 100 < np.ptp(vertices[b"Mesh"][0].reshape(-1, 3), axis=0).max() < 250
+    largest = max(np.abs(moved).max() for moved in vertices[b"Shape"])
     assert largest == pytest.approx(100 * np.abs(body.shapedirs).max(), rel=1e-3)
-    places = [
-        below(n, "Matrix")[0].props[0][12:15]
-        for e in below(objects, "Pose")
-        for n in below(e, "PoseNode")
-    ]
+    poses = [node for pose in objects[b"Pose"] for node in below(pose, b"PoseNode")]
+    places = [next(below(node, b"Matrix")).props[0][12:15] for node in poses]
     assert np.abs(places).max() > 50
-    camera = next(properties(e) for e in below(objects, "NodeAttribute") if e.props[2] == b"Camera")
-    assert camera["FarPlane"] == [pytest.approx(100 * 1000.0)]
+    (camera,) = (node for node in objects[b"NodeAttribute"] if node.props[2] == b"Camera")
+    assert fbx_properties(camera)["FarPlane"] == [pytest.approx(100 * 1000.0)]
 
 
 @pytest.mark.parametrize("rate", [30000 / 1001, 24.449])
@@ -73,14 +60,10 @@ def test_glb_key_times_are_those_of_the_footage(body, make_motion, tmp_path, rat
     motion = make_motion(body, 7, rate=rate)
     path = tmp_path / "walk.glb"
     export_motions([motion], body, path, export_options=ExportOptions(camera=True))
-    gltf = glb_json(path)
-    data = path.read_bytes()
-    assert len(data) == struct.unpack("<I", data[8:12])[0]
-    binary = data[28 + struct.unpack("<I", data[12:16])[0] :]
+    gltf, binary = read_glb(path)
     for index in {sampler["input"] for sampler in gltf["animations"][0]["samplers"]}:
         accessor = gltf["accessors"][index]
-        start = gltf["bufferViews"][accessor["bufferView"]]["byteOffset"]
-        times = np.frombuffer(binary, "<f4", accessor["count"], start)
+        times = glb_values(gltf, binary, index)
         np.testing.assert_allclose(times, motion.timestamps[: len(times)], atol=1e-6)
         assert (accessor["min"], accessor["max"]) == ([times[0]], [times[-1]])
         assert len(times) in (2, 7)  # constant shapes have their ends alone
