@@ -13,7 +13,6 @@ from scope.scope_addon.capture.world.travel_scale import (
     _fitted_plane,
     belt_travel,
     contradicting_strides,
-    find_floor,
     scaled_travel,
     walking_speed,
 )
@@ -46,8 +45,12 @@ def walk(shortened=1.0):
     return soles
 
 
-def room(rng, with_floor=True):
-    """Corners in units of the map: of a floor, table tops, and walls."""
+CENTER = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]  # of a camera that follows at the walker's speed
+
+
+def room():
+    """Corners in units of the map: 80 of a floor, 30 of table tops, and 150 of walls."""
+    rng = np.random.default_rng(0)
     floor = np.stack(
         [rng.uniform(-3, 3, 80), np.full(80, HEIGHT_M), rng.uniform(1, 14, 80)], axis=1
     )
@@ -57,17 +60,18 @@ def room(rng, with_floor=True):
     wall = np.stack(
         [np.full(150, -3.0), rng.uniform(-1.5, HEIGHT_M, 150), rng.uniform(1, 14, 150)], axis=1
     )
-    parts = [floor, table, wall] if with_floor else [wall]
-    places = np.concatenate(parts)
+    places = np.concatenate([floor, table, wall])
     return (places + 0.004 * rng.standard_normal(places.shape)) / SCALE
 
 
+ROOM = room()
+WALLS = ROOM[110:]
+
+
 def travel(places):
-    """A camera that follows at the walker's speed, as the background shows it."""
-    center = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
+    """How the camera follows, as the background shows it."""
     still = np.tile(np.eye(3), (T, 1, 1))
-    odometry = Odometry(still, center / SCALE, np.zeros(T, int), [places])
-    return odometry, center
+    return Odometry(still, CENTER / SCALE, np.zeros(T, int), [places])
 
 
 def placed(soles, root):
@@ -80,45 +84,44 @@ def placed(soles, root):
 
 def follower(shortened=1.0):
     """The walker, relative to a camera that follows at the same speed."""
-    center = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
-    return placed(walk(shortened) - center[:, None], np.tile([0.0, 0.6, 4.0], (T, 1)))
+    return placed(walk(shortened) - CENTER[:, None], np.tile([0.0, 0.6, 4.0], (T, 1)))
+
+
+def largest_error(found):
+    """The largest distance of the travel from the true one, as a share of that."""
+    return np.abs(found.center - CENTER).max() / CENTER[-1, 2]
 
 
 @pytest.mark.parametrize("shortened", [1.0, 0.65])
 def test_the_floor_tells_the_scale_however_long_strides_seem(shortened):
-    odometry, center = travel(room(np.random.default_rng(0)))
     tilted = exp([0.1, 0.0, 0.0]) @ UP  # as the up direction of a body may be
-    found = scaled_travel(follower(shortened), tilted, odometry)
-    assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+    found = scaled_travel(follower(shortened), tilted, travel(ROOM))
+    assert largest_error(found) < 0.03
     assert np.degrees(np.arccos(found.floor_up @ UP)) < 1.0
     assert found.source == FLOOR
 
 
 def test_without_a_floor_the_feet_tell_it():
-    odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
-    assert find_floor(odometry.maps[0], odometry.center, UP) is None
-    found = scaled_travel(follower(), UP, odometry)
-    assert np.abs(found.center - center).max() < 0.1 * center[-1, 2]
+    found = scaled_travel(follower(), UP, travel(WALLS))
+    assert largest_error(found) < 0.1
     assert found.floor_up is None
     assert found.source == FEET
 
 
 def test_a_floor_of_few_corners_tells_it_where_strides_seem_much_too_short():
     """As of somebody who comes towards the camera, whose feet hardly swing in the picture."""
-    places = room(np.random.default_rng(0))
-    odometry, center = travel(np.concatenate([places[:16], places[80:]]))
-    found = scaled_travel(follower(0.4), UP, odometry)
+    places = np.concatenate([ROOM[:16], ROOM[80:]])
+    found = scaled_travel(follower(0.4), UP, travel(places))
     assert found.source == FLOOR
-    assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+    assert largest_error(found) < 0.03
 
 
 def test_the_cadence_tells_it_where_strides_along_the_line_of_sight_seem_much_too_short():
     """Steps alone would tell a third to a half of it."""
-    odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
     for shortened in (0.5, 0.3):
-        found = scaled_travel(follower(shortened), UP, odometry)
+        found = scaled_travel(follower(shortened), UP, travel(WALLS))
         assert found.source == FEET
-        assert found.center[-1, 2] == pytest.approx(center[-1, 2], rel=0.25)
+        assert found.center[-1, 2] == pytest.approx(CENTER[-1, 2], rel=0.25)
 
 
 def test_people_walk_as_fast_as_their_cadence_tells():
@@ -130,23 +133,20 @@ def test_people_walk_as_fast_as_their_cadence_tells():
 
 
 def test_a_scale_that_nobody_tells_is_said_to_be_unknown():
-    odometry, center = travel(room(np.random.default_rng(0), with_floor=False))
     unseen = follower()
     unseen.valid[:] = False
-    found = scaled_travel(unseen, UP, odometry)
+    found = scaled_travel(unseen, UP, travel(WALLS))
     assert found.source == NOTHING
     np.testing.assert_array_equal(found.center, 0.0)
 
 
 def test_on_a_treadmill_the_floor_alone_tells_it():
-    without, _ = travel(room(np.random.default_rng(0), with_floor=False))
-    found = scaled_travel(follower(), UP, without, treadmill=True)
+    found = scaled_travel(follower(), UP, travel(WALLS), treadmill=True)
     assert found.source == NOTHING
     np.testing.assert_array_equal(found.center, 0.0)
-    odometry, center = travel(room(np.random.default_rng(0)))
-    found = scaled_travel(follower(), UP, odometry, treadmill=True)
+    found = scaled_travel(follower(), UP, travel(ROOM), treadmill=True)
     assert found.source == FLOOR
-    assert np.abs(found.center - center).max() < 0.03 * center[-1, 2]
+    assert largest_error(found) < 0.03
 
 
 def test_a_belt_does_not_run_in_the_gap_at_a_scene_cut():
@@ -168,10 +168,7 @@ def test_the_floor_of_a_long_path_takes_little_memory():
 
 
 def test_strides_on_the_spot_contradict_a_path_that_stands_still():
-    body = TIMES[:, None] * [0.0, 0.0, SPEED_M_S]
-    walks = contradicting_strides(placed(walk(), body), UP)
-    assert not walks.any()
-    seen_short = contradicting_strides(placed(walk(0.65), body), UP)
-    assert not seen_short.any()
-    on_the_spot = contradicting_strides(placed(walk(0.65) - body[:, None], 0.0 * body), UP)
+    assert not contradicting_strides(placed(walk(), CENTER), UP).any()
+    assert not contradicting_strides(placed(walk(0.65), CENTER), UP).any()
+    on_the_spot = contradicting_strides(placed(walk(0.65) - CENTER[:, None], 0.0 * CENTER), UP)
     assert on_the_spot.mean() > 0.9

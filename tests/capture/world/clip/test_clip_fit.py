@@ -59,6 +59,14 @@ def shaken(track, deviation_px, seed):
     return replace(track, keypoints_px=track.keypoints_px + noise)
 
 
+def with_mirrored_leg(true, span):
+    """The states with the right leg on the other side of the image plane in some frames."""
+    start = replace(true, rotations=true.rotations.copy())
+    for joint, angle in (("right_hip", -0.3), ("right_knee", -0.9)):
+        start.rotations[span, BODY.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
+    return start
+
+
 @pytest.mark.parametrize("flipped", [1, 8])
 def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_it_was(flipped):
     """The image shows a leg bent towards the camera as one bent away; the lifter is half as sure
@@ -71,17 +79,12 @@ def test_a_limb_that_is_lifted_to_its_mirror_image_for_some_frames_stays_where_i
     mirrored = 2 * wrong[:, HIPS[1], None, 2] - wrong[:, LEG, 2]
     wrong[span, LEG, 2] = mirrored[span]
     sigma[span, LEG] = 0.25
-    hip, knee = (BODY.joint_names.index(f"right_{name}") for name in ("hip", "knee"))
-    start = replace(true, rotations=true.rotations.copy())
-    start.rotations[span, hip] = exp(np.array([-0.3, 0.0, 0.0]))
-    start.rotations[span, knee] = exp(np.array([-0.9, 0.0, 0.0]))
+    start = with_mirrored_leg(true, span)
+    found = fit(prepare(track, wrong, sigma), start)
     ankle = BODY.joint_names.index("right_ankle")
-    depth = [
-        joints(each)[:, ankle, 2]
-        for each in (true, start, fit(prepare(track, wrong, sigma), start))
-    ]
-    assert np.abs(depth[1] - depth[0])[span].min() > 0.5
-    np.testing.assert_allclose(depth[2], depth[0], atol=0.06)
+    truth, before, after = (joints(each)[:, ankle, 2] for each in (true, start, found))
+    assert np.abs(before - truth)[span].min() > 0.5
+    np.testing.assert_allclose(after, truth, atol=0.06)
 
 
 def test_noise_of_single_frames_is_averaged_and_a_motion_keeps_its_amplitude():
@@ -265,24 +268,17 @@ def test_deviations_are_those_along_each_joints_own_line_of_sight():
     np.testing.assert_allclose(sigma[:, 1:], np.tile([0.006 * ALONG, 0.002 * ACROSS], (5, 3, 1)))
 
 
-@pytest.mark.parametrize(("first", "second", "ratio"), [(30.0, 60.0, 2**0.3), (1.0, 10.0, 1.0)])
-def test_the_same_covariance_says_less_of_more_frames(first, second, ratio):
+def test_the_same_covariance_says_less_of_more_frames_and_a_single_one_is_as_one_of_few():
     joints = np.tile([0.0, 0.0, 3.0], (3, 2, 1))
     covariance = np.tile(1e-5 * np.eye(3), (3, 2, 1, 1))
-    slow, fast = (
+    at_1, at_10, at_30, at_60 = (
         joint_sigma(covariance[:, 0], covariance, joints, np.arange(3) / rate)
-        for rate in (first, second)
+        for rate in (1.0, 10.0, 30.0, 60.0)
     )
-    np.testing.assert_allclose(fast, ratio * slow)
-
-
-def test_a_single_frame_is_as_one_of_few():
-    joints = np.tile([0.0, 0.0, 3.0], (2, 2, 1))
-    covariance = np.tile(1e-5 * np.eye(3), (2, 2, 1, 1))
+    np.testing.assert_allclose(at_60, 2**0.3 * at_30)
+    np.testing.assert_allclose(at_10, at_1)
     one = joint_sigma(covariance[:1, 0], covariance[:1], joints[:1], np.zeros(1))
-    np.testing.assert_allclose(
-        one, joint_sigma(covariance[:, 0], covariance, joints, np.array([0.0, 0.1]))[:1]
-    )
+    np.testing.assert_allclose(one, at_10[:1])
 
 
 LIMB_SEARCH_FRAMES = 64
@@ -304,17 +300,9 @@ def test_a_limb_that_starts_mirrored_for_long_ends_where_it_was() -> None:
     sigma = np.full((LIMB_SEARCH_FRAMES, JOINTS), 0.1)
     unsure[SPAN, LEG, 2] = unsure[SPAN, HIPS[1], None, 2]
     sigma[SPAN, LEG] = 0.8
-    start = replace(true, rotations=true.rotations.copy())
-    for joint, angle in (("right_hip", -0.3), ("right_knee", -0.9)):
-        start.rotations[SPAN, BODY.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
+    start = with_mirrored_leg(true, SPAN)
     ankle = BODY.joint_names.index("right_ankle")
-    truth, before, after = (
-        joints(each)[:, ankle]
-        for each in (
-            true,
-            start,
-            path.to_first(fit(prepare(track, unsure, sigma), path.to_frames(start), path)),
-        )
-    )
+    found = path.to_first(fit(prepare(track, unsure, sigma), path.to_frames(start), path))
+    truth, before, after = (joints(each)[:, ankle] for each in (true, start, found))
     assert np.linalg.norm(before - truth, axis=1)[SPAN].min() > 0.5
     assert np.linalg.norm(after - truth, axis=1).max() < 0.1
