@@ -12,11 +12,11 @@ from types import EllipsisType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .errors import ShapeError
+from .part import Array
 
-Array = NDArray[Any]
 _Shape = tuple[int | EllipsisType | None, ...]
 _FLOAT64 = np.dtype(np.float64)
 

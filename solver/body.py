@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 
 from .arrays import as_array, as_arrays, as_integers, described
 from .errors import InvalidValueError, ModelFileError, ShapeError
-
-Array = NDArray[np.float64]
+from .part import Array
 
 
 @dataclass(frozen=True)
@@ -105,10 +104,10 @@ class Body:
         return v_bar
 
     @cached_property
-    def strongest_joints(self) -> NDArray[np.integer[Any]]:
+    def strongest_joints(self) -> Array:
         """(V,) the joint that moves each vertex most."""
         rows = np.arange(len(self.skin_joints))
-        joints: NDArray[np.integer[Any]] = self.skin_joints[rows, self.skin_weights.argmax(axis=1)]
+        joints: Array = self.skin_joints[rows, self.skin_weights.argmax(axis=1)]
         return joints
 
     def _minus_parent(self, rest: Array) -> Array:
@@ -267,7 +266,7 @@ class Body:
         p: Array = np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
         return p
 
-    def _checked_numbers(self, which: Sequence[int]) -> NDArray[np.int64]:
+    def _checked_numbers(self, which: Sequence[int]) -> Array:
         numbers = as_integers(which, "which, numbers of keypoints as keypoint_set returns them,")
         if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(self.keypoint_part):
             last = len(self.keypoint_part) - 1
@@ -276,12 +275,12 @@ class Body:
             )
         return numbers
 
-    def triangles(self) -> NDArray[np.int32]:
+    def triangles(self) -> Array:
         """(F', 3) int32: the faces split along the first diagonal."""
         f = self.faces
         if f.shape[1] == 3:
             return f
-        halves: NDArray[np.int32] = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(
+        halves: Array = np.concatenate([f[:, [0, 1, 2]], f[:, [0, 2, 3]]]).astype(
             np.int32, order="C"
         )
         return halves

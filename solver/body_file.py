@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .arrays import described
 from .body import Body
 from .errors import InvalidValueError, ModelFileError, ScopeWarning
+from .part import Array
 from .smpl_family import MAX_BETAS, smpl_body, stored_gender
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
@@ -138,7 +138,7 @@ def load_body(which: str | Path = "scope", betas: int = MAX_BETAS) -> Body:
     return replace(body, file=str(path.resolve()))
 
 
-def _surprises(arrays: Mapping[str, NDArray[Any]], body: Body) -> list[str]:
+def _surprises(arrays: Mapping[str, Array], body: Body) -> list[str]:
     """Return what of a model is not as it may be expected, although it can be used."""
     found = []
     stored = arrays["shapedirs"].shape[2] if "shapedirs" in arrays else 0
@@ -171,7 +171,7 @@ _DAMAGED = (
 )
 
 
-def read_arrays(path: Path, what: str) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path, what: str) -> dict[str, Array]:
     """Return the arrays of a .npz file, without those that are pickled.
 
     :param what: what the file is, for messages.
@@ -192,7 +192,7 @@ def read_arrays(path: Path, what: str) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def scope_body(data: Mapping[str, NDArray[Any]], path: Path) -> Body:
+def scope_body(data: Mapping[str, Array], path: Path) -> Body:
     """Return the body of a file in our own format.
 
     :param data: its arrays by name: v_template (V, 3), and the others as `Body` has them.
@@ -202,7 +202,7 @@ def scope_body(data: Mapping[str, NDArray[Any]], path: Path) -> Body:
     if missing:
         raise ModelFileError(f"{path} lacks {', '.join(missing)}: it is not a Scope body file")
 
-    def numbers(key: str) -> NDArray[np.float64]:
+    def numbers(key: str) -> Array:
         return data[key].astype(np.float64)
 
     return Body(
@@ -237,7 +237,7 @@ def _built_in(which: str) -> Body:
     return scope_body(data, BUILT_IN[which])
 
 
-def _read_once(path: Path, what: str) -> dict[str, NDArray[Any]]:
+def _read_once(path: Path, what: str) -> dict[str, Array]:
     """Return the arrays of a file of ours, which stays in memory: in the panel, every change of a
     capture needs it.
 
@@ -256,12 +256,12 @@ def _read_once(path: Path, what: str) -> dict[str, NDArray[Any]]:
 
 
 @lru_cache(maxsize=4)
-def _kept(path: Path, what: str, changed_ns: int) -> dict[str, NDArray[Any]]:
+def _kept(path: Path, what: str, changed_ns: int) -> dict[str, Array]:
     del changed_ns  # another file of that name is read anew
     return read_arrays(path, what)
 
 
-def _with_growth(data: dict[str, NDArray[Any]], which: str) -> dict[str, NDArray[Any]]:
+def _with_growth(data: dict[str, Array], which: str) -> dict[str, Array]:
     """Return the name and the shape derivatives of a body of all ages, from the arrays of the
     adult's.
     """

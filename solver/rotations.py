@@ -14,16 +14,14 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .arrays import as_arrays
 from .errors import UnitsWarning
 from .kernel import kernel
-
-Array = NDArray[Any]
+from .part import Array
 
 # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
 _PI_MARGIN = 1e-4

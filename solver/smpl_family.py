@@ -33,14 +33,13 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .body import Body
 from .errors import ModelFileError
 from .names import BLAZEPOSE, BODY_JOINTS, BODY_PARENTS, COCO
+from .part import Array
 
 MAX_BETAS = 16  # as AMASS; SMPL-X and STAR files carry 300, most of them below a millimetre
 # how a full SMPL-X file divides shapedirs; older ones have 10 and 10
@@ -91,7 +90,7 @@ def _skeletons() -> dict[int, Skeleton]:
 SKELETONS = _skeletons()
 
 
-def recognise_skeleton(parents: NDArray[np.integer[Any]]) -> Skeleton | None:
+def recognise_skeleton(parents: Array) -> Skeleton | None:
     """Return the published skeleton with exactly these parents (K+1,), or None."""
     skeleton = SKELETONS.get(len(parents))
     return (
@@ -161,22 +160,20 @@ class RestPoints:
         )
         self._vertices = dict(known) if known else self._search()
 
-    def vertex(self, index: int) -> NDArray[np.float64]:
+    def vertex(self, index: int) -> Array:
         """(3, 1 + P) one vertex."""
-        return np.concatenate(
-            [self.body.v_template[index][:, None], self.body.shapedirs[index]], axis=1
-        )
+        return np.column_stack([self.body.v_template[index], self.body.shapedirs[index]])
 
-    def joint(self, name: str) -> NDArray[np.float64]:
+    def joint(self, name: str) -> Array:
         """(3, 1 + P) one joint."""
         i = self.joint_index[name]
-        return np.concatenate([self.body.J_template[i][:, None], self.body.J_shapedirs[i]], axis=1)
+        return np.column_stack([self.body.J_template[i], self.body.J_shapedirs[i]])
 
-    def landmark(self, name: str) -> NDArray[np.float64]:
+    def landmark(self, name: str) -> Array:
         """(3, 1 + P) one of ``LANDMARKS``."""
         return self.vertex(self._vertices[name])
 
-    def fingertip(self, side: str, finger: str) -> NDArray[np.float64]:
+    def fingertip(self, side: str, finger: str) -> Array:
         """(3, 1 + P) a fingertip: a known vertex, else beyond the last joint, else by the hand's
         proportions.
         """
@@ -185,21 +182,21 @@ class RestPoints:
             return self.vertex(known)
         if f"{side}_{finger}3" in self.joint_index:
             last = self.joint(f"{side}_{finger}3")
-            before = self.joint(f"{side}_{finger}2")
-            return last + _TIP_BEYOND * (last - before)
+            tip: Array = last + _TIP_BEYOND * (last - self.joint(f"{side}_{finger}2"))
+            return tip
         wrist = self.joint(f"{side}_wrist")
         reach = self.vertex(self._farthest_of_hand(side))
         sign = 1.0 if side == "left" else -1.0
         length = abs(reach[0, 0] - wrist[0, 0])
         along, up, forward = _TIP_OFFSETS[finger]
-        point = wrist + along * (reach - wrist)
+        point: Array = wrist + along * (reach - wrist)
         # reach may be any finger's tip
         point[:, 0] = wrist[:, 0] + length * np.array([sign * along, up, forward])
         return point
 
     # searching
 
-    def _part(self, *joints: str) -> NDArray[np.intp]:
+    def _part(self, *joints: str) -> Array:
         """Vertices of some parts; when they have none, of the nearest ancestor that has, at last
         the whole mesh.
         """
@@ -219,7 +216,7 @@ class RestPoints:
     def _search(self) -> dict[str, int]:
         return {**self._search_head(), **self._search_foot("left"), **self._search_foot("right")}
 
-    def _nearest(self, vertices: NDArray[np.intp], target: NDArray[np.float64]) -> int:
+    def _nearest(self, vertices: Array, target: Array) -> int:
         return int(
             vertices[np.argmin(np.sum((self.body.v_template[vertices] - target) ** 2, axis=1))]
         )
@@ -290,7 +287,7 @@ _HAND_NAMES = {
     for finger in FINGERS
 }
 
-Attached = tuple[NDArray[np.float64], str]  # a point (3, 1 + P) and the part it turns with
+Attached = tuple[Array, str]  # a point (3, 1 + P) and the part it turns with
 
 
 def derive_keypoints(body: Body) -> Body:
@@ -377,7 +374,7 @@ def _hand(points: RestPoints, side: str) -> dict[str, Attached]:
     return hand
 
 
-def smpl_body(arrays: Mapping[str, NDArray[Any]], path: Path, betas: int = MAX_BETAS) -> Body:
+def smpl_body(arrays: Mapping[str, Array], path: Path, betas: int = MAX_BETAS) -> Body:
     """Return the body of a model's arrays.
 
     Needs v_template (V, 3), weights (V, K+1), J_regressor (K+1, V), kintree_table (2, K+1) with
@@ -432,7 +429,7 @@ def smpl_body(arrays: Mapping[str, NDArray[Any]], path: Path, betas: int = MAX_B
     return derive_keypoints(body)
 
 
-def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]:
+def _parents(kintree: Array, path: Path) -> Array:
     """Return the parents (K+1,). Row 1 names the joints, row 0 the parents; the root's is 2³² − 1,
     −1 or itself.
     """
@@ -447,9 +444,7 @@ def _parents(kintree: NDArray[np.integer[Any]], path: Path) -> NDArray[np.int32]
     return parents
 
 
-def _shapedirs(
-    shapedirs: NDArray[Any] | None, vertices: int, name: str, max_betas: int
-) -> NDArray[np.float64]:
+def _shapedirs(shapedirs: Array | None, vertices: int, name: str, max_betas: int) -> Array:
     """Return the leading shape directions (V, 3, P), without the facial expressions that SMPL-X
     stores after them.
     """
@@ -461,9 +456,7 @@ def _shapedirs(
     return shapedirs[:, :, : min(count, max_betas)].astype(np.float64)
 
 
-def reduce_weights(
-    weights: NDArray[Any], path: Path
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+def reduce_weights(weights: Array, path: Path) -> tuple[Array, Array]:
     """Return the four largest skin weights of each vertex, scaled to sum to one; weights below zero
     count as zero.
 
@@ -484,7 +477,7 @@ def reduce_weights(
     return joints, kept / total
 
 
-def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
+def _joint_names(names: Array | None, count: int) -> tuple[str, ...]:
     if (
         names is not None
         and names.shape == (count,)
@@ -495,7 +488,7 @@ def _joint_names(names: NDArray[Any] | None, count: int) -> tuple[str, ...]:
     return tuple(f"joint_{i:02d}" for i in range(count))
 
 
-def stored_gender(stored: NDArray[Any] | None) -> str | None:
+def stored_gender(stored: Array | None) -> str | None:
     """Return male, female or neutral as a file holds it, () text; None if it does not."""
     if stored is None or stored.size != 1 or stored.dtype.kind not in "SU":
         return None
@@ -504,7 +497,7 @@ def stored_gender(stored: NDArray[Any] | None) -> str | None:
     return _GENDERS.get(text)
 
 
-def gender_of(stored: NDArray[Any] | None, path: Path) -> str:
+def gender_of(stored: Array | None, path: Path) -> str:
     """Return male, female or neutral: as the file says, else as its name or its folder's says, else
     neutral.
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import as_array, as_integers
 from .errors import ShapeError
+from .part import Array
 from .validation import as_indices, check_finite, check_switch, warn_of_units
 
 
@@ -54,12 +55,12 @@ class Tree(NamedTuple):
     keypoints, then the K+1 part origins.
     """
 
-    parents: NDArray[np.int64]  # (K+1,)
-    S: NDArray[np.float64]  # (K+1, 3, W)
-    l: NDArray[np.float64]  # (K+1, 3)
-    point_part: NDArray[np.int64]  # (M+K+1,)
-    v_bar: NDArray[np.float64]  # (M+K+1, 3)
-    V: NDArray[np.float64]  # (M+K+1, 3, W)
+    parents: Array  # (K+1,)
+    S: Array  # (K+1, 3, W)
+    l: Array  # (K+1, 3)
+    point_part: Array  # (M+K+1,)
+    v_bar: Array  # (M+K+1, 3)
+    V: Array  # (M+K+1, 3, W)
     keypoints: int  # M
     shape: int  # P
     globals: int  # P, or P + 1 with an unknown focal length, which is then column P
@@ -140,7 +141,7 @@ def with_fixed_shape(tree: Tree, beta: ArrayLike) -> Tree:
 _ARRAYS = ("parents", "S", "l", "keypoint_part", "v_bar", "V")
 
 
-def _check(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> NDArray[np.float64]:
+def _check(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
     """Return a copy of an array of the body."""
     array = as_array(value, shape, f"To fit the rest of the body, {name}")
     check_finite(array, f"The body's {name}")

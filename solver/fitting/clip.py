@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import as_array
 from ..errors import ShapeError
@@ -34,7 +33,7 @@ from ..gauss_newton.recursion import (
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements, as_confidence
 from ..options import Options, Priors, default_priors
-from ..part import Blocks, Pose
+from ..part import Array, Blocks, Pose
 from ..points import frames_of
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
@@ -186,7 +185,7 @@ def fit_clip(
 
 
 # R_camera_world (3, 3), t_camera_world (3,)
-Camera = tuple[NDArray[np.float64], NDArray[np.float64]]
+Camera = tuple[Array, Array]
 _AT_ORIGIN: Camera = np.eye(3), np.zeros(3)
 
 
@@ -233,7 +232,7 @@ def fit_in_order(
     return states
 
 
-def _moved(state: State, R: NDArray[np.float64], t: NDArray[np.float64]) -> State:
+def _moved(state: State, R: Array, t: Array) -> State:
     """Return the state in other axes, in which a point p is at R p + t."""
     return replace(
         state, R_camera_root=R @ state.R_camera_root, t_camera_root=R @ state.t_camera_root + t
@@ -263,7 +262,7 @@ def _fit_with_shape(
     tree: Tree,
     m: Measurements,
     init: State,
-    beta: NDArray[np.float64],
+    beta: Array,
     priors: Priors,
     options: Options,
 ) -> Fit:
@@ -364,9 +363,7 @@ class _Joint(SeveralFrames):
         shared = self.shared.costs(self.shape_weights[s], at.beta, float(at.log_focal[0]))
         return total + sum(shared.values())
 
-    def _reduced(
-        self, s: int, damping: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def _reduced(self, s: int, damping: float) -> tuple[Array, Array, float]:
         """Eliminate every frame's pose; return the summed system of the global columns and the sum
         of |q~|^2.
         """
@@ -437,19 +434,19 @@ class _Joint(SeveralFrames):
                 total[name] = total.get(name, 0.0) + cost
         return total | self.shared.costs(self.shape_weights[-1], self.beta, self.log_focal)
 
-    def information(self) -> NDArray[np.float64]:
+    def information(self) -> Array:
         """Return the information matrix of beta (P, P), prior included, poses and focal length
         eliminated.
         """
         P = self.P
         if not self.frames:
-            prior: NDArray[np.float64] = self.shape_weights[-1] * self.shared.shape_information
+            prior: Array = self.shape_weights[-1] * self.shared.shape_information
             return prior
         C, _, _ = self._reduced(len(self.stages) - 1, MIN_DAMPING)
         return shape_information(C[: self.tree.globals, : self.tree.globals], P)
 
 
-def shape_information(information: NDArray[np.float64], P: int) -> NDArray[np.float64]:
+def shape_information(information: Array, P: int) -> Array:
     """Return the information (P, P) of the shape from that (G, G) of the global columns: the others
     are eliminated.
     """

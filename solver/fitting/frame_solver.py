@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gauss_newton.curvature import make_curvature
 from ..gauss_newton.linearize import linearize, make_blocks, make_pose
@@ -26,7 +25,7 @@ from ..gauss_newton.terms import (
 from ..kernel import announce_compilation
 from ..measurements import SIGMA_3D, Measurements
 from ..options import Options, Priors, Stage, default_priors
-from ..part import Blocks, Pose
+from ..part import Array, Blocks, Pose
 from ..points import numbered
 from ..residuals.external import external_residuals, raise_failure
 from ..residuals.registry import KEYPOINT3D, NAMES, SHAPE_PRIOR, column_of
@@ -242,7 +241,7 @@ class FrameSolver:
             self._settings = [*self._settings[-3:], (options, stages, settings)]
         return settings
 
-    def _mean(self, priors: Priors) -> NDArray[np.float64]:
+    def _mean(self, priors: Priors) -> Array:
         if priors.joint_mean is None:
             return self._rest
         mean = np.asarray(priors.joint_mean, dtype=np.float64)
@@ -283,10 +282,10 @@ def _with_loose_points(settings: Settings, terms: Terms) -> Settings | None:
 def cost_by_term(
     tree: Tree,
     terms: Terms,
-    stage: NDArray[np.float64],
+    stage: Array,
     pose: Pose,
     blocks: Blocks,
-    scratch: NDArray[np.float64],
+    scratch: Array,
 ) -> dict[str, float]:
     """Return the cost of each kind of residual at `pose`; they add up to what `linearize` returns
     there.

@@ -11,11 +11,10 @@ camera, or where 2D keypoints do not say where a person faces, each of 24 headin
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gauss_newton.linearize import make_pose, place_parts
 from ..gauss_newton.terms import HAS_2D, HAS_3D, HAS_DIRECTION, Terms
-from ..part import Pose
+from ..part import Array, Pose
 from ..rotations import exp, nearest_rotation
 from ..state import State
 from ..tree import Tree
@@ -31,9 +30,7 @@ STEP = 2.0**-30  # to which first states are rounded
 _HEADINGS = tuple(k * math.pi / 12.0 for k in range(24))
 
 
-def _place_slots(
-    tree: Tree, terms: Terms, pose: Pose
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _place_slots(tree: Tree, terms: Terms, pose: Pose) -> tuple[Array, Array]:
     """Place the parts; return every slot's point, or difference of points, from the origin of its
     part and from the camera (n, 3).
     """
@@ -41,11 +38,11 @@ def _place_slots(
     part = np.repeat(np.arange(len(tree.parents)), np.diff(terms.starts))
     P = tree.shape
     rest = terms.rest + terms.V[:, :, :P] @ pose.beta[:P]
-    levers: NDArray[np.float64] = np.einsum("nij,nj->ni", pose.R[part], rest)
+    levers: Array = np.einsum("nij,nj->ni", pose.R[part], rest)
     return levers, levers + pose.t[part]
 
 
-def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _rotation_onto(products: Array) -> Array | None:
     """Return R maximizing tr(Rᵀ B) for B = sum w target sourceᵀ (3, 3), or None where B does not
     fix it.
     """
@@ -58,19 +55,19 @@ def _rotation_onto(products: NDArray[np.float64]) -> NDArray[np.float64] | None:
     return nearest_rotation(_rounded(u @ vt))
 
 
-def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rounded(values: Array) -> Array:
     """Return values without their last bits, which differ between versions of LAPACK, and which a
     first fit amplifies by many orders of magnitude.
     """
-    rounded: NDArray[np.float64] = np.round(values / STEP) * STEP
+    rounded: Array = np.round(values / STEP) * STEP
     return rounded
 
 
 def initial_states(
     tree: Tree,
     terms: Terms,
-    joint_mean: NDArray[np.float64],
-    beta: NDArray[np.float64],
+    joint_mean: Array,
+    beta: Array,
     *,
     several: bool = False,
 ) -> list[State]:
@@ -115,7 +112,7 @@ def initial_states(
     return states
 
 
-def _position_in_image(terms: Terms, turned: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _position_in_image(terms: Terms, turned: Array) -> Array | None:
     """Return t (3,) by linear least squares; where it is not in front of the camera, at a distance
     on the mean ray.
 
@@ -135,7 +132,7 @@ def _position_in_image(terms: Terms, turned: NDArray[np.float64]) -> NDArray[np.
     g = np.einsum("n,nki,nk->i", weight, A, b)
     if not np.isfinite(H).all() or not np.isfinite(g).all():
         return None
-    t: NDArray[np.float64] = np.linalg.lstsq(H, g, rcond=None)[0]
+    t: Array = np.linalg.lstsq(H, g, rcond=None)[0]
     if not NEAREST < t[2] < FARTHEST:
         depth = min(max(DISTANCE, t[2]), FARTHEST)
         mean = weight @ image / weight.sum()

@@ -17,7 +17,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kernel import inlined_kernel, kernel
 from ..options import Options, Stage
@@ -38,9 +37,9 @@ CONVERGED, MAX_ITERATIONS, STALLED, NO_MEASUREMENTS, NON_FINITE = range(5)  # va
 class Settings(NamedTuple):
     """`Options` for `optimize`; S stages."""
 
-    stages: NDArray[np.float64]  # (S, 2, weights): weights and 1/sigma in the registry's order
-    tolerances: NDArray[np.float64]  # (S,) relative decrease at which a stage ends
-    limits: NDArray[np.int64]  # (S,) iterations
+    stages: Array  # (S, 2, weights): weights and 1/sigma in the registry's order
+    tolerances: Array  # (S,) relative decrease at which a stage ends
+    limits: Array  # (S,) iterations
     damping: float  # at the start of each stage
     root_scale: float  # radians per metre of the pelvis's motion
     curvature: bool  # whether curvature.py takes part
