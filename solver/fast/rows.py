@@ -10,18 +10,8 @@ from typing import Any
 
 from ..kernel import kernel
 from ..part import GRADIENT, SHAPE
-from .vectors import in_lanes, row_pass, tile_of
-
-__all__ = [
-    "add_origin",
-    "add_point",
-    "add_to_parent",
-    "in_lanes",
-    "place_origin",
-    "scale_rows",
-    "subtract_eliminated",
-    "take_moment",
-]
+from .vectors import in_lanes as in_lanes
+from .vectors import row_pass, tile_of
 
 
 def _dot(a: Any, b: Any) -> Any:
@@ -82,11 +72,11 @@ def _parent_formula(s, A_parent, A, Y):  # type: ignore[no-untyped-def]
     return out, [], []
 
 
-_place = row_pass(_place_formula, (3, 3, 0))
-_point = row_pass(_point_formula, (6, 3, 0))
-_origin = row_pass(_origin_formula, (6, 3, 0))
+_place = row_pass(_place_formula, (3, 3, 3))
+_point = row_pass(_point_formula, (6, 3, 6))
+_origin = row_pass(_origin_formula, (6, 3, 12))
 _add = row_pass(_add_formula, (1, 3, 0))
-_moment = row_pass(_moment_formula, (6, 0, 0))
+_moment = row_pass(_moment_formula, (6, 3, 0))
 _scale = row_pass(_scale_formula, (3, 0, 0))
 _parent = row_pass(_parent_formula, (6, 6, 3))
 _plus1 = tile_of(1, 1)

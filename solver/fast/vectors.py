@@ -84,25 +84,13 @@ def _splat_of(builder: Any, scalar: Any) -> Any:
     )
 
 
-class _Any:
-    """Placeholder for a vector where only the number of results is wanted."""
-
-    def __add__(self, other: object) -> _Any:
-        return self
-
-    __sub__ = __mul__ = __add__
-
-
-def _counted(scalars: int, rows: Sequence[int]) -> list[list[_Any]]:
-    return [[_Any()] * count for count in (scalars, *rows)]
-
-
 def row_pass(formula: Callable[..., Sequence[Sequence[Vector]]], rows: Sequence[int]) -> Any:
     """Return `apply(scalars, n, a, a0, a_row, b, b0, b_row, c, c0, c_row)` for kernels: one pass
     over three arrays.
 
     formula(s, a, b, c) gets the scalars (a tuple of float64 in kernels) and `rows[k]` rows of each
-    array, and returns the new rows of each array in turn; an empty list leaves them as they are.
+    array, and returns the new first rows of each array in turn; an empty list leaves them as they
+    are.
     All rows have length n, row r of `a` beginning at a0 + r a_row. Of each column everything is
     read before anything is written.
     """
@@ -110,7 +98,6 @@ def row_pass(formula: Callable[..., Sequence[Sequence[Vector]]], rows: Sequence[
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         scalars = args[0]
         n = args[1]
-        written = [len(list(group)) for group in formula(*_counted(sig.args[0].count, rows))]
         splats = [
             Vector(builder, _splat_of(builder, builder.extract_value(scalars, k)))
             for k in range(sig.args[0].count)
@@ -120,7 +107,7 @@ def row_pass(formula: Callable[..., Sequence[Sequence[Vector]]], rows: Sequence[
             array, offset, stride = args[2 + 3 * k : 5 + 3 * k]
             data = context.make_array(sig.args[2 + 3 * k])(context, builder, array).data
             places = [offset]
-            for _ in range(max(count, written[k]) - 1):
+            for _ in range(count - 1):
                 places.append(builder.add(places[-1], stride))
             starts.append([builder.gep(data, [place]) for place in places])
         width = ir.Constant(n.type, WIDTH)
@@ -131,8 +118,7 @@ def row_pass(formula: Callable[..., Sequence[Sequence[Vector]]], rows: Sequence[
                 for group in starts
             ]
             loaded = [
-                [Vector(builder, builder.load(p, align=8)) for p in at[k][:count]]
-                for k, count in enumerate(rows)
+                [Vector(builder, builder.load(p, align=8)) for p in pointers] for pointers in at
             ]
             for pointers, values in zip(at, formula(splats, *loaded), strict=True):
                 for pointer, value in zip(pointers[: len(values)], values, strict=True):

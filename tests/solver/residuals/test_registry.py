@@ -86,7 +86,7 @@ def test_one_file_its_import_and_one_line_add_a_residual(tmp_path):
     registry.write_text(text.replace("import floor,", "import toy, floor,"))
     # As plain Python: to compile it all takes a quarter of a minute.
     rows = copied / "solver" / "gauss_newton" / "rows.py"
-    rows.write_text(rows.read_text("utf-8").replace("USE_FAST = True", "USE_FAST = False"))
+    rows.write_text(rows.read_text("utf-8").replace("..fast.rows", ".plain_rows"))
     environment = dict(os.environ, NUMBA_DISABLE_JIT="1")
     command = [sys.executable, "-c", USE, str(tmp_path)]
     # compiled code is bound to all sources in its folder, here the current one
