@@ -104,6 +104,16 @@ def as_table(value: Any, ints: int, floats: int, name: str) -> tuple[Array, Arra
     return table
 
 
+def has_axis(value: ArrayLike, more_than: int = 0) -> bool:
+    """Whether a value has more axes than that; a ragged list has, and is refused where it is
+    converted.
+    """
+    try:
+        return np.ndim(value) > more_than
+    except ValueError:
+        return True
+
+
 def described(value: Any) -> str:
     """Return the words for a value of the wrong kind in a message."""
     if value is None:

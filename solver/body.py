@@ -153,11 +153,7 @@ class Body:
         :param betas: (P,); zeros if None.
         :raises ShapeError: betas have another shape.
         """
-        return (
-            self.J_template
-            if betas is None
-            else self.J_template + self.J_shapedirs @ self._betas(betas)
-        )
+        return self._shaped(self.J_template, self.J_shapedirs, betas)
 
     def rest_vertices(self, betas: Array | None = None) -> Array:
         """v̄(β): (V, 3) metres, model frame.
@@ -165,11 +161,7 @@ class Body:
         :param betas: (P,); zeros if None.
         :raises ShapeError: betas have another shape.
         """
-        return (
-            self.v_template
-            if betas is None
-            else self.v_template + self.shapedirs @ self._betas(betas)
-        )
+        return self._shaped(self.v_template, self.shapedirs, betas)
 
     def stature(self, betas: Array | None = None) -> float:
         """Return the height of a person standing upright: from the lowest to the highest vertex of
@@ -180,8 +172,14 @@ class Body:
         """
         return float(np.ptp(self.rest_vertices(betas)[:, 1]))
 
-    def _betas(self, betas: Array) -> Array:
-        return as_array(betas, (self.P,), f"betas of body '{self.name}'")
+    def _shaped(self, rest: Array, directions: Array, betas: Array | None) -> Array:
+        """Return points (n, 3), at rest at β = 0, which move along directions (n, 3, P)."""
+        if betas is None:
+            return rest
+        moved: Array = rest + directions @ as_array(
+            betas, (self.P,), f"betas of body '{self.name}'"
+        )
+        return moved
 
     def forward_kinematics(
         self, rotations: Array, trans: Array, betas: Array | None = None
@@ -257,11 +255,7 @@ class Body:
                 f"R and t must be of the same frames, but got shapes {R.shape} and {t.shape}."
             )
         chosen = which if isinstance(which, slice) else self._checked_numbers(which)
-        local = (
-            self.v_bar[chosen]
-            if betas is None
-            else self.v_bar[chosen] + self.V[chosen] @ self._betas(betas)
-        )
+        local = self._shaped(self.v_bar[chosen], self.V[chosen], betas)
         part = self.keypoint_part[chosen]
         p: Array = np.einsum("...mij,mj->...mi", R[..., part, :, :], local) + t[..., part, :]
         return p

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_array, as_integers, as_numbers, described
+from .arrays import as_array, as_integers, as_numbers, described, has_axis
 from .errors import InvalidValueError, ShapeError
 from .kernel import kernel
 from .part import Array
@@ -289,7 +289,7 @@ class Measurements:
             tables["foot_contact"] = _foot_contact_rows(self.foot_contacts, points)
         if self.floor is not None:
             tables["floor"] = _floor_rows(self.floor, points)
-            if not _has_axis(self.floor.normal, 1):
+            if not has_axis(self.floor.normal, 1):
                 seen = np.zeros((0, 3))
                 if self.keypoints3d is not None:
                     seen = np.asarray(self.keypoints3d.points, dtype=float)
@@ -332,7 +332,7 @@ def _sigmas(value: ArrayLike, n: int, name: str) -> Array:
     :raises ShapeError: they are neither one number nor (n,).
     :raises InvalidValueError: one is not positive.
     """
-    if not _has_axis(value):
+    if not has_axis(value):
         check_robust(value, name)
         return np.full(n, float(np.asarray(value)))
     sigmas = as_array(value, (n,), name)
@@ -384,19 +384,9 @@ def _foot_contact_rows(m: FootContacts, points: int) -> tuple[Array, Array]:
     return _usable_rows(foot_contact.pack(indices, stand, weight))
 
 
-def _has_axis(value: ArrayLike, more_than: int = 0) -> bool:
-    """Whether a value has more axes than that; a ragged list has, and is refused where it is
-    converted.
-    """
-    try:
-        return np.ndim(value) > more_than
-    except ValueError:
-        return True
-
-
 def _floor_rows(m: Floor, points: int) -> tuple[Array, Array]:
     indices = as_indices(m.indices, points, "Indices of the floor's points")
-    planes = (len(indices),) if _has_axis(m.normal, 1) else ()
+    planes = (len(indices),) if has_axis(m.normal, 1) else ()
     normal = as_array(m.normal, (*planes, 3), "Normal of the floor")
     contact = as_array(m.contact, (len(indices),), "Contact with the floor")
     below = np.ones(len(indices)) if m.below is None else m.below

@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_array
 from .errors import InvalidValueError
 from .learned_prior import load_joint_prior
 from .measurements import SIGMA_2D, SIGMA_3D
@@ -19,9 +18,9 @@ from .part import Array
 from .residuals import joint_limits, joint_prior
 from .residuals.registry import COLUMNS, FIRST_EXTERNAL, RESIDUALS, column_of, registered
 from .validation import (
+    as_finite,
     as_number,
     check_count,
-    check_finite,
     check_information,
     check_list,
     check_not_negative,
@@ -279,10 +278,8 @@ class Priors:
         """
         mean = np.tile(np.eye(3), (K, 1, 1)) if self.joint_mean is None else self.joint_mean
         weights = np.ones(K) if self.joint_weights is None else self.joint_weights
-        mean = as_array(mean, (K, 3, 3), "Means of the joint prior")
-        weights = as_array(weights, (K,), "Weights of the joint prior")
-        check_finite(mean, "Means of the joint prior")
-        check_finite(weights, "Weights of the joint prior")
+        mean = as_finite(mean, (K, 3, 3), "Means of the joint prior")
+        weights = as_finite(weights, (K,), "Weights of the joint prior")
         check_rotations(mean, "Means of the joint prior", weights)
         check_not_negative(weights, "Weights of the joint prior")
         tables = {"joint_prior": joint_prior.pack(np.arange(1, K + 1), mean, weights)}
@@ -299,15 +296,10 @@ class Priors:
         :raises InvalidValueError: one is not finite, or the information is not symmetric positive
             semidefinite.
         """
-        mean = as_array(
-            np.zeros(P) if self.shape_mean is None else self.shape_mean,
-            (P,),
-            "Mean of the shape prior",
-        )
+        mean = np.zeros(P) if self.shape_mean is None else self.shape_mean
+        mean = as_finite(mean, (P,), "Mean of the shape prior")
         information = np.eye(P) if self.shape_information is None else self.shape_information
-        information = as_array(information, (P, P), "Information of the shape prior")
-        check_finite(mean, "Mean of the shape prior")
-        check_finite(information, "Information of the shape prior")
+        information = as_finite(information, (P, P), "Information of the shape prior")
         if self.shape_information is not None:
             check_information(
                 information, "Information of the shape prior (Priors.shape_information)"

@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from .arrays import has_axis
 from .body import number_of, numbers_of
 from .errors import InvalidValueError, ShapeError
 from .measurements import Measurements
@@ -129,14 +129,6 @@ def _by_frame(kind: Any, axes: Mapping[str, int]) -> dict[str, Array]:
     found = {}
     for key, count in axes.items():
         value = getattr(kind, key, None)
-        if value is not None and _axes(value) == count + 1:
+        if value is not None and has_axis(value, count) and not has_axis(value, count + 1):
             found[key] = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
     return found
-
-
-def _axes(value: ArrayLike) -> int:
-    """Return how many axes a value has; 0 for a ragged list, which is refused where it is used."""
-    try:
-        return np.ndim(value)
-    except ValueError:
-        return 0

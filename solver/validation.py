@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import as_integers, described
+from .arrays import as_array, as_integers, described
 from .errors import InvalidValueError, ScopeWarning, ShapeError, UnitsWarning
 from .kernel import kernel
 from .part import Array
@@ -124,8 +124,7 @@ def check_not_negative(values: Array, name: str) -> None:
 
     :raises InvalidValueError: one is negative.
     """
-    k = _first_negative(values)
-    if k >= 0:
+    for k in np.flatnonzero(values < 0.0):
         raise InvalidValueError(f"{name} must not be negative, but number {k} is {values[k]:.6g}.")
 
 
@@ -134,8 +133,19 @@ def check_finite(values: Array, name: str) -> None:
 
     :raises InvalidValueError: a value is NaN or infinite.
     """
-    if not all_finite(values.ravel()):
+    if not np.isfinite(values).all():
         raise InvalidValueError(f"{name} must be finite, but hold NaN or infinity.")
+
+
+def as_finite(value: ArrayLike, shape: tuple[int | None, ...], name: str) -> Array:
+    """Return `value` as contiguous float64 of a shape that can be written to, as `as_array`.
+
+    :raises ShapeError: it has another shape, or is not an array of numbers.
+    :raises InvalidValueError: a value is NaN or infinite.
+    """
+    array = as_array(value, shape, name)
+    check_finite(array, name)
+    return array
 
 
 def check_rotations(R: Array, name: str, weights: Array | None = None) -> None:
@@ -224,11 +234,10 @@ def warn_of_units(points: Array, name: str) -> None:
     `UnitsWarning`.
     """
     if _far_apart(points, LARGEST_STEP):
-        warnings.warn(
+        _warn(
+            UnitsWarning,
             f"{name} lie more than {LARGEST_STEP:g} m apart from one to the next, too far for a "
             f"person; {_UNITS}.",
-            UnitsWarning,
-            stacklevel=3,
         )
 
 
@@ -403,13 +412,12 @@ def warn_of_frame_numbers(times: Array) -> None:
     are_whole = not (times % 1.0).any()
     if are_whole or np.median(np.diff(times)) > _LONGEST_INTERVAL:
         kind = "whole numbers" if are_whole else "far apart"
-        warnings.warn(
+        _warn(
+            UnitsWarning,
             f"times are {kind}, {times[0]:g}, {times[1]:g}, {times[2]:g}, …, probably frame "
             "numbers or milliseconds instead of seconds; divide frame numbers by the frame rate, "
             "milliseconds by 1000. For frames that are seconds apart, give smaller weights of "
             "acceleration than MotionPrior's.",
-            UnitsWarning,
-            stacklevel=3,
         )
 
 
@@ -420,24 +428,6 @@ def all_within(indices: Array, least: int, limit: int) -> bool:
         if not least <= indices[k] < limit:
             return False
     return True
-
-
-@kernel
-def all_finite(values: Array) -> bool:
-    """Whether all of (n,) are finite; numpy takes ten times as long for so few."""
-    total = 0.0
-    for k in range(values.shape[0]):
-        total += 0.0 * values[k]
-    return total == 0.0
-
-
-@kernel
-def _first_negative(values: Array) -> int:
-    """Return the index of the first negative of (n,), or -1."""
-    for k in range(values.shape[0]):
-        if values[k] < 0.0:
-            return k
-    return -1
 
 
 @kernel

@@ -41,7 +41,7 @@ from ..state import MULTI, ClipFit, Fit, State, Status, given_states
 from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_switch, check_type, check_weight
-from .frame_solver import cost_by_term, fit_tree
+from .frame_solver import cost_by_term, fit_at, fit_tree
 from .misfit import warn_of_mirrored_clip, warn_of_unlikely_shape
 
 
@@ -151,7 +151,10 @@ def fit_clip(
 
     def alone(k: int, start: State) -> Fit:
         m = _with_focal(measurements[k], scale)
-        return _fit_with_shape(fixed, m, start, beta, priors, rescaled)
+        start = replace(start, beta=np.zeros(0))
+        found = fit_tree(fixed, m, start, without_shape(priors), rescaled)
+        found.state.beta = beta.copy()
+        return replace(found, beta_information=np.zeros((len(beta),) * 2))
 
     for k in seen:
         if k not in by_frame:
@@ -258,23 +261,9 @@ def _with_focal(m: Measurements, scale: float) -> Measurements:
     return replace(m, intrinsics=K, keypoints2d=seen)
 
 
-def _fit_with_shape(
-    tree: Tree,
-    m: Measurements,
-    init: State,
-    beta: Array,
-    priors: Priors,
-    options: Options,
-) -> Fit:
-    """Fit one frame with the shape fixed, which `tree` has built in."""
-    empty = np.zeros(0)
-    without = replace(priors, shape_mean=None, shape_information=None)
-    fitted = fit_tree(tree, m, replace(init, beta=empty), without, options)
-    return replace(
-        fitted,
-        state=replace(fitted.state, beta=beta.copy()),
-        beta_information=np.zeros((len(beta),) * 2),
-    )
+def without_shape(priors: Priors) -> Priors:
+    """Return the priors of a fit whose shape is known."""
+    return replace(priors, shape_mean=None, shape_information=None)
 
 
 @dataclass
@@ -405,10 +394,9 @@ class _Joint(SeveralFrames):
                 shares = cost_by_term(self.tree, f.terms, last, f.pose, spare, f.work.scratch)
             seen, measurements = usable(f.terms)
             out.append(
-                Fit(
-                    state=State.from_pose(self.tree, f.pose),
-                    R_camera_part=f.pose.R.copy(),
-                    t_camera_part=f.pose.t.copy(),
+                fit_at(
+                    self.tree,
+                    f.pose,
                     beta_information=f.work.C[: self.P, : self.P].copy(),
                     seen=seen,
                     measurements=measurements,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -212,10 +212,9 @@ class FrameSolver:
         shares = {}
         if report:
             shares = cost_by_term(tree, terms, last, found, memory.blocks[0], work.scratch)
-        return Fit(
-            state=State.from_pose(tree, found),
-            R_camera_part=found.R.copy(),
-            t_camera_part=found.t.copy(),
+        return fit_at(
+            tree,
+            found,
             beta_information=information,
             seen=seen,
             measurements=count,
@@ -253,6 +252,16 @@ class FrameSolver:
 
 
 _last = threading.local()
+
+
+def fit_at(tree: Tree, pose: Pose, **how: Any) -> Fit:
+    """Return the result of a fit that ended at a pose; `how` has the other fields of `Fit`."""
+    return Fit(
+        state=State.from_pose(tree, pose),
+        R_camera_part=pose.R.copy(),
+        t_camera_part=pose.t.copy(),
+        **how,
+    )
 
 
 def _cheaper(best: Fit, other: Fit) -> Fit:

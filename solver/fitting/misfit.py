@@ -119,10 +119,6 @@ _SPACE_REMEDIES: list[tuple[str, Change]] = [
 ]
 
 
-def _nothing(measurements: Measurements) -> Measurements:
-    return measurements
-
-
 def some_of(frames: Sequence[Any]) -> Array:
     """Return the numbers of a few frames of a clip, which show what holds for all."""
     return np.arange(0, len(frames), max(1, math.ceil(len(frames) / _FRAMES)))
@@ -233,10 +229,10 @@ def warn_of_mirroring(
 
     factor = _FACTOR if in_space else _FACTOR_IN_IMAGE
     best = ""
-    unflipped: Change = _nothing
+    unflipped: Change = replace  # that is, as it was given
     with _SILENCE, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # each was told of what was given
-        least = cost_of(_nothing)[0] / factor
+        least = cost_of(unflipped)[0] / factor
         for remedy, change in remedies:
             changed, are_upright = cost_of(change)
             if changed < least and (in_space or are_upright):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..arrays import as_array
 from ..body import numbers_of
 from ..errors import InvalidValueError, ShapeError
-from ..fitting.clip import shape_information
+from ..fitting.clip import shape_information, without_shape
 from ..fitting.frame_solver import fit_tree
 from ..fitting.misfit import some_of, warn_of_mirroring, warn_of_unlikely_shape
 from ..gauss_newton.optimizer import SharedPriors, make_settings, optimize
@@ -30,8 +30,8 @@ from ..rotations import nearest_rotation
 from ..state import MULTI, State, Status, given_states
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import (
+    as_finite,
     as_number,
-    check_finite,
     check_switch,
     check_type,
     check_weight,
@@ -164,14 +164,7 @@ def fit_motion(
         terms = MotionTerms.make(
             tree, clock, motion, StandingPoints() if stands is None else stands
         )
-        clip = _Clip(
-            tree,
-            views,
-            terms,
-            states,
-            _Settings(priors, options, focal, focal_weight, covariance),
-            pool,
-        )
+        clip = _Clip(tree, views, terms, states, priors, options, focal_weight, covariance, pool)
         found = clip.solve(make_tree(body, focal), shape, overlapping(clock, window, overlap))
     if by_default and not has_wrong_cameras:
         chosen = some_of(views)
@@ -217,9 +210,7 @@ def _checked_shape(shape: ArrayLike | None, tree: Tree, focal: bool) -> Array | 
         raise InvalidValueError(
             "The focal length can only be estimated together with the shape; leave `shape` out."
         )
-    known = as_array(shape, (tree.shape,), "shape")
-    check_finite(known, "shape")
-    return known
+    return as_finite(shape, (tree.shape,), "shape")
 
 
 def _first_states(
@@ -234,57 +225,41 @@ def _first_states(
     if shape is None:
         return initial_states(tree, frames, priors, options, cold)
     states = initial_states(
-        with_fixed_shape(tree, shape), frames, _without_shape(priors), options, cold
+        with_fixed_shape(tree, shape), frames, without_shape(priors), options, cold
     )
     return [replace(state, beta=shape) for state in states]
 
 
-def _without_shape(priors: Priors) -> Priors:
-    return replace(priors, shape_mean=None, shape_information=None)
-
-
 @dataclass
-class _Settings:
-    """How to optimize a clip."""
-
-    priors: Priors
-    options: Options
-    focal: bool
-    focal_weight: float
-    covariance: bool
-
-
 class _Clip:
     """A clip on its way to its motion."""
 
-    def __init__(
-        self,
-        tree: Tree,
-        frames: Sequence[Sequence[View]],
-        motion: MotionTerms,
-        init: Sequence[State],
-        settings: _Settings,
-        pool: ThreadPoolExecutor | None,
-    ) -> None:
-        self.tree = tree
-        self.frames = frames
-        self.motion = motion
-        self.settings = settings
-        self.pool = pool
-        T = len(frames)
-        K = len(tree.parents) - 1
-        P = tree.shape
+    tree: Tree
+    frames: Sequence[Sequence[View]]
+    motion: MotionTerms
+    init: Sequence[State]
+    priors: Priors
+    options: Options
+    focal_weight: float
+    covariance: bool
+    pool: ThreadPoolExecutor | None
+
+    def __post_init__(self) -> None:
+        """Take over the states."""
+        T = len(self.frames)
+        K = len(self.tree.parents) - 1
+        P = self.tree.shape
         self.R = np.empty((T, K + 1, 3, 3))
         self.t = np.empty((T, K + 1, 3))
         self.Omega = np.empty((T, K, 3, 3))
-        for f, state in enumerate(init):
-            self.R[f, 0], self.t[f, 0], self.Omega[f], beta = state.arrays(tree)
+        for f, state in enumerate(self.init):
+            self.R[f, 0], self.t[f, 0], self.Omega[f], beta = state.arrays(self.tree)
         self.R[:, 0] = nearest_rotation(self.R[:, 0])
         self.Omega = nearest_rotation(self.Omega)
         self.beta = beta.copy()
         self.log_focal = 0.0
         self.information = np.zeros((P, P))
-        self.covariances = np.empty((2, T, K + 1, 3, 3)) if settings.covariance else None
+        self.covariances = np.empty((2, T, K + 1, 3, 3)) if self.covariance else None
         self.counts = np.zeros(T, np.int64)
         self.status = Status.NO_MEASUREMENTS
         self.cost = 0.0
@@ -301,7 +276,7 @@ class _Clip:
             self._keep(free, self._optimize(free, windows[0]), windows[0])
         else:
             if shape is None:
-                self._find_shared(free, tiles(windows))
+                self._find_shared(free, [Window(w.kept, w.kept) for w in windows])
             else:
                 self.beta = shape.copy()
             fixed = with_fixed_shape(self.tree, self.beta)
@@ -311,9 +286,8 @@ class _Clip:
 
     def _optimize(self, tree: Tree, window: Window) -> Optimizer:
         """Optimize the frames of a window with the global columns of `tree`."""
-        settings = self.settings
         P = tree.shape
-        priors = settings.priors if P else _without_shape(settings.priors)
+        priors = self.priors if P else without_shape(self.priors)
         frames = self.frames[window.frames]
         views, self.counts[window.frames] = pack_frames(tree, frames, pack_priors(tree, priors))
         poses = make_poses(tree, len(frames))
@@ -322,13 +296,11 @@ class _Clip:
         poses.Omega[:, 1:] = self.Omega[window.frames]
         poses.beta[:P] = self.beta[:P]
         poses.log_focal[:] = self.log_focal
-        focal_weight = settings.focal_weight if tree.globals > P else None
+        focal_weight = self.focal_weight if tree.globals > P else None
         shared = SharedPriors(*priors.packed_shape(P), focal_weight)
-        options = settings.options
-        problem = ClipProblem(
-            tree, views, self.motion.part(window.frames), shared,
-            make_settings(options, options.schedule(cold=False)), self.pool,
-        )  # fmt: skip
+        settings = make_settings(self.options, self.options.schedule(cold=False))
+        motion = self.motion.part(window.frames)
+        problem = ClipProblem(tree, views, motion, shared, settings, self.pool)
         optimizer = Optimizer(problem, poses, self.pool)
         if self.counts[window.frames].any():
             status = Status(optimizer.run())
@@ -361,10 +333,10 @@ class _Clip:
             informations.append(optimizer.information())
         prior = np.zeros((G, G))
         mean = np.zeros(G)
-        mean[:P], information = self.settings.priors.packed_shape(P)
+        mean[:P], information = self.priors.packed_shape(P)
         prior[:P, :P] = optimizer.problem.shape_weights[-1] * information
         if G > P:
-            prior[P, P] = self.settings.focal_weight
+            prior[P, P] = self.focal_weight
         self.information = sum(informations) - (len(informations) - 1) * prior
         shared = combined(estimates, informations, mean, prior)
         self.beta = shared[:P]
@@ -460,11 +432,6 @@ def overlapping(times: Array, length: float, overlap: float) -> list[Window]:
         for k in range(count)
         if middle[k] < middle[k + 1]  # a longer gap between frames leaves windows empty
     ]
-
-
-def tiles(windows: Sequence[Window]) -> list[Window]:
-    """Return windows without overlap: what is kept of each."""
-    return [Window(w.kept, w.kept) for w in windows]
 
 
 def combined(

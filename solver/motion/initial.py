@@ -60,12 +60,21 @@ def first_view(views: Sequence[View], points: int) -> View:
 def _points_of(view: View, points: int) -> int:
     """Return how many usable 2D and 3D keypoints a camera has."""
     tables = view.measurements.packed2d(points)[1], view.measurements.packed3d(points)[1]
-    return sum(int((np.isfinite(m).all(axis=1) & (m[:, -1] > 0.0)).sum()) for m in tables)
+    return sum(int(_usable(m).sum()) for m in tables)
+
+
+def _usable(m: Array) -> Array:
+    """Return which rows (n,) of measurements are finite and have a positive confidence, the
+    last.
+    """
+    usable: Array = np.isfinite(m).all(axis=1) & (m[:, -1] > 0.0)
+    return usable
 
 
 def _camera_of(view: View) -> Camera:
-    return np.asarray(view.R_camera_world, dtype=float), np.asarray(
-        view.t_camera_world, dtype=float
+    return (
+        np.asarray(view.R_camera_world, dtype=float),
+        np.asarray(view.t_camera_world, dtype=float),
     )
 
 
@@ -82,10 +91,9 @@ def triangulated(views: Sequence[View], points: int) -> Measurements:
         A = np.zeros((points, 3, 3))
         b = np.zeros((points, 3))
         for view in views:
-            R = np.asarray(view.R_camera_world, dtype=float)
-            t = np.asarray(view.t_camera_world, dtype=float)
+            R, t = _camera_of(view)
             indices, m = view.measurements.packed2d(points)
-            usable = np.isfinite(m).all(axis=1) & (m[:, 2] > 0.0)
+            usable = _usable(m)
             indices = indices[usable]
             m = m[usable]
             depth = np.nan_to_num(p[indices] @ R[2] + t[2], nan=1.0)
@@ -94,7 +102,7 @@ def triangulated(views: Sequence[View], points: int) -> Measurements:
                 row = R[axis] - m[:, axis, None] * R[2]
                 _add_rows(A, b, indices, row, m[:, axis] * t[2] - t[axis], weight)
             indices, q = view.measurements.packed3d(points)
-            usable = np.isfinite(q).all(axis=1) & (q[:, 3] > 0.0)
+            usable = _usable(q)
             for axis in range(3):
                 row = np.broadcast_to(R[axis], (usable.sum(), 3))
                 _add_rows(A, b, indices[usable], row, q[usable, axis] - t[axis], q[usable, 3])
@@ -182,9 +190,9 @@ def _median_error(views: Sequence[View], points: int) -> float:
     errors = []
     for view in views:
         indices, m = view.measurements.packed2d(points)
-        p = at[indices] @ np.asarray(view.R_camera_world, dtype=float).T
-        p = p + np.asarray(view.t_camera_world, dtype=float)
-        usable = np.isfinite(m).all(axis=1) & (m[:, 2] > 0.0) & np.isfinite(p).all(axis=1)
+        R, t = _camera_of(view)
+        p = at[indices] @ R.T + t
+        usable = _usable(m) & np.isfinite(p).all(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.linalg.norm(p[:, :2] / p[:, 2:] - m[:, :2], axis=1)
         errors.append(np.where(p[:, 2] > 0.0, off, np.inf)[usable])

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import as_array
+from ..arrays import as_array, has_axis
 from ..part import Array
 from ..validation import (
+    as_finite,
     as_indices,
     as_number,
     check_finite,
@@ -84,7 +85,7 @@ class MotionPrior:
 
 def _each(values: ArrayLike, K: int, name: str) -> Array:
     """Return one number for each joint (K,)."""
-    if isinstance(values, (list, tuple)) or np.ndim(values):
+    if has_axis(values):
         return as_array(values, (K,), name)
     return np.full(K, as_number(values, name))
 
@@ -113,8 +114,7 @@ class StandingPoints:
         indices = as_indices(self.indices, points, "Indices of standing points")
         if len(indices) == 0:
             return indices, np.zeros((frames, 0))
-        p = as_array(self.probability, (frames, len(indices)), "Probability of standing points")
-        check_finite(p, "Probability of standing points")
+        p = as_finite(self.probability, (frames, len(indices)), "Probability of standing points")
         check_not_negative(p.ravel(), "Probability of standing points")
         both = np.zeros((frames, len(indices)))
         both[1:] = np.minimum(p[1:], p[:-1])

@@ -29,7 +29,7 @@ from ..residuals.registry import RESIDUALS, empty_tables
 from ..rotations import nearest_rotation
 from ..tree import Tree
 from ..validation import (
-    check_finite,
+    as_finite,
     check_list,
     check_rotations,
     check_type,
@@ -149,7 +149,7 @@ def pack_frames(
             # The next view with this layout overwrites them.
             kept = {name: getattr(terms, name).copy() for name in _VALUES}
             seen.append(terms._replace(**kept))
-            cameras.append(_camera_of(view))
+            cameras.append(_placed(view))
         of_frame.append(len(seen))
     return _packed(seen, cameras, np.array(of_frame)), counts
 
@@ -218,9 +218,8 @@ def _views_of(frame: Any, name: str) -> Sequence[View]:
         check_type(view, View, f"{name}[{k}]")
         check_type(view.measurements, Measurements, f"measurements of {name}[{k}]")
         R = as_array(view.R_camera_world, (3, 3), f"R_camera_world of {name}[{k}]")
-        t = as_array(view.t_camera_world, (3,), f"t_camera_world of {name}[{k}]")
         check_rotations(R[None], f"R_camera_world of {name}[{k}]")
-        check_finite(t, f"t_camera_world of {name}[{k}]")
+        t = as_finite(view.t_camera_world, (3,), f"t_camera_world of {name}[{k}]")
         warn_of_distance(t[None], f"t_camera_world of {name}[{k}] lies")
     return frame
 
@@ -286,7 +285,7 @@ class _Shared:
         )
 
 
-def _camera_of(view: View) -> tuple[Array, Array, bool]:
+def _placed(view: View) -> tuple[Array, Array, bool]:
     """Return R_camera_world, made orthonormal, t_camera_world, and whether the camera's axes are
     the world's.
     """
