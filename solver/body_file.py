@@ -12,7 +12,7 @@ import tokenize
 import warnings
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from numbers import Integral
@@ -252,12 +252,17 @@ def _read_once(path: Path, what: str) -> dict[str, Array]:
         ) from error
     # Copies in the files' order of memory, on which sums depend in their last bits, and the time
     # that they take.
-    return {key: value.copy(order="K") for key, value in _kept(path, what, changed_ns).items()}
+    return {
+        key: value.copy(order="K") for key, value in kept_arrays(path, what, changed_ns).items()
+    }
 
 
-@lru_cache(maxsize=4)
-def _kept(path: Path, what: str, changed_ns: int) -> dict[str, Array]:
-    del changed_ns  # another file of that name is read anew
+@lru_cache(maxsize=8)
+def kept_arrays(path: Path, what: str, changed: Hashable) -> dict[str, Array]:
+    """Return what `read_arrays` does, which nobody may change, from memory if it was read before.
+
+    :param changed: by which another file of that name is known, to be read anew.
+    """
     return read_arrays(path, what)
 
 

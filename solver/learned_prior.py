@@ -6,14 +6,13 @@ assets/prior.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from .arrays import as_array, as_arrays, described
-from .body_file import as_path, read_arrays
+from .body_file import as_path, kept_arrays
 from .errors import InvalidValueError, ModelFileError
 from .part import Array
 from .residuals import joint_flow
@@ -122,14 +121,7 @@ def load_joint_prior(path: str | Path = BUILT_IN) -> JointPrior:
         changed = status.st_mtime_ns, status.st_size
     except (OSError, ValueError):  # `read_arrays` says what is wrong
         changed = 0, 0
-    prior = _read(path, changed)
-    return replace(prior, parameters=prior.parameters.copy())
-
-
-@lru_cache(maxsize=4)
-def _read(path: Path, changed: tuple[int, int]) -> JointPrior:
-    del changed  # another file of that name is read anew
-    arrays = read_arrays(path, "joint prior")
+    arrays = kept_arrays(path, "joint prior", changed)
     expected = {"layers": joint_flow.LAYERS, "hidden": joint_flow.HIDDEN}
     for key in ("joint_names", "parameters", *expected):
         if key not in arrays:
@@ -143,7 +135,7 @@ def _read(path: Path, changed: tuple[int, int]) -> JointPrior:
                 f"solver evaluates {value}"
             )
     names = tuple(str(name) for name in np.ravel(arrays["joint_names"]))
-    parameters = np.ascontiguousarray(arrays["parameters"], dtype=np.float64)
+    parameters = np.array(arrays["parameters"], dtype=np.float64, order="C")
     if parameters.shape != (len(names), joint_flow.SIZE) or not np.isfinite(parameters).all():
         raise ModelFileError(
             f"{path}: parameters of the joint prior must be finite and of shape ({len(names)}, "

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -115,28 +115,21 @@ MULTI: Literal["multi"] = "multi"
 
 
 def given_states(
-    init: Sequence[State] | Literal["multi"] | None, frames: int
-) -> Sequence[State] | None:
-    """Return the initial states of a clip, checked; None if there are none, or for "multi".
-
-    :raises InvalidValueError: they are not a list, or an entry is of another type.
-    :raises ShapeError: there are more or fewer than `frames`.
-    """
-    if init is None or (isinstance(init, str) and init == MULTI):
-        return None
-    check_states(init, frames)
-    return init
-
-
-def check_states(
-    init: Sequence[State | None], frames: int, kinds: type | tuple[type, ...] = State
-) -> None:
-    """Check that there is an initial state for each frame.
+    init: Sequence[State | None] | Literal["multi"] | None,
+    frames: int,
+    kinds: type | tuple[type, ...] = State,
+) -> tuple[Sequence[Any] | None, Literal["multi"] | None]:
+    """Return the initial states of frames, checked, or None; and without them, `init` of `fit` for
+    each frame.
 
     :param kinds: what an entry may be.
     :raises InvalidValueError: they are not a list, or an entry is of another type.
     :raises ShapeError: there are more or fewer than `frames`.
     """
+    if init is None:
+        return None, None
+    if isinstance(init, str) and init == MULTI:
+        return None, MULTI
     check_list(init, "init", "frame")
     if len(init) != frames:
         raise ShapeError(
@@ -144,6 +137,7 @@ def check_states(
         )
     for k, state in enumerate(init):
         check_type(state, kinds, f"init[{k}]")
+    return init, None
 
 
 @dataclass

@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 from ..measurements import Measurements
 from ..options import Options, Priors, default_priors
 from ..points import frames_of
-from ..state import MULTI, ClipFit, Fit, State, check_states
+from ..state import ClipFit, Fit, State, given_states
 from ..temporal import Temporal
 from ..tree import BodyArrays, make_tree
 from ..validation import check_count, check_list
@@ -49,14 +49,10 @@ def fit_batch(
     :raises InvalidValueError: a value that no fit can use, in whichever frame.
     """
     measurements = frames_of(body, measurements)
-    starts: list[State | Literal["multi"] | None] = [None] * len(measurements)
-    if isinstance(init, str) and init == MULTI:
-        starts = [MULTI] * len(measurements)
-    elif init is not None:
-        check_states(init, len(measurements), (State, type(None)))
-        starts = list(init)
+    states, cold = given_states(init, len(measurements), (State, type(None)))
+    starts = [cold] * len(measurements) if states is None else states
     tree = make_tree(body)
-    by_default = priors is None and (init is None or isinstance(init, str))
+    by_default = priors is None and states is None
     priors = default_priors(body) if priors is None else priors
 
     def some(first: int) -> list[Fit]:

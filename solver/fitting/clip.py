@@ -37,7 +37,7 @@ from ..part import Array, Blocks, Pose
 from ..points import frames_of
 from ..residuals.external import raise_failure
 from ..residuals.registry import SHAPE_PRIOR
-from ..state import MULTI, ClipFit, Fit, State, Status, given_states
+from ..state import ClipFit, Fit, State, Status, given_states
 from ..temporal import Temporal, with_previous
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import check_count, check_switch, check_type, check_weight
@@ -109,7 +109,7 @@ def fit_clip(
     check_weight(focal_weight, "focal_weight")
     check_count(shape_frames, "shape_frames")
     check_switch(focal, "focal")
-    states = given_states(init, len(measurements))
+    states, cold = given_states(init, len(measurements))
     by_default = priors is None and states is None
     priors = default_priors(body) if priors is None else priors
     check_type(priors, Priors, "priors")
@@ -117,7 +117,6 @@ def fit_clip(
     check_type(temporal, (Temporal, type(None)), "temporal")
     tree = make_tree(body)
     if states is None:
-        cold = MULTI if init is not None else None
         states = fit_in_order(tree, measurements, priors, options, temporal, cold=cold)
     given = measurements
     if temporal is not None:

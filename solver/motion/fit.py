@@ -27,7 +27,7 @@ from ..options import Options, Priors, default_priors
 from ..part import Array, Pose
 from ..points import has_names, with_numbers
 from ..rotations import nearest_rotation
-from ..state import MULTI, State, Status, given_states
+from ..state import State, Status, given_states
 from ..tree import BodyArrays, Tree, make_tree, with_fixed_shape
 from ..validation import (
     as_finite,
@@ -126,7 +126,7 @@ def fit_motion(
     """
     views = view_frames_of(body, frames)
     clock = _checked_times(times, len(views))
-    states = given_states(init, len(views))
+    states, cold = given_states(init, len(views))
     if not as_number(window, "window") > 0.0:
         raise InvalidValueError(
             f"window must be a positive number of seconds, or infinite for one, but is {window}."
@@ -157,7 +157,6 @@ def fit_motion(
         )
     shape = _checked_shape(shape, tree, focal)
     if states is None:
-        cold = MULTI if init is not None else None
         states = _first_states(tree, views, shape, priors, options, cold)
     many = len(views) >= _FRAMES_FOR_TWO_THREADS and (os.cpu_count() or 1) > 1
     with ThreadPoolExecutor(2) if many else nullcontext() as pool:

@@ -5,7 +5,6 @@ stand.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,13 +72,13 @@ class MotionPrior:
         check_finite(joints, "MotionPrior.joints")
         check_not_negative(joints, "MotionPrior.joints")
         table = np.empty((K + 2, 2))
-        table[0] = self.root_rotation, _inverse(self.robust_root_rotation)
+        table[0] = self.root_rotation, 1.0 / float(self.robust_root_rotation)
         sigmas = _each(self.robust_joints, K, "MotionPrior.robust_joints")
         for sigma in sigmas:
             check_robust(sigma, "MotionPrior.robust_joints")
         table[1:-1, 0] = joints
         table[1:-1, 1] = 1.0 / sigmas
-        table[-1] = self.root_position, _inverse(self.robust_root_position)
+        table[-1] = self.root_position, 1.0 / float(self.robust_root_position)
         return table
 
 
@@ -88,10 +87,6 @@ def _each(values: ArrayLike, K: int, name: str) -> Array:
     if has_axis(values):
         return as_array(values, (K,), name)
     return np.full(K, as_number(values, name))
-
-
-def _inverse(sigma: float) -> float:
-    return 0.0 if math.isinf(sigma) else 1.0 / float(sigma)
 
 
 @dataclass
