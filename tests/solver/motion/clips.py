@@ -138,7 +138,7 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
     def velocity(A, B, step):
         return complex_log(A.T @ B) / step
 
-    def all_of_them(d, step=moved):
+    def all_of_them(d):
         shared = d[T * n :]
         log_focal = shared[P] if focal else 0.0
         poses = []
@@ -146,7 +146,7 @@ def gauss_newton_residuals(clip, prior=PRIOR, focal=True):
         for f in range(T):
             s = clip.starts[f]
             state = (s.R_camera_root, s.t_camera_root, s.Omega, clip.starts[0].beta)
-            state = step(body, state, np.concatenate([d[f * n : (f + 1) * n], shared[:P]]))
+            state = moved(body, state, np.concatenate([d[f * n : (f + 1) * n], shared[:P]]))
             R, t, points = forward(body, *state)
             poses.append((R, t, state[2], np.concatenate([points, t])))
             for (R_c, t_c), pixels in zip(clip.cameras, clip.pixels, strict=True):

@@ -8,15 +8,15 @@ import pytest
 from scope.solver.motion.band import make_factor, solve_clip
 
 from ..dense import H
-from .clips import K, P, gauss_newton_residuals, kernel, noisy_clip
+from .clips import K, P, cost_of, gauss_newton_residuals, kernel, noisy_clip
 
 DAMPING = 3.0
 ROOT_SCALE = 1 / 0.3
 
 
 def dense_step(clip):
-    """Return (poses' steps (T, n), globals' step, predicted decrease) by one dense solve, and the
-    Hessian.
+    """Return (poses' steps (T, n), globals' step, predicted decrease) by one dense solve, the
+    Hessian and the cost.
     """
     residuals = gauss_newton_residuals(clip)
     n = 6 + 3 * K
@@ -42,17 +42,18 @@ def dense_step(clip):
         DAMPING * np.r_[np.ones(3), np.full(3, ROOT_SCALE**2), np.ones(3 * K)], T
     )
     d = -np.linalg.solve(JTJ + np.diag(damped), g)
-    return d[: T * n].reshape(T, n), d[T * n :], -g @ d - 0.5 * d @ JTJ @ d, JTJ
+    return d[: T * n].reshape(T, n), d[T * n :], -g @ d - 0.5 * d @ JTJ @ d, JTJ, cost_of(at_rest)
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3, 6])
 def test_step_is_the_dense_step_of_the_clip(frames):
     clip = noisy_clip(frames, frames=frames)
     problem, poses, system = clip.problem()
-    problem.linearize(0, poses, system)
+    cost = problem.linearize(0, poses, system)
     factor = make_factor(system)
     predicted = solve_clip(problem.tree, system, DAMPING, ROOT_SCALE, factor)
-    d, dg, decrease, _ = dense_step(clip)
+    d, dg, decrease, _, expected_cost = dense_step(clip)
+    assert cost == pytest.approx(expected_cost, rel=1e-11)
     scale = max(np.abs(d).max(), np.abs(dg).max())
     np.testing.assert_allclose(factor.d[:, : d.shape[1]], d, atol=1e-8 * scale)
     np.testing.assert_allclose(factor.dg[: P + 1], dg, atol=1e-8 * scale)

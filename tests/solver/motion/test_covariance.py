@@ -22,7 +22,7 @@ def test_covariance_is_that_of_the_dense_inverse():
     found, from_root, shared = joint_covariances(
         problem.tree, system, poses, 1.0, make_factor(system)
     )
-    _, _, _, H = dense_step(clip)
+    _, _, _, H, _ = dense_step(clip)
     n = 6 + 3 * K
     T = len(clip.times)
     S = np.linalg.inv(H + MIN_DAMPING * np.diag(np.r_[np.ones(T * n), np.zeros(P + 1)]))
@@ -61,7 +61,7 @@ def test_a_column_of_the_shape_that_nothing_fixes_is_unknown():
     )
     assert shared[column, column] == pytest.approx(1.0 / MIN_DAMPING)
     known = np.delete(np.arange(P + 1), column)
-    *_, H = dense_step(clip)
+    _, _, _, H, _ = dense_step(clip)
     poses_end = len(H) - (P + 1)
     rows = np.r_[:poses_end, poses_end + known]
     damping = MIN_DAMPING * (rows < poses_end)
