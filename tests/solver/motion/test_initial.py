@@ -30,9 +30,7 @@ CAMERAS = [
 ]
 
 
-def seen(
-    world: np.ndarray, camera: int, index: np.ndarray, noise: float = 0.0, confidence: float = 1.0
-) -> View:
+def seen(world, camera, index, noise=0.0, confidence=1.0):
     R, t = CAMERAS[camera]
     points = world[index] @ R.T + t
     pixels = (points / points[:, 2:] @ K.T)[:, :2]
@@ -41,36 +39,32 @@ def seen(
     return View(Measurements(K, keypoints2d=found), R, t)
 
 
-def points_of(views: list[View]) -> Keypoints3D:
-    found = triangulated(views, POINTS).keypoints3d
-    assert found is not None
-    return found
+def points_of(views):
+    return triangulated(views, POINTS).keypoints3d
 
 
 @pytest.fixture
-def world() -> np.ndarray:
+def world():
     return np.random.default_rng(4).uniform(-1, 1, (POINTS, 3))
 
 
-def test_exact_rays_meet_in_the_points(world: np.ndarray) -> None:
+def test_exact_rays_meet_in_the_points(world):
     every = np.arange(POINTS)
     found = points_of([seen(world, c, every) for c in range(3)])
     np.testing.assert_array_equal(found.indices, every)
-    np.testing.assert_allclose(np.asarray(found.points), world, atol=1e-9)
+    np.testing.assert_allclose(found.points, world, atol=1e-9)
 
 
-def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(
-    world: np.ndarray,
-) -> None:
+def test_points_that_one_camera_sees_or_whose_rays_are_parallel_are_left_out(world):
     first = np.arange(8)
     second = np.arange(4, POINTS)
     found = points_of([seen(world, 0, first), seen(world, 1, second)])
     np.testing.assert_array_equal(found.indices, np.arange(4, 8))
     twice = [seen(world, 0, first), seen(world, 0, first)]  # two cameras in one place
-    assert len(np.asarray(points_of(twice).indices)) == 0
+    assert len(points_of(twice).indices) == 0
 
 
-def test_nothing_seen_and_nan_count_for_nothing(world: np.ndarray) -> None:
+def test_nothing_seen_and_nan_count_for_nothing(world):
     every = np.arange(POINTS)
     views = [seen(world, 0, every), seen(world, 1, every)]
     views.append(
@@ -81,23 +75,22 @@ def test_nothing_seen_and_nan_count_for_nothing(world: np.ndarray) -> None:
         )
     )
     views.append(seen(world + 5.0, 2, every, confidence=0.0))
-    np.testing.assert_allclose(np.asarray(points_of(views).points), world, atol=1e-9)
+    np.testing.assert_allclose(points_of(views).points, world, atol=1e-9)
 
 
-def pixel_errors(views: list[View], point: np.ndarray, k: int) -> np.ndarray:
+def pixel_errors(views, point, k):
     """Errors (2 views,) of point k in all views if it is at `point`."""
     errors = []
     for view in views:
-        p = np.asarray(view.R_camera_world) @ point + view.t_camera_world
-        assert view.measurements.keypoints2d is not None
-        errors.append((p / p[2] @ K.T)[:2] - np.asarray(view.measurements.keypoints2d.pixels)[k])
+        p = view.R_camera_world @ point + view.t_camera_world
+        errors.append((p / p[2] @ K.T)[:2] - view.measurements.keypoints2d.pixels[k])
     return np.concatenate(errors)
 
 
-def test_the_error_in_the_image_is_minimized(world: np.ndarray) -> None:
+def test_the_error_in_the_image_is_minimized(world):
     """Of cameras at different distances; against Gauss-Newton with numerical derivatives."""
     views = [seen(world, c, np.arange(POINTS), noise=0.5) for c in range(3)]
-    found = np.asarray(points_of(views).points)
+    found = points_of(views).points
     for k in range(POINTS):
         best = world[k].copy()
         for _ in range(5):
@@ -116,19 +109,19 @@ def test_the_error_in_the_image_is_minimized(world: np.ndarray) -> None:
         assert np.linalg.norm(found[k] - best) < 0.03 * np.linalg.norm(world[k] - best)
 
 
-def test_3d_keypoints_of_a_camera_are_moved_to_the_world(world: np.ndarray) -> None:
+def test_3d_keypoints_of_a_camera_are_moved_to_the_world(world):
     R, t = CAMERAS[2]
     given = Measurements(keypoints3d=Keypoints3D(np.array([3]), world[[3]] @ R.T + t, np.ones(1)))
     found = points_of([View(given, R, t)])
     np.testing.assert_array_equal(found.indices, [3])
-    np.testing.assert_allclose(np.asarray(found.points), world[[3]], atol=1e-12)
+    np.testing.assert_allclose(found.points, world[[3]], atol=1e-12)
 
 
 BODY = load_body("scope")
 INDEX = np.array(list(BODY.keypoint_set("blazepose").values()))
 
 
-def filmed(frame: int, *cameras: int) -> tuple[list[View], np.ndarray]:
+def filmed(frame, *cameras):
     """One frame of a person who moves, as some cameras see it, and the person's joints in the
     world.
     """
@@ -139,7 +132,7 @@ def filmed(frame: int, *cameras: int) -> tuple[list[View], np.ndarray]:
     return [seen(points, camera, INDEX) for camera in cameras], joints
 
 
-def started(clip: list[tuple[list[View], np.ndarray]]) -> np.ndarray:
+def started(clip):
     """How far the joints (T, K+1) of the states are from the true ones, where a clip's optimization
     starts.
     """
@@ -150,7 +143,7 @@ def started(clip: list[tuple[list[View], np.ndarray]]) -> np.ndarray:
     return np.linalg.norm(np.array(found) - [joints for _, joints in clip], axis=-1)
 
 
-def test_one_camera_that_does_not_see_the_person_holds_them_in_the_world() -> None:
+def test_one_camera_that_does_not_see_the_person_holds_them_in_the_world():
     """They were held in the camera's axes, as if those were the world's."""
     clip = [filmed(0), filmed(0, 1), filmed(1), filmed(1), filmed(2, 1)]
     errors = started(clip)
@@ -159,7 +152,7 @@ def test_one_camera_that_does_not_see_the_person_holds_them_in_the_world() -> No
     assert errors.mean() < 0.25
 
 
-def test_cameras_that_take_turns_start_from_one_person_in_the_world() -> None:
+def test_cameras_that_take_turns_start_from_one_person_in_the_world():
     """The state of the frame before was taken into the next frame's camera as it was, at another
     angle.
     """
@@ -169,18 +162,18 @@ def test_cameras_that_take_turns_start_from_one_person_in_the_world() -> None:
         assert turns[camera::3].max() < 1.5 * alone.max()
 
 
-def test_cameras_in_one_place_say_as_much_as_one_of_them() -> None:
+def test_cameras_in_one_place_say_as_much_as_one_of_them():
     """Nothing can be triangulated: the clip started from the pose at rest, somewhere."""
     np.testing.assert_allclose(
         started([filmed(f, 1, 1) for f in range(2)]), started([filmed(f, 1) for f in range(2)])
     )
 
 
-def test_cameras_may_have_joints_in_space_besides_points_in_the_image() -> None:
+def test_cameras_may_have_joints_in_space_besides_points_in_the_image():
     """Points in the image have lower numbers than joints, which were taken for too high ones."""
     (first, second), joints = filmed(0, 0, 1)
     M = len(BODY.keypoint_names)
-    in_camera = joints @ np.asarray(first.R_camera_world).T + np.asarray(first.t_camera_world)
+    in_camera = joints @ first.R_camera_world.T + first.t_camera_world
     space = Keypoints3D(M + np.arange(len(joints)), in_camera)
     first = replace(first, measurements=replace(first.measurements, keypoints3d=space))
     with warnings.catch_warnings():
