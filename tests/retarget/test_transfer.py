@@ -10,9 +10,7 @@ import pytest
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
 from scope.scope_addon.retarget.foot_placement import frames_on_one_floor
-from scope.scope_addon.retarget.skeleton import Skeleton
-from scope.scope_addon.retarget.transfer import Transfer, rest_alignment
-from scope.solver.body_file import load_body
+from scope.scope_addon.retarget.transfer import Transfer
 from scope.solver.rotations import exp
 
 from ..edit.walking import BETAS, BODY, NAMES, walk
@@ -112,30 +110,3 @@ def test_limbs_of_a_rig_in_an_a_pose_point_where_the_bodys_do(feet: bool) -> Non
         assert off.max() < np.radians(
             0.01 if not feet or "shoulder" in first or "elbow" in first else 3.0
         )
-
-
-@pytest.mark.parametrize("turn", [0.6, -1.2])
-def test_hands_of_any_rest_pose_are_turned_until_the_palms_are_the_bodys(turn: float) -> None:
-    """A rig whose hands and fingers are turned about the forearms at rest."""
-    body = load_body("scope_h")
-    rest = body.rest_joints(np.zeros(body.P)) @ R_WORLD_MODEL.T
-    names = list(body.joint_names)
-    heads = rest.copy()
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        wrist = rest[names.index(f"{side}_wrist")]
-        of_hand = [
-            i for i, name in enumerate(names) if name.startswith(f"{side}_") and name[-1] in "123"
-        ]
-        heads[of_hand] = wrist + (heads[of_hand] - wrist) @ exp(np.array([sign * turn, 0.0, 0.0])).T
-    parents = np.asarray(body.parents)
-    tails = heads + [0.0, 0.0, 0.02]
-    rig = Skeleton(
-        names, parents, parents, heads, tails, np.tile(np.eye(3), (len(names), 1, 1)), floor=0.0
-    )
-    row = {name: i for i, name in enumerate(names)}
-    A = rest_alignment(rig, names, row, rest, row, np.eye(3))
-    for side in ("left", "right"):
-        wrist, first, last = (row[f"{side}_{part}"] for part in ("wrist", "index1", "pinky1"))
-        for knuckle in (first, last):
-            found = A[wrist] @ (heads[knuckle] - heads[wrist])
-            np.testing.assert_allclose(found, rest[knuckle] - rest[wrist], atol=1e-9)
