@@ -18,16 +18,35 @@ from scope.scope_addon.scene.export.export import export
 
 from ...made_motion import made_face
 from ..character.test_expression_keys import morph_animation
-from ..exported import JOINT_TOLERANCE, SKIN_TOLERANCE, corresponding, read_back
+from ..exported import (
+    JOINT_TOLERANCE,
+    SKIN_TOLERANCE,
+    assert_joints,
+    corresponding,
+    read_back,
+)
+
+
+@pytest.fixture
+def motion(body, make_motion):
+    return make_motion(body, 4)
+
+
+@pytest.fixture
+def built(body, motion):
+    """A capture at its own rate."""
+    return build_scene([motion], body, options=BuildOptions(frame_rate="set"))
+
+
+@pytest.fixture
+def person(built):
+    return built.people[0]
 
 
 @pytest.mark.parametrize("suffix", [".fbx", ".usdc", ".blend"])
-def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suffix, blender, truth):
+def test_only_the_capture_leaves_a_users_scene(body, motion, person, tmp_path, suffix):
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.scene.name = "Shot"
-    motion = make_motion(body, 4)
-    result = build_scene([motion], body)
-    person = result.people[0]
     person.mesh.hide_set(True)  # hidden things are captured things all the same
     scene = bpy.context.scene
     scene.frame_set(2)
@@ -38,22 +57,18 @@ def test_only_the_capture_leaves_a_users_scene(body, make_motion, tmp_path, suff
     assert (bpy.context.scene, scene.frame_current) == (scene, 2)
     assert [s.name for s in bpy.data.scenes] == ["Shot"]
     assert person.mesh.data.shape_keys is not None
-    first = read_back(path, 24.0)
+    assert_joints(path, body, motion, 0)
     assert not [obj for obj in bpy.data.objects if obj.name.startswith("Cube")]
     assert [obj.type for obj in bpy.context.scene.objects].count("MESH") == 1
-    blender.go_to(first)
-    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
-    np.testing.assert_allclose(joints, truth(body, motion).joints[0], atol=JOINT_TOLERANCE)
 
 
 @pytest.mark.parametrize("overridden", [False, True])
 def test_a_linked_capture_is_exported_with_its_shape_baked(
-    body, make_motion, tmp_path, blender, truth, overridden
+    body, motion, built, tmp_path, blender, truth, overridden
 ):
-    motion = make_motion(body, 4)
     file = tmp_path / "capture.blend"
     path = tmp_path / "walk.usdc"
-    name = build_scene([motion], body, options=BuildOptions(frame_rate="set")).collection.name
+    name = built.collection.name
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.fps = 30
@@ -97,12 +112,9 @@ def _hidden_at_rest(person, collection):
     ],
 )
 def test_motion_disabled_in_the_viewport_is_exported(
-    body, make_motion, tmp_path, blender, truth, suffix, hide
+    body, motion, built, person, tmp_path, suffix, hide
 ):
-    motion = make_motion(body, 4)
-    result = build_scene([motion], body, options=BuildOptions(frame_rate="set"))
-    person = result.people[0]
-    collection = result.collection
+    collection = built.collection
     hide(person, collection)
 
     def state():
@@ -115,10 +127,7 @@ def test_motion_disabled_in_the_viewport_is_exported(
     path = tmp_path / f"walk{suffix}"
     export(path)
     assert state() == before
-    first = read_back(path)
-    blender.go_to(first + 3)
-    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
-    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+    assert_joints(path, body, motion, 3)
 
 
 def _to_nla(datablock, *starts):
@@ -135,12 +144,7 @@ def _to_nla(datablock, *starts):
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".usdc"])
-def test_a_capture_with_a_parent_moves_with_it_in_the_file(
-    body, make_motion, tmp_path, blender, suffix
-):
-    person = build_scene(
-        [make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")
-    ).people[0]
+def test_a_capture_with_a_parent_moves_with_it_in_the_file(body, person, tmp_path, blender, suffix):
     stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
     stage.rotation_euler = (0.2, -0.1, 0.7)
@@ -164,11 +168,8 @@ def test_a_capture_with_a_parent_moves_with_it_in_the_file(
 
 @pytest.mark.parametrize("in_place", [False, True])
 def test_the_t_pose_of_a_bvh_faces_forwards_with_root_motion_on_an_object(
-    body, make_motion, tmp_path, blender, in_place
+    body, person, tmp_path, blender, in_place
 ):
-    (person,) = build_scene(
-        [make_motion(body, 4)], body, options=BuildOptions(frame_rate="set")
-    ).people
     export(tmp_path / "bones.bvh")
     move_root_motion_to_object(person.armature, body, 30.0, in_place=in_place, heading=True)
     blender.go_to(3)
@@ -189,10 +190,8 @@ def test_the_t_pose_of_a_bvh_faces_forwards_with_root_motion_on_an_object(
 
 @pytest.mark.parametrize("suffix", [".glb", ".fbx", ".usdc"])
 def test_a_motion_in_the_nla_is_exported_as_displayed(
-    body, make_motion, tmp_path, blender, truth, suffix
+    body, motion, person, tmp_path, blender, truth, suffix
 ):
-    motion = make_motion(body, 5)
-    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     animation = _to_nla(person.armature, 40)
     actions_before = set(bpy.data.actions)
     path = tmp_path / f"walk{suffix}"
@@ -205,15 +204,13 @@ def test_a_motion_in_the_nla_is_exported_as_displayed(
     read_back(path)
     armature = blender.only("ARMATURE")
     first, last = actions.frame_range([armature])
-    assert last - first == pytest.approx(4, abs=0.01)
+    assert last - first == pytest.approx(3, abs=0.01)
     blender.go_to(first + 3)
     joints = blender.joints(armature, body.joint_names)
     np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
 
 
-def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path, blender, truth):
-    motion = make_motion(body, 5)
-    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
+def test_objects_without_bones_may_be_in_the_nla_too(body, motion, person, tmp_path):
     _to_nla(person.armature, 1)
     person.camera.keyframe_insert("location", frame=1)
     layered = _to_nla(person.camera, 1)
@@ -222,10 +219,7 @@ def test_objects_without_bones_may_be_in_the_nla_too(body, make_motion, tmp_path
     action = layered.action
     export(tmp_path / "walk.glb")
     assert (layered.action, layered.action_blend_type, layered.use_nla) == (action, "ADD", True)
-    first = read_back(tmp_path / "walk.glb")
-    blender.go_to(first + 3)
-    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
-    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+    assert_joints(tmp_path / "walk.glb", body, motion, 3)
 
 
 @pytest.mark.slow
@@ -247,10 +241,7 @@ def test_a_face_in_the_nla_moves_in_a_glb(whole_body, make_motion, tmp_path):
     np.testing.assert_allclose(weights["Shape000"], motion.betas[0], atol=1e-5)
 
 
-def test_a_solo_track_determines_the_frame_range(body, make_motion):
-    person = build_scene(
-        [make_motion(body, 5)], body, options=BuildOptions(frame_rate="set")
-    ).people[0]
+def test_a_solo_track_determines_the_frame_range(person):
     animation = _to_nla(person.armature, 1, 1000)
     assert actions.frame_range([person.armature])[1] > 1000
     animation.nla_tracks[0].is_solo = True
@@ -262,25 +253,19 @@ def test_a_solo_track_determines_the_frame_range(body, make_motion):
     [(".glb", 1.0), (".glb", 100.0), (".fbx", 100.0)],
 )
 def test_a_capture_in_a_scene_in_centimetres_has_its_true_size(
-    body, make_motion, tmp_path, blender, truth, size, suffix
+    body, motion, person, tmp_path, size, suffix
 ):
     bpy.context.scene.unit_settings.scale_length = 0.01
-    motion = make_motion(body, 4)
     path = tmp_path / f"walk{suffix}"
-    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
     person.armature.scale = (size,) * 3  # as the warning of the build suggests
     bpy.context.view_layer.update()
     export(path)
     assert person.armature.parent is None
     assert bpy.data.objects.get("Unit") is None
-    blender.go_to(read_back(path) + 3)
-    joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
-    np.testing.assert_allclose(joints, truth(body, motion).joints[3], atol=JOINT_TOLERANCE)
+    assert_joints(path, body, motion, 3)
 
 
-def test_hidden_objects_stay_hidden_in_a_blend(body, make_motion, tmp_path):
-    result = build_scene([make_motion(body, 4)], body, options=BuildOptions(frame_rate="set"))
-    person = result.people[0]
+def test_hidden_objects_stay_hidden_in_a_blend(person, tmp_path):
     person.armature.data.pose_position = "REST"
     person.armature.hide_render = person.mesh.hide_viewport = person.mesh.hide_render = True
     name = person.mesh.name
@@ -289,24 +274,6 @@ def test_hidden_objects_stay_hidden_in_a_blend(body, make_motion, tmp_path):
     mesh = bpy.data.objects[name]
     assert (mesh.hide_viewport, mesh.hide_render, mesh.parent.hide_render) == (True, True, True)
     assert mesh.parent.data.pose_position == "REST"
-
-
-def test_an_edit_in_progress_is_exported(body, make_motion, tmp_path, blender):
-    motion = make_motion(body, 4)
-    person = build_scene([motion], body, options=BuildOptions(frame_rate="set")).people[0]
-    person.armature.location = (5.0, 0.0, 0.0)
-    for suffix in (".bvh", ".glb"):
-        export(tmp_path / f"walk{suffix}")
-    before = None
-    for suffix in (".bvh", ".glb"):
-        first = read_back(tmp_path / f"walk{suffix}")
-        blender.go_to(first + 3)
-        joints = blender.joints(blender.only("ARMATURE"), body.joint_names)
-        assert before is None or np.abs(joints - before).max() < JOINT_TOLERANCE
-        before = joints
-    assert before[0, 0] == pytest.approx(
-        5.0 + motion.trans[3, 0] + body.rest_joints(motion.betas)[0, 0], abs=1e-3
-    )
 
 
 def test_a_motion_that_begins_before_frame_0_is_not_cut_off(body, make_motion, tmp_path):
