@@ -127,11 +127,8 @@ class PersonDetector:
         """
         found = self._detect_in(image_rgb, SCORE_THRESHOLD, (0, 0))
         if closely or not found or found[0].score < _SURE_SCORE:
-            for left, top, side in squares(*image_rgb.shape[:2]):
-                found += self._detect_in(
-                    image_rgb[top : top + side, left : left + side], SCORE_THRESHOLD, (left, top)
-                )
-            found = unique(found)
+            around = squares(*image_rgb.shape[:2])
+            found = unique(found + self._detect_in_squares(image_rgb, around, SCORE_THRESHOLD))
         return found
 
     def detect_small(self, image_rgb: Uint8Array) -> list[Detection]:
@@ -141,7 +138,9 @@ class PersonDetector:
         Searches some thirty to fifty squares of an (H, W, 3) uint8 RGB image, and takes as many
         times as long as `detect` takes for the whole image.
         """
-        return self._detect_in_squares(image_rgb, _SMALL_SIDE, _SMALL_STEP)
+        height, width = image_rgb.shape[:2]
+        grid = grid_of_squares(height, width, _SMALL_SIDE, _SMALL_STEP)
+        return unique(self._detect_in_squares(image_rgb, grid, _SMALL_SCORE))
 
     def detect_in_parts(self, image_rgb: Uint8Array) -> list[Detection]:
         """Detect people of about a fifth to two fifths of the shorter side, whom `detect` misses,
@@ -151,22 +150,22 @@ class PersonDetector:
         Searches some four to eight squares of an (H, W, 3) uint8 RGB image, and takes as many times
         as long as `detect` takes for the whole image.
         """
-        return self._detect_in_squares(image_rgb, _PART_SIDE, _PART_STEP)
+        height, width = image_rgb.shape[:2]
+        grid = grid_of_squares(height, width, _PART_SIDE, _PART_STEP)
+        return unique(self._detect_in_squares(image_rgb, grid, _SMALL_SCORE))
 
     def detect_turned(self, image_rgb: Uint8Array) -> list[Detection]:
         """Return nothing for any (H, W, 3) image: `detect` finds people at any turn."""
         return []
 
     def _detect_in_squares(
-        self, image_rgb: Uint8Array, share: float, step: float
+        self, image_rgb: Uint8Array, around: list[tuple[int, int, int]], threshold: float
     ) -> list[Detection]:
         found: list[Detection] = []
-        height, width = image_rgb.shape[:2]
-        for left, top, side in grid_of_squares(height, width, share, step):
-            found += self._detect_in(
-                image_rgb[top : top + side, left : left + side], _SMALL_SCORE, (left, top)
-            )
-        return unique(found)
+        for left, top, side in around:
+            part_rgb = image_rgb[top : top + side, left : left + side]
+            found += self._detect_in(part_rgb, threshold, (left, top))
+        return found
 
     def _detect_in(
         self, image_rgb: Uint8Array, threshold: float, corner: tuple[int, int]
@@ -187,12 +186,9 @@ def squares(height: int, width: int) -> list[tuple[int, int, int]]:
     """Calculate (left, top, side) of the overlapping squares that cover an image; none if it is
     nearly square.
     """
-    side = min(height, width)
-    length = max(height, width)
-    if length < _SQUARES_FROM * side:
+    if max(height, width) < _SQUARES_FROM * min(height, width):
         return []
-    starts = np.linspace(0, length - side, math.ceil(length / side)).astype(int).tolist()
-    return [(start, 0, side) if width > height else (0, start, side) for start in starts]
+    return grid_of_squares(height, width, share=1.0, step=1.0)
 
 
 def grid_of_squares(
