@@ -36,6 +36,8 @@ RECORD = _LIGHT + 1  # numbers in a row
 # half.
 _FACE_PX = (16.0, 64.0)
 _FACING = (0.2, 0.6)  # cosine of the angle between the face's direction and the one to the camera
+_SURE_PX = 64.0  # size of a face from which it is large
+MAX_NOISE = 8.0  # of a small face, over that of a large one
 _SCALE = 1.5  # side of a region over the face's
 # Indices of landmarks.
 _FOREHEAD = 10
@@ -131,6 +133,14 @@ def with_landmarks_of(rows: FloatArray, others: FloatArray) -> FloatArray:
     out = rows.copy()
     out[:, _POINTS] = others[:, _POINTS]
     return out
+
+
+def noise_of_size(size: FloatArray) -> FloatArray:
+    """Return by how much errors of landmarks exceed those of a large face (T,), of faces of a size
+    (T,) in pixels: by the inverse of the area.
+    """
+    noise: FloatArray = np.clip((_SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE)
+    return noise
 
 
 def _ramp(value: Any, low: float, high: float) -> Any:

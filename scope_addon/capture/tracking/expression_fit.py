@@ -46,9 +46,11 @@ from ...untrusted.files import read_npz
 from ..camera.intrinsics import Camera
 from ..perception.face_landmarks import EXPRESSION_POINTS, ExpressionNetwork
 from ..perception.face_record import (
+    MAX_NOISE,
     gaze,
     kept_landmarks,
     landmarks_of,
+    noise_of_size,
     parts,
     presence_of,
     with_expression,
@@ -61,9 +63,6 @@ MIN_S = 2.0
 MIN_FRAMES = 10
 SURE = 0.3  # confidence of frames that tell the person's face
 SPARSITY = 3.0  # λ
-# Below this size of a face, errors grow with the inverse of its area; λ grows by this at most.
-SURE_PX = 64.0
-MAX_NOISE = 8.0
 # The w_max of the units that turn the eyes: eyes turn farther than the body's keys at 1.
 LARGEST_GAZE = 2.0
 _TIME_TOLERANCE_S = 0.005  # of their sum
@@ -136,9 +135,10 @@ def fitted(rows: FloatArray) -> FloatArray:
         response.reference,
         response.shares,
     )
-    noise = np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE)
     sure = confidence >= min(SURE, float(np.median(confidence)))
-    units = fit_units(response, faces.points.reshape(len(seen), -1), faces.turns, noise, sure)
+    units = fit_units(
+        response, faces.points.reshape(len(seen), -1), faces.turns, noise_of_size(size), sure
+    )
     out = rows.copy()
     out[seen] = with_expression(
         rows[seen], np.minimum(units @ response.units, 1.0), _directions(units @ response.gaze)

@@ -14,13 +14,11 @@ from ...arrays import BoolArray, Float64Array, FloatArray
 from ...kinematics.face import EXPRESSIONS
 from ...kinematics.smoothing import gaussian_smooth
 from ...motion import FACE_KEYS
-from ..perception.face_record import CONTOURS, eye_light_of, parts
+from ..perception.face_record import CONTOURS, eye_light_of, noise_of_size, parts
 
 CALM_HZ = 2.0  # cut-off frequency at rest
 NOISE = 0.05  # deviation of a weight from the calm motion that counts as noise, of a large face
-MAX_NOISE = 8.0  # times as much for a small one, by the inverse of its area
 GAZE_NOISE = 0.06
-SURE_PX = 64.0  # size of a face from which it is large
 # The time in which an expression goes to rest after the face was last seen, and comes back before
 # it is seen again.
 RELEASE_S = 0.5
@@ -56,7 +54,7 @@ def expression_motion(
     weights[:, _EYES] = eyes
     sure = np.where(eyes_seen, confidence, SURE_OF_MOUTH * confidence)
     if smoothing and len(rows) > 2:
-        noise = np.where(seen, np.clip((SURE_PX / np.maximum(size, 1.0)) ** 2, 1.0, MAX_NOISE), 1.0)
+        noise = np.where(seen, noise_of_size(size), 1.0)
         weights = np.clip(calmed(weights, times, NOISE * noise[:, None]), 0.0, 1.0)
         sure = np.where(seen, np.clip(gaussian_smooth(sure, times, CALM_HZ), 0.0, 1.0), 0.0)
     gaze = np.empty_like(directions)
