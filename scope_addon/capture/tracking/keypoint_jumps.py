@@ -118,9 +118,7 @@ def scale_px_per_m(track: Track) -> Float64Array:
     body.
     """
     size = np.where(track.seen, person_size(track.keypoints_px), 0.0)
-    reach = (
-        round(SPREAD_S / max(float(np.median(np.diff(track.times))), 1e-3)) if len(track) > 1 else 0
-    )
+    reach = round(SPREAD_S / max(track.step_s, 1e-3)) if len(track) > 1 else 0
     padded = np.pad(size, reach, mode="edge")
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
     scale: Float64Array = np.maximum(largest / SPREAD_M, 1e-3)

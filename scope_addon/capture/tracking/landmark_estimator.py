@@ -80,17 +80,8 @@ class LandmarkEstimator:
         calls = [f.pending for f in live]
         for f in live:
             f.pending = None
-            if (
-                upcoming_rgb is None
-                or self._early is None
-                or not self._prefetches
-                or f.age < MIN_VELOCITY_FRAMES
-            ):
-                continue
-            if is_in_image(f.prefetch_region, upcoming_rgb):
-                f.pending = self._early.begin(
-                    upcoming_rgb, f.prefetch_region, self._upcoming_with_masks
-                )
+            if self._prefetches and f.age >= MIN_VELOCITY_FRAMES:
+                self._begin(upcoming_rgb, f, f.prefetch_region)
         found: dict[int, PoseEstimate | None] = {}
         for f, call in zip(live, calls, strict=True):
             estimate = call.result() if call is not None else None
@@ -110,13 +101,17 @@ class LandmarkEstimator:
         :param upcoming_rgb: (H, W, 3) or None.
         :param live: in the state of this frame; their ``pending`` is set.
         """
-        if upcoming_rgb is None or self._early is None:
-            return
         for f in live:
-            if f.pending is None and is_in_image(f.estimate.next_region, upcoming_rgb):
-                f.pending = self._early.begin(
-                    upcoming_rgb, f.estimate.next_region, self._upcoming_with_masks
-                )
+            if f.pending is None:
+                self._begin(upcoming_rgb, f, f.estimate.next_region)
+
+    def _begin(
+        self, upcoming_rgb: Uint8Array | None, target: TrackedTarget, region: Region
+    ) -> None:
+        """Start the estimate of somebody in a region of the next frame, if it is of use there."""
+        if upcoming_rgb is None or self._early is None or not is_in_image(region, upcoming_rgb):
+            return
+        target.pending = self._early.begin(upcoming_rgb, region, self._upcoming_with_masks)
 
 
 class ReferenceEstimator:

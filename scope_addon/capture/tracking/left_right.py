@@ -218,8 +218,7 @@ def _find_lifted_labels(track: Track, camera: Camera, reference: FloatArray | No
         readings.append(
             np.concatenate([body, certainty], axis=-1)[track.seen][:, LIMBS].astype(np.float32)
         )
-    step_s = float(np.median(np.diff(track.times))) if len(track) > 1 else 0.0
-    costs = np.array([0.0, LIFTED_COST_M_S * step_s])
+    costs = np.array([0.0, LIFTED_COST_M_S * track.step_s])
     steps = _steps(np.stack(readings))
     steps = (steps + steps[:, ::-1, ::-1]) / 2
     return _cheapest(np.stack(readings), steps, track.seen, costs, track.acquired, reference)
@@ -277,7 +276,7 @@ def _correction(world: FloatArray, track: Track) -> FloatArray:
         if track.seen[row]
     }
     # At a low frame rate only the reference's own frame would move.
-    if not references or len(track) < 2 or np.median(np.diff(track.times)) > CORRECTION_S:
+    if not references or len(track) < 2 or track.step_s > CORRECTION_S:
         return np.zeros_like(world)
     knots: list[float] = []
     values: list[FloatArray] = []

@@ -110,8 +110,7 @@ def find_limb_swaps(track: Track, limbs: _Limbs) -> BoolArray:
         return where
     features, reference = _features(track, limbs)
     f = np.stack([features, features[:, _PARTNER]])[:, rows]  # (2, N, 4, n): as detected, swapped
-    step_s = float(np.median(np.diff(track.times)))
-    swap_cost = SWAP_COST * min(1.0, FASTEST_HZ * step_s)
+    swap_cost = SWAP_COST * min(1.0, FASTEST_HZ * track.step_s)
     label_cost = np.array([0.0, swap_cost]) + _reference_cost(f, reference[rows])
     cost = _continuity_cost(f, track.times[rows], track.acquired[rows])
     where[rows] = _cheapest(cost, label_cost)

@@ -60,6 +60,11 @@ class Track:
         return len(self.frames)
 
     @property
+    def step_s(self) -> float:
+        """The usual time from one frame to the next, 0 for a single frame."""
+        return float(np.median(np.diff(self.times))) if len(self) > 1 else 0.0
+
+    @property
     def has_depth(self) -> bool:
         """Whether the landmark network estimated depth; a user's keypoint network does not."""
         return bool(self.world_landmarks.any())

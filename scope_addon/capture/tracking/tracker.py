@@ -292,7 +292,7 @@ class PeopleTracker:
         """Estimate a person who may be behind those who are still tracked, with these removed; None
         if too little of the person is seen.
         """
-        predicted = target.estimate.next_region.moved(target.velocity_px)
+        predicted = target.prefetch_region
         front = [f for f in kept if f.estimate.next_region.is_near(predicted)]
         if self._largest_only or not front:
             return None
