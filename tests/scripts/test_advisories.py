@@ -13,13 +13,13 @@ import re
 import sys
 import tomllib
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from scope.scope_addon.capture.media.still_images import is_picture
 from scope.scope_addon.errors import VideoError
 
-ROOT = Path(__file__).resolve().parents[2]
+from .script_modules import ROOT, script
+
 TABLE = tomllib.loads((ROOT / "scripts" / "advisories.toml").read_text("utf-8"))
 # Where the files of Blender's module state the versions of libraries.
 STATED_IN_BLENDER = {
@@ -28,16 +28,6 @@ STATED_IN_BLENDER = {
     "OpenEXR": ("bpy/lib/libOpenEXR.so.32", rb"\0(3\.\d+\.\d+)\0"),
 }
 IS_LINUX = (sys.platform, platform.machine()) == ("linux", "x86_64")
-
-
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look for their module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.skipif(not IS_LINUX, reason="the table is of the wheels for Linux")

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The audit of known vulnerabilities, on answers made for it; the registry itself is not asked."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from .script_modules import script
+
 BAD = {
     "id": "PYSEC-1",
     "aliases": ["CVE-2026-1"],
@@ -18,12 +16,7 @@ BAD = {
 
 @pytest.fixture
 def auditor():
-    spec = importlib.util.spec_from_file_location(
-        "audit_packages", ROOT / "scripts" / "audit_packages.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script("audit_packages")
 
 
 def registry(newest, *, vulnerabilities=(), of_versions=True):

@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
-import sys
 import zipfile
 from datetime import UTC, datetime
 from importlib import metadata
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from .script_modules import ROOT, script
+
 SHIPPED = ("numba", "llvmlite", "onnxruntime", "opencv-contrib-python-headless", "av")
 MADE = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 BUILD_INFORMATION = (
@@ -25,14 +23,7 @@ BUILD_INFORMATION = (
 
 @pytest.fixture(scope="module")
 def bills():
-    spec = importlib.util.spec_from_file_location(
-        "bill_of_materials", ROOT / "scripts" / "bill_of_materials.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["bill_of_materials"] = module  # as its dataclass needs
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["bill_of_materials"]
+    return script("bill_of_materials")
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ import inspect
 import os
 import re
 import shutil
-import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -18,7 +17,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from .script_modules import ROOT, script
+
 CP311 = "numba-0.68.1-cp311-cp311-manylinux_2_27_x86_64.manylinux_2_28_x86_64.whl"
 CP313 = CP311.replace("311", "313")
 STABLE = (
@@ -53,12 +53,7 @@ def small_root(tmp_path):
 
 @pytest.fixture
 def builder(tmp_path, monkeypatch):
-    spec = importlib.util.spec_from_file_location(
-        "build_extension", ROOT / "scripts" / "build_extension.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "build_extension", module)  # as its dataclass needs
-    spec.loader.exec_module(module)
+    module = script("build_extension")
     for name in ("WHEELS", "STAGING", "DIST", "OTHER_DIST"):
         monkeypatch.setattr(module, name, tmp_path / name.lower())
     monkeypatch.setattr(module, "add_kernels", lambda *_: False)  # see test_shipped_kernels.py

@@ -3,16 +3,14 @@
 written is lost.
 """
 
-import importlib.util
 import re
 import shutil
 from collections import Counter
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from .script_modules import ROOT, script
 
 
 class Page(HTMLParser):
@@ -46,11 +44,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def extension(tmp_path_factory):
     """A folder with what the extension contains besides the pages, and the pages."""
-    spec = importlib.util.spec_from_file_location(
-        "guide_pages", ROOT / "scripts" / "guide_pages.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = script("guide_pages")
     folder = tmp_path_factory.mktemp("extension")
     left_out = shutil.ignore_patterns("pictures", "*.npz", "*.onnx", "*.mp4")
     shutil.copytree(ROOT / "assets", folder / "assets", ignore=left_out)

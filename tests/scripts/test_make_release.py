@@ -2,7 +2,6 @@
 """A release: its checks, its contents, and that Blender's own tool installs and updates from it."""
 
 import hashlib
-import importlib.util
 import json
 import os
 import re
@@ -11,11 +10,11 @@ import threading
 import zipfile
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from .script_modules import ROOT, script
+
 CHANGELOG = """# Changelog
 
 ## 0.2.0, 2026-12-01
@@ -32,14 +31,7 @@ CHANGELOG = """# Changelog
 
 @pytest.fixture(scope="module")
 def release():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ROOT / "scripts"))
-        spec = importlib.util.spec_from_file_location(
-            "make_release", ROOT / "scripts" / "make_release.py"
-        )
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        yield module
+    return script("make_release")
 
 
 @pytest.fixture

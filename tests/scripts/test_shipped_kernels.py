@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Machine code goes into an extension only if it was made from the extension's own sources."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from .script_modules import script
+
 WHEELS = [
     Path("numba-0.68.1-cp313-cp313-win_amd64.whl"),
     Path("numba-0.68.1-cp311-cp311-win_amd64.whl"),
@@ -15,11 +15,7 @@ WHEELS = [
 
 @pytest.fixture
 def shipped(tmp_path, monkeypatch):
-    spec = importlib.util.spec_from_file_location(
-        "shipped_kernels", ROOT / "scripts" / "shipped_kernels.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = script("shipped_kernels")
     monkeypatch.setattr(module, "KEPT", tmp_path / "kept")
     return module
 

@@ -4,16 +4,16 @@
 import base64
 import csv
 import hashlib
-import importlib.util
 import io
 import subprocess
 import sys
 import zipfile
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from .script_modules import ROOT, script
+
+SOLVER_WHEEL = script("solver_wheel")
 CODE = "machine_code/linux-x86_64-cpython-311/kernel.nbc"
 # Loads what a fit needs besides machine code, which is not compiled here.
 LOAD = """
@@ -30,27 +30,14 @@ for name in solver.__all__:
 
 
 @pytest.fixture(scope="module")
-def script():
-    """The module of the script."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ROOT / "scripts"))
-        spec = importlib.util.spec_from_file_location(
-            "solver_wheel", ROOT / "scripts" / "solver_wheel.py"
-        )
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        yield module
-
-
-@pytest.fixture(scope="module")
-def wheel(script, tmp_path_factory):
+def wheel(tmp_path_factory):
     """The wheel, with a file in place of machine code."""
     place = tmp_path_factory.mktemp("solver_wheel")
     made = place / "code" / CODE.removeprefix("machine_code/")
     made.parent.mkdir(parents=True)
     made.write_bytes(b"code")
     (made.parent / "made_from").write_text("sources")
-    return script.build_wheel(place, place / "code", script.sources_digest())
+    return SOLVER_WHEEL.build_wheel(place, place / "code", SOLVER_WHEEL.sources_digest())
 
 
 def test_it_has_the_solver_its_data_and_machine_code_and_nothing_else(wheel):
@@ -105,22 +92,22 @@ def test_it_states_its_licences_and_needs_numpy_and_numba_alone(wheel):
     assert "](../" not in text
 
 
-def test_files_that_change_meanwhile_are_refused(script, tmp_path, monkeypatch):
+def test_files_that_change_meanwhile_are_refused(tmp_path, monkeypatch):
     """Machine code would be that of others."""
     source = tmp_path / "solver" / "kernel.py"
     source.parent.mkdir()
     source.write_text("before")
     with monkeypatch.context() as patch:
-        patch.setattr(script, "ROOT", tmp_path)
-        digest = script.sources_digest()
-        script.refuse_changes(digest)
+        patch.setattr(SOLVER_WHEEL, "ROOT", tmp_path)
+        digest = SOLVER_WHEEL.sources_digest()
+        SOLVER_WHEEL.refuse_changes(digest)
         source.write_text("after")
         with pytest.raises(SystemExit, match="changed while the wheel was made; run it again"):
-            script.refuse_changes(digest)
+            SOLVER_WHEEL.refuse_changes(digest)
     with pytest.raises(SystemExit, match="changed while"):
-        script.build_wheel(tmp_path / "dist", tmp_path / "code", digest)
+        SOLVER_WHEEL.build_wheel(tmp_path / "dist", tmp_path / "code", digest)
     with pytest.raises(SystemExit, match="changed while"):
-        script.compile_code(tmp_path / "code", digest)
+        SOLVER_WHEEL.compile_code(tmp_path / "code", digest)
     assert not (tmp_path / "dist").exists()
 
 
