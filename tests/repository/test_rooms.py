@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from functools import cache
 from pathlib import Path
@@ -14,6 +13,7 @@ COMMAND_LINE = ("scope_addon/cli", "scope_addon/__main__")
 # Options, and the files directly in scope_addon: the page says that the drawing leaves them out.
 # All rooms may use them, except those of which they are made.
 FOR_ALL = "files"
+_IMPORT = re.compile(r"^ *from (\.+)([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 BELOW_ALL = {FOR_ALL: {"untrusted"}, "untrusted": {"solver"}, "solver": set[str]()}
 
 
@@ -64,24 +64,20 @@ def imported(module: str) -> frozenset[str]:
     checking.
     """
     path = ROOT / module
-    package = (path / "__init__.py").is_file()
-    base = module.split("/") if package else module.split("/")[:-1]
+    is_package = (path / "__init__.py").is_file()
+    base = module.split("/") if is_package else module.split("/")[:-1]
+    text = (path / "__init__.py" if is_package else path.with_suffix(".py")).read_text("utf-8")
     found = set()
-    for node in ast.walk(
-        ast.parse((path / "__init__.py" if package else path.with_suffix(".py")).read_text("utf-8"))
-    ):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            target = "/".join(
-                [*base[: len(base) - node.level + 1], *filter(None, (node.module or "").split("."))]
-            )
-            for alias in node.names:
-                inner = f"{target}/{alias.name}"
-                # A folder alone may be left over from a package that was removed, with compiled
-                # modules in it.
-                is_module = (ROOT / inner / "__init__.py").is_file() or (ROOT / inner).with_suffix(
-                    ".py"
-                ).is_file()
-                found.add(inner if is_module else target)
+    for dots, name, names in _IMPORT.findall(text):
+        target = "/".join([*base[: len(base) - len(dots) + 1], *filter(None, name.split("."))])
+        for alias in re.findall(r"(?:^|[,(])\s*(\w+)", names):
+            inner = f"{target}/{alias}"
+            # A folder alone may be left over from a package that was removed, with compiled
+            # modules in it.
+            is_module = (ROOT / inner / "__init__.py").is_file() or (ROOT / inner).with_suffix(
+                ".py"
+            ).is_file()
+            found.add(inner if is_module else target)
     return frozenset(m for m in found if m.startswith(PRODUCT) and m != module)
 
 
