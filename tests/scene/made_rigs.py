@@ -13,8 +13,9 @@ import numpy as np
 from mathutils import Matrix, Vector
 from scope.scope_addon.scene.build import BuildOptions, build_scene
 from scope.scope_addon.scene.packed_motion import pack_motion
+from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
-from ..edit.walking import BODY, RATE, motion_of, walk
+from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ..retarget.naming_schemes import PARENTS, PLACES, SIDED, names_of
 
 FRAMES = range(1, 60, 6)
@@ -180,6 +181,40 @@ def renamed(rig, names):
     own = bpy.data.objects.new("own", data)
     bpy.context.scene.collection.objects.link(own)
     return own
+
+
+def run(source, rig, bone_map=None, body=BODY, **options):
+    """Retarget a capture to a rig, by its own bone map or the one that is guessed."""
+    bone_map = bone_map or guess_bone_map(rig)
+    options = RetargetOptions(**options)
+    return retarget(source, body, np.zeros(body.P), rig, bone_map, RATE, options)
+
+
+def direction_error(rig, bone_of, pairs, joints, frames=FRAMES):
+    """Return the largest angle between a limb of the rig and the body's, degrees.
+
+    :param joints: (T, K+1, 3) of the body, of which the first is shown in the scene's frame 1.
+    """
+    joints = joints[[frame - 1 for frame in frames]]
+    worst = 0.0
+    for a, b in pairs:
+        ours = np.diff(seen(rig, [bone_of[a], bone_of[b]], frames), axis=1)[:, 0]
+        theirs = joints[:, NAMES.index(b)] - joints[:, NAMES.index(a)]
+        worst = max(worst, angles(ours, theirs).max())
+    return worst
+
+
+def angles(a, b):
+    """Return the angles between directions (..., 3), degrees."""
+    cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def added_empty(name):
+    """Add an empty to the scene."""
+    empty = bpy.data.objects.new(name, None)
+    bpy.context.scene.collection.objects.link(empty)
+    return empty
 
 
 def seen(rig, bones, frames=FRAMES):

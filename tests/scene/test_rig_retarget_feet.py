@@ -8,8 +8,7 @@ from scope.solver.rotations import exp
 
 from ..edit.rolling import STRIDE, joint, rolling_walk
 from ..edit.walking import motion_of, walk
-from .made_rigs import FBX, build_rig, captured, seen
-from .test_rig_retarget import run
+from .made_rigs import FBX, build_rig, captured, run, seen
 
 _, STANDS = rolling_walk()
 PART = {"thigh": "hip", "shin": "knee", "foot": "ankle", "toe": "foot"}

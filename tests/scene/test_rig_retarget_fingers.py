@@ -8,12 +8,12 @@ from mathutils import Matrix, Vector
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.scene.actions import bone_path, fcurves
 from scope.scope_addon.scene.build import BuildOptions, build_scene
-from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import guess_bone_map
 from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
-from ..edit.walking import BODY, RATE, motion_of, walk
-from .made_rigs import FBX, FRAMES, build_rig, captured, seen, truth
+from ..edit.walking import BODY, motion_of, walk
+from .made_rigs import FBX, FRAMES, angles, build_rig, captured, run, seen, truth
 
 HANDS = load_body("scope_h")
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
@@ -126,18 +126,6 @@ def source():
     return captured(motion_of(gesture(), body=HANDS), HANDS)
 
 
-def run(source, rig, body=HANDS):
-    return retarget(
-        source, body, np.zeros(body.P), rig, guess_bone_map(rig), RATE, RetargetOptions()
-    )
-
-
-def angles(a, b):
-    """Return the angles between directions (..., 3), degrees."""
-    cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
-    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-
-
 def check_hands(rig, bone_of):
     """Check that phalanges and palms have the directions of the body's at the checked frames."""
     joints = truth(motion_of(gesture(), body=HANDS), HANDS)[[f - 1 for f in FRAMES]]
@@ -168,7 +156,7 @@ def test_fingers_are_guessed():
 @pytest.mark.parametrize(("scheme", "twist"), [("mixamo", 0.9), ("unreal", -0.6)])
 def test_fingers_point_where_the_body_points(source, scheme, twist):
     rig, bone_of = build_hands(scheme, twist, matrix=FBX if scheme == "mixamo" else None)
-    run(source, rig)
+    run(source, rig, body=HANDS)
     check_hands(rig, bone_of)
 
 
@@ -183,7 +171,7 @@ def test_fingers_of_rigify(source, rigify_rigs):
                 bone_of |= {
                     f"{side}_{f}{k}": f"{prefix}{name}.{k:02d}.{side[0].upper()}" for k in (1, 2, 3)
                 }
-        run(source, rig)
+        run(source, rig, body=HANDS)
         check_hands(rig, bone_of)
 
 
@@ -194,7 +182,7 @@ def test_a_capture_without_fingers_leaves_them_as_they_are():
     for name in bent:
         rig.pose.bones[name].matrix_basis = Matrix.Rotation(0.7, 4, "X")
     before = {name: rig.pose.bones[name].matrix_basis.copy() for name in bent}
-    done = run(source, rig, BODY)
+    done = run(source, rig)
     for frame in (1, 30):
         bpy.context.scene.frame_set(frame)
         for name in bent:
@@ -216,7 +204,7 @@ def test_fingers_of_a_hand_that_was_not_seen_stay_as_they_are() -> None:
     curled = Matrix.Rotation(0.7, 4, "X")
     for side in ("left", "right"):
         rig.pose.bones[bone_of[f"{side}_ring2"]].matrix_basis = curled
-    run(source, rig)
+    run(source, rig, body=HANDS)
     keyed = {curve.data_path for curve in fcurves(rig)}
     bpy.context.scene.frame_set(30)
     for side in ("left", "right"):
@@ -244,15 +232,7 @@ def test_a_rig_of_the_same_shape_deforms_the_same_mesh(source, blender):
             rig.data.bones[name].name = SPELL["unreal"](part[:-1], int(part[-1]), side)
     for bone in rig.pose.bones:
         bone.matrix_basis = Matrix()
-    retarget(
-        source,
-        HANDS,
-        np.zeros(HANDS.P),
-        rig,
-        guess_bone_map(rig),
-        RATE,
-        RetargetOptions(feet=False),
-    )
+    run(source, rig, body=HANDS, feet=False)
     captured = next(o for o in source.children if o.type == "MESH")
     for frame in (1, 12, 23, 40):
         bpy.context.scene.frame_set(frame)

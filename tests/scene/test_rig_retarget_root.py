@@ -15,11 +15,11 @@ from scope.scope_addon.scene.character.root_object import (
     move_root_motion_to_object,
     root_object,
 )
-from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
+from scope.scope_addon.scene.rig_retarget import RetargetOptions
 from scope.scope_addon.scene.visibility import hide
 
 from ..edit.walking import BODY, RATE, motion_of, walk
-from .made_rigs import FBX, FRAMES, build_rig, captured, seen
+from .made_rigs import FBX, FRAMES, added_empty, build_rig, captured, run, seen
 
 TURNED = Matrix.LocRotScale(
     (2.0, 1.0, 0.0), Matrix.Rotation(math.pi, 3, "Z").to_quaternion(), (1.0,) * 3
@@ -32,12 +32,6 @@ def source():
     clip = walk(2.0)
     bent = with_trajectory(clip, np.tile([0.7, -0.4, 0.0], (len(clip), 1)), 0.3 + 0.8 * clip.times)
     return captured(motion_of(bent))
-
-
-def run(source, rig, **options):
-    return retarget(
-        source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, RetargetOptions(**options)
-    )
 
 
 def between_hips(armature, bone_of=None):
@@ -121,13 +115,6 @@ def test_the_rig_follows_where_the_user_puts_the_captured_armature(source):
     run(source, rig, root="object", offset=(0.0, 0.0, 0.25))
     wanted = before @ np.array(place)[:3, :3].T + np.array(place.translation) + [0, 0, 0.25]
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=2e-3)
-
-
-def added_empty(name):
-    """Add an empty to the scene."""
-    empty = bpy.data.objects.new(name, None)
-    bpy.context.scene.collection.objects.link(empty)
-    return empty
 
 
 def drive_around(obj):

@@ -5,10 +5,9 @@ by Blender.
 
 import bpy
 import numpy as np
-from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map, retarget
 
-from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
-from .made_rigs import captured
+from ..edit.walking import NAMES, motion_of, walk
+from .made_rigs import angles, captured, run
 
 LIMBS = [
     (f"{name}.{side}", kind)
@@ -54,21 +53,14 @@ def test_ik_shows_the_pose_of_fk(rigify_rigs):
     source = captured(motion)
     rig = rigify_rigs[1][0]
     rig.pose.bones["foot_heel_ik.L"].rotation_euler = (0.4, 0.2, 0.1)  # left by the user
-    options = RetargetOptions(root="object")
-    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, options)
+    run(source, rig, root="object")
     switch(rig, IK_FK=1.0)
     by_fk = posed(rig)
     for pole in (False, True):
         switch(rig, IK_FK=0.0, pole_vector=pole)
         by_ik = posed(rig)
         assert np.linalg.norm(by_ik - by_fk, axis=-1).max() < 0.01
-        lines = [ends[:, :, 1] - ends[:, :, 0] for ends in (by_fk, by_ik)]
-        cosine = (
-            (lines[0] * lines[1]).sum(-1)
-            / np.linalg.norm(lines[0], axis=-1)
-            / np.linalg.norm(lines[1], axis=-1)
-        )
-        assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 2.0
+        assert angles(*(ends[:, :, 1] - ends[:, :, 0] for ends in (by_fk, by_ik))).max() < 2.0
     assert np.linalg.norm(by_fk[0] - by_fk[-1], axis=-1).max() > 0.1  # it moves
 
 
@@ -81,9 +73,7 @@ def test_a_leg_that_is_straight_or_overstretched_does_not_turn_about_itself(rigi
         turns[:, NAMES.index(f"{side}_hip")] = 0.0
         turns[:, NAMES.index(f"{side}_knee")] = bent[:, None] * [1.0, 0.0, 0.0]
     rig = rigify_rigs[1][0]
-    source = captured(motion)
-    options = RetargetOptions(feet=False)
-    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, options)
+    run(captured(motion), rig, feet=False)
     bones = [f"ORG-{bone}.{side}" for bone in ("thigh", "shin") for side in "LR"]
     axes = []
     places = []
@@ -108,9 +98,7 @@ def test_limbs_that_are_folded_and_bent_aside_are_where_fk_has_them(rigify_rigs)
         turns[:, NAMES.index(f"{side}_elbow")] = elbow
         turns[:, NAMES.index(f"{side}_knee")] = knee
     rig = rigify_rigs[1][0]
-    source = captured(motion)
-    options = RetargetOptions(feet=False)
-    retarget(source, BODY, np.zeros(BODY.P), rig, guess_bone_map(rig), RATE, options)
+    run(captured(motion), rig, feet=False)
     switch(rig, IK_FK=1.0)
     by_fk = posed(rig)
     for pole in (False, True):
