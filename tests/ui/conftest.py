@@ -5,7 +5,6 @@ workers.
 
 from __future__ import annotations
 
-import sys
 import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
@@ -199,11 +198,6 @@ def one(fake_worker, footage, file_of_one) -> bpy.types.Collection:
         bpy.ops.wm.save_as_mainfile(filepath=str(file_of_one))
     bpy.ops.wm.open_mainfile(filepath=str(file_of_one))
     return bpy.context.scene.scope.capture
-
-
-@pytest.fixture
-def python() -> list[str]:
-    return [sys.executable, *bpy.app.python_args]
 
 
 def inventory() -> dict:

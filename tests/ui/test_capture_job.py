@@ -21,13 +21,18 @@ from scope.scope_addon.ui.capture_job import CaptureJob, capture_request
 from scope.scope_addon.ui.capture_operators import state
 from scope.scope_addon.ui.comparison import cameras_of
 from scope.scope_addon.ui.preferences import cache
-from scope.solver.body_file import load_body
 from scope.solver.errors import ScopeError
 
 from ..job.processes import wait_for
 from ..made_motion import made_views
 
 FINISH = "send('progress', stage='solving', done=1, total=10)\nfinish()"
+
+
+@pytest.fixture(autouse=True)
+def chosen(footage):
+    """The footage is chosen in the scene."""
+    bpy.context.scene.scope.footage = str(footage)
 
 
 def run_to_end(job):
@@ -46,10 +51,9 @@ def captures():
     return [c for c in bpy.data.collections if "scope_capture" in c]
 
 
-def test_a_result_is_built_shown_and_cached(fake_worker, footage):
+def test_a_result_is_built_shown_and_cached(fake_worker):
     fake_worker(FINISH)
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
     result = scene.scope.result
     assert (result.people, result.frames) == (1, 10)
@@ -88,14 +92,13 @@ def select(*names):
         bpy.context.view_layer.objects.active = bpy.data.objects[name]
 
 
-def started(fake_worker, footage):
+def started(fake_worker):
     fake_worker(FINISH)
-    bpy.context.scene.scope.footage = str(footage)
     return CaptureJob(bpy.context.scene)
 
 
-def test_what_was_selected_during_a_capture_stays_selected(fake_worker, footage, cubes):
-    job = started(fake_worker, footage)
+def test_what_was_selected_during_a_capture_stays_selected(fake_worker, cubes):
+    job = started(fake_worker)
     select(*cubes)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.context.scene.frame_set(60)
@@ -105,20 +108,18 @@ def test_what_was_selected_during_a_capture_stays_selected(fake_worker, footage,
     assert bpy.context.scene.frame_current == 60
 
 
-def test_a_mesh_that_is_edited_since_before_the_capture_stays_in_edit_mode(
-    fake_worker, footage, cubes
-):
+def test_a_mesh_that_is_edited_since_before_the_capture_stays_in_edit_mode(fake_worker, cubes):
     bpy.ops.object.mode_set(mode="EDIT")
-    job = started(fake_worker, footage)
+    job = started(fake_worker)
     run_to_end(job)
     assert selection() == (["first"], "first", "EDIT")
 
 
-def test_an_earlier_capture_that_is_posed_meanwhile_stays_visible(fake_worker, footage):
-    run_to_end(started(fake_worker, footage))
+def test_an_earlier_capture_that_is_posed_meanwhile_stays_visible(fake_worker):
+    run_to_end(started(fake_worker))
     (earlier,) = captures()
     armature = bpy.context.view_layer.objects.active
-    job = started(fake_worker, footage)
+    job = started(fake_worker)
     bpy.ops.object.mode_set(mode="POSE")
     run_to_end(job)
     assert len(captures()) == 2
@@ -127,8 +128,8 @@ def test_an_earlier_capture_that_is_posed_meanwhile_stays_visible(fake_worker, f
     assert not earlier.hide_render
 
 
-def test_otherwise_the_captured_person_is_selected(fake_worker, footage, cubes):
-    job = started(fake_worker, footage)
+def test_otherwise_the_captured_person_is_selected(fake_worker, cubes):
+    job = started(fake_worker)
     select()
     run_to_end(job)
     assert selection() == (["person"], "person", "OBJECT")
@@ -149,7 +150,6 @@ def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(
         "finish()"
     )
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     job = CaptureJob(scene)
     wait_for(lambda: job.step() and job.progress.stage == "solving")
     now[0] += 3.0
@@ -167,15 +167,12 @@ def test_the_next_capture_of_a_kind_knows_how_long_the_stages_took(
     assert job.progress._earlier["solving"] == pytest.approx(0.3)  # seconds for each of ten frames
 
 
-def test_blender_does_not_wait_for_a_worker_that_is_ending(
-    fake_worker, footage, tmp_path, monkeypatch
-):
+def test_blender_does_not_wait_for_a_worker_that_is_ending(fake_worker, tmp_path, monkeypatch):
     # on a busy computer, three steps may take long
     monkeypatch.setattr(capture_job, "_ENDING_S", 600.0)
     fake_worker(
         f"finish()\nwhile not os.path.exists({str(tmp_path / 'end')!r}):\n    time.sleep(0.01)"
     )
-    bpy.context.scene.scope.footage = str(footage)
     job = CaptureJob(bpy.context.scene)
     wait_for(lambda: job.step() and job.worker.finished)
     for _ in range(3):
@@ -188,10 +185,9 @@ def test_blender_does_not_wait_for_a_worker_that_is_ending(
     assert job_files() == []
 
 
-def test_several_people_are_built_and_distinguished(fake_worker, footage):
+def test_several_people_are_built_and_distinguished(fake_worker):
     fake_worker("assert request['people'] == 3\nfinish(2)")
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     scene.scope.people = "COUNT"
     scene.scope.people_count = 3
     bpy.ops.scope.capture()
@@ -203,7 +199,6 @@ def test_several_people_are_built_and_distinguished(fake_worker, footage):
 def test_changed_options_need_another_capture(fake_worker, footage):
     fake_worker(FINISH)
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     fake_worker("send('error', message='asked again')")
     scene.scope.quality = "FAST"
@@ -219,7 +214,6 @@ def test_a_result_of_what_changed_after_its_key_was_made_is_not_found_again(fake
     content = footage.read_bytes()
     status = footage.stat()
     fake_worker(f"open({str(footage)!r}, 'ab').write(b'x')\nfinish()")
-    bpy.context.scene.scope.footage = str(footage)
     assert bpy.ops.scope.capture() == {"FINISHED"}
     footage.write_bytes(content)
     os.utime(footage, ns=(status.st_atime_ns, status.st_mtime_ns))
@@ -237,9 +231,8 @@ def test_a_result_of_what_changed_after_its_key_was_made_is_not_found_again(fake
         ("send('result', motions=['person1.npz'], report={})", "No such file"),
     ],
 )
-def test_a_failure_is_reported_and_changes_nothing(fake_worker, footage, contents, script, says):
+def test_a_failure_is_reported_and_changes_nothing(fake_worker, contents, script, says):
     fake_worker(script)
-    bpy.context.scene.scope.footage = str(footage)
     before = contents()
     with pytest.raises(RuntimeError, match=says):
         bpy.ops.scope.capture()
@@ -252,12 +245,11 @@ def test_a_failure_is_reported_and_changes_nothing(fake_worker, footage, content
 @pytest.mark.parametrize(
     "end", [lambda job: job.close(), lambda job: os.kill(job.worker.pid, signal.SIGKILL)]
 )
-def test_a_cancelled_or_killed_capture_leaves_nothing_behind(fake_worker, footage, contents, end):
+def test_a_cancelled_or_killed_capture_leaves_nothing_behind(fake_worker, contents, end):
     fake_worker(
         "send('progress', stage='solving', done=3, total=10)\nopen(folder + '/half', "
         "'w')\ntime.sleep(600)"
     )
-    bpy.context.scene.scope.footage = str(footage)
     before = contents()
     job = CaptureJob(bpy.context.scene)
     wait_for(lambda: job.step() and job.progress.done == 3)
@@ -269,28 +261,8 @@ def test_a_cancelled_or_killed_capture_leaves_nothing_behind(fake_worker, footag
     assert job_files() == []
 
 
-def test_a_linked_scene_is_refused(footage, tmp_path):
-    bpy.context.scene.scope.footage = str(footage)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (there, here):
-        here.scenes = there.scenes
-    with pytest.raises(ScopeError, match="linked from .*library.blend"):
-        CaptureJob(here.scenes[0])
-
-
-def test_step_never_waits_for_the_worker(fake_worker, footage):
-    fake_worker("time.sleep(600)")
-    bpy.context.scene.scope.footage = str(footage)
-    job = CaptureJob(bpy.context.scene)
-    for _ in range(1000):  # takes minutes if a step waits
-        assert job.step()
-    job.close()
-
-
-def test_an_unwritable_cache_is_an_error(footage, monkeypatch, tmp_path, contents):
+def test_an_unwritable_cache_is_an_error(monkeypatch, tmp_path, contents):
     (tmp_path / "user").write_text("a file where the folder should be")
-    bpy.context.scene.scope.footage = str(footage)
     before = contents()
     with pytest.raises(RuntimeError, match="(?i)cannot write to the cache folder"):
         bpy.ops.scope.capture()
@@ -300,7 +272,6 @@ def test_an_unwritable_cache_is_an_error(footage, monkeypatch, tmp_path, content
 def test_footage_that_is_removed_during_a_capture_gives_a_warning(fake_worker, footage):
     fake_worker(f"os.remove({str(footage)!r})\nfinish()")
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     assert any("no longer exists" in w.text for w in scene.scope.result.warnings)
 
@@ -315,9 +286,8 @@ def test_footage_that_is_removed_during_a_capture_gives_a_warning(fake_worker, f
         ({"lens": "FILE", "calibration_file": "/nowhere/lens.json"}, "lens.json"),
     ],
 )
-def test_invalid_settings_are_errors(footage, settings, says, contents):
+def test_invalid_settings_are_errors(settings, says, contents):
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     for name, value in settings.items():
         setattr(scene.scope, name, value)
     before = contents()
@@ -326,10 +296,9 @@ def test_invalid_settings_are_errors(footage, settings, says, contents):
     assert contents() == before
 
 
-def test_the_result_is_built_in_the_scene_of_the_capture(fake_worker, footage):
+def test_the_result_is_built_in_the_scene_of_the_capture(fake_worker):
     fake_worker(FINISH)
     first = bpy.context.scene
-    first.scope.footage = str(footage)
     job = CaptureJob(first)
     second = bpy.data.scenes.new("second")
     bpy.context.window.scene = second
@@ -350,34 +319,16 @@ def test_a_removed_scene_is_an_error(fake_worker, footage):
         run_to_end(job)
 
 
-def test_what_is_animated_during_a_capture_keeps_its_frame_rate(fake_worker, footage):
+def test_what_is_animated_during_a_capture_keeps_its_frame_rate(fake_worker):
     fake_worker(FINISH)
     scene = bpy.context.scene
     scene.render.fps = 24
-    scene.scope.footage = str(footage)
     job = CaptureJob(scene)
     cube = bpy.data.objects.new("cube", bpy.data.meshes.new("cube"))
     scene.collection.objects.link(cube)
     cube.shape_key_add(name="Basis").keyframe_insert("mute", frame=1)
     run_to_end(job)
     assert scene.render.fps == 24
-
-
-@pytest.mark.slow
-def test_real_worker_on_a_picture(footage):
-    """It runs in Blender's Python, isolated, with only the folders that it is given."""
-    scene = bpy.context.scene
-    scene.scope.footage = str(footage)
-    scene.scope.quality = "FAST"
-    assert bpy.ops.scope.capture() == {"FINISHED"}
-    assert scene.scope.result.people == 1
-    from scope.scope_addon.capture.options import CaptureOptions
-    from scope.scope_addon.capture.pipeline import capture
-
-    expected = capture(footage, load_body("scope"), CaptureOptions(quality="fast")).motions[0]
-    got = stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o))
-    assert np.allclose(got.poses, expected.poses, atol=1e-4)
-    assert np.allclose(got.trans, expected.trans, atol=1e-4)
 
 
 @pytest.mark.slow
@@ -389,7 +340,6 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, 
     dist = [-0.05, 0.01, 0.002, 0.0, 0.0]
     lens = tmp_path / "lens.json"
     scene = bpy.context.scene
-    scene.scope.footage = str(footage)
     scene.scope.quality = "FAST"
     scene.scope.lens = "FILE"
     scene.scope.calibration_file = str(lens)
@@ -436,22 +386,20 @@ def test_footage_whose_name_is_not_utf8(fake_worker, footage, tmp_path):
     state.message.encode()
 
 
-def test_a_kept_frame_rate_that_differs_is_reported(fake_worker, footage):
+def test_a_kept_frame_rate_that_differs_is_reported(fake_worker):
     fake_worker("finish()")
     scene = bpy.context.scene
     scene.render.fps = 20
     scene.scope.frame_rate = "KEEP"
-    scene.scope.footage = str(footage)
     bpy.ops.scope.capture()
     texts = [warning.text for warning in scene.scope.result.warnings]
     assert any("keeps its 20 frames/s, the footage has 25" in text for text in texts)
 
 
-def test_disabling_the_extension_ends_the_worker(fake_worker, footage):
+def test_disabling_the_extension_ends_the_worker(fake_worker):
     import scope
 
     fake_worker("time.sleep(600)")
-    bpy.context.scene.scope.footage = str(footage)
     state.job = job = CaptureJob(bpy.context.scene)
     scope.unregister()
     try:
@@ -475,7 +423,6 @@ def test_views_are_captured_with_their_offsets_and_shown(fake_worker, footage, t
     """)
     scene = bpy.context.scene
     settings = scene.scope
-    settings.footage = str(footage)
     for name in ("b.png", "c.png"):
         shutil.copy(footage, tmp_path / name)
         assert bpy.ops.scope.add_view(filepath=str(tmp_path / name)) == {"FINISHED"}
@@ -496,6 +443,7 @@ def test_views_are_captured_with_their_offsets_and_shown(fake_worker, footage, t
 
 def test_at_most_seven_further_views_which_exist(footage, tmp_path):
     settings = bpy.context.scene.scope
+    settings.footage = ""
     assert not bpy.ops.scope.add_view.poll()
     settings.footage = str(footage)
     with pytest.raises(RuntimeError, match="is not a file"):

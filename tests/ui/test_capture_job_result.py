@@ -18,8 +18,20 @@ from scope.solver.names import BODY_JOINTS
 from ..made_motion import made_motion
 
 
+def at_rest(body, T=5):
+    return made_motion(body, np.zeros((T, body.K + 1, 3)), np.zeros((T, 3)))
+
+
+def shown_of(body, motion, report=None):
+    """Build a motion; return the built scene, and the result that the panel shows of it."""
+    built = build_scene([motion], body)
+    shown = built.collection.scope_result
+    show_result(shown, "", report or Report(), built)
+    return built, shown
+
+
 def test_spans_are_listed_by_reason_in_scene_frames(body):
-    motion = made_motion(body, np.zeros((30, body.K + 1, 3)), np.zeros((30, 3)))
+    motion = at_rest(body, 30)
     motion.valid[[0, 20]] = False
     under = np.zeros(30, bool)
     under[3:6] = True
@@ -30,59 +42,50 @@ def test_spans_are_listed_by_reason_in_scene_frames(body):
 
 
 def test_heights_and_joints_with_their_deviations(body):
-    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion = at_rest(body)
     motion.joint_sigma_m[1:4] = 0.052
-    result = build_scene([motion], body)
-    shown = result.collection.scope_result
     heights = (
         {"height_m": 1.741, "height_sigma_m": 0.0913},
         {"height_m": 1.5, "height_sigma_m": 0.005},
     )
     unsure = {"height_m": 1.62, "height_sigma_m": None}
-    show_result(shown, "", Report(per_person=[*heights, unsure]), result)
+    built, shown = shown_of(body, motion, Report(per_person=[*heights, unsure]))
     assert shown.heights == "1.74 m ± 0.09, 1.50 m ± 0.005, 1.62 m"
     assert np.isclose(shown.sigma_cm, 5.2, atol=1e-5)
-    show_result(shown, "", Report(), result)
+    show_result(shown, "", Report(), built)
     assert shown.heights == ""
 
 
 def test_the_reprojection_error_is_that_of_frames_the_first_camera_sees(body):
-    motion = made_motion(body, np.zeros((6, body.K + 1, 3)), np.zeros((6, 3)))
+    motion = at_rest(body, 6)
     motion.residual_px[3:] = 4.0
-    result = build_scene([motion], body)
-    shown = result.collection.scope_result
-    show_result(shown, "", Report(), result)
+    _, shown = shown_of(body, motion)
     assert shown.reprojection_px == 4.0
 
 
 def test_panel_and_page_say_the_same_of_joints_and_nothing_of_fingers():
     body = load_body("scope_h")
-    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion = at_rest(body)
     motion.joint_sigma_m[:, : len(BODY_JOINTS)] = 0.03
     motion.joint_sigma_m[1, : len(BODY_JOINTS)] = 0.08
     motion.joint_sigma_m[:, len(BODY_JOINTS) :] = 0.2
-    result = build_scene([motion], body)
-    shown = result.collection.scope_result
-    show_result(shown, "", Report(), result)
+    _, shown = shown_of(body, motion)
     assert np.isclose(shown.sigma_cm, 3.0, atol=1e-5)
     assert motion_figures(motion, body)["Standard deviation of joints, median"] == "3.0 cm"
 
 
 def test_a_warning_keeps_the_name_of_the_footage(body):
-    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion = at_rest(body)
     motion.source = "my walk.mp4"
-    result = build_scene([motion], body)
-    shown = result.collection.scope_result
     unseen = notice("unseen_legs", footage="my walk.mp4", person=0)
-    show_result(shown, "", Report(warnings=[unseen, notice("pixel_aspect")]), result)
+    _, shown = shown_of(body, motion, Report(warnings=[unseen, notice("pixel_aspect")]))
     texts = [stored.text for stored in shown.warnings]
     assert texts[0].startswith("my walk.mp4: the legs of the person were not seen")
     assert texts[1].startswith("The footage's pixels are not square")
 
 
 def test_a_stored_warning_is_known_by_its_record_and_else_by_its_text(body):
-    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
-    shown = build_scene([motion], body).collection.scope_result
+    shown = build_scene([at_rest(body)], body).collection.scope_result
     drifts = notice("footage_drifts", frames=3.0)
     add_warning(shown, drifts, [FrameSpan(3, 5), FrameSpan(8, 8)])
     stored = shown.warnings[0]
@@ -101,13 +104,11 @@ def test_a_sentence_begins_with_a_capital_but_not_a_file_name():
 
 
 def test_figures_are_wrapped_to_the_width_of_the_sidebar(body):
-    motion = made_motion(body, np.zeros((5, body.K + 1, 3)), np.zeros((5, 3)))
+    motion = at_rest(body)
     motion.joint_sigma_m[:] = 0.041
-    result = build_scene([motion], body)
-    shown = result.collection.scope_result
     drawn = []
     heights = [{"height_m": 1.7, "height_sigma_m": 0.1}] * 4
-    show_result(shown, "", Report(camera="estimated, 52 degrees", per_person=heights), result)
+    _, shown = shown_of(body, motion, Report(camera="estimated, 52 degrees", per_person=heights))
     layout = SimpleNamespace(label=lambda text="", icon="NONE": drawn.append(text))
     layout.column = lambda align=False: layout
     region = SimpleNamespace(width=260)

@@ -26,7 +26,7 @@ from scope.scope_addon.ui.capture_operators import (
 from scope.scope_addon.ui.job_operator import JobOperator
 from scope.scope_addon.ui.view_operators import show_new_capture
 
-from ..scene.exported import glb_json
+from ..scene.exported import read_glb
 
 
 def window_with_sidebar(category="Scope", width=200):
@@ -72,8 +72,7 @@ def test_an_unexpected_error_ends_the_capture():
     assert state.job is None  # otherwise no other capture could be started
 
 
-@pytest.mark.parametrize("capturing", [SCOPE_OT_capture, SCOPE_OT_capture_queue])
-def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch, capturing):
+def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch):
     drawn = []
     now = [100.0]
     monkeypatch.setattr(capture_operators, "redraw_sidebars", lambda: drawn.append(None))
@@ -84,7 +83,7 @@ def test_the_panel_is_drawn_again_only_for_news_and_rarely(monkeypatch, capturin
     operator = SimpleNamespace(
         _shown=("", "", 0), _drawn_s=0.0, _pause_s=0.3, timer_s=0.1, job_state=state
     )
-    operator.step = partial(capturing.step, operator)
+    operator.step = partial(SCOPE_OT_capture.step, operator)
     operator._advance = partial(SCOPE_OT_capture._advance, operator)
     timer = SimpleNamespace(type="TIMER", value="NOTHING")
 
@@ -347,7 +346,7 @@ def test_files_of_a_queue_have_the_frame_rate_of_their_clips_and_their_captures_
         name = capture.name
         names = {obj.name for obj in capture.all_objects}
         assert names == {name, f"{name}_body", f"{name}_camera"}
-        content = glb_json(tmp_path / f"{name}.glb")
+        content, _ = read_glb(tmp_path / f"{name}.glb")
         assert {node["name"] for node in content["nodes"]} >= {name, f"{name}_body"}
         samplers = content["animations"][0]["samplers"]
         ends = {content["accessors"][sampler["input"]]["max"][0] for sampler in samplers}
@@ -356,88 +355,70 @@ def test_files_of_a_queue_have_the_frame_rate_of_their_clips_and_their_captures_
     assert scene.render.fps == 10
 
 
-def test_a_clip_whose_file_cannot_be_written_says_so_and_stays_in_the_scene(
-    fake_worker, footage, tmp_path, monkeypatch
-):
-    paths = copies(footage, "a", "b")
-    fake_worker("finish()")
-    choose_several(paths)
-    settings = bpy.context.scene.scope
-    settings.queue_format = "BVH"
-    settings.queue_folder = str(tmp_path)
+@pytest.fixture
+def capture_two(fake_worker, footage, tmp_path, monkeypatch):
+    """Return a function that captures a list of two clips, with a BVH file of each; before each
+    step of a capture, it calls another one.
+    """
 
+    def capture(meanwhile=lambda: None):
+        choose_several(copies(footage, "a", "b"))
+        fake_worker("finish()")
+        settings = bpy.context.scene.scope
+        settings.queue_format = "BVH"
+        settings.queue_folder = str(tmp_path)
+        step = CaptureJob.step
+        monkeypatch.setattr(CaptureJob, "step", lambda job: meanwhile() or step(job))
+        assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+        assert sorted(each.name for each in captures_of(bpy.context.scene)) == ["a", "b"]
+
+    return capture
+
+
+def test_a_clip_whose_file_cannot_be_written_says_so_and_stays_in_the_scene(
+    capture_two, monkeypatch
+):
     def full(path, *_):
         raise OutputError(f"cannot write {path.name}: no space is left")
 
     monkeypatch.setattr(capture_operators, "write_captures", full)
-    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    capture_two()
     assert queued() == [("a.png", "DONE"), ("b.png", "DONE")]
-    messages = [clip.message for clip in settings.queue]
+    messages = [clip.message for clip in bpy.context.scene.scope.queue]
     assert messages == [f"Cannot write {name}.bvh: no space is left" for name in ("a", "b")]
-    assert len(captures_of(bpy.context.scene)) == 2
 
 
-def test_a_clip_that_is_removed_while_it_is_captured_marks_no_other_as_done(fake_worker, footage):
-    paths = copies(footage, "a", "b")
-    choose_several(paths)
-    fake_worker("finish()")
+def test_a_clip_that_is_removed_while_it_is_captured_marks_no_other_as_done(capture_two):
     settings = bpy.context.scene.scope
-    began = CaptureJob.step
 
-    def removed_meanwhile(job):
+    def remove():
         if Path(settings.footage).name == "a.png" and len(settings.queue) == 2:
             settings.queue.remove(0)
-        return began(job)
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CaptureJob, "step", removed_meanwhile)
-        assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    capture_two(remove)
     assert queued() == [("b.png", "DONE")]
-    assert sorted(each.name for each in captures_of(bpy.context.scene)) == ["a", "b"]
 
 
 def test_what_the_user_undoes_during_a_queue_repeats_no_clip_and_loses_no_file(
-    fake_worker, footage, tmp_path, monkeypatch
+    capture_two, tmp_path
 ):
     """Undo takes the list's states back with everything else in the scene."""
-    paths = copies(footage, "a", "b")
-    choose_several(paths)
-    fake_worker("finish()")
-    settings = bpy.context.scene.scope
-    settings.queue_format = "BVH"
-    settings.queue_folder = str(tmp_path)
-    step = CaptureJob.step
 
-    def undone_meanwhile(job):
-        for clip in settings.queue:
+    def undo():
+        for clip in bpy.context.scene.scope.queue:
             clip.status = "WAITING"
-        return step(job)
 
-    monkeypatch.setattr(CaptureJob, "step", undone_meanwhile)
-    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    capture_two(undo)
     assert queued() == [("a.png", "DONE"), ("b.png", "DONE")]
-    assert sorted(each.name for each in captures_of(bpy.context.scene)) == ["a", "b"]
     assert sorted(path.name for path in tmp_path.glob("*.bvh")) == ["a.bvh", "b.bvh"]
 
 
 def test_a_folder_that_is_gone_is_said_and_nothing_is_written_elsewhere(
-    fake_worker, footage, tmp_path, monkeypatch
+    capture_two, tmp_path, monkeypatch
 ):
-    (other,) = copies(footage, "other")
-    choose_several([footage, other])
-    fake_worker("finish()")
     settings = bpy.context.scene.scope
-    settings.queue_format = "BVH"
-    settings.queue_folder = str(tmp_path)
-    step = CaptureJob.step
-
-    def cleared_meanwhile(job):
-        settings.queue_folder = ""
-        return step(job)
-
-    monkeypatch.setattr(CaptureJob, "step", cleared_meanwhile)
     monkeypatch.chdir(tmp_path)
-    assert bpy.ops.scope.capture_queue() == {"FINISHED"}
+    capture_two(lambda: setattr(settings, "queue_folder", ""))
     assert all("there is no folder" in clip.message for clip in settings.queue)
     assert list(tmp_path.glob("*.bvh")) == []
 

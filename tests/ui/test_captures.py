@@ -126,16 +126,6 @@ def test_comparison_and_active_person_follow_the_selection(two):
     assert bpy.context.scene.camera.name == "other_camera"
 
 
-def test_selection_and_results_survive_saving_and_opening(two, tmp_path):
-    select("person")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
-    assert shown() == ("person", 1, "First")
-    select("other")
-    assert shown() == ("other", 2, "Second")
-
-
 def test_undoing_a_capture_shows_the_previous_result(one, fake_worker, footage):
     bpy.ops.ed.undo_push(message="first")
     other = footage.with_name("other.png")

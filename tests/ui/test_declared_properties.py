@@ -38,56 +38,6 @@ STORED = {
     "shape": {"KEYED": 0, "BAKED": 2},
     "provider": {"AUTO": 0, "CPU": 1, "CUDA": 2, "TENSORRT": 3, "DIRECTML": 4, "COREML": 5},
 }
-# of paths; they store nothing themselves
-_TEXTS = ("footage_text", "body_file_text", "calibration_file_text")
-_NOT_OPTIONS = (
-    "rna_type",
-    "name",
-    "views",
-    "queue",
-    "capture",
-    "capture_index",
-    "no_result",
-    "smooth_everyone",
-    *_TEXTS,
-)
-LABELS = {
-    "footage": "Footage",
-    "quality": "Quality",
-    "people": "People",
-    "people_count": "At Most",
-    "person": "Person",
-    "body": "Body",
-    "body_file": "Body File",
-    "hands": "Hands",
-    "face": "Face",
-    "height_cm": "Height (cm)",
-    "lens": "Lens",
-    "focal_mm": "Focal Length",
-    "fov": "Field of View",
-    "calibration_file": "Calibration",
-    "scene_camera": "Scene Camera",
-    "queue_format": "Files",
-    "queue_folder": "Folder",
-    "rotate": "Turn",
-    "mirror": "Mirror",
-    "crop": "Only in Part",
-    "speed": "Slow Motion",
-    "use_range": "Part of the Video",
-    "range_start": "From",
-    "range_end": "To",
-    "smoothing": "Smooth",
-    "uneven_ground": "Uneven Ground",
-    "treadmill": "Treadmill",
-    "belt_speed": "Belt Speed (m/s)",
-    "frame_rate": "Frame Rate",
-    "start_frame": "First Frame",
-    "set_frame_range": "Set Frame Range",
-    "shape": "Shape",
-    "take": "Take",
-    "with_markers": "Markers",
-    "with_camera": "Camera with Footage",
-}
 # Number of the property's units in one of the option's.
 UNITS = {("m", "cm"): 100.0, ("degrees", "radians"): math.pi / 180, ("", "s"): 1.0}
 PLACES = [(each, place) for place in (Place.PANEL, Place.PREFERENCES) for each in options_at(place)]
@@ -97,13 +47,6 @@ IDS = [each.name for each, _ in PLACES]
 def properties(place):
     owner = bpy.context.scene.scope if place is Place.PANEL else SCOPE_AP_preferences
     return owner.bl_rna.properties
-
-
-def test_the_panel_keeps_its_names_and_labels():
-    own = {
-        p.identifier: p.name for p in properties(Place.PANEL) if p.identifier not in _NOT_OPTIONS
-    }
-    assert own == LABELS
 
 
 @pytest.mark.parametrize("name", STORED)

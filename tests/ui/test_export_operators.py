@@ -14,7 +14,6 @@ from scope.scope_addon.scene.build import BuildOptions
 from scope.scope_addon.scene.visibility import hide
 from scope.scope_addon.ui.capture_job import build_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
-from scope.scope_addon.ui.export_operators import FORMATS
 from scope.scope_addon.ui.live_job import live_rig
 from scope.solver.body_file import load_body
 
@@ -133,11 +132,3 @@ def test_one_camera_has_no_calibration_to_save(standing, tmp_path):
     content = [(tmp_path / "a.npz", standing.to_bytes())]
     build_capture(bpy.context.scene, content, "scope", "", Report(), BuildOptions())
     assert not bpy.ops.scope.save_calibration.poll()
-
-
-@pytest.mark.parametrize("kind", ["NPZ", "TRC", "MOT", "C3D", "VRMA"])
-def test_tooltips_say_that_motions_are_written_with_their_corrections(kind):
-    """Which they are: `test_an_imported_motion_file_has_the_edits`."""
-    text = next(text for key, _, text, _ in FORMATS if key == kind)
-    assert "with its corrections" in text
-    assert "before any editing" not in text

@@ -59,6 +59,15 @@ def scene():
     return scene
 
 
+def retargeted(person):
+    """Return a rig with the motion of a person, and its bones by part."""
+    rig, bones = build_rig("mixamo")
+    bpy.context.scene.scope_retarget.rig = rig
+    bpy.context.view_layer.objects.active = person
+    bpy.ops.scope.retarget()
+    return rig, bones
+
+
 def at_times(armature, names, start=START):
     """Return where bones are at times of the footage, (T, B, 3)."""
     scene = bpy.context.scene
@@ -223,10 +232,7 @@ def test_a_retargeted_rig_moves_along_and_its_own_action_stays(scene):
 def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
     first = built()
     second = built(start=101.0)
-    rig, bones = build_rig("mixamo")
-    scene.scope_retarget.rig = rig
-    bpy.context.view_layer.objects.active = first
-    bpy.ops.scope.retarget()
+    rig, bones = retargeted(first)
     bpy.context.view_layer.objects.active = rig
     bpy.ops.scope.push_to_nla()
     (strip,) = rig.animation_data.nla_tracks[0].strips
@@ -246,10 +252,7 @@ def test_every_take_of_a_rig_moves_along_in_the_nla_too(scene):
 
 def test_a_strip_that_plays_the_action_of_a_library_stays_with_its_keys(scene, tmp_path):
     person = built()
-    rig, _ = build_rig("mixamo")
-    scene.scope_retarget.rig = rig
-    bpy.context.view_layer.objects.active = person
-    bpy.ops.scope.retarget()
+    rig, _ = retargeted(person)
     action = rig.animation_data.action
     path = str(tmp_path / "take.blend")
     bpy.data.libraries.write(path, {action})
@@ -268,11 +271,8 @@ def test_a_strip_that_plays_the_action_of_a_library_stays_with_its_keys(scene, t
 def test_only_animation_that_was_not_captured_is_said_to_play_faster(scene, capfd):
     person = built()
     bpy.data.objects.remove(scene["cube"])
-    rig, _ = build_rig("mixamo")
-    scene.scope_retarget.rig = rig
     scene.scope_retarget.root = "object"
-    bpy.context.view_layer.objects.active = person
-    bpy.ops.scope.retarget()
+    rig, _ = retargeted(person)
     assert rig.parent is not None
     bpy.ops.scope.match_frame_rate()
     said = capfd.readouterr().out

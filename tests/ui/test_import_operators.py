@@ -61,7 +61,8 @@ def test_a_motion_of_another_tool_is_built_and_listed(amass):
 
 
 def test_the_scenes_frame_rate_is_set_on_request(amass):
-    bpy.ops.scope.import_motion(filepath=str(amass), set_rate=True)
+    # dropped into a viewport
+    bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(amass), set_rate=True)
     assert bpy.context.scene.render.fps == 120
     assert not any(
         "frames/s" in warning.text for warning in bpy.context.scene.scope.result.warnings

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import bpy
 import pytest
-from scope.scope_addon.notices import SENTENCES, Notice
 from scope.scope_addon.options import Place, options_at
 from scope.scope_addon.ui import reporting
 from scope.scope_addon.ui import translations as translations_module
@@ -31,7 +30,6 @@ from .interface_texts import (
     OPERATOR,
     ROOT,
     interface_texts,
-    stage_texts,
     texts_without_lookup,
 )
 
@@ -81,19 +79,6 @@ def test_translations_end_as_the_english_texts_do(language):
         assert translation.endswith(("?", "？")) == text.endswith("?"), text
 
 
-@every_language
-def test_a_text_of_the_progress_says_the_same_values_in_every_language(language):
-    values = {"stage": "<stage>", "done": 12, "total": 34, "rate": 5.67, "time": "<time>"}
-    english = stage_texts()
-    progress = [entry for entry in TABLE.texts if entry[ENGLISH] in english]
-    assert len(progress) == len(english)
-    for entry in progress:
-        said = entry[language].format(**values)
-        for name, value in values.items():
-            shown = f"{value:.1f}" if name == "rate" else str(value)
-            assert (shown in said) == (shown in entry[ENGLISH].format(**values)), said
-
-
 def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
     texts = interface_texts()
     assert ("Operator", "Capture") in texts  # bl_label
@@ -102,23 +87,6 @@ def test_the_texts_found_come_from_classes_layouts_reports_and_lists():
     assert ("Operator", "Left Foot Stands") in texts  # literal that a loop gives to a layout
     assert (CONTEXT, "{count} people") in texts  # either branch of a lookup's condition
     assert ("*", "Capture finished") in texts  # report
-
-
-@every_language
-def test_every_warning_is_written_in_every_language_with_its_values(language):
-    texts = {entry[ENGLISH]: entry[language] for entry in TABLE.texts}
-    samples = {"who": 3, "whose": 0, "frames": 456, "times": [7.8], "phrase": "motion"}
-    samples["names"] = ["Hips"]
-    shown = {"who": "3", "whose": "", "frames": "456", "times": "7.8", "phrase": texts["motion"]}
-    shown["names"] = "'Hips'"
-    for code, sentence in SENTENCES.items():
-        fields = {name: spec for _, name, spec, _ in string.Formatter().parse(sentence) if name}
-        values = {
-            name: samples.get(spec, 12.0 if spec else f"<{name}>") for name, spec in fields.items()
-        }
-        said = Notice(code, values).text(lambda text: texts.get(text, text))
-        for name, spec in fields.items():
-            assert shown.get(spec, "12" if spec else f"<{name}>") in said, (code, name)
 
 
 @pytest.mark.parametrize("language", ["de", "es", "fr"])

@@ -425,8 +425,7 @@ def test_edits_need_a_captured_armature_and_find_the_only_one():
     assert not bpy.ops.scope.refloor.poll()
 
 
-@pytest.mark.parametrize("overridden", [False, True])
-def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overridden):
+def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path):
     name = rig.users_collection[0].name
     file = tmp_path / "capture.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
@@ -436,10 +435,7 @@ def test_a_linked_capture_is_not_edited_until_it_is_local(rig, tmp_path, overrid
     scene.render.fps = int(RATE)
     with bpy.data.libraries.load(str(file), link=True) as (_, here):
         here.collections = [name]
-    if overridden:
-        here.collections[0].override_hierarchy_create(scene, layer)
-    else:
-        scene.collection.children.link(here.collections[0])
+    here.collections[0].override_hierarchy_create(scene, layer)
     linked = layer.objects.active = next(obj for obj in scene.objects if obj.type == "ARMATURE")
     before = seen(linked)
     for operator in (bpy.ops.scope.refloor, bpy.ops.scope.root_motion):

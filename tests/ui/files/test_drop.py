@@ -7,7 +7,6 @@ Where an operator writes a file whose name the user has entered.
 import os
 
 import bpy
-import numpy as np
 import pytest
 from scope.scope_addon.ui import file_field
 
@@ -24,20 +23,6 @@ def test_dropped_files_become_the_footage(footage):
     with pytest.raises(RuntimeError, match="not a file"):
         bpy.ops.scope.choose_footage(filepath=str(footage.parent))
     assert bpy.context.scene.scope.footage == str(footage)
-
-
-def test_dropped_motions_are_imported(tmp_path):
-    motion = motion_of(walk(1.0))
-    path = tmp_path / "walk_poses.npz"
-    np.savez(
-        path,
-        poses=motion.poses,
-        trans=motion.trans,
-        betas=np.ones(16),
-        mocap_framerate=np.array(120.0),
-    )
-    assert file_field.SCOPE_FH_motion.bl_file_extensions == ".npz"
-    assert bpy.ops.scope.import_motion("INVOKE_DEFAULT", filepath=str(path)) == {"FINISHED"}
 
 
 def test_nothing_is_written_into_the_current_folder(tmp_path, monkeypatch):

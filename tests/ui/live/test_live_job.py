@@ -89,6 +89,14 @@ def to_end(job):
     wait_for(lambda: not job.step())
 
 
+def following_rig():
+    """Return a rig that follows live captures."""
+    rig, _ = build_rig("mixamo")
+    bpy.context.scene.scope_live.with_rig = True
+    bpy.context.scene.scope_retarget.rig = rig
+    return rig
+
+
 def test_the_newest_pose_is_shown_and_stays_after_stop(live):
     job = live("pose(1); pose(2); pose(7, [0.5] * 10); receive()")
     until(job, lambda: job.poses)
@@ -317,11 +325,9 @@ def test_a_recording_that_was_asked_for_too_late_leaves_the_last_pose(live):
     assert "Live" in bpy.data.objects
 
 
-def test_a_recording_whose_retargeting_fails_is_kept(live, monkeypatch):
-    rig, _ = build_rig("mixamo")
+def test_a_recording_whose_retargeting_fails_is_kept(live):
+    following_rig()
     scene = bpy.context.scene
-    scene.scope_live.with_rig = True
-    scene.scope_retarget.rig = rig
     job = live("pose(1); receive(); receive(); finish()")
     until(job, lambda: job.has_body)
     job.record()
@@ -355,11 +361,9 @@ def test_a_stream_ends_when_online_access_does(live, monkeypatch):
 
 def test_cancelling_leaves_the_scene_as_it_was(live):
     bpy.ops.object.armature_add()
-    rig, _ = build_rig("mixamo")
+    rig = following_rig()
     bpy.context.view_layer.objects.active = bpy.data.objects["Armature"]
     scene = bpy.context.scene
-    scene.scope_live.with_rig = True
-    scene.scope_retarget.rig = rig
     before = inventory()
     posed = [bone.matrix_basis.copy() for bone in rig.pose.bones]
     scene.scope_live.people = 2
@@ -378,10 +382,8 @@ def test_cancelling_leaves_the_scene_as_it_was(live):
 
 
 def test_a_process_that_cannot_be_started_leaves_the_rig_as_it_was(live, monkeypatch):
-    rig, _ = build_rig("mixamo")
+    rig = following_rig()
     rig.data.pose_position = "REST"
-    bpy.context.scene.scope_live.with_rig = True
-    bpy.context.scene.scope_retarget.rig = rig
     live("receive()").cancel()
     assert rig.data.pose_position == "REST"
 
@@ -395,10 +397,8 @@ def test_a_process_that_cannot_be_started_leaves_the_rig_as_it_was(live, monkeyp
 
 
 def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
-    rig, _ = build_rig("mixamo")
+    rig = following_rig()
     scene = bpy.context.scene
-    scene.scope_live.with_rig = True
-    scene.scope_retarget.rig = rig
     job = live('pose(1); assert receive() == "record"; assert receive() == "stop"; finish()')
     until(job, lambda: job.has_body)
     job.record()
@@ -409,10 +409,7 @@ def test_a_recording_is_retargeted_to_the_rig_that_followed(live):
 
 
 def test_the_rig_gets_nobody_elses_recording(live):
-    rig, _ = build_rig("mixamo")
-    scene = bpy.context.scene
-    scene.scope_live.with_rig = True
-    scene.scope_retarget.rig = rig
+    rig = following_rig()
     job = live('pose(1); assert receive() == "record"; assert receive() == "stop"; finish(2); ')
     until(job, lambda: job.has_body)
     job.record()

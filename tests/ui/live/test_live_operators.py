@@ -10,7 +10,7 @@ import pytest
 from scope.scope_addon.ui import live_operators
 from scope.scope_addon.ui.capture_operators import state as capture_state
 from scope.scope_addon.ui.live_operators import end_live, play_scene
-from scope.scope_addon.ui.live_panel import SCOPE_PT_live, _speed
+from scope.scope_addon.ui.live_panel import SCOPE_PT_live
 from scope.scope_addon.ui.live_properties import state
 
 
@@ -144,11 +144,3 @@ def test_the_header_of_the_panel_shows_what_runs_while_it_is_closed(job):
     state.scene_uid = bpy.context.scene.session_uid
     assert header(job) == [("", "ERROR")]
     state.message = ""
-
-
-def test_one_pose_per_second_is_singular():
-    assert [_speed(rate, 20.0).split(",")[0] for rate in (0.3, 1.4, 2.0)] == [
-        "0 poses/s",
-        "1 pose/s",
-        "2 poses/s",
-    ]

@@ -19,6 +19,13 @@ from scope.solver import load_body
 from ...made_motion import made_views
 
 
+def window_and_viewport():
+    """Open Blender's own startup file; return its window and 3D viewport."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    window = bpy.context.window_manager.windows[0]
+    return window, next(each for each in window.screen.areas if each.type == "VIEW_3D")
+
+
 @pytest.mark.parametrize("heading", [0.0, 0.7, 3.0])
 @pytest.mark.parametrize("tilt", [0.0, -0.5, 0.4])
 def test_the_side_view_is_level_and_looks_across_the_cameras_view(heading, tilt):
@@ -47,9 +54,7 @@ def test_the_side_view_needs_the_view_over_the_footage():
 
 
 def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    window, area = window_and_viewport()
     overlay = area.spaces.active.overlay
     collection = bpy.data.collections.new("capture")
     bpy.context.scene.collection.children.link(collection)
@@ -63,9 +68,7 @@ def test_bones_are_hidden_in_the_view_and_shown_again_after_it():
 
 
 def test_a_capture_is_compared_without_what_is_excluded_from_the_view_layer():
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    window, area = window_and_viewport()
     collection, bpy.context.scene.camera = capture_with_camera("capture")
     child = bpy.data.collections.new("props")
     child.objects.link(bpy.data.objects.new("prop", None))
@@ -90,9 +93,7 @@ def capture_with_camera(name):
 
 
 def test_a_capture_without_people_splits_no_viewport():
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    window, area = window_and_viewport()
     scene = bpy.context.scene
     scene.scope.capture, scene.camera = capture_with_camera("capture")
     count = len(window.screen.areas)
@@ -102,10 +103,8 @@ def test_a_capture_without_people_splits_no_viewport():
 
 
 def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(monkeypatch):
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
-    window = bpy.context.window_manager.windows[0]
+    window, area = window_and_viewport()
     scene = bpy.context.scene
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
     space = area.spaces.active
     earlier, scene.camera = capture_with_camera("earlier")
     with bpy.context.temp_override(window=window, area=area):
@@ -135,13 +134,11 @@ def test_a_new_capture_ends_the_comparison_of_an_earlier_one_and_no_other_view(m
 
 
 def test_the_comparison_switches_between_the_cameras_of_a_capture(standing):
-    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    window, area = window_and_viewport()
     scene = bpy.context.scene
     motion = replace(standing, views=made_views(0.5, -0.2))
     built = build_scene([motion], load_body("scope"), options=BuildOptions())
     scene.scope.capture = built.collection
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
     space = area.spaces.active
     cameras = comparison.cameras_of(scene)
     assert [view_number(camera) for camera in cameras] == [None, 0, 1]

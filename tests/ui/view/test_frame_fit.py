@@ -258,25 +258,9 @@ def test_the_tab_opens_in_the_largest_viewport_of_a_menu():
     assert large.regions[1].tab == "Scope"
 
 
-def test_the_tab_opens_in_the_viewport_that_a_file_is_dropped_in():
-    small = area(size=(100, 100))
-    large = area()
-    sidebar.show_tab(context([small, large], small))
-    assert [each.spaces.active.show_region_ui for each in (small, large)] == [True, False]
-
-
 def test_without_a_viewport_or_before_the_first_drawing_nothing_fails():
     sidebar.show_tab(context([area("TOPBAR")]))
     sidebar.show_tab(SimpleNamespace(window=None, area=None))
     new = area(drawn=False)
     sidebar.show_tab(context([new]))
     assert new.spaces.active.show_region_ui
-
-
-def test_what_a_menu_at_the_top_imports_is_framed_in_the_largest_viewport():
-    menu = area("TOPBAR", (2000, 2000))
-    small = area(size=(100, 100))
-    large = area()
-    assert sidebar.viewport_of(context([menu, small, large], menu)) is large
-    assert sidebar.viewport_of(context([menu, small, large], small)) is small
-    assert sidebar.viewport_of(context([menu], menu)) is None
