@@ -46,8 +46,7 @@ def test_bars_are_found(sides: tuple[int, int, int, int]) -> None:
     assert longer_content_side(bars, WIDTH, HEIGHT) == pytest.approx(longer, abs=4)
 
 
-@pytest.mark.parametrize("upright", [False, True])
-@pytest.mark.parametrize("kind", ["blurred", "white"])
+@pytest.mark.parametrize(("kind", "upright"), [("blurred", False), ("white", True)])
 def test_bars_of_other_kinds_are_found(kind: str, upright: bool) -> None:
     """A portrait clip in front of its own blurred copy, as broadcasters show it, or of a plain
     colour.

@@ -14,8 +14,9 @@ HEIGHT = 720
 FOCAL_PX = 1000.0
 
 
-def projected(R_camera_room: np.ndarray, rng: np.random.Generator, others: int) -> Segments:
+def edges_of(R_camera_room: np.ndarray, seed: int, others: int) -> Edges:
     """Return the edges of a room, 20 along each of its axes, and some in other directions."""
+    rng = np.random.default_rng(seed)
     ends: list[np.ndarray] = []
     while len(ends) < 60 + others:
         a = rng.uniform([-4, -2, -3], [4, 2, 3])
@@ -29,14 +30,15 @@ def projected(R_camera_room: np.ndarray, rng: np.random.Generator, others: int) 
             ends.append(FOCAL_PX * points[:, :2] / points[:, 2:] + [WIDTH / 2, HEIGHT / 2])
     lengths = np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1) / WIDTH
     order = np.argsort(-lengths)
-    return Segments(np.array(ends)[order], lengths[order])
+    return Edges.of(Segments(np.array(ends)[order], lengths[order]), WIDTH, HEIGHT)
 
 
-@pytest.mark.parametrize("others", [0, 30])
-@pytest.mark.parametrize("turn", [(0.1, 0.6, 0.05), (-0.3, -0.4, -0.1), (0.2, 0.3, 0.2)])
+@pytest.mark.parametrize(
+    ("turn", "others"), [((0.1, 0.6, 0.05), 0), ((-0.3, -0.4, -0.1), 30), ((0.2, 0.3, 0.2), 30)]
+)
 def test_the_axes_of_a_room_are_found(turn: tuple[float, float, float], others: int) -> None:
     R = exp(np.array(turn))
-    edges = Edges.of(projected(R, np.random.default_rng(2), others), WIDTH, HEIGHT)
+    edges = edges_of(R, 2, others)
     explained, axes = edges.axes(FOCAL_PX)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-5)
     agreement = np.abs(axes @ R)
@@ -47,17 +49,13 @@ def test_the_axes_of_a_room_are_found(turn: tuple[float, float, float], others: 
 
 
 def test_the_true_focal_length_explains_most() -> None:
-    edges = Edges.of(
-        projected(exp(np.array([0.15, 0.6, 0.05])), np.random.default_rng(5), 10), WIDTH, HEIGHT
-    )
+    edges = edges_of(exp(np.array([0.15, 0.6, 0.05])), 5, others=10)
     support = {factor: edges.support(factor * FOCAL_PX) for factor in (0.6, 0.8, 1.0, 1.25, 1.6)}
     assert max(support, key=lambda factor: support[factor]) == 1.0
 
 
 def test_each_edge_counts_as_far_as_it_points_at_the_nearest_vanishing_point() -> None:
-    edges = Edges.of(
-        projected(exp(np.array([0.1, 0.6, 0.05])), np.random.default_rng(3), 40), WIDTH, HEIGHT
-    )
+    edges = edges_of(exp(np.array([0.1, 0.6, 0.05])), 3, others=40)
     explained, axes = edges.axes(FOCAL_PX)
     expected = 0.0
     for middle, along, weight in zip(edges.middle, edges.along, edges.weight, strict=True):

@@ -19,9 +19,9 @@ CAMERA = Camera(K, np.zeros(5), "given")
 LEVEL_UP = np.array([0.0, -1.0, 0.0])
 
 
-def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
-    """A picture of posts, horizontal edges, a tiled floor and clutter, seen by a rotated camera."""
-    rng = np.random.default_rng(seed)
+def room(R_camera_level, posts=14, clutter=0):
+    """A picture of posts, horizontal edges and clutter, seen by a rotated camera."""
+    rng = np.random.default_rng(0)
     picture = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
 
     def line(a, b, colour):
@@ -29,27 +29,16 @@ def room(R_camera_level, posts=14, clutter=0, seed=0, across=10, tiles=0):
         if (ends[:, 2] > 0.5).all():
             pixels = ends @ K.T
             pixels = np.round(pixels[:, :2] / pixels[:, 2:]).astype(int)
-            cv2.line(
-                picture,
-                tuple(map(int, pixels[0])),
-                tuple(map(int, pixels[1])),
-                colour,
-                3,
-                cv2.LINE_AA,
-            )
+            cv2.line(picture, *pixels.tolist(), colour, 3, cv2.LINE_AA)
 
     for _ in range(posts):
         x = rng.uniform(-4, 4)
         z = rng.uniform(4, 9)
         line([x, -1.5, z], [x, 1.2, z], (30, 30, 30))
-    for _ in range(across):
+    for _ in range(10):
         y = rng.uniform(-1.5, 1.2)
         z = rng.uniform(4, 9)
         line([-4, y, z], [4, y, z], (220, 220, 220))
-    for k in range(tiles):
-        x = 8 * (k + 0.5) / tiles
-        line([x - 4, 1.2, 3], [x - 4, 1.2, 9], (220, 220, 220))
-        line([-4, 1.2, x + 2], [4, 1.2, x + 2], (220, 220, 220))
     for _ in range(clutter):
         a = rng.uniform([-4, -1.5, 4], [4, 1.2, 9])
         line(a, a + rng.uniform(-0.7, 0.7, 3), (60, 60, 200))
@@ -71,7 +60,7 @@ def test_posts_correct_a_leaning_body(turn):
     assert angle_deg(found, truth) < 1.0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_ramp_next_to_a_floor_is_ambiguous(seed):
     """Edges across both, and as many along either: one of them determines up, both together do
     not.
@@ -88,21 +77,16 @@ def test_a_ramp_next_to_a_floor_is_ambiguous(seed):
         normals = np.cross(through, direction)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
+    def up_from(*parts):
+        normals = np.concatenate(parts)
+        lines = Lines(normals, np.full(len(normals), 0.1))
+        return estimate_up_from_lines(lines, R @ between).up
+
     across = edges(R @ [1.0, 0, 0], 16)
     along = {name: edges(R @ np.cross(up, [1.0, 0, 0]), 16) for name, up in up_of.items()}
     for name, up in up_of.items():
-        normals = np.concatenate([across, along[name]])
-        assert (
-            angle_deg(
-                estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up,
-                R @ up,
-            )
-            < 1.0
-        )
-    normals = np.concatenate([across, *along.values()])
-    assert (
-        estimate_up_from_lines(Lines(normals, np.full(len(normals), 0.1)), R @ between).up is None
-    )
+        assert angle_deg(up_from(across, along[name]), R @ up) < 1.0
+    assert up_from(across, *along.values()) is None
 
 
 @pytest.mark.parametrize("turn", [[0, 0, 0.12], [-0.1, 0.1, -0.1]])
@@ -110,8 +94,9 @@ def test_a_fence_determines_a_horizontal_direction_but_not_up(turn):
     R = exp(turn)
     lines = find_segments(room(R, posts=0, clutter=10), []).lines(CAMERA)
     leaning = exp([0.1, 0.0, 0.15]) @ R @ LEVEL_UP
-    assert estimate_up_from_lines(lines, leaning).up is None
-    assert abs(90 - angle_deg(estimate_up_from_lines(lines, leaning).level, R @ LEVEL_UP)) < 0.5
+    found = estimate_up_from_lines(lines, leaning)
+    assert found.up is None
+    assert abs(90 - angle_deg(found.level, R @ LEVEL_UP)) < 0.5
     feet = np.zeros((5, 4, 3))
     up, source = up_from_scene(leaning, feet, lines)
     assert source == BODIES
@@ -122,7 +107,7 @@ def test_a_fence_determines_a_horizontal_direction_but_not_up(turn):
 
 
 @pytest.mark.parametrize("count", [12, 60, 200])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_random_lines_determine_nothing(count, seed):
     rng = np.random.default_rng(seed)
     middle = rng.uniform([0, 0], [WIDTH, HEIGHT], (count, 2))
@@ -130,28 +115,17 @@ def test_random_lines_determine_nothing(count, seed):
     lengths = np.sort(0.03 + rng.exponential(0.08, count))[::-1]
     half = 0.5 * WIDTH * lengths[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = Segments(np.stack([middle - half, middle + half], axis=1), lengths).lines(CAMERA)
-    assert estimate_up_from_lines(lines, LEVEL_UP).up is None
-    assert estimate_up_from_lines(lines, LEVEL_UP).level is None
+    found = estimate_up_from_lines(lines, LEVEL_UP)
+    assert found.up is None
+    assert found.level is None
 
 
 def test_a_picture_without_vertical_edges_determines_nothing():
-    assert estimate_up_from_lines(Lines.none(), LEVEL_UP).up is None
     blank = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
-    assert estimate_up_from_lines(find_segments(blank, []).lines(CAMERA), LEVEL_UP).up is None
     horizontal_edges_only = room(np.eye(3), posts=0)
-    assert (
-        estimate_up_from_lines(find_segments(horizontal_edges_only, []).lines(CAMERA), LEVEL_UP).up
-        is None
-    )
-
-
-def test_lines_on_people_are_left_out():
-    picture = room(np.eye(3), posts=0)
-    for k in range(12):
-        # somebody's striped coat
-        cv2.line(picture, (600 + 8 * k, 200), (500 + 8 * k, 520), (0, 0, 0), 3)
-    box = np.array([[480.0, 190.0], [700.0, 530.0]])
-    assert len(find_segments(picture, []).lengths) > len(find_segments(picture, [box]).lengths) + 5
+    for picture in (blank, horizontal_edges_only):
+        lines = find_segments(picture, []).lines(CAMERA)
+        assert estimate_up_from_lines(lines, LEVEL_UP).up is None
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
@@ -163,7 +137,5 @@ def test_real_cameras_with_roll_and_pitch(shared, number):
     truth = np.load(folder / f"truth_cam{number}.npz")["up"]
     camera = choose_camera(picture.shape[1], picture.shape[0])  # the focal length is unknown
     lines = find_segments(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), []).lines(camera)
-    rng = np.random.default_rng(number)
-    for _ in range(3):
-        leaning = exp(np.radians(7) * rng.standard_normal(3)) @ truth
-        assert angle_deg(estimate_up_from_lines(lines, leaning).up, truth) < 2.0
+    leaning = exp(np.radians(7) * np.random.default_rng(number).standard_normal(3)) @ truth
+    assert angle_deg(estimate_up_from_lines(lines, leaning).up, truth) < 2.0
