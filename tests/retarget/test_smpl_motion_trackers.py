@@ -117,50 +117,36 @@ def as_pytorch(content: Any, path: Path) -> None:
     _rebuild_tensor_v2.__module__ = "torch._utils"
     _rebuild_tensor_v2.__qualname__ = "_rebuild_tensor_v2"
     vars(utils)["_rebuild_tensor_v2"] = _rebuild_tensor_v2
-    storages: list[bytes] = []
+    storages: list[np.ndarray] = []
 
-    class Storage:
-        def __init__(self, array: np.ndarray) -> None:
-            self.size = array.size
-            self.key = str(len(storages))
-            storages.append(array.astype("<f4").tobytes())
-
-    class Tensor:
-        """Every second column of the storage, as a slice of a tensor is saved."""
-
-        def __init__(self, array: np.ndarray) -> None:
-            self.shape = array.shape
-            wide = np.repeat(array.reshape(len(array), -1), 2, axis=1)
-            self.storage = Storage(wide)
-            steps = [wide.shape[1], *(2 * np.cumprod([1, *array.shape[:1:-1]])[::-1]).tolist()]
-            self.steps = tuple(int(n) for n in steps[: array.ndim])
-
-        def __reduce__(self) -> Any:
-            given: tuple[Any, ...] = (self.storage, 0, self.shape, self.steps, False, OrderedDict())
-            return _rebuild_tensor_v2, given
-
-    class Pickler(pickle._Pickler):
+    class Pickler(pickle.Pickler):
         def persistent_id(self, value: Any) -> Any:
-            if not isinstance(value, Storage):
+            keys = [key for key, storage in enumerate(storages) if storage is value]
+            if not keys:
                 return None
-            return "storage", torch.FloatStorage, value.key, "cuda:0", value.size
+            return "storage", torch.FloatStorage, str(keys[0]), "cuda:0", value.size
 
-    def tensors(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: tensors(each) for key, each in value.items()}
-        return Tensor(value)
+        def reducer_override(self, value: Any) -> Any:
+            """Every second column of a storage, as a slice of a tensor is saved."""
+            if not isinstance(value, np.ndarray):
+                return NotImplemented
+            storages.append(np.repeat(value.reshape(len(value), -1), 2, axis=1))
+            row = storages[-1].shape[1]
+            steps = [row, *(2 * np.cumprod([1, *value.shape[:1:-1]])[::-1]).tolist()]
+            size = value.shape, tuple(int(step) for step in steps[: value.ndim])
+            return _rebuild_tensor_v2, (storages[-1], 0, *size, False, OrderedDict())
 
     out = io.BytesIO()
     sys.modules.update({"torch": torch, "torch._utils": utils})
     try:
-        Pickler(out, 2).dump(tensors(content))
+        Pickler(out, 2).dump(content)
     finally:
         del sys.modules["torch"], sys.modules["torch._utils"]
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("results/data.pkl", out.getvalue())
         file.writestr("results/byteorder", "little")
-        for key, raw in enumerate(storages):
-            file.writestr(f"results/data/{key}", raw)
+        for key, storage in enumerate(storages):
+            file.writestr(f"results/data/{key}", storage.astype("<f4").tobytes())
 
 
 def compressed_joblib(content: Any, path: Path) -> None:
