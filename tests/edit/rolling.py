@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 from scope.scope_addon.edit.clip import Clip
 from scope.scope_addon.kinematics.axes import R_WORLD_MODEL
-from scope.solver.rotations import exp, shortest_turn
+from scope.scope_addon.kinematics.leg_reach import LEGS, move_ends
+from scope.solver.rotations import exp
 
-from .walking import BODY, NAMES, RATE
+from .walking import ARMS_DOWN, BODY, NAMES, RATE
 
 ZERO = np.zeros(BODY.P)
 J = BODY.rest_joints(ZERO) @ R_WORLD_MODEL.T
@@ -75,44 +76,30 @@ def rolling_walk(seconds=2.6, stiff_toes=False):
     :param stiff_toes: keep the toes from bending, as in a capture without toe keypoints.
     """
     times = np.arange(int(seconds * RATE) + 1) / RATE
+    height = -FLOOR - 0.07 + 0.015 * np.cos(4 * np.pi * times / PERIOD)
+    ahead = -STRIDE * (times / PERIOD - 0.5 * STANCE + 0.04)
+    root = J[0] + np.stack([np.zeros(len(times)), ahead, height], axis=1)
     rotations = np.tile(np.eye(3), (len(times), len(NAMES), 1, 1))
-    root = np.empty((len(times), 3))
-    stands = {"left": np.zeros((len(times), 2), bool), "right": np.zeros((len(times), 2), bool)}
-    for t, time in enumerate(times):
-        D = {name: np.eye(3) for name in NAMES}
-        D["left_shoulder"], D["right_shoulder"] = (
-            exp(np.array([0, sign * 1.2, 0])) for sign in (1, -1)
-        )
-        for side in ("left", "right"):
-            for part in ("elbow", "wrist", "hand"):
-                D[f"{side}_{part}"] = D[f"{side}_shoulder"]
-        height = -FLOOR - 0.07 + 0.015 * np.cos(4 * np.pi * time / PERIOD)
-        root[t] = J[0] + [0, -STRIDE * (time / PERIOD - 0.5 * STANCE + 0.04), height]
-        for side, begin in (("left", 0.0), ("right", 0.5)):
-            ankle, D[f"{side}_ankle"], D[f"{side}_foot"], *stands[side][t] = foot(
-                side, time / PERIOD + begin
-            )
-            if stiff_toes:
-                D[f"{side}_foot"] = D[f"{side}_ankle"]
-            ankle = ankle + [0, STRIDE * begin, 0]
-            hip = root[t] + joint(f"{side}_hip") - J[0]
-            upper = joint(f"{side}_knee") - joint(f"{side}_hip")
-            lower = joint(f"{side}_ankle") - joint(f"{side}_knee")
-            a = np.linalg.norm(upper)
-            b = np.linalg.norm(lower)
-            leg = ankle - hip
-            c = np.linalg.norm(leg)
-            assert c < a + b, "the walk's legs are too short"
-            along = (a * a - b * b + c * c) / (2 * c)
-            front = np.cross(np.cross(leg, [0, -1, 0]), leg)
-            knee = leg / c * along + front / np.linalg.norm(front) * np.sqrt(a * a - along * along)
-            thigh = shortest_turn(upper, knee)
-            D[f"{side}_hip"] = thigh
-            D[f"{side}_knee"] = shortest_turn(thigh @ lower, leg - knee) @ thigh
-        for i, name in enumerate(NAMES):
-            parent = BODY.parents[i]
-            R = D[name] if parent < 0 else D[NAMES[parent]].T @ D[name]
-            rotations[t, i] = (
-                R @ R_WORLD_MODEL if parent < 0 else R_WORLD_MODEL.T @ R @ R_WORLD_MODEL
-            )
+    rotations[:, 0] = R_WORLD_MODEL
+    for name, vector in ARMS_DOWN.items():
+        rotations[:, NAMES.index(name)] = exp(np.array(vector))
+    ankles = np.empty((len(times), 2, 3))
+    feet = np.empty((len(times), 2, 3, 3))
+    toes = np.empty((len(times), 2, 3, 3))
+    stands = {}
+    for leg, (side, begin) in enumerate((("left", 0.0), ("right", 0.5))):
+        stands[side] = np.zeros((len(times), 2), bool)
+        for t, time in enumerate(times):
+            ankle, feet[t, leg], toes[t, leg], *stands[side][t] = foot(side, time / PERIOD + begin)
+            ankles[t, leg] = ankle + [0, STRIDE * begin, 0]
+    parts = [[NAMES.index(f"{side}_{part}") for side in stands] for part in ("ankle", "foot")]
+    R, joints = Clip(times, rotations, root).parts(BODY, ZERO)
+    rotations = move_ends(BODY, LEGS, rotations, (R, joints), ankles - joints[:, parts[0]])
+    R, joints = Clip(times, rotations, root).parts(BODY, ZERO)
+    np.testing.assert_allclose(joints[:, parts[0]], ankles, atol=1e-6)  # no leg is too short
+    shins = R[:, [BODY.parents[ankle] for ankle in parts[0]]]
+    feet = feet @ R_WORLD_MODEL
+    toes = feet if stiff_toes else toes @ R_WORLD_MODEL
+    rotations[:, parts[0]] = np.swapaxes(shins, -1, -2) @ feet
+    rotations[:, parts[1]] = np.swapaxes(feet, -1, -2) @ toes
     return Clip(times, rotations, root), stands
