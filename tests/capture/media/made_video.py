@@ -4,10 +4,16 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
 from pathlib import Path
 
 import cv2
 import numpy as np
+
+from ...required import package
+
+av = package("av")
 
 
 def write_video(
@@ -21,6 +27,68 @@ def write_video(
     for image in images:
         writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     writer.release()
+    return path
+
+
+def write_film(
+    path: Path,
+    pictures: Iterable,
+    codec: str,
+    pixels: str = "yuv420p",
+    rate: int = 25,
+    *,
+    times_s: Sequence[float] | None = None,
+    metadata: dict[str, str] | None = None,
+    **options: str,
+) -> Path:
+    """Encode pictures (H, W, 3), or frames, with the tags of the first one.
+
+    :param pixels: their form in the file.
+    :param times_s: when each is shown; None: picture k at k / rate.
+    """
+    frames = [
+        picture if hasattr(picture, "pts") else av.VideoFrame.from_ndarray(picture, format="rgb24")
+        for picture in pictures
+    ]
+    with av.open(str(path), "w", options={"movflags": "use_metadata_tags"}) as container:
+        container.metadata.update(metadata or {})
+        stream = container.add_stream(
+            codec, rate=rate, options={name.replace("_", "-"): v for name, v in options.items()}
+        )
+        context = stream.codec_context
+        stream.width, stream.height = frames[0].width, frames[0].height
+        stream.pix_fmt = pixels
+        context.thread_count = 1
+        for tag in ("color_trc", "color_primaries", "colorspace", "color_range"):
+            setattr(context, tag, getattr(frames[0], tag))
+        ticks = rate if times_s is None else 1000
+        stream.time_base = context.time_base = Fraction(1, ticks)
+        for k, frame in enumerate(frames):
+            shown = frame if frame.format.name == pixels else frame.reformat(format=pixels)
+            shown.pts = k if times_s is None else round(ticks * times_s[k])
+            shown.time_base = Fraction(1, ticks)
+            container.mux(stream.encode(shown))
+        container.mux(stream.encode(None))
+    return path
+
+
+def sound_track(path: Path, cover: np.ndarray | None = None) -> Path:
+    """Write an .mp4 of a silent second alone, or with the picture of a cover."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("aac", rate=8000)
+        silence = np.zeros((1, 8000), np.float32)
+        sound = av.AudioFrame.from_ndarray(silence, format="fltp", layout="mono")
+        sound.rate = 8000
+        if cover is not None:
+            height, width = cover.shape[:2]
+            picture = container.add_stream("mjpeg", width=width, height=height, pix_fmt="yuvj420p")
+            picture.disposition = av.stream.Disposition.attached_pic
+        for packet in [*stream.encode(sound), *stream.encode()]:
+            container.mux(packet)
+        if cover is not None:
+            frame = av.VideoFrame.from_ndarray(cover, format="rgb24")
+            for packet in [*picture.encode(frame), *picture.encode()]:
+                container.mux(packet)
     return path
 
 

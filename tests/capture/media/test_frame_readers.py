@@ -21,7 +21,7 @@ from scope.scope_addon.capture.media.frame_readers import (
 )
 from scope.scope_addon.errors import VideoError
 
-from .made_video import write_video
+from .made_video import sound_track, write_film, write_video
 
 COUNT = 24
 
@@ -41,14 +41,7 @@ def test_a_video_that_is_refused_is_closed(tmp_path, monkeypatch, video, reason)
     path = video
     opened = []
     if reason == "only audio":
-        path = tmp_path / "sound.mp4"
-        with av.open(str(path), "w") as container:
-            stream = container.add_stream("aac", rate=8000)
-            sound = av.AudioFrame.from_ndarray(
-                np.zeros((1, 8000), np.float32), format="fltp", layout="mono"
-            )
-            sound.rate = 8000
-            container.mux([*stream.encode(sound), *stream.encode()])
+        path = sound_track(tmp_path / "sound.mp4")
     monkeypatch.setattr(guards, "MAX_PIXELS", 100)
     pyav_open = av.open
     monkeypatch.setattr(
@@ -74,15 +67,9 @@ def test_without_the_decoder_a_video_is_refused(video, monkeypatch):
 
 def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):
     # bytes of a packet
-    path = tmp_path / "recorded.ts"
     size = 188
-    with av.open(str(path), "w", format="mpegts") as container:
-        stream = container.add_stream("mpeg2video", rate=25, width=64, height=48, pix_fmt="yuv420p")
-        for k in range(60):
-            noise = np.random.default_rng(k).integers(0, 255, (48, 64, 3), np.uint8)
-            frame = av.VideoFrame.from_ndarray(noise, format="rgb24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+    noise = np.random.default_rng(0).integers(0, 255, (60, 48, 64, 3), np.uint8)
+    path = write_film(tmp_path / "recorded.ts", noise, "mpeg2video")
     data = path.read_bytes()
     packets = [data[at : at + size] for at in range(0, len(data), size)]
     # a picture, of the stream 0x100
@@ -112,19 +99,16 @@ def test_packets_of_fields_are_no_frames(tmp_path, packets_per_s):
     assert frame_readers._frames_before(path, one_second, None) == packets_per_s
 
 
+def test_fields_and_frames_may_alternate():
+    packets_s = [0.0, 0.02, 0.04, 0.08, 0.1, 0.12]
+    times_s = frame_readers._frame_times(packets_s, Fraction(25))
+    assert times_s.tolist() == [0.0, 0.04, 0.08, 0.12]
+
+
 @pytest.mark.parametrize("is_interlaced", [False, True])
 def test_frames_that_are_interlaced_may_have_packets_of_fields(tmp_path, is_interlaced):
-    path = tmp_path / "a.ts"
-    options = {"x264-params": "interlaced=1"} if is_interlaced else {}
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=25, options=options)
-        stream.width = 64
-        stream.height = 64
-        stream.pix_fmt = "yuv420p"
-        for k in range(5):
-            image = np.full((64, 64, 3), 10 * k, np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode())
+    options = {"x264_params": "interlaced=1"} if is_interlaced else {}
+    path = write_film(tmp_path / "a.ts", np.zeros((5, 64, 64, 3), np.uint8), "libx264", **options)
     with closing(PyavReader(path)) as reader:
         reader.read()
         assert reader.may_have_field_packets == is_interlaced

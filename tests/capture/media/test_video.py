@@ -13,14 +13,19 @@ import av
 import cv2
 import numpy as np
 import pytest
-from av.stream import Disposition
 from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.errors import VideoError
 
 from .corner_picture import H, W, corner_image, corners, encode
-from .made_video import patch_track_header, with_time_table, write_video
+from .made_video import (
+    patch_track_header,
+    sound_track,
+    with_time_table,
+    write_film,
+    write_video,
+)
 
 
 def ramp(count: int) -> list[np.ndarray]:
@@ -86,12 +91,7 @@ def test_a_repeated_time_does_not_move_what_follows(tmp_path, again):
 
 
 def test_a_range_of_a_stream_without_times_has_the_times_of_the_whole(tmp_path):
-    path = tmp_path / "bare.h264"
-    with av.open(str(path), "w", format="h264") as container:
-        stream = container.add_stream("libx264", rate=25, width=W, height=H, pix_fmt="yuv420p")
-        for image in ramp(30):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode())
+    path = write_film(tmp_path / "bare.h264", ramp(30), "libx264")
     with open_video(path, VideoRange(start_s=0.49, end_s=0.61)) as video:
         part = list(video)
     assert [f.index for f in part] == [13, 14, 15]
@@ -249,27 +249,6 @@ def test_sixteen_bits_grey_and_alpha(tmp_path):
 # Files that cannot be used
 
 
-def sound_track(path: Path, cover: bool = False) -> None:
-    """Write an .mp4 of sound alone, or with the picture of a cover."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("aac", rate=8000)
-        picture = (
-            container.add_stream("mjpeg", width=W, height=H, pix_fmt="yuvj420p") if cover else None
-        )
-        if picture is not None:
-            picture.disposition = Disposition.attached_pic
-        sound = av.AudioFrame.from_ndarray(
-            np.zeros((1, 8000), np.float32), format="fltp", layout="mono"
-        )
-        sound.rate = 8000
-        for packet in [*stream.encode(sound), *stream.encode()]:
-            container.mux(packet)
-        if picture is not None:
-            frame = av.VideoFrame.from_ndarray(corner_image(), format="rgb24")
-            for packet in [*picture.encode(frame), *picture.encode()]:
-                container.mux(packet)
-
-
 @pytest.mark.parametrize(
     ("name", "make", "words"),
     [
@@ -278,7 +257,7 @@ def sound_track(path: Path, cover: bool = False) -> None:
         ("folder.mp4", lambda p: p.mkdir(), "is a folder"),
         ("text.mp4", lambda p: p.write_text("not a film at all\n" * 50), "not a video or image"),
         ("sound.mp4", sound_track, "contains only audio; choose the file with the video"),
-        ("cover.mp4", lambda p: sound_track(p, cover=True), "contains only audio"),
+        ("cover.mp4", lambda p: sound_track(p, corner_image()), "contains only audio"),
         (
             "half.png",
             lambda p: p.write_bytes(encode(".png", corner_image())[:40]),

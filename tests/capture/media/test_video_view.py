@@ -14,7 +14,7 @@ from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.footage_view import FootageView
 
 from .corner_picture import corner_image, corners
-from .made_video import write_video
+from .made_video import write_film, write_video
 
 
 def files(folder: Path) -> list[Path]:
@@ -44,16 +44,10 @@ def test_footage_of_every_kind_is_turned_and_mirrored(
 
 @pytest.mark.parametrize(("stated", "speed"), [("240.000000", 8.0), ("30.0", 1.0), ("x", 1.0)])
 def test_slow_motion_is_read_from_a_phones_file(tmp_path: Path, stated: str, speed: float) -> None:
-    path = tmp_path / "a.mp4"
-    options = {"movflags": "use_metadata_tags"}
-    with av.open(str(path), "w", options=options) as container:
-        container.metadata["com.android.capture.fps"] = stated
-        stream = container.add_stream("mpeg4", rate=30)
-        stream.width, stream.height = 96, 64
-        for k in range(10):
-            image = np.full((64, 96, 3), 20 * k, np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode())
+    metadata = {"com.android.capture.fps": stated}
+    path = write_film(
+        tmp_path / "a.mp4", [corner_image()] * 10, "mpeg4", rate=30, metadata=metadata
+    )
     with open_video(path) as video:
         assert video.recorded_speed == pytest.approx(speed)
 

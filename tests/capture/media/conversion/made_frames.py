@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 
@@ -41,33 +39,6 @@ def coded_frame(
     frame.colorspace = matrix
     frame.color_range = 1
     return frame
-
-
-def write_frames(
-    path: Path, frames: Iterable, codec: str, pixels: str, rate: int = 25, **options: str
-) -> Path:
-    """Encode frames with the tags of the first one; frame k is shown at k / rate."""
-    frames = [frame.reformat(format=pixels) for frame in frames]
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(
-            codec, rate=rate, options={k.replace("_", "-"): v for k, v in options.items()}
-        )
-        stream.width = frames[0].width
-        stream.height = frames[0].height
-        stream.pix_fmt = pixels
-        context = stream.codec_context
-        first = frames[0]
-        context.thread_count = 1
-        context.color_trc = first.color_trc
-        context.color_primaries = first.color_primaries
-        context.colorspace = first.colorspace
-        context.color_range = first.color_range
-        for k, frame in enumerate(frames):
-            frame.pts = k
-            frame.time_base = Fraction(1, rate)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-    return path
 
 
 def with_fields(pictures: list[np.ndarray], order: str = "tff", pixels: str = "yuv420p") -> list:

@@ -13,6 +13,7 @@ from scope.scope_addon.capture.media.deinterlace import deinterlaced
 from scope.scope_addon.capture.media.video import open_video
 from scope.scope_addon.capture.media.video_range import VideoRange
 
+from ..made_video import write_film
 from .made_frames import av, marked, with_fields
 
 HEIGHT = 48
@@ -123,26 +124,12 @@ def test_a_filter_that_fails_loses_no_frame(monkeypatch, broken: str, after: int
     assert shown[-1] is woven[-1]
 
 
-def write(
-    path: Path, count: int, rate: int, codec: str = "libx264", order: str = "tff", **options: str
-) -> Path:
+def write(path: Path, count: int, rate: int, codec: str = "libx264", order: str = "tff") -> Path:
     """Encode ``count`` interlaced frames of a moving bar."""
     pixels = "yuv422p10le" if codec == "prores_ks" else "yuv420p"
     frames = with_fields([moving_bar(k) for k in range(2 * count)], order, pixels)
     flags = "+ildct+ilme" if codec == "mpeg2video" else "+ildct"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(
-            codec, rate=rate, options={"flags": flags, "threads": "1", **options}
-        )
-        stream.width = WIDTH
-        stream.height = HEIGHT
-        stream.pix_fmt = pixels
-        for k, frame in enumerate(frames):
-            frame.pts = k
-            frame.time_base = 1 / stream.codec_context.framerate
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-    return path
+    return write_film(path, frames, codec, pixels, rate, flags=flags)
 
 
 def combs(image: np.ndarray) -> float:

@@ -12,7 +12,8 @@ from scope.scope_addon.capture.media.hdr import compress, hdr_rgb, hlg_light, pq
 from scope.scope_addon.capture.media.video import open_video
 
 from ....required import need_encoder
-from .made_frames import HLG, PQ, coded_frame, write_frames
+from ..made_video import write_film
+from .made_frames import HLG, PQ, coded_frame
 
 # Codes for light in cd/m² on a screen of 1000 cd/m², from tables of ITU-R BT.2408 and BT.2100.
 LEVELS = {
@@ -167,7 +168,7 @@ def test_files_show_what_was_filmed(tmp_path: Path, name: str) -> None:
     transfer, codec, pixels, options = FILES[name]
     need_encoder(codec)
     frames = [coded_frame(as_hdr(picture(), transfer), transfer)] * 3
-    path = write_frames(tmp_path / name, frames, codec, pixels, 25, **options)
+    path = write_film(tmp_path / name, frames, codec, pixels, **options)
     with open_video(path) as video:
         frames = list(video)
     assert [f.timestamp_s for f in frames] == pytest.approx([0, 0.04, 0.08], abs=1e-3)
