@@ -217,13 +217,28 @@ def _largest_radius2(lens: Float64Array) -> float:
 
 @cached
 @njit(nogil=True)
-def _pixel(x: float, y: float, K: Float64Array, lens: Float64Array) -> tuple[float, float]:
-    """Project the normalized image point (x, y) to a pixel."""
+def _set_corner(
+    corner: Float64Array,
+    x_cam: float,
+    y_cam: float,
+    z_cam: float,
+    gain: float,
+    rim: float,
+    K: Float64Array,
+    lens: Float64Array,
+) -> None:
+    """Set a corner (u, v, 1/z, shading) to the projection of a point in camera axes."""
+    x = x_cam / z_cam
+    y = y_cam / z_cam
     r2 = x * x + y * y
     radial = 1 + r2 * (lens[0] + r2 * (lens[1] + r2 * lens[4]))
     u = x * radial + 2 * lens[2] * x * y + lens[3] * (r2 + 2 * x * x)
     v = y * radial + lens[2] * (r2 + 2 * y * y) + 2 * lens[3] * x * y
-    return K[0, 0] * u + K[0, 1] * v + K[0, 2], K[1, 1] * v + K[1, 2]
+    corner[0] = K[0, 0] * u + K[0, 1] * v + K[0, 2]
+    corner[1] = K[1, 1] * v + K[1, 2]
+    corner[2] = 1.0 / z_cam
+    corner[3] = gain
+    corner[4] = rim
 
 
 @cached
@@ -247,10 +262,7 @@ def _project(
         elif not (x * x + y * y) / (z * z) < largest:
             where[i] = _OUTSIDE
         else:
-            screen[i, 0], screen[i, 1] = _pixel(x / z, y / z, K, lens)
-            screen[i, 2] = 1.0 / z
-            screen[i, 3] = shading[i, 0]
-            screen[i, 4] = shading[i, 1]
+            _set_corner(screen[i], x, y, z, shading[i, 0], shading[i, 1], K, lens)
     return screen, where
 
 
@@ -303,19 +315,16 @@ def _clip_at_near(
         za = vertices[a, 2]
         zb = vertices[b, 2]
         if za >= NEAR:
-            cut[n, 0], cut[n, 1] = _pixel(vertices[a, 0] / za, vertices[a, 1] / za, K, lens)
-            cut[n, 2] = 1 / za
-            cut[n, 3] = shading[a, 0]
-            cut[n, 4] = shading[a, 1]
+            x, y, z = vertices[a]
+            _set_corner(cut[n], x, y, z, shading[a, 0], shading[a, 1], K, lens)
             n += 1
         if (za >= NEAR) != (zb >= NEAR):
             s = (NEAR - za) / (zb - za)
             x = vertices[a, 0] + s * (vertices[b, 0] - vertices[a, 0])
             y = vertices[a, 1] + s * (vertices[b, 1] - vertices[a, 1])
-            cut[n, 0], cut[n, 1] = _pixel(x / NEAR, y / NEAR, K, lens)
-            cut[n, 2] = 1 / NEAR
-            cut[n, 3] = shading[a, 0] + s * (shading[b, 0] - shading[a, 0])
-            cut[n, 4] = shading[a, 1] + s * (shading[b, 1] - shading[a, 1])
+            gain = shading[a, 0] + s * (shading[b, 0] - shading[a, 0])
+            rim = shading[a, 1] + s * (shading[b, 1] - shading[a, 1])
+            _set_corner(cut[n], x, y, NEAR, gain, rim, K, lens)
             n += 1
     return n
 
