@@ -15,11 +15,10 @@ import re
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ..errors import UsageError, VideoError
 from ..live.system_cameras import camera_names, camera_with_modes, described
@@ -44,7 +43,6 @@ _SIZE = "III6I8x"
 _CAPTURE = 1  # V4L2_CAP_VIDEO_CAPTURE and V4L2_BUF_TYPE_VIDEO_CAPTURE
 _DISCRETE = 1  # V4L2_FRMSIZE_TYPE_DISCRETE
 
-Ioctl = Callable[[int, int, bytearray], Any]
 ANSWER_S = 20.0  # for an answer, and for the user's to the system's question
 _MAX_ANSWERED_FORMATS = 64  # formats
 _INTERVAL_S = 0.02
@@ -68,30 +66,20 @@ class Camera:
         )
 
 
-def list_cameras(
-    names: Path = NAMES, devices: Path = DEVICES, ioctl: Ioctl | None = None
-) -> list[Camera]:
-    """Return the cameras in the order of their numbers; what cannot be read is left out.
-
-    :param ioctl: of devices; None: the system's.
-    """
-    if ioctl is None:
-        if not sys.platform.startswith("linux"):
-            return [
-                Camera(number, _shown(name))
-                for number, name in enumerate(camera_names(sys.platform)[:_MAX_CAMERAS])
-            ]
-        import fcntl
-
-        ioctl = fcntl.ioctl
+def list_cameras() -> list[Camera]:
+    """Return the cameras in the order of their numbers; what cannot be read is left out."""
+    if not sys.platform.startswith("linux"):
+        return [
+            Camera(number, _shown(name))
+            for number, name in enumerate(camera_names(sys.platform)[:_MAX_CAMERAS])
+        ]
     with suppress(OSError):
         numbers = sorted(
             int(m[1])
-            for entry in os.listdir(names)
+            for entry in os.listdir(NAMES)
             if (m := re.fullmatch(r"video(\d{1,3})", entry))
         )
-        entries = ((n, f"video{n}") for n in numbers[:_MAX_CAMERAS])
-        found = (_camera(n, names / entry / "name", devices / entry, ioctl) for n, entry in entries)
+        found = map(_camera, numbers[:_MAX_CAMERAS])
         return [camera for camera in found if camera is not None]
     return []
 
@@ -130,47 +118,57 @@ def camera_number(source: str) -> int:
     return int(source.removeprefix("/dev/video"))
 
 
-def _camera(number: int, name: Path, device: Path, ioctl: Ioctl) -> Camera | None:
+def _camera(number: int) -> Camera | None:
     """Return a camera; None for a node that gives no pictures, such as that of a camera's
     metadata.
     """
     try:
-        shown = _printable(name.read_bytes())
+        shown = _printable((NAMES / f"video{number}" / "name").read_bytes())
     except OSError:
         shown = "camera"
     formats: tuple[str, ...] = ()
     with suppress(OSError):  # it is in use, or this user may not open it
-        node = os.open(device, os.O_RDWR | os.O_NONBLOCK)
+        node = os.open(DEVICES / f"video{number}", os.O_RDWR | os.O_NONBLOCK)
         try:
             answer = bytearray(struct.calcsize(_CAPABILITY))
-            ioctl(node, _QUERYCAP, answer)
+            _ask(node, _QUERYCAP, answer)
             if not struct.unpack(_CAPABILITY, answer)[5] & _CAPTURE:
                 return None
-            formats = tuple(_formats(node, ioctl))
+            formats = tuple(_formats(node))
         finally:
             os.close(node)
     return Camera(number, shown, formats)
 
 
-def _formats(node: int, ioctl: Ioctl) -> Iterator[str]:
+def _ask(node: int, request: int, answer: bytearray) -> None:
+    """Have a device fill in a structure.
+
+    :raises OSError: it does not.
+    """
+    import fcntl  # which other systems do not have
+
+    fcntl.ioctl(node, request, answer)
+
+
+def _formats(node: int) -> Iterator[str]:
     """Yield each pixel format of a camera with its largest size."""
     for index in range(_MAX_FORMATS):
         answer = bytearray(struct.pack(_FORMAT, index, _CAPTURE, 0, b"", 0))
         try:
-            ioctl(node, _ENUM_FMT, answer)
+            _ask(node, _ENUM_FMT, answer)
         except OSError:  # there are no more
             return
         code = struct.unpack(_FORMAT, answer)[4]
-        size = max(_sizes(node, code, ioctl), default=None, key=lambda size: size[0] * size[1])
+        size = max(_sizes(node, code), default=None, key=lambda size: size[0] * size[1])
         yield _printable(struct.pack("<I", code)) + (f" {size[0]}×{size[1]}" if size else "")
 
 
-def _sizes(node: int, code: int, ioctl: Ioctl) -> Iterator[tuple[int, int]]:
+def _sizes(node: int, code: int) -> Iterator[tuple[int, int]]:
     """Yield the sizes of a pixel format; the largest one of a continuous range."""
     for index in range(_MAX_SIZES):
         answer = bytearray(struct.pack(_SIZE, index, code, 0, *[0] * 6))
         try:
-            ioctl(node, _ENUM_FRAMESIZES, answer)
+            _ask(node, _ENUM_FRAMESIZES, answer)
         except OSError:
             return
         values = struct.unpack(_SIZE, answer)

@@ -6,6 +6,7 @@ import struct
 import sys
 
 import pytest
+from scope.scope_addon.job import live_cameras
 from scope.scope_addon.job.live_cameras import LONGEST_NAME, camera_source, list_cameras
 
 SIZES = {b"MJPG": [(640, 480), (1920, 1080)], b"YUYV": [(640, 480)]}
@@ -33,7 +34,14 @@ def ioctl(node, request, answer):
 
 
 @pytest.fixture
-def folders(tmp_path):
+def node(tmp_path, monkeypatch):
+    """Adds a camera to those of the system."""
+    if not sys.platform.startswith("linux"):
+        pytest.skip("Video4Linux")
+    monkeypatch.setattr(live_cameras, "NAMES", tmp_path / "sys")
+    monkeypatch.setattr(live_cameras, "DEVICES", tmp_path / "dev")
+    monkeypatch.setattr(live_cameras, "_ask", ioctl)
+
     def node(number, name, content):
         (tmp_path / "sys" / f"video{number}").mkdir(parents=True)
         (tmp_path / "sys" / f"video{number}" / "name").write_bytes(name)
@@ -41,44 +49,35 @@ def folders(tmp_path):
             (tmp_path / "dev").mkdir(exist_ok=True)
             (tmp_path / "dev" / f"video{number}").write_bytes(content)
 
-    return tmp_path, node
+    return node
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Video4Linux")
-def test_cameras_are_listed_with_names_and_largest_sizes(folders):
-    path, node = folders
+def test_cameras_are_listed_with_names_and_largest_sizes(node):
+    assert list_cameras() == []
     node(10, b"Second\n", b"pictures")
     node(0, b"USB Camera\n", b"pictures")
     node(1, b"USB Camera\n", b"metadata")
-    labels = [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)]
+    labels = [camera.label for camera in list_cameras()]
     assert labels == [
         f"{n}: {name} (MJPG 1920×1080, YUYV 640×480)"
         for n, name in ((0, "USB Camera"), (10, "Second"))
     ]
 
 
-def test_a_camera_that_cannot_be_opened_is_listed_without_sizes(folders):
-    path, node = folders
+def test_a_camera_that_cannot_be_opened_is_listed_without_sizes(node):
     node(0, b"Busy", None)
-    assert [camera.label for camera in list_cameras(path / "sys", path / "dev", ioctl)] == [
-        "0: Busy"
-    ]
+    assert [camera.label for camera in list_cameras()] == ["0: Busy"]
 
 
-def test_hostile_names_are_harmless(folders):
-    path, node = folders
+def test_hostile_names_are_harmless(node):
     node(0, b"\x1b[2J\xe2\x80\xaeevil\n\x00name" + b"x" * 500, None)
     node(1, b"\xff\xfe", None)
     node(2, b"\n", None)
-    first, second, third = list_cameras(path / "sys", path / "dev", ioctl)
+    first, second, third = list_cameras()
     assert first.name.startswith("[2Jevilname")
     assert len(first.name) == LONGEST_NAME
     assert (second.name, third.name) == ("\ufffd\ufffd", "camera")
     assert camera_source(first.label) == "0"
-
-
-def test_without_cameras_the_list_is_empty(tmp_path):
-    assert list_cameras(tmp_path / "none", tmp_path, ioctl) == []
 
 
 @pytest.mark.parametrize(
