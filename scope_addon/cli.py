@@ -21,6 +21,7 @@ from ..solver.body_file import ASSETS
 from ..solver.errors import ScopeError
 from .command_line.arguments import (
     add_options,
+    add_outputs,
     body_and_options,
     non_default_arguments,
     path_argument,
@@ -148,16 +149,7 @@ def _add_capture_files(capture: argparse.ArgumentParser) -> None:
         metavar="VIEW",
         help="further videos of the same moment, of other cameras; all must stand still",
     )
-    capture.add_argument(
-        "-o",
-        "--output",
-        action="append",
-        type=path_argument,
-        default=[],
-        metavar="OUT",
-        help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
-        " (default: .npz and .glb next to the video; in the current folder for the sample)",
-    )
+    add_outputs(capture, ".npz and .glb next to the video; in the current folder for the sample")
     capture.add_argument(
         "--overlay",
         type=path_argument,

@@ -15,6 +15,7 @@ from ..errors import UsageError
 from ..footage import is_url
 from ..options import OPTIONS, Option, Place, options_at
 from ..options.body_choice import chosen_body
+from ..output_paths import SUFFIXES
 
 if TYPE_CHECKING:
     from ..capture.options import CaptureOptions
@@ -37,6 +38,23 @@ def path_argument(text: str) -> Path:
             f"{text} is an address, and files are needed here; download it first"
         )
     return Path(text)
+
+
+def add_outputs(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the argument for the files that a command writes.
+
+    :param default: what it writes without one, for the help.
+    """
+    parser.add_argument(
+        "-o",
+        "--output",
+        action="append",
+        type=path_argument,
+        default=[],
+        metavar="OUT",
+        help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
+        f" (default: {default})",
+    )
 
 
 def add_options(parser: argparse.ArgumentParser, place: Place = Place.COMMAND_LINE) -> None:

@@ -12,8 +12,7 @@ from ..capture_report import warnings_as_json
 from ..footage import display_text
 from ..notices import counted
 from ..options import Place
-from ..output_paths import SUFFIXES
-from .arguments import add_options, path_argument, values_in_range
+from .arguments import add_options, add_outputs, path_argument, values_in_range
 from .outputs import (
     check_blender,
     check_outputs,
@@ -34,16 +33,7 @@ def add_import(parser: argparse.ArgumentParser) -> None:
         metavar="MOTION",
         help="motion of Scope, AMASS, or an SMPL-based tracker (.npz, .npy, .pkl or .pt), or .bvh",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        action="append",
-        type=path_argument,
-        default=[],
-        metavar="OUT",
-        help=f"result file, may be repeated; its suffix selects the format: {', '.join(SUFFIXES)}"
-        " (default: .glb next to the motion)",
-    )
+    add_outputs(parser, ".glb next to the motion")
     add_options(parser, Place.IMPORT)
     parser.set_defaults(run=run_import, file_per_person=False)
 
