@@ -221,16 +221,10 @@ class RemoteStaging:
         """Return the URL of an attempt's folder."""
         return f"{self.folder}/{number}"
 
-    def windows(self, number: int) -> None:
-        """Return that clips are not divided; see `Staging.windows`."""
-
-    def publish(
-        self, attempt: str, outputs: list[str], content: dict[str, Any], folder: Path | None = None
-    ) -> bool:
+    def publish(self, attempt: str, outputs: list[str], content: dict[str, Any]) -> bool:
         """Give the results of an attempt their final names; see `Staging.publish`. Their sizes are
         compared.
 
-        :param folder: is not used, because clips are not divided.
         :raises OutputError: the store cannot be written.
         :raises UsageError: the URL cannot be used.
         """
@@ -325,10 +319,8 @@ class Staging:
         """Return the path of an attempt's folder, which the worker makes."""
         return str(self.folder / str(number))
 
-    def windows(self, number: int) -> Path | None:
-        """Return the path of a folder for the windows of a clip; None where clips are not
-        divided.
-        """
+    def windows(self, number: int) -> Path:
+        """Return the path of a folder for the windows of a clip."""
         return self.folder / f"windows{number}"
 
     def publish(

@@ -111,7 +111,7 @@ class DaskRunner:
                 and self._client.status == "running"
                 and (record := self._workers.free(self._jobs))
             ):
-                self._start(self._waiting.popleft(), record.address)
+                self._start(self._waiting.popleft(), record.worker)
             yield found | self._next_outcome()
 
     def stop(self) -> dict[str, Entry]:
@@ -315,12 +315,11 @@ class DaskRunner:
         self, key: str, attempt: _Attempt, task: ClipTask, entry: Entry
     ) -> dict[str, Entry]:
         """Let the workers observe the windows of a long clip."""
-        assert self._staging is not None
+        assert isinstance(self._staging, Staging)  # else, clips are not divided
         folder = self._staging.windows(self._count)
         self._forget(key)
         self._workers.observed(attempt.worker, 0, entry)
         try:
-            assert folder is not None
             parts = self._divisions.begin(task, entry, folder, self._workers.slots(self._jobs))
         except OSError as error:
             return self._ended(task, attempt.worker, failure(task, system_error_message(error)))
@@ -336,7 +335,7 @@ class DaskRunner:
         """Keep the windows that were observed; what fails here is observed again by the task that
         joins them.
         """
-        assert self._staging is not None
+        assert isinstance(self._staging, Staging)
         done = entry["status"] == "done"
         try:
             folder = self._divisions.folder(task)

@@ -10,7 +10,7 @@ import re
 import time
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,33 +35,24 @@ _TIMEOUT_S = 15.0
 class WorkerRecord:
     """One worker: its state, and what it has done."""
 
-    address: str
-    state: str = CHECKED
+    worker: str  # address
     host: str = ""
     threads: int = 0
-    running: int = 0
+    state: str = CHECKED
     clips: int = 0
     failed: int = 0
     attempts_lost: int = 0
     windows: int = 0
     frames: int = 0
     busy_s: float = 0.0
+    running: int = 0
 
     def row(self) -> dict[str, Any]:
-        """Return the row of the report's table."""
-        return {
-            "worker": self.address,
-            "host": self.host,
-            "threads": self.threads,
-            "state": self.state,
-            "clips": self.clips,
-            "failed": self.failed,
-            "attempts_lost": self.attempts_lost,
-            "windows": self.windows,
-            "frames": self.frames,
-            "busy_s": round(self.busy_s, 1),
-            "frames_per_s": round(self.frames / self.busy_s, 1) if self.busy_s else 0.0,
-        }
+        """Return the row of the report's table, whose columns are the fields."""
+        row = asdict(self)
+        del row["running"]
+        rate = round(self.frames / self.busy_s, 1) if self.busy_s else 0.0
+        return row | {"busy_s": round(self.busy_s, 1), "frames_per_s": rate}
 
 
 class Workers:
