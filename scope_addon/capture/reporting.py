@@ -48,6 +48,7 @@ def make_report(
     :param rates: frames per second by stage.
     """
     motions = solved.motions
+    name = Path(video.path).name
     camera = footage.camera
     motion = footage.camera_motion
     is_still = len(footage.timestamps) == 1
@@ -78,12 +79,10 @@ def make_report(
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
         + speed_warnings(video, options)
-        + up_warnings(Path(video.path).name, solved.up_source, is_still)
-        + capture_warnings(Path(video.path).name, body, options, footage, motions)
-        + camera_warnings(Path(video.path).name, footage, solved)
-        + floor_warnings(
-            Path(video.path).name, body, motions, footage.timestamps, len(options.heights_m)
-        ),
+        + up_warnings(name, solved.up_source, is_still)
+        + capture_warnings(name, body, options, footage, motions)
+        + camera_warnings(name, footage, solved)
+        + floor_warnings(name, body, motions, footage.timestamps, len(options.heights_m)),
     )
 
 

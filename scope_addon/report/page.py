@@ -45,19 +45,15 @@ def person_color(person: int) -> str:
     return f"var(--person{person % PEOPLE_COLORS + 1})"
 
 
-def document(
-    title: str, content: Sequence[Markup], data: Mapping[str, Any] | None = None
-) -> Markup:
+def document(title: str, content: Sequence[Markup], data: Mapping[str, Any]) -> Markup:
     """Return a whole page.
 
-    :param data: for the 3D view, see `viewer_data`; None for a page without one.
+    :param data: for the 3D view, see `viewer_data`.
     """
-    scripts = ""
-    if data is not None:
-        # "<" could end the element; in JSON it can only be inside a string.
-        text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-        scripts = f'<script type="application/json" id="data">{text}</script>\n'
-        scripts += "".join(f"<script>\n{_file(name)}</script>\n" for name in _SCRIPTS)
+    # "<" could end the element; in JSON it can only be inside a string.
+    text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+    scripts = f'<script type="application/json" id="data">{text}</script>\n'
+    scripts += "".join(f"<script>\n{_file(name)}</script>\n" for name in _SCRIPTS)
     return Markup(
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
