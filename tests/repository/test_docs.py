@@ -307,6 +307,7 @@ def test_every_command_would_be_accepted(words, folder):
         assert importlib.util.find_spec(words[2]) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("blender_module")
 def test_the_first_capture_of_the_command_line_page_is_run(folder, capfd):
     page = (DOCS / "command_line.md").read_text("utf-8")
@@ -340,6 +341,7 @@ def session() -> list:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("blender_module")
 @pytest.mark.parametrize("words", session())
 def test_the_captures_of_the_readme_are_run(words, folder):
