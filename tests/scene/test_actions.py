@@ -98,20 +98,8 @@ def test_a_key_within_a_hundredth_of_a_frame_is_changed_as_where_blender_inserts
         curves[1].keyframe_points.insert(frame, value, options={"FAST"})
     curves[1].update()
     found = actions.read_keys(curves[0])
+    assert len(found) == len(frames) + 2
     np.testing.assert_array_equal(found, actions.read_keys(curves[1]))
-    expected = [
-        [0, 0],
-        [1, 1],
-        [1.5, 20],
-        [2, 2],
-        [3, 21],
-        [4, 4],
-        [4.012, 22],
-        [5, 23],
-        [5.5, 24],
-        [6, 6],
-    ]
-    np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])

@@ -2,8 +2,6 @@
 """A .blend file that carries its motions: saved, appended, linked, duplicated, renamed, deleted,
 undone, hostile.
 
-A capture that was built before, as tests append it, is as one that is built.
-
 Nothing is added to a scene that is linked from another file.
 """
 
@@ -25,9 +23,7 @@ from scope.scope_addon.scene.footage_strip import add_footage_strips
 from scope.scope_addon.scene.packed_motion import MOTION, pack_motion, stored_motion
 from scope.scope_addon.scene.transaction import all_or_nothing
 
-from ..edit.walking import motion_of, walk
 from .conftest import dance
-from .made_rigs import captured
 
 
 @pytest.fixture(scope="module")
@@ -212,26 +208,6 @@ def test_an_armature_without_a_motion_is_an_error():
         armature[MOTION] = value
         with pytest.raises(UsageError, match="stored neither in"):
             stored_motion(armature)
-
-
-def state(armature):
-    action = armature.animation_data.action
-    scene = bpy.context.scene
-    return {
-        "objects": sorted((each.name, each.type, each.select_get()) for each in bpy.data.objects),
-        "action": (action.name, action.use_fake_user, action.users, tuple(action.frame_range)),
-        "libraries": len(bpy.data.libraries),
-        "frames": (scene.frame_start, scene.frame_end, scene.frame_current),
-        "camera": scene.camera and scene.camera.name,
-        "collections": sorted(each.name for each in scene.collection.children),
-    }
-
-
-def test_an_appended_capture_is_as_a_built_one():
-    motion = motion_of(walk(0.7))
-    built = state(captured(motion))
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert state(captured(motion)) == built
 
 
 SAMPLE = Path(scope.__file__).resolve().parent / "assets" / "sample" / "sample.mp4"

@@ -175,23 +175,6 @@ def test_fingers_of_rigify(source, rigify_rigs):
         check_hands(rig, bone_of)
 
 
-def test_a_capture_without_fingers_leaves_them_as_they_are():
-    source = captured(motion_of(walk(2.0)))
-    rig, bone_of = build_hands("unreal")
-    bent = [bone_of[f"left_{finger}2"] for finger in FINGERS]
-    for name in bent:
-        rig.pose.bones[name].matrix_basis = Matrix.Rotation(0.7, 4, "X")
-    before = {name: rig.pose.bones[name].matrix_basis.copy() for name in bent}
-    done = run(source, rig)
-    for frame in (1, 30):
-        bpy.context.scene.frame_set(frame)
-        for name in bent:
-            assert np.allclose(rig.pose.bones[name].matrix_basis, before[name], atol=1e-5)
-    paths = {curve.data_path for curve in fcurves(rig)}
-    assert not any(bone_path(name, "rotation_quaternion") in paths for name in bent)
-    assert rig.animation_data.action == done.action
-
-
 def test_fingers_of_a_hand_that_was_not_seen_stay_as_they_are() -> None:
     """The body has fingers, but those of such a hand are at rest in every frame."""
     clip = gesture()

@@ -2,7 +2,6 @@
 """Root motion of rig and capture: in the bones, on a root object, or in place."""
 
 import math
-from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -16,7 +15,6 @@ from scope.scope_addon.scene.character.root_object import (
     root_object,
 )
 from scope.scope_addon.scene.rig_retarget import RetargetOptions
-from scope.scope_addon.scene.visibility import hide
 
 from ..edit.walking import BODY, RATE, motion_of, walk
 from .made_rigs import FBX, FRAMES, added_empty, build_rig, captured, run, seen
@@ -194,41 +192,6 @@ def test_a_rig_that_its_parent_scales_from_nothing_is_where_the_capture_is(sourc
     bpy.context.scene.frame_set(45)
     assert run(source, rig).warnings == []
     np.testing.assert_allclose(seen(rig, pelvis)[1:], wanted[1:], atol=5e-3)
-
-
-@contextmanager
-def counted(handlers):
-    """Return a list that gets one entry whenever Blender calls the handlers."""
-    calls = []
-
-    def count(*_):
-        calls.append(1)
-
-    handlers.append(count)
-    try:
-        yield calls
-    finally:
-        handlers.remove(count)
-
-
-def test_a_hidden_capture_that_is_carried_is_not_evaluated_again_for_each_key(source):
-    rig, _ = build_rig("unreal")
-    drive_around(source)
-    hide(source, bpy.context.view_layer)
-    with counted(bpy.app.handlers.depsgraph_update_post) as updates:
-        run(source, rig)
-    assert len(updates) < len(walk(2.0))
-
-
-def test_a_capture_whose_parent_has_lost_its_keys_is_not_followed_from_key_to_key(source):
-    rig, _ = build_rig("unreal")
-    car = added_empty("car")
-    source.parent = car
-    drive_around(car)
-    car.animation_data.action = None
-    with counted(bpy.app.handlers.frame_change_post) as frames:
-        run(source, rig)
-    assert not frames
 
 
 def test_retargeting_again_replaces_its_own_action_unless_it_was_edited(source):

@@ -11,7 +11,6 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from scope.scope_addon.errors import UsageError
 from scope.scope_addon.scene.character.keys import read_clip
 from scope.scope_addon.scene.character.root_object import (
     move_root_motion_to_object,
@@ -104,17 +103,6 @@ def test_the_trajectory_is_read_back_between_its_keys_too(in_place):
     np.testing.assert_allclose(angles, [0.0, 0.25, 1.5], atol=1e-6)
     assert (empty.animation_data is None) == in_place
     np.testing.assert_allclose(place(armature, 21), expected(0 if in_place else 2), atol=1e-5)
-
-
-def test_another_armature_is_not_moved_along():
-    group = made("group", "EMPTY")
-    armature = made("hero", parent=group)
-    made("villain", parent=group)
-    with pytest.raises(
-        UsageError, match="'hero' is parented to 'group', and 'villain' would move along"
-    ):
-        parent_to_root_object(armature, FRAMES, POSITIONS, ANGLES)
-    assert armature.parent == group
 
 
 def test_a_new_root_object_takes_over_what_is_parented_to_the_former():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Markers in .c3d files, read as the format says, and by the library c3d where it is installed."""
+"""Markers in .c3d files, read as the format says."""
 
 import math
 import struct
@@ -143,20 +143,3 @@ def test_somebody_who_enters_later_begins_in_a_later_frame(
             low, high = found["TRIAL", f"ACTUAL_{name}_FIELD"].tolist()
             assert low + (high << 16) == frame
         assert found["POINT", "FRAMES"] == len(points) == 12
-
-
-@pytest.mark.filterwarnings("ignore:No analog data")
-def test_another_reader_agrees(whole_body, make_motion, tmp_path):
-    c3d = pytest.importorskip("c3d", reason="the library c3d is not installed")
-    motion = with_deviations(make_motion(whole_body, 12), whole_body.K + 1)
-    path = written(motion, whole_body, tmp_path)
-    _, found, points = read(path.read_bytes())
-    with path.open("rb") as file:
-        reader = c3d.Reader(file)
-        frames = [(number, rows.copy()) for number, rows, _ in reader.read_frames()]
-    assert [label.strip() for label in reader.point_labels] == found["POINT", "LABELS"]
-    assert [number for number, _ in frames] == list(range(1, 13))
-    rows = np.array([row for _, row in frames])
-    seen = motion.valid
-    np.testing.assert_array_equal(rows[seen, :, :3], points[seen, :, :3])
-    np.testing.assert_array_equal(rows[..., 3], points[..., 3])
