@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The committed lifting network on people whose depth is known exactly, and its invariances."""
 
-import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
@@ -19,16 +18,6 @@ from scope.scope_addon.capture.perception.lifter import (
 from scope.scope_addon.capture.perception.person_detector import PersonDetector
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.scope_addon.errors import SetupError
-from scope.solver import (
-    Keypoints2D,
-    Measurements,
-    Options,
-    Stage,
-    View,
-    Weights,
-    fit_motion,
-    load_body,
-)
 from scope.solver.errors import ModelFileError
 from scope.solver.rotations import exp
 
@@ -110,15 +99,15 @@ LIMBS = [
 ]
 
 
-@pytest.fixture(scope="module")
-def estimates(shared, frames):
-    """The landmark network's estimates of a man filmed by four cameras: (camera, frame, estimate,
-    truth, joint names).
+@pytest.mark.slow
+def test_real_people_are_lifted_better_than_their_world_landmarks_are(lifter, shared, frames):
+    """A man filmed by four cameras, with true joints in the camera's axes, NaN where not measured.
 
-    The true joints are in the camera's axes, NaN where not measured.
+    Root mean square of residual over standard deviation: 1 if calibrated.
     """
     detector = PersonDetector(threads=1)
     network = LandmarkNetwork("pose_landmark_heavy", threads=1)
+    limbs = [KEYPOINT_NAMES.index(name) for name in LIMBS]
     found = []
     for camera in range(1, 5):
         truth = np.load(shared / "data" / "pose2sim" / f"truth_cam{camera}.npz")
@@ -126,6 +115,7 @@ def estimates(shared, frames):
             {"L": "left_", "R": "right_"}.get(n[0], "") + n[1:].lower() for n in truth["names"]
         ]
         rows = {int(index): row for row, index in enumerate(truth["frame_index"])}
+        K = truth["intrinsics"]
         for k, image in enumerate(frames(f"pose2sim/cam{camera}", stop=81, every=20)):
             if 20 * k not in rows:
                 continue
@@ -134,119 +124,23 @@ def estimates(shared, frames):
             )
             (seen,) = network.estimate(image, [seen.next_region])
             joints = dict(zip(names, truth["joints"][rows[20 * k]], strict=True))
-            found.append((camera, 20 * k, seen, truth, joints))
-    return found
-
-
-@pytest.fixture(scope="module")
-def real_people(estimates):
-    """Return what the network estimates of him, and his true position, hip centre at 0.
-
-    rays (n, 33, 2), confidence (n, 33), world landmarks (n, 33, 3), true limbs (n, 10, 3), NaN
-    where not measured, and their keypoints' numbers.
-    """
-    found = []
-    for _, _, seen, truth, joints in estimates:
-        K = truth["intrinsics"]
-        rays = (seen.keypoints_px - K[:2, 2]) / np.diag(K)[:2]
-        hips = (joints["left_hip"] + joints["right_hip"]) / 2
-        limb_joints = np.array([joints[name] for name in LIMBS]) - hips
-        found.append((rays, seen.keypoints_confidence, seen.world_landmarks, limb_joints))
-    return [np.array(part) for part in zip(*found, strict=True)], [
-        KEYPOINT_NAMES.index(n) for n in LIMBS
-    ]
-
-
-@pytest.mark.slow
-def test_lifting_real_people_is_more_accurate_than_their_world_landmarks(lifter, real_people):
-    (rays, confidence, world, truth), limbs = real_people
+            hips = (joints["left_hip"] + joints["right_hip"]) / 2
+            true_limbs = np.array([joints[name] for name in LIMBS]) - hips
+            rays = (seen.keypoints_px - K[:2, 2]) / np.diag(K)[:2]
+            found.append((rays, seen.keypoints_confidence, seen.world_landmarks, true_limbs))
+    rays, confidence, world, exact = (np.array(part) for part in zip(*found, strict=True))
+    assert len(exact) >= 15
     lifted = lifter.lift(rays, confidence, world)
     ours, theirs = (
-        np.nanmean(np.linalg.norm(p[:, limbs] - truth, axis=-1)) for p in (lifted.points, world)
+        np.nanmean(np.linalg.norm(p[:, limbs] - exact, axis=-1)) for p in (lifted.points, world)
     )
-    assert len(truth) >= 15
     assert ours < 0.115
     assert ours < 0.85 * theirs
-
-
-@pytest.mark.slow
-def test_errors_on_real_people_match_their_standard_deviations(lifter, real_people):
-    """Root mean square of residual over standard deviation, 1 if calibrated, over all four
-    cameras.
-    """
-    (rays, confidence, world, truth), limbs = real_people
-    lifted = lifter.lift(rays, confidence, world)
-    error = (lifted.points[:, limbs] - truth) @ np.swapaxes(virtual_camera(rays), 1, 2)
+    error = (lifted.points[:, limbs] - exact) @ np.swapaxes(virtual_camera(rays), 1, 2)
     across = error[..., :2] / lifted.sigma_across[:, limbs, None]
     along = error[..., 2] / lifted.sigma_along[:, limbs]
     assert 0.75 < np.sqrt(np.nanmean(np.square(across))) < 1.25
     assert 0.75 < np.sqrt(np.nanmean(np.square(along))) < 1.25
-
-
-def rigid(a, b):
-    """R, t with R a + t closest to b, both (n, 3)."""
-    U, _, V = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
-    return R, b.mean(axis=0) - R @ a.mean(axis=0)
-
-
-def head_as_three_keypoints(confidence):
-    """The errors of the eleven keypoints of a head are alike, so that they weigh as much as three
-    others.
-    """
-    head = [
-        any(part in name for part in ("nose", "eye", "ear", "mouth")) for name in KEYPOINT_NAMES
-    ]
-    return np.where(head, 0.25, 1.0) * confidence
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("cameras", "limit_mm"), [((1, 2, 3, 4), 35.0), ((1, 2, 3), 39.0)])
-def test_several_cameras_together_are_near_the_truth(estimates, cameras, limit_mm):
-    """One frame in 20 of each camera, 2D keypoints alone, through `fit_motion`.
-
-    The rig's calibration: intrinsics and distortion as published; a camera's place is where the
-    true joints are the same in its axes as in the first one's, to rounding. Measured: 33.5 mm, and
-    37.2 with the first three cameras; captures of one camera have 56 to 69. The true hips are
-    keypoints; with the body's hip joints there instead of where anatomy has them, 28.4 and 32.5 mm.
-    """
-    plain = load_body("scope")
-    body = with_keypoint_offsets(plain)
-    names = plain.joint_names
-    at = body.keypoint_set("blazepose")
-    index = [at[name] for name in KEYPOINT_NAMES]
-    true = {(camera, frame): joints for camera, frame, _, _, joints in estimates}
-    common = sorted(
-        frame
-        for camera, frame in true
-        if camera == 1 and all((c, frame) in true for c in (2, 3, 4))
-    )
-    views = {frame: [] for frame in common}
-    for camera, frame, seen, truth, joints in estimates:
-        if frame not in common or camera not in cameras:
-            continue
-        K = truth["intrinsics"]
-        first = true[1, frame]
-        both = [n for n in joints if np.isfinite(joints[n] + first[n]).all()]
-        a, b = (np.array([side[n] for n in both]) for side in (first, joints))
-        R, t = rigid(a, b)
-        assert np.abs(a @ R.T + t - b).max() < 1e-9
-        pixels = cv2.undistortPoints(
-            seen.keypoints_px[:, None].astype(float), K, truth["dist"], P=K
-        )[:, 0]
-        keypoints = Keypoints2D(index, pixels, head_as_three_keypoints(seen.keypoints_confidence))
-        views[frame].append(View(Measurements(K, keypoints2d=keypoints), R, t))
-    options = Options(robust_keypoints2d=0.01, stages=[Stage(Weights())])
-    found = fit_motion(
-        body, [views[frame] for frame in common], np.array(common) / 60.0, options=options
-    )
-    parts = [*LIMBS, "left_hip", "right_hip"]
-    ours = found.t_world_part[:, [names.index(part) for part in parts]]
-    exact = np.array([[true[1, frame][part] for part in parts] for frame in common])
-    ours, exact = (joints - joints[:, -2:].mean(axis=1, keepdims=True) for joints in (ours, exact))
-    error = 1e3 * np.nanmean(np.linalg.norm(ours - exact, axis=-1))
-    assert len(common) >= 4
-    assert error < limit_mm
 
 
 def test_a_mirrored_image_is_lifted_to_the_mirrored_body(lifter, people):
