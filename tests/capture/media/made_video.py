@@ -56,7 +56,8 @@ def write_film(
             codec, rate=rate, options={name.replace("_", "-"): v for name, v in options.items()}
         )
         context = stream.codec_context
-        stream.width, stream.height = frames[0].width, frames[0].height
+        stream.width = frames[0].width
+        stream.height = frames[0].height
         stream.pix_fmt = pixels
         context.thread_count = 1
         for tag in ("color_trc", "color_primaries", "colorspace", "color_range"):
