@@ -23,8 +23,9 @@ def cost(name, rotation_vector):
     origin = np.zeros(3)
     identity = np.eye(3)
     part = Part(Omega, origin, np.zeros((3, 0)), Omega, identity, origin, np.zeros(0))
-    residual = joint_limits(part, np.array(axis), lower, upper, swing_limit, 1.0, 1.0)
-    return float(np.sum(residual.r**2))
+    return float(
+        np.sum(joint_limits(part, np.array(axis), lower, upper, swing_limit, 1.0, 1.0) ** 2)
+    )
 
 
 @pytest.mark.parametrize("name", HINGES)
