@@ -20,7 +20,8 @@ OFF = "off"
 AUTO = "auto"
 ON = "on"
 
-_EVERYWHERE = Place.COMMAND_LINE | Place.WORKER | Place.PANEL
+_CAPTURE = Place.COMMAND_LINE | Place.WORKER
+_EVERYWHERE = _CAPTURE | Place.PANEL
 _LIVE = Place.LIVE | Place.LIVE_WORKER
 
 QUALITIES = (
@@ -176,7 +177,7 @@ class CaptureDeclaration:
         "start",
         str,
         None,
-        Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
+        _EVERYWHERE,
         "start of the captured part, in seconds",
         argument=Argument(
             metavar="TIME", help="start time: seconds, MM:SS, HH:MM:SS.mmm or HH:MM:SS:FF"
@@ -195,7 +196,7 @@ class CaptureDeclaration:
         "end",
         str,
         None,
-        Place.COMMAND_LINE | Place.WORKER | Place.PANEL,
+        _EVERYWHERE,
         "end of the captured part, in seconds",
         argument=Argument(metavar="TIME", help="end time, inclusive"),
         blender=Property(
@@ -249,7 +250,7 @@ class CaptureDeclaration:
         "fps",
         str,
         None,
-        Place.COMMAND_LINE | Place.WORKER,
+        _CAPTURE,
         "frame rate of the capture, such as 12 or 29.97",
         argument=Argument(metavar="N", default_text="the footage's"),
     )
@@ -275,7 +276,7 @@ class CaptureDeclaration:
         "body",
         str,
         "scope",
-        Place.COMMAND_LINE | Place.WORKER | Place.PANEL | Place.IMPORT | _LIVE,
+        _EVERYWHERE | Place.IMPORT | _LIVE,
         "the body that is fitted to the person",
         argument=Argument(
             help="body model: scope, scope_h, scope_child, scope_child_h, or your "
@@ -398,14 +399,14 @@ class CaptureDeclaration:
         "offset",
         str,
         "",
-        Place.COMMAND_LINE | Place.WORKER,
+        _CAPTURE,
         "of several cameras, the time in each further video less that in the first one, of the "
         "same moment, in seconds, or auto",
         argument=Argument(metavar="S[,S...]", default_text="found from the people"),
     )
     camera_path: Path | None = declared(
         None,
-        Place.COMMAND_LINE | Place.WORKER,
+        _CAPTURE,
         "JSON file with the lens and the poses of a camera that another program has solved",
         argument=Argument(metavar="FILE"),
     )
@@ -451,7 +452,7 @@ class CaptureDeclaration:
 CAPTURE_OPTIONS = options_of(CaptureDeclaration)
 
 
-_NETWORKS = Place.COMMAND_LINE | Place.WORKER | Place.PREFERENCES
+_NETWORKS = _CAPTURE | Place.PREFERENCES
 
 PROVIDERS = (
     Choice("auto", "Automatic", "A supported GPU if there is one, otherwise the CPU", 0),
@@ -497,7 +498,7 @@ class NetworkDeclaration:
     )
     provider: str = declared(
         "auto",
-        _NETWORKS | Place.LIVE | Place.LIVE_WORKER,
+        _NETWORKS | _LIVE,
         "execution provider for the networks",
         choices=PROVIDERS,
         argument=Argument(default_text="auto, the fastest available"),
@@ -510,7 +511,7 @@ class NetworkDeclaration:
     )
     threads: int = declared(
         0,
-        _NETWORKS | Place.LIVE | Place.LIVE_WORKER,
+        _NETWORKS | _LIVE,
         "CPU threads for the networks; 0: all cores",
         minimum=0,
         decides_result=False,

@@ -9,13 +9,14 @@ from .capture import QUALITIES
 from .record import Argument, Option, Place, Property
 
 MAX_PEOPLE = 4
+_LIVE = Place.LIVE | Place.LIVE_WORKER
 
 LIVE_OPTIONS = (
     Option(
         "live_quality",
         str,
         "fast",
-        Place.LIVE | Place.LIVE_WORKER | Place.LIVE_PANEL,
+        _LIVE | Place.LIVE_PANEL,
         "speed versus accuracy",
         choices=QUALITIES[:2],
         argument=Argument("--quality"),
@@ -25,7 +26,7 @@ LIVE_OPTIONS = (
         "live_people",
         int,
         1,
-        Place.LIVE | Place.LIVE_WORKER | Place.LIVE_PANEL,
+        _LIVE | Place.LIVE_PANEL,
         "maximum number of people to follow; each one takes time",
         minimum=1,
         maximum=MAX_PEOPLE,
@@ -52,7 +53,7 @@ LIVE_OPTIONS = (
         "keep_footage",
         Path,
         None,
-        Place.LIVE | Place.LIVE_WORKER,
+        _LIVE,
         "video (.mp4) to which the recorded images are written",
         argument=Argument(metavar="VIDEO"),
     ),
@@ -93,7 +94,7 @@ LIVE_OPTIONS = (
         "reconnect_s",
         float,
         2.0,
-        Place.LIVE | Place.LIVE_WORKER,
+        _LIVE,
         "pause before an interrupted stream or camera is opened again; 0: the capture ends",
         unit="s",
         minimum=0.0,

@@ -60,12 +60,14 @@ FRAME_RATES = (
     ),
 )
 
+_FILES = Place.COMMAND_LINE | Place.IMPORT
+
 OUTPUT_OPTIONS = (
     Option(
         "shape",
         str,
         "keyed",
-        Place.COMMAND_LINE | Place.IMPORT | Place.PANEL,
+        _FILES | Place.PANEL,
         "how the person's body shape is stored",
         choices=SHAPES,
         argument=Argument(
@@ -85,7 +87,7 @@ OUTPUT_OPTIONS = (
         "bvh_unit",
         str,
         "cm",
-        Place.COMMAND_LINE | Place.IMPORT | Place.EXPORT,
+        _FILES | Place.EXPORT,
         "unit of length in .bvh files",
         choices=BVH_UNITS,
         blender=Property(label="Unit"),
@@ -94,7 +96,7 @@ OUTPUT_OPTIONS = (
         "skeleton",
         str,
         "scope",
-        Place.COMMAND_LINE | Place.IMPORT,
+        _FILES,
         "names of the bones of Scope's own body in .glb, .fbx, .bvh and .usdc files; the rest pose "
         "is a T-pose",
         choices=SKELETONS,
@@ -110,7 +112,7 @@ OUTPUT_OPTIONS = (
         "retarget",
         Path,
         None,
-        Place.COMMAND_LINE | Place.IMPORT,
+        _FILES,
         "retarget the motion to the rig in this .blend, .fbx, .glb, .gltf or .vrm file; given "
         "several times, each rig has an output of its own, in the same order",
         argument=Argument(metavar="RIG", repeated=True),
@@ -119,7 +121,7 @@ OUTPUT_OPTIONS = (
         "rig_object",
         str,
         "",
-        Place.COMMAND_LINE | Place.IMPORT,
+        _FILES,
         "name of the armature, if RIG contains several",
         argument=Argument(metavar="NAME", repeated=True),
     ),
@@ -127,7 +129,7 @@ OUTPUT_OPTIONS = (
         "bone_map",
         Path,
         None,
-        Place.COMMAND_LINE | Place.IMPORT,
+        _FILES,
         "bone assignments, a JSON file saved in the panel",
         argument=Argument(metavar="FILE", repeated=True),
     ),
@@ -135,7 +137,7 @@ OUTPUT_OPTIONS = (
         "expression_map",
         Path,
         None,
-        Place.COMMAND_LINE | Place.IMPORT,
+        _FILES,
         "shape keys that follow the captured expressions, a JSON file saved in the panel",
         argument=Argument(metavar="FILE", repeated=True),
     ),
@@ -143,7 +145,7 @@ OUTPUT_OPTIONS = (
         "retarget_root",
         str,
         "bone",
-        Place.COMMAND_LINE | Place.IMPORT,
+        _FILES,
         "root motion of the rig: in its pelvis bone, on its object, or none (in-place)",
         choices=ROOTS,
     ),
@@ -191,7 +193,7 @@ OUTPUT_OPTIONS = (
     ),
 )
 
-_REPORTING = Place.COMMAND_LINE | Place.IMPORT | Place.LIVE
+_REPORTING = _FILES | Place.LIVE
 
 REPORT_OPTIONS = (
     Option(
