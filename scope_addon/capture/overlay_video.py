@@ -276,17 +276,10 @@ class _Painter:
         radius = max(1, round(max(image.shape[:2]) / 500))
         for k, (u, v, confidence) in enumerate(keypoints):
             if confidence > 0.3 and np.isfinite((u, v)).all() and max(abs(u), abs(v)) < 1e5:
-                center = (round(float(u * self._scale)), round(float(v * self._scale)))
+                center = u * self._scale, v * self._scale
                 if k < KEYPOINT_COUNT:  # those of a hand are too close together for a dark rim
-                    cv2.circle(image, center, radius + 1, (20, 20, 20), -1, cv2.LINE_AA)
-                cv2.circle(
-                    image,
-                    center,
-                    radius,
-                    tuple(int(c) for c in 255 * (0.5 + 0.5 * color)),
-                    -1,
-                    cv2.LINE_AA,
-                )
+                    _draw_dot(image, center, radius + 1, (20, 20, 20))
+                _draw_dot(image, center, radius, [int(c) for c in 255 * (0.5 + 0.5 * color)])
 
     def _draw_face(self, image: Uint8Array, face: dict[str, NDArray[Any]], row: int) -> None:
         """Draw the points of one person's face into the image, in place, if it was seen here."""
@@ -297,9 +290,14 @@ class _Painter:
             return
         for u, v in points * self._scale:
             if max(abs(u), abs(v)) < 1e5:
-                cv2.circle(
-                    image, (round(float(u)), round(float(v))), 1, _FACE_COLOR, -1, cv2.LINE_AA
-                )
+                _draw_dot(image, (u, v), 1, _FACE_COLOR)
+
+
+def _draw_dot(
+    image: Uint8Array, center: tuple[float, float], radius: int, color: Sequence[int]
+) -> None:
+    u, v = center
+    cv2.circle(image, (round(float(u)), round(float(v))), radius, color, -1, cv2.LINE_AA)
 
 
 def _write_still(path: Path, painter: _Painter, video: Video, index: int) -> None:
