@@ -275,16 +275,14 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
 
     :raises UsageError: a value is impossible, or contradicts another.
     """
-    if values["record"] and values["record"].suffix.lower() != ".npz":
-        raise UsageError(
-            "--record writes a motion file: give a name that ends in .npz, not "
-            f"{values['record'].name}"
-        )
-    if values["keep_footage"] and values["keep_footage"].suffix.lower() != ".mp4":
-        raise UsageError(
-            "--keep-footage writes a video: give a name that ends in .mp4, not "
-            f"{values['keep_footage'].name}"
-        )
+    for flag, path, kind, suffix in (
+        ("--record", values["record"], "motion file", ".npz"),
+        ("--keep-footage", values["keep_footage"], "video", ".mp4"),
+    ):
+        if path and path.suffix.lower() != suffix:
+            raise UsageError(
+                f"{flag} writes a {kind}: give a name that ends in {suffix}, not {path.name}"
+            )
     if not values["listen"].strip():
         raise UsageError(
             "--listen is empty, which would mean all networks; give an address, or leave it out"
@@ -346,10 +344,9 @@ def _preview(body: Body, stack: ExitStack) -> PreviewPage:
 
 
 def _summary(report: Mapping[str, Any]) -> str:
+    written = "".join(f"; wrote {path}" for path in report["outputs"])
     if "latency_ms" not in report:  # of a recording that was not finished
-        return f"{report['seconds']:g} s of {report['source']}" + "".join(
-            f"; wrote {path}" for path in report["outputs"]
-        )
+        return f"{report['seconds']:g} s of {report['source']}{written}"
     latency = report["latency_ms"]
     return (
         f"{counted(report['poses'], 'pose')}, {report['poses_per_second']:g}/s, latency "
@@ -357,5 +354,5 @@ def _summary(report: Mapping[str, Any]) -> str:
         f" (p95 {latency['p95']:.0f} ms), {report['dropped']} of "
         f"{counted(report['frames'], 'frame')} dropped"
         + (f", {report['damaged']} more damaged and left out" if report["damaged"] else "")
-        + "".join(f"; wrote {path}" for path in report["outputs"])
+        + written
     )
