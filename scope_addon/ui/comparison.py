@@ -30,7 +30,7 @@ from ...solver.errors import ScopeError
 from ..scene.datablocks import captures_of, enter_object_mode, holds, is_in_layer, is_person
 from .captured_person import body_of, captured_armature
 from .captures import people_of
-from .sidebar import viewport_at, viewports
+from .sidebar import main_region, viewport_at, viewports
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -190,12 +190,9 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     do nothing.
     """
     collection = context.scene.scope.result.collection
-    cameras = cameras_of(context.scene)
-    compared = [each for each in cameras if each == context.scene.camera]
-    camera = next(iter([*compared, *cameras]), None)
     people = people_of(collection)
     active = captured_armature(context)
-    if camera is None or not people:
+    if not people:
         return
     window = context.window
     screen = context.window.screen
@@ -220,7 +217,7 @@ def open_side_view(context: bpy.types.Context, area: bpy.types.Area) -> None:
     view = space.region_3d
     view.view_perspective = "ORTHO"
     # Slightly from above: in an orthographic view that is level, Blender draws no floor.
-    turn = _side_rotation(camera.matrix_world).to_quaternion() @ Quaternion(
+    turn = _side_rotation(context.scene.camera.matrix_world).to_quaternion() @ Quaternion(
         (1.0, 0.0, 0.0), -_SIDE_TILT
     )
     view.view_rotation = turn
@@ -303,28 +300,21 @@ def _show_alone(
 
 def _in(window: bpy.types.Window, area: bpy.types.Area) -> bpy.types.ContextTempOverride:
     """Return the context of a viewport's main region."""
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    return bpy.context.temp_override(window=window, area=area, region=region)
+    return bpy.context.temp_override(window=window, area=area, region=main_region(area))
 
 
 def fit_frame(scene: bpy.types.Scene, area: bpy.types.Area) -> None:
     """Zoom and move a viewport's camera view so that the whole frame of the scene's camera is
     visible.
     """
-    region = next((each for each in area.regions if each.type == "WINDOW"), None)
-    camera = scene.camera
+    region = main_region(area)
     space = area.spaces.active
-    if (
-        region is None
-        or camera is None
-        or camera.type != "CAMERA"
-        or min(region.width, region.height) < 2
-    ):
+    if min(region.width, region.height) < 2:
         return
     left, right, bottom, top = visible_part(area, region)
     render = scene.render
     size = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
-    width, height = _frame_at_one(camera.data.sensor_fit, size, (region.width, region.height))
+    width, height = _frame_at_one(scene.camera.data.sensor_fit, size, (region.width, region.height))
     factor = _FILLED * min((right - left) / width, (top - bottom) / height)
     view = space.region_3d
     _former.setdefault(space.as_pointer(), (view.view_camera_zoom, tuple(view.view_camera_offset)))

@@ -14,7 +14,7 @@ import math
 
 import bpy
 
-from .sidebar import viewport_at
+from .sidebar import main_region, viewport_at
 
 _ANGLES = [2 * math.pi * k / 20 for k in range(20)]
 _MOVES = ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE")
@@ -23,12 +23,7 @@ _MOVES = ("MOUSEMOVE", "INBETWEEN_MOUSEMOVE")
 def viewport_of(pointer: int) -> tuple[bpy.types.Area, bpy.types.Region] | None:
     """Return the viewport at an address and its main region; see `viewport_at`."""
     found = viewport_at(pointer)
-    region = (
-        next((region for region in found[1].regions if region.type == "WINDOW"), None)
-        if found
-        else None
-    )
-    return (found[1], region) if found is not None and region is not None else None
+    return (found[1], main_region(found[1])) if found else None
 
 
 def redraw_viewport(pointer: int) -> None:

@@ -102,6 +102,11 @@ def viewports() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
     ]
 
 
+def main_region(area: bpy.types.Area) -> bpy.types.Region:
+    """Return the region of an area that is neither header nor sidebar; every area has one."""
+    return next(region for region in area.regions if region.type == "WINDOW")
+
+
 def viewport_at(pointer: int) -> tuple[bpy.types.Window, bpy.types.Area] | None:
     """Return a viewport and its window; None once it was closed or became another editor.
 

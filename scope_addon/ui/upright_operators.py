@@ -18,6 +18,7 @@ from .comparison import camera_of
 from .correction_operators import CorrectionOperator, change_world, shown_frame
 from .drawing import Pointer, draw_line, redraw_viewport, viewport_of
 from .reporting import iface_, refuse, rpt_, sentence
+from .sidebar import main_region
 
 if TYPE_CHECKING:
     import numpy as np
@@ -183,8 +184,8 @@ class SCOPE_OT_upright_line(bpy.types.Operator):
             )
             if area is not None:
                 line.area = area.as_pointer()
-                _, region = viewport_of(line.area) or (None, None)
-                line.ends = [(x - region.x, y - region.y)] * 2 if region is not None else []
+                region = main_region(area)
+                line.ends = [(x - region.x, y - region.y)] * 2
             return {"PASS_THROUGH"} if event.type.startswith(_NAVIGATION) else {"RUNNING_MODAL"}
         viewport = viewport_of(line.area)
         if viewport is None:

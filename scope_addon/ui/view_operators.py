@@ -15,7 +15,7 @@ from .captured_person import captured_people, motion_if_stored
 from .captures import people_of
 from .comparison import camera_of, cameras_of, is_looking_through, is_side_view
 from .reporting import ReportingOperator, refuse, rpt_
-from .sidebar import redraw_sidebars_twice, viewport_of
+from .sidebar import main_region, redraw_sidebars_twice, viewport_of
 
 
 def hide_startup_cube(context: bpy.types.Context) -> None:
@@ -42,11 +42,9 @@ def frame_selected(context: bpy.types.Context) -> None:
     area = viewport_of(context)
     if area is None:
         return
-    region = next((r for r in area.regions if r.type == "WINDOW"), None)
-    view = area.spaces.active.region_3d
-    if region is None or view is None or view.view_perspective == "CAMERA":
+    if area.spaces.active.region_3d.view_perspective == "CAMERA":
         return
-    with context.temp_override(window=context.window, area=area, region=region):
+    with context.temp_override(window=context.window, area=area, region=main_region(area)):
         if bpy.ops.view3d.view_selected.poll():
             bpy.ops.view3d.view_selected()
 
