@@ -55,10 +55,9 @@ _MAX_SPANS = 12  # buttons of one warning in the panel
 class CaptureJob:
     """A capture for one scene, with the current settings of the scene."""
 
-    def __init__(self, scene: bpy.types.Scene, python: Sequence[str] = ()) -> None:
+    def __init__(self, scene: bpy.types.Scene) -> None:
         """Start the worker, or find the finished capture in the cache.
 
-        :param python: interpreter of the worker and its arguments; if empty, Blender's own.
         :raises ScopeError: a setting is invalid, or the worker cannot be started.
         """
         self._cache: Cache = cache()
@@ -78,10 +77,9 @@ class CaptureJob:
         self._result_s = 0.0
         self._building = False
         if self._captured is None:
-            python = python or python_command()
             folder = self._cache.new_job_folder()
             self._worker = WorkerProcess(
-                self._request, folder, self._cache.kernels, python, START_SCRIPT
+                self._request, folder, self._cache.kernels, python_command(), START_SCRIPT
             )
 
     @property

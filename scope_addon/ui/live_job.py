@@ -72,12 +72,9 @@ class LiveStatus:
 class LiveJob:
     """A live capture for one scene, with the current settings of the scene."""
 
-    def __init__(
-        self, scene: bpy.types.Scene, python: Sequence[str] = (), unfinished: Path | None = None
-    ) -> None:
+    def __init__(self, scene: bpy.types.Scene, unfinished: Path | None = None) -> None:
         """Start the process.
 
-        :param python: its interpreter and arguments; if empty, Blender's own.
         :param unfinished: file of a recording that is to be finished; None: capture.
         :raises ScopeError: a setting is invalid, or the process cannot be started.
         """
@@ -116,7 +113,7 @@ class LiveJob:
                 self._request,
                 self._cache.new_job_folder(),
                 self._cache.kernels,
-                python or python_command(),
+                python_command(),
                 START_SCRIPT,
             )
         except BaseException:

@@ -355,7 +355,9 @@ def test_real_worker_uses_a_calibration_and_no_internet_connection(fake_worker, 
         "runpy.run_path(sys.argv[0], run_name='__main__')\n"
     )
     lens.write_text(json.dumps({"intrinsics": K, "dist": dist}))
-    run_to_end(CaptureJob(scene, python=[sys.executable, str(guard)]))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(capture_job, "python_command", lambda: [sys.executable, str(guard)])
+        run_to_end(CaptureJob(scene))
     assert scene.scope.result.people == 1
     found = stored_motion(next(o for o in captures()[-1].objects if "scope_source" in o))
     assert np.allclose(found.intrinsics, K)

@@ -5,7 +5,6 @@ failure ends it.
 
 import os
 import signal
-import sys
 import textwrap
 import time
 from pathlib import Path
@@ -73,7 +72,7 @@ def live(tmp_path, monkeypatch, standing):
             """)
             + textwrap.dedent(body)
         )
-        jobs.append(LiveJob(bpy.context.scene, [sys.executable], **options))
+        jobs.append(LiveJob(bpy.context.scene, **options))
         return jobs[-1]
 
     yield start
@@ -392,7 +391,7 @@ def test_a_process_that_cannot_be_started_leaves_the_rig_as_it_was(live, monkeyp
 
     monkeypatch.setattr(live_job, "LiveProcess", fail)
     with pytest.raises(OSError, match="no more processes"):
-        LiveJob(bpy.context.scene, [sys.executable])
+        LiveJob(bpy.context.scene)
     assert rig.data.pose_position == "REST"
 
 
