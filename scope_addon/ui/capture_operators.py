@@ -345,7 +345,8 @@ class SCOPE_OT_capture_queue(CapturingOperator):
         for clip in scene.scope.queue:
             if clip.footage in self._ended:
                 clip.status, clip.message = self._ended[clip.footage]
-            elif _waits(clip):
+            # a file that was saved while a clip was being captured holds it as such
+            elif clip.status in (WAITING, CAPTURING):
                 clip.status = CAPTURING
                 clip.message = ""
                 self._clip = scene.scope.footage = clip.footage
@@ -452,13 +453,6 @@ def _folder_of_files(settings: Any) -> str:
         return ""  # relative to a .blend file that was never saved
     folder: str = bpy.path.abspath(settings.queue_folder)
     return folder
-
-
-def _waits(clip: Any) -> bool:
-    """Whether a clip of the list is still to be captured; a file that was saved while it was being
-    captured holds it as such.
-    """
-    return clip.status in (WAITING, CAPTURING)
 
 
 def _scene_of_job() -> bpy.types.Scene | None:

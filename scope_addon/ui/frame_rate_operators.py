@@ -85,16 +85,14 @@ class SCOPE_OT_match_frame_rate(ReportingOperator):
         scene = context.scene
         if scene.scope.result.footage_rate <= 0:
             return refuse(cls, "The scene contains no captured video or imported motion")
-        linked = next(
-            (block for block in [scene, *captured_people(context)] if _library(block)), None
-        )
-        library = _library(linked) if linked is not None else None
-        if linked is not None and library is not None:
-            name = linked.name
-            file = library.filepath
-            return refuse(
-                cls, "'{name}' is linked from {file}: make it local", name=name, file=file
-            )
+        for block in (scene, *captured_people(context)):
+            if (library := _library(block)) is not None:
+                return refuse(
+                    cls,
+                    "'{name}' is linked from {file}: make it local",
+                    name=block.name,
+                    file=library.filepath,
+                )
         return True
 
     def work(self, context: bpy.types.Context) -> str:

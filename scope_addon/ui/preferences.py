@@ -77,8 +77,8 @@ class SCOPE_AP_preferences(bpy.types.AddonPreferences):
         row.operator("scope.documentation", icon="HELP")
         row = layout.row()
         row.alignment = "RIGHT"
-        size = _size_text(_cache_size(cache().root))
         folder = cache().root
+        size = _size_text(_cache_size(folder))
         row.label(text=iface_("{size} of captures in {folder}", size=size, folder=folder))
         row.operator("scope.clear_cache")
 
