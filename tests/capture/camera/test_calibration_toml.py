@@ -63,8 +63,8 @@ def test_what_does_not_say_which_camera_it_is_is_refused(path: Path) -> None:
         read_calibration(path.with_name("none.toml"))
 
 
-@pytest.mark.parametrize("value", [f"1{'0' * 400}", f"[{'9' * 400}, 1, 1]", "[1979-05-27, 1, 1]"])
-@pytest.mark.parametrize("key", ["size", "matrix", "rotation", "translation"])
+@pytest.mark.parametrize("value", [f"[{'9' * 400}, 1, 1]", "[1979-05-27, 1, 1]"])
+@pytest.mark.parametrize("key", ["matrix", "rotation"])
 def test_numbers_and_dates_that_json_has_not_are_refused(path: Path, key: str, value: str) -> None:
     lines = path.read_text().splitlines()
     changed = [f"{key} = {value}" if line.startswith(key) else line for line in lines]

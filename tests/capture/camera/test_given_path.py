@@ -21,7 +21,7 @@ from scope.scope_addon.errors import UsageError
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp, log
 
-RATE = 25.0
+ALL_S = np.arange(50) / 25.0  # times of the poses in the file
 LENS = {"intrinsics": [[1000, 0, 640], [0, 1000, 360], [0, 0, 1]], "size": [1280, 720]}
 
 
@@ -33,16 +33,10 @@ def true_poses(times_s):
     return poses
 
 
-def content(**changes):
-    times_s = np.arange(50) / RATE
-    poses = true_poses(times_s)
-    values = {"times_s": times_s.tolist(), "world_from_camera": poses.tolist()}
-    return LENS | values | changes
-
-
 def written(tmp_path, name="camera.json", **changes):
+    values = {"times_s": ALL_S, "world_from_camera": true_poses(ALL_S)} | changes
     path = tmp_path / name
-    path.write_text(json.dumps(content(**changes)))
+    path.write_text(json.dumps(LENS | values, default=np.ndarray.tolist))
     return path
 
 
@@ -61,9 +55,7 @@ def test_a_path_of_all_frames_is_accepted_where_the_frame_rate_varies(tmp_path):
     video = Video(Path("clip.mp4"), 640, 480, Fraction(24), 50 * 40)
     video._average_fps = Fraction(50)
     times_s = np.arange(41.0)
-    path = written(
-        tmp_path, times_s=times_s.tolist(), world_from_camera=true_poses(times_s).tolist()
-    )
+    path = written(tmp_path, times_s=times_s, world_from_camera=true_poses(times_s))
     assert _given_path(video, CaptureOptions(camera_path=path)) is not None
     video.wanted = VideoRange(start_s=20.0, end_s=30.0)
     assert video.length_s == 10.0
@@ -71,7 +63,7 @@ def test_a_path_of_all_frames_is_accepted_where_the_frame_rate_varies(tmp_path):
 
 def test_one_pose_is_that_of_a_camera_that_stands(tmp_path):
     pose = true_poses(np.array([0.7]))
-    path = read_camera_path(written(tmp_path, times_s=[0.0], world_from_camera=pose.tolist()))
+    path = read_camera_path(written(tmp_path, times_s=[0.0], world_from_camera=pose))
     np.testing.assert_allclose(path.at(np.array([0.0, 9.0])), np.tile(pose, (2, 1, 1)), atol=1e-9)
 
 
@@ -94,17 +86,17 @@ def test_the_lens_names_its_file_as_people_may_see_it(tmp_path, kind):
     assert camera.source == f"{kind} lens\N{REPLACEMENT CHARACTER}.json"
 
 
-@pytest.mark.parametrize("times_s", [[2.5], [-0.5]])
-def test_frames_without_a_pose_are_refused(tmp_path, times_s):
+@pytest.mark.parametrize("time_s", [2.5, -0.5])
+def test_frames_without_a_pose_are_refused(tmp_path, time_s):
     path = read_camera_path(written(tmp_path))
     with pytest.raises(InputError, match=r"has poses from 0.00 to 1.96 s, but frames"):
-        path.at(np.array(times_s))
+        path.at(np.array([time_s]))
 
 
 def test_a_gap_in_the_captured_part_is_refused(tmp_path):
-    times_s = np.delete(np.arange(50) / RATE, np.arange(10, 30))
-    poses = true_poses(times_s).tolist()
-    path = read_camera_path(written(tmp_path, times_s=times_s.tolist(), world_from_camera=poses))
+    times_s = np.delete(ALL_S, np.arange(10, 30))
+    poses = true_poses(times_s)
+    path = read_camera_path(written(tmp_path, times_s=times_s, world_from_camera=poses))
     path.at(np.array([0.1, 1.5]))
     with pytest.raises(InputError, match=r"has no pose from 0.36 to 1.20 s"):
         path.at(np.array([0.1, 0.8]))
@@ -130,15 +122,14 @@ def test_a_path_of_another_clip_or_time_is_warned_of(begins_s, codes):
 
 
 def changed(row, pose):
-    poses = true_poses(np.arange(50) / RATE)
+    poses = true_poses(ALL_S)
     poses[row] = pose(poses[row])
-    return poses.tolist()
+    return poses
 
 
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"world_from_camera": None}, "must be a list of matrices"),
         ({"world_from_camera": []}, "must be a list of matrices"),
         ({"world_from_camera": [[1, 2], [3]]}, "must be a list of matrices"),
         ({"times_s": [0.0, 1.0]}, "must be a list of 50 numbers"),
@@ -146,14 +137,8 @@ def changed(row, pose):
         ({"times_s": [*np.arange(49.0), float("nan")]}, "numbers that ascend"),
         ({"world_from_camera": changed(3, lambda T: T * np.nan)}, "pose 3 .* not a finite number"),
         ({"world_from_camera": changed(4, lambda T: T.T)}, "pose 4 .* last row 0, 0, 0, 1"),
-        (
-            {"world_from_camera": changed(5, lambda T: T @ np.diag([2.0, 2.0, 2.0, 1.0]))},
-            "pose 5 .* is scaled",
-        ),
-        (
-            {"world_from_camera": changed(6, lambda T: T @ np.diag([-1.0, 1.0, 1.0, 1.0]))},
-            "pose 6 .* sheared or mirrored",
-        ),
+        ({"world_from_camera": changed(5, lambda T: T * [2, 2, 2, 1])}, "pose 5 .* is scaled"),
+        ({"world_from_camera": changed(6, lambda T: T * [-1, 1, 1, 1])}, "pose 6 .* or mirrored"),
         ({"focal_px": [1000.0]}, "'focal_px' is unknown"),
         ({"intrinsics": None}, "intrinsics"),
     ],

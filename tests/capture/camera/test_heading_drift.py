@@ -24,13 +24,8 @@ CAMERA = Camera(pinhole(WIDTH, HEIGHT, 1100.0), np.zeros(5), "given")
 def edges(rng, directions, count=25):
     """(n, 2, 3) ends of edges in space along each of the directions."""
     starts = rng.uniform([-8, -3, 5], [14, 3, 12], (len(directions) * count, 3))
-    return np.stack(
-        [
-            starts,
-            starts + np.repeat(directions, count, axis=0) * rng.uniform(1, 4, (len(starts), 1)),
-        ],
-        1,
-    )
+    steps = np.repeat(directions, count, axis=0) * rng.uniform(1, 4, (len(starts), 1))
+    return np.stack([starts, starts + steps], axis=1)
 
 
 def seen(rng, ends, R_camera_hall, center, noise_px=0.5):
@@ -57,11 +52,7 @@ def run(clutter, directions=None):
     truth = exp(s * [0.02, 0.25, -0.01])  # R_first_camera
     drifted = exp(s * [0.01, 0.4, 0.02]) @ truth
     ends = edges(rng, np.eye(3) if directions is None else directions)
-    ends = (
-        np.concatenate([ends, edges(rng, rng.standard_normal((clutter, 3)), 1)])
-        if clutter
-        else ends
-    )
+    ends = np.concatenate([ends, edges(rng, rng.standard_normal((clutter, 3)), 1)])
     edge_frames = [
         FrameEdges(k, seen(rng, ends, truth[k].T @ hall, np.array([4.0 * k / T, 0, 0])))
         for k in (0, *range(12, T, 12))
