@@ -31,6 +31,7 @@ def test_a_whole_file_passes(tmp_path):
         ([array(b"i", 2, bytes(8), size=1000)], "does not lie within"),
         ([array(b"d", 0xFFFFFFFF, bytes(24))], "too large"),
         ([b"S" + struct.pack("<I", 0xFFFFFFFF)], "does not lie within"),
+        ([b"Q"], "of type 'Q'"),
         ([b"d" + struct.pack("<III", 1, 1, 3) + b"bad"], "incorrect header"),
     ],
 )

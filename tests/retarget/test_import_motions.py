@@ -148,6 +148,12 @@ def test_what_is_missing_is_assumed_and_said(tmp_path):
     np.testing.assert_allclose(np.ptp(found.motion.trans, axis=0), 0, atol=1e-6)
 
 
+def test_arrays_that_no_body_can_have_are_said(tmp_path):
+    np.savez(tmp_path / "walk.npz", **PIECES, pose_hand=np.ones((9, 12)))
+    notes = import_motion(tmp_path / "walk.npz", up="z").notes
+    assert "were left out: 'pose_hand'" in " ".join(map(str, notes))
+
+
 def test_an_unclear_up_axis_is_said(tmp_path):
     arrays = in_file("z")
     lying = arrays["poses"].copy()

@@ -192,6 +192,8 @@ BROKEN = {
     "infinite trans": (GOOD | {"trans": np.full((T, 3), np.inf)}, "NaN or infinity"),
     "far away": (GOOD | {"trans": np.full((T, 3), 1e30)}, "metres"),
     "rate of NaN": (GOOD | {"mocap_framerate": np.array(np.nan)}, "frames per second"),
+    "rate of text": (GOOD | {"mocap_framerate": np.array("fast")}, "frames per second"),
+    "wrong betas": (GOOD | {"betas": np.zeros((3, 4, 5))}, "betas has shape"),
     "betas of text": (GOOD | {"betas": np.array(["a"])}, "must hold numbers"),
     "scaling of zero": (
         GOOD | {"trans": np.zeros((T, 3)), "smpl_scaling": np.array([0.0])},
