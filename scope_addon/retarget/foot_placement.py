@@ -97,17 +97,17 @@ def legs_at_rest(
     )
     toe_of = [row.get(f"{side}_foot") for side in sides]
     source = _body_feet(body, *rest, sides)
-    pairs = zip(ankles, toe_of, source, strict=True)
     feet = [
-        _rig_foot(rig, alignment[ankle], ankle, toe, foot, float(scales[2]))
-        for ankle, toe, foot in pairs
+        _rig_foot(rig, alignment[ankle], ankle, toe, source.heel[leg], source.ball[leg], scales[2])
+        for leg, (ankle, toe) in enumerate(zip(ankles, toe_of, strict=True))
     ]
+    heels, balls, heights = (np.array(each) for each in zip(*feet, strict=True))
     toed = [leg for leg, toe in enumerate(toe_of) if toe is not None]
     toes = [toe for toe in toe_of if toe is not None]
     sizes = [np.linalg.norm(rig.ends[toe] - rig.heads[toe]) for toe in toes]
     # What toes end at may lie above or below them, so their direction is taken from the foot.
     tips = [
-        feet[leg].ball * [1, 1, 0] / np.linalg.norm(feet[leg].ball[:2]) * size
+        balls[leg] * [1, 1, 0] / np.linalg.norm(balls[leg, :2]) * size
         for leg, size in zip(toed, sizes, strict=True)
     ]
     places = rig.heads[[hips, knees, ankles]]  # (3, L, 3)
@@ -119,28 +119,28 @@ def legs_at_rest(
         toed=toed,
         toes=toes,
         toes_in_t_pose=alignment[toes] @ rig.rotations[toes],
-        body=_stacked(source),
-        rig=_stacked(feet),
+        body=source,
+        rig=FootRest(heels, balls, heights),
         tips=np.array(tips).reshape(-1, 3),
         lengths=_REACH * np.linalg.norm(np.diff(places, axis=0), axis=2).sum(axis=0),
         scales=scales,
     )
 
 
-def _body_feet(body: Body, v: Float64Array, J: Float64Array, sides: list[str]) -> list[FootRest]:
+def _body_feet(body: Body, v: Float64Array, J: Float64Array, sides: list[str]) -> FootRest:
     """Measure the feet of the body at rest. The heel is the rear end of what the foot, without its
     toes, stands on.
     """
     low = float(v[:, 2].min())
-    feet = []
-    for side in sides:
-        part = body.joint_names.index(f"{side}_ankle")
-        ankle = J[part]
-        ball = J[body.joint_names.index(f"{side}_foot")]
-        sole = v[(body.strongest_joints == part) & (v[:, 2] < low + _SOLE_M)]
-        heel = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0) if len(sole) else ankle
-        feet.append(FootRest(np.array([*heel[:2], low]) - ankle, ball - ankle, ankle[2] - low))
-    return feet
+    ankles = [body.joint_names.index(f"{side}_ankle") for side in sides]
+    balls = [body.joint_names.index(f"{side}_foot") for side in sides]
+    heels = J[ankles]
+    for foot, ankle in enumerate(ankles):
+        sole = v[(body.strongest_joints == ankle) & (v[:, 2] < low + _SOLE_M)]
+        if len(sole):
+            heels[foot] = sole[sole[:, 1] > sole[:, 1].max() - _HEEL_M].mean(axis=0)
+    heels[:, 2] = low
+    return FootRest(heels - J[ankles], J[balls] - J[ankles], J[ankles, 2] - low)
 
 
 def _rig_foot(
@@ -148,28 +148,22 @@ def _rig_foot(
     AF: Float64Array,
     ankle: int,
     toe: int | None,
-    source: FootRest,
+    heel_of_body: Float64Array,
+    ball_of_body: Float64Array,
     scale: float,
-) -> FootRest:
-    """Measure the rig's foot; without a bone at the ball, its length is taken from the body's."""
-    height = rig.heads[ankle, 2] - rig.floor
+) -> tuple[Float64Array, Float64Array, float]:
+    """Measure the rig's foot: heel and ball (3,) from the ankle, and its height. Without a bone at
+    the ball, its length is taken from the body's.
+    """
+    height = float(rig.heads[ankle, 2] - rig.floor)
     ball = AF @ ((rig.heads[toe] if toe is not None else rig.ends[ankle]) - rig.heads[ankle])
-    length = float(np.linalg.norm(source.ball[:2]))
+    length = float(np.linalg.norm(ball_of_body[:2]))
     share = float(np.linalg.norm(ball[:2])) / length
-    if not 0.3 * scale < share < 3 * scale or ball @ source.ball < 0:
+    if not 0.3 * scale < share < 3 * scale or ball @ ball_of_body < 0:
         share = scale
-        ball = np.array([*(scale * source.ball[:2]), -0.8 * height])
+        ball = np.array([*(scale * ball_of_body[:2]), -0.8 * height])
     # No bone ends at the heel, so its position is proportional to the body's.
-    heel = np.array([*(share * source.heel[:2]), -height])
-    return FootRest(heel, ball, height)
-
-
-def _stacked(feet: list[FootRest]) -> FootRest:
-    """Return several feet as one, with their number as the first axis."""
-    heels, balls, heights = zip(
-        *((foot.heel, foot.ball, foot.height) for foot in feet), strict=True
-    )
-    return FootRest(np.array(heels), np.array(balls), np.array(heights))
+    return np.array([*(share * heel_of_body[:2]), -height]), ball, height
 
 
 def place_feet(
