@@ -136,8 +136,7 @@ def _hermite(
     """Evaluate the cubic from p0 to p1 with derivatives v0, v1 with respect to s, 0 to 1."""
     s2 = s * s
     s3 = s * s * s
-    value: Float64Array
-    value = (
+    value: Float64Array = (
         (2 * s3 - 3 * s2 + 1) * p0
         + (s3 - 2 * s2 + s) * v0
         + (3 * s2 - 2 * s3) * p1
@@ -228,7 +227,6 @@ def _monotone_cubic(times: Float64Array, x: Float64Array, y: Float64Array) -> Fl
     k = np.clip(np.searchsorted(x, times, side="right") - 1, 0, len(x) - 2)
     s = np.clip((times - x[k]) / (x[k + 1] - x[k]), 0.0, 1.0)[:, None]
     h = (x[k + 1] - x[k])[:, None]
-    value: Float64Array
-    value = (1 + 2 * s) * (1 - s) ** 2 * y[k] + s**2 * (3 - 2 * s) * y[k + 1]
+    value: Float64Array = (1 + 2 * s) * (1 - s) ** 2 * y[k] + s**2 * (3 - 2 * s) * y[k + 1]
     value += h * s * (1 - s) * ((1 - s) * m[k] - s * m[k + 1])
     return value
