@@ -5,6 +5,7 @@ captured.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import cv2
@@ -14,6 +15,8 @@ from scope.scope_addon.capture.media.frame import AutoExposure
 from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.solver import Body
+
+from .made_video import write_video
 
 
 def picture(level: float) -> np.ndarray:
@@ -47,17 +50,15 @@ def test_brightness_does_not_flicker() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("networks")
-def test_a_person_in_the_dark_is_captured(shared: Path, body: Body, tmp_path: Path) -> None:
+def test_a_person_in_the_dark_is_captured(
+    frames: Callable[..., Iterator[np.ndarray]], body: Body, tmp_path: Path
+) -> None:
     """At 6 % of the light, at which the networks find nobody without the gain."""
-    clip = tmp_path / "dark.mp4"
-    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 15, (540, 960))
-    video = cv2.VideoCapture(str(shared / "data" / "pose2sim" / "cam2.mp4"))
-    for k in range(40):
-        frame = video.read()[1]
-        if k % 4 == 0:
-            small = cv2.resize(frame, (540, 960), interpolation=cv2.INTER_AREA)
-            writer.write((0.06 * small).astype(np.uint8))
-    writer.release()
+    dark = [
+        (0.06 * cv2.resize(image, (540, 960), interpolation=cv2.INTER_AREA)).astype(np.uint8)
+        for image in frames("pose2sim/cam2", stop=40, every=4)
+    ]
+    clip = write_video(tmp_path / "dark.mp4", dark, 15)
     (motion,) = capture(clip, body, CaptureOptions(quality="fast")).motions
     assert motion.valid.all()
     assert motion.residual_px.mean() < 6

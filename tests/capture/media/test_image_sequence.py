@@ -106,13 +106,6 @@ def test_the_number_of_a_pattern_is_where_its_sign_stands(tmp_path: Path) -> Non
         assert video.length_s == pytest.approx(0.3)
 
 
-def test_a_damaged_picture_ends_the_sequence_with_a_warning(folder: Path) -> None:
-    (folder / "walk_9.png").write_bytes(b"no picture any more")
-    with open_video(folder, VideoRange(fps=Fraction(10))) as video:
-        assert [int(f.image_rgb[0, 0, 0]) for f in video] == [7, 8]
-        assert any("stopped after 2" in warning for warning in map(str, video.warnings))
-
-
 @pytest.mark.parametrize(
     ("numbers", "damaged", "decoded"), [(range(0, 60, 2), 58, 29), ([*range(40), 60, 61], 60, 40)]
 )

@@ -6,11 +6,12 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.quicktime import focal_35mm
 from scope.scope_addon.capture.media.video import open_video
+
+from .made_video import write_video
 
 KEY = b"com.apple.quicktime.camera.focal_length.35mm_equivalent"
 
@@ -76,13 +77,7 @@ def test_absent_or_damaged_is_none(tmp_path):
 
 
 def test_a_video_has_its_focal_length(tmp_path: Path):
-    path = tmp_path / "a.mp4"
-    writer = cv2.VideoWriter(
-        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), 30, (64, 48)
-    )
-    for _ in range(3):
-        writer.write(np.full((48, 64, 3), 90, np.uint8))
-    writer.release()
+    path = write_video(tmp_path / "a.mp4", [np.full((48, 64, 3), 90, np.uint8)] * 3)
     assert open_video(path).focal_35mm is None
     data = bytearray(path.read_bytes())
     extra = meta(67, struct.pack(">i", 26))

@@ -14,6 +14,7 @@ from scope.scope_addon.capture.tracking.left_right import (
     repair_left_right,
 )
 from scope.scope_addon.capture.tracking.track import Track
+from scope.solver.rotations import exp
 
 from ..walking import someone_walking, track_without_depth
 
@@ -25,12 +26,7 @@ def walker(count: int, turn_rad: float = 0.0) -> np.ndarray:
     rng = np.random.default_rng(2)
     body = rng.normal(0, 0.3, (33, 3))
     body[:, 0] = [0.2 if "left" in n else -0.2 if "right" in n else 0.0 for n in KEYPOINT_NAMES]
-    angle = np.linspace(0, turn_rad, count)
-    c = np.cos(angle)
-    s = np.sin(angle)
-    zero = np.zeros(count)
-    one = np.ones(count)
-    turns = np.stack([c, zero, s, zero, one, zero, -s, zero, c], axis=1).reshape(-1, 3, 3)
+    turns = exp(np.linspace(0, turn_rad, count)[:, None] * [0.0, 1.0, 0.0])
     return np.einsum("tij,kj->tki", turns, body) + rng.normal(0, 0.01, (count, 33, 3))
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -13,6 +13,8 @@ from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking.scene_cuts import SceneCuts
 from scope.solver import Body
+
+from ..media.made_video import write_video
 
 W = 320
 H = 180
@@ -84,19 +86,18 @@ def test_other_changes_are_not_cuts(frames: list[np.ndarray]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("networks")
-def test_scenes_are_captured_separately(shared: Path, body: Body, tmp_path: Path) -> None:
+def test_scenes_are_captured_separately(
+    frames: Callable[..., Iterator[np.ndarray]], body: Body, tmp_path: Path
+) -> None:
     """A man from two sides, one after the other: the cut is reported, and he is followed before and
     after it.
     """
-    clip = tmp_path / "two.mp4"
-    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter.fourcc(*"mp4v"), 30, (540, 960))
-    for camera in ("cam3", "cam1"):
-        video = cv2.VideoCapture(str(shared / "data" / "pose2sim" / f"{camera}.mp4"))
-        for k in range(30):
-            picture = video.read()[1]
-            if k % 2 == 0:
-                writer.write(cv2.resize(picture, (540, 960), interpolation=cv2.INTER_AREA))
-    writer.release()
+    pictures = [
+        cv2.resize(picture, (540, 960), interpolation=cv2.INTER_AREA)
+        for camera in ("cam3", "cam1")
+        for picture in frames(f"pose2sim/{camera}", stop=30, every=2)
+    ]
+    clip = write_video(tmp_path / "two.mp4", pictures)
     found = capture(clip, body, CaptureOptions(quality="fast"))
     (motion,) = found.motions
     assert list(found.report.cuts_s) == [pytest.approx(15 / 30, abs=1e-3)]

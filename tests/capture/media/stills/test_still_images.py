@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
-from scope.scope_addon.capture.media.video_range import VideoRange, parse_range
+from scope.scope_addon.capture.media.video_range import parse_range
 from scope.scope_addon.errors import VideoError
 
 from ....required import need_encoder, package
@@ -47,13 +46,6 @@ def test_avif_is_recognized_by_its_content(tmp_path: Path) -> None:
         assert video.frame_count == 1
         assert (video.width, video.height) == (W, H)
         assert np.abs(frame.image_rgb.astype(int) - image)[[6, -7]].max() < 12
-
-
-def test_avif_in_a_sequence(tmp_path: Path) -> None:
-    for k in (1, 2):
-        avif(tmp_path / f"a_{k}.avif", GREY + 50 * np.uint8(k))
-    with open_video(tmp_path, VideoRange(fps=Fraction(10))) as video:
-        assert [int(f.image_rgb.mean()) for f in video] == pytest.approx([140, 190], abs=4)
 
 
 def test_damaged_avif(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from scope.scope_addon.capture.pipeline import capture
 from scope.scope_addon.capture.tracking import face_tracker
 from scope.scope_addon.capture.tracking.face_tracker import FaceTracker
 from scope.solver.body_file import load_body
+from scope.solver.rotations import exp
 
 IMAGE = np.zeros((800, 800, 3), np.uint8)
 SHAPE = np.random.default_rng(0).uniform(-0.5, 0.5, (FACE_POINTS, 3))
@@ -47,10 +48,8 @@ def person(x: float, y: float, scale: float = 500.0, yaw: float | None = None) -
     points[[0, 7, 8]] = (0, 0.03), (0.07, 0.01), (-0.07, 0.01)
     world = np.zeros((33, 3))
     if yaw is not None:
-        c = np.cos(np.radians(yaw))
-        s = np.sin(np.radians(yaw))
         world[:, :2] = points
-        world = world @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
+        world = world @ exp(np.radians([0.0, yaw, 0.0])).T
     points = scale * points + [x, y]
     return Observation(points, np.ones(33), world, 1.0, Region((x, y), 400.0, 0.0), False)
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, WRISTS, HandEstimate
+from scope.scope_addon.capture.perception.hand_landmarks import WRISTS, HandEstimate
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.hand_assignment import (
@@ -28,39 +28,16 @@ from scope.scope_addon.capture.tracking.hand_sight import Found
 from scope.scope_addon.capture.tracking.left_right import swap_keypoints
 from scope.scope_addon.capture.tracking.track import Track
 
-SCALE = 500.0  # pixels per metre
-
-
-LENGTH = HAND_LENGTH_M * SCALE
-
+from .flat_hand import LENGTH, SCALE, SHAPE, hand_at
 
 WRIST_PX = {0: (300.0, 500.0), 1: (700.0, 500.0)}
 
 
-FINGERS = [(x, y) for x in (-0.25, -0.12, 0.0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1.0)]
-
-
-SHAPE = np.array([(0.0, 0.0), *FINGERS])  # in hand lengths, fingers up
-
-
-def hand(
-    side: int,
-    *,
-    away: float = 0.0,
-    size: float = 1.0,
-    left: float | None = None,
-    presence: float = 0.9,
-) -> HandEstimate:
-    """Return the hand at a wrist, or some hand lengths beside it, with keypoints that agree with
-    those in space.
-    """
-    at = np.array(WRIST_PX[side]) + [away * LENGTH, 0.0]
-    world = np.pad(SHAPE * HAND_LENGTH_M, ((0, 0), (0, 1)))
-    world[:, 2] = np.linspace(0.0, 0.02, len(world))
+def hand(side: int, away: float = 0.0, left: float | None = None, **given: float) -> HandEstimate:
+    """Return the hand at a wrist, or some hand lengths beside it."""
+    x, y = WRIST_PX[side]
     left = (0.95 if side == 0 else 0.05) if left is None else left
-    return HandEstimate(
-        size * LENGTH * SHAPE + at, world, presence, left, Region((at[0], at[1]), 2 * LENGTH, 0.0)
-    )
+    return hand_at((x + away * LENGTH, y), left, **{"presence": 0.9, **given})
 
 
 def person(sure: float = 1.0, right_wrist_px: tuple[float, float] = WRIST_PX[1]) -> Observation:
@@ -191,18 +168,15 @@ FPS = 30
 LEFT = 0
 
 
-def tentative_hand(presence, turned_deg=0.0, size=40.0, wrist=(200.0, 300.0)):
+def tentative_hand(presence, turned_deg=0.0, size=40.0):
     """A flat hand of 21 points, as in a row of the track; a negative presence marks it as
     tentative.
     """
     a = np.radians(turned_deg)
-    points = np.array(
-        [[0.0, 0.0], *([x, y] for x in (-0.4, -0.2, 0, 0.2, 0.4) for y in (-0.5, -0.65, -0.8, -1))]
-    )
     out = np.zeros((21, 7))
-    out[:, :2] = size * points @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) + wrist
+    out[:, :2] = size * SHAPE @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) + 300.0
     out[:, 2] = presence
-    out[:, 3:5] = points
+    out[:, 3:5] = SHAPE
     return out
 
 

@@ -11,11 +11,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video_range import VideoRange
 from scope.scope_addon.capture.options import CaptureOptions
-from scope.scope_addon.capture.perception.hand_landmarks import (
-    HAND_LENGTH_M,
-    HandEstimate,
-    pixels_per_metre,
-)
+from scope.scope_addon.capture.perception.hand_landmarks import pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
@@ -27,23 +23,9 @@ from scope.solver.body_file import load_body
 from scope.solver.rotations import exp
 
 from ...followed_people import FollowedPeople
+from .flat_hand import LENGTH, SCALE, hand_at
 
-SCALE = 500.0  # pixels per metre
-LENGTH = HAND_LENGTH_M * SCALE
 IMAGE = np.zeros((1000, 1000, 3), np.uint8)
-
-
-def hand_at(wrist, left=0.95, presence=0.95):
-    """An upright hand as the network would report it."""
-    points = np.array(
-        [
-            [0.0, 0.0],
-            *([x, y] for x in (-0.25, -0.12, 0, 0.12, 0.24) for y in (-0.5, -0.65, -0.8, -1)),
-        ]
-    )
-    region = Region((wrist[0], wrist[1] - LENGTH / 2), 2 * LENGTH, 0.0)
-    world = np.pad(points * HAND_LENGTH_M, ((0, 0), (0, 1)))
-    return HandEstimate(points * LENGTH + wrist, world, presence, left, region)
 
 
 def person(left_wrist=(300, 500), right_wrist=(700, 500)):
