@@ -8,25 +8,14 @@ from __future__ import annotations
 from concurrent.futures import Future
 
 import numpy as np
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
 from scope.scope_addon.capture.tracking.left_right import MIRROR_PARTNER
 from scope.scope_addon.live.left_right import CausalLeftRight
 
+from ..capture.tracking.test_left_right import walker
+
 COUNT = 60
-
-
-def turning_body() -> np.ndarray:
-    """A body (COUNT, 33, 3) with noise that turns by a quarter about its vertical axis."""
-    rng = np.random.default_rng(2)
-    body = rng.normal(0, 0.3, (33, 3))
-    body[:, 0] = [0.2 if "left" in n else -0.2 if "right" in n else 0.0 for n in KEYPOINT_NAMES]
-    angle = np.linspace(0, np.pi / 2, COUNT)
-    turned = np.repeat(body[None], COUNT, axis=0)
-    turned[..., 0] = np.cos(angle)[:, None] * body[:, 0] + np.sin(angle)[:, None] * body[:, 2]
-    turned[..., 2] = np.cos(angle)[:, None] * body[:, 2] - np.sin(angle)[:, None] * body[:, 0]
-    return turned + rng.normal(0, 0.01, (COUNT, 33, 3))
 
 
 def read(swapped: np.ndarray, answers: dict[int, int | None], *, wait: bool = False) -> np.ndarray:
@@ -36,7 +25,7 @@ def read(swapped: np.ndarray, answers: dict[int, int | None], *, wait: bool = Fa
     :param answers: the reference network's: frame that it was asked about, and frame before which
         it answers; None: it has answered at once.
     """
-    truth = turning_body()
+    truth = walker(COUNT, np.pi / 2)
     sides = CausalLeftRight(wait=wait)
     wrong = []
     pending: dict[int, Future] = {frame: Future() for frame in answers}

@@ -22,6 +22,14 @@ SOURCE = {
 }
 
 
+def make_solver(folder):
+    """Make the package with these sources, and return the folder of its solver."""
+    solver = make_package(folder)
+    for name, text in SOURCE.items():
+        (solver / name).write_text(text.format(value=1))
+    return solver
+
+
 # Prints the kernel's result, and whether its code came from disk.
 RUN = """
 from package.solver.kernel import announce_compilation
@@ -38,14 +46,12 @@ def runs(request, run_code, tmp_path_factory):
     after a change.
     """
     folder = tmp_path_factory.mktemp("kernels")
-    solver = make_package(folder)
+    solver = make_solver(folder)
     before = "import package.scope_addon" if request.param == "extension" else ""
     variables = dict(os.environ, NUMBA_CACHE_DIR=str(folder / "cache"))
     found = []
     for value in (1, 22):
-        for name, text in SOURCE.items():
-            if value == 1 or name == "inner.py":
-                (solver / name).write_text(text.format(value=value))
+        (solver / "inner.py").write_text(SOURCE["inner.py"].format(value=value))
         for _ in range(2):
             run = run_code(before + RUN, folder, variables)
             found.append((run.stdout.split(), run.stderr.count("Compiling the solver")))
@@ -83,9 +89,7 @@ kernel.ship_code(folder)
 @pytest.mark.skipif(not can_run_shipped(), reason="no code is shipped for this processor")
 def test_code_that_came_with_a_wheel_is_used_until_a_source_changes(run_code, tmp_path):
     """It was compiled into another cache, for a processor that need not be this one."""
-    solver = make_package(tmp_path)
-    for name, text in SOURCE.items():
-        (solver / name).write_text(text.format(value=1))
+    solver = make_solver(tmp_path)
     variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "maker"))
     chosen = {"NUMBA_CPU_NAME": shipped_processor(), "NUMBA_CPU_FEATURES": ""}
     run_code(SHIP, tmp_path, variables | chosen)
@@ -109,9 +113,7 @@ print(outer(0.0), type(outer._cache).__name__, outer._compiler.pipeline_class.__
 
 
 def test_the_extension_also_keeps_the_code_of_kernels_that_were_there_before(run_code, tmp_path):
-    solver = make_package(tmp_path)
-    for name, text in SOURCE.items():
-        (solver / name).write_text(text.format(value=1))
+    make_solver(tmp_path)
     variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     done = run_code(LATE, tmp_path, variables)
     assert done.stdout.split() == ["1.0", "CodeCache", "KernelCompiler"]
@@ -119,9 +121,7 @@ def test_the_extension_also_keeps_the_code_of_kernels_that_were_there_before(run
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no folder that nobody may write to")
 def test_without_a_place_for_code_a_solver_alone_works(run_code, tmp_path):
-    solver = make_package(tmp_path)
-    for name, text in SOURCE.items():
-        (solver / name).write_text(text.format(value=1))
+    make_solver(tmp_path)
     (tmp_path / "file").touch()
     variables = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
     assert run_code(RUN, tmp_path, variables).stdout.split() == ["1.0", "0"]
