@@ -226,8 +226,3 @@ def test_each_box_is_in_the_cluster_of_the_best_box_that_it_overlaps():
             expected.append([k])
     assert clusters == expected
     assert 1 < len(clusters) < len(boxes)
-
-
-def test_boxes_without_area():
-    boxes = np.array([[3.0, 3, 3, 3], [0, 0, 2, 2], [3, 3, 3, 3]])
-    assert [cluster.tolist() for cluster in overlap_clusters(boxes, 0.5)] == [[0], [1], [2]]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.frame_readers import rgb
-from scope.scope_addon.capture.media.hdr import compress, hdr_rgb, hlg_light, pq_code, pq_light
+from scope.scope_addon.capture.media.hdr import compress, hdr_rgb, pq_code
 from scope.scope_addon.capture.media.video import open_video
 
 from ....required import need_encoder
@@ -35,8 +35,6 @@ def grey(code: float, transfer: int, **tags: int):
 def test_the_curves_are_those_of_the_standards() -> None:
     light = np.array([0.0, 100.0, 1000.0, 10000.0])
     np.testing.assert_allclose(pq_code(light), [7.3e-7, 0.508078, 0.751827, 1.0], atol=1e-6)
-    np.testing.assert_allclose(pq_light(pq_code(light)), light, atol=1e-6)
-    np.testing.assert_allclose(hlg_light(np.array([0.0, 0.5, 1.0])), [0.0, 1 / 12, 1.0], atol=1e-6)
     np.testing.assert_allclose(
         compress(np.array([0.0, 50.0, 1000.0, 9000.0])), [0.0, 50.0, 203.0, 203.0], atol=1e-6
     )
