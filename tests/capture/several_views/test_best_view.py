@@ -38,11 +38,9 @@ def body():
     return load_body("scope_h")
 
 
-def beside(degrees):
-    """Return the place of a camera that looks at the person from so many degrees to the side."""
-    R = exp(np.array([0.0, np.radians(degrees), 0.0]))
-    middle = np.array([0.0, 0.0, 3.0])
-    return CameraPlace(R, middle - R @ middle)
+MIDDLE = np.array([0.0, 0.0, 3.0])
+TURN = exp(np.array([0.0, np.radians(60.0), 0.0]))
+BESIDE = CameraPlace(TURN, MIDDLE - TURN @ MIDDLE)  # of a camera that looks from the side
 
 
 def points_of(body):
@@ -88,6 +86,18 @@ def track_of(body, points, hand_confidence):
     )
 
 
+def tracks_of(body, *hand_confidence):
+    """Return what both cameras see, with the confidences of both hands in each."""
+    points = points_of(body)
+    seen = points, BESIDE.of(points)
+    return [track_of(body, *each) for each in zip(seen, hand_confidence, strict=True)]
+
+
+def person_in_views(body, first, second):
+    shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
+    return shot, PersonInViews(shot, first, [(second, CAMERA, BESIDE)], None, lambda *_: None)
+
+
 def pixels_of(points):
     projected = points @ K.T
     return projected[:, :2] / projected[:, 2:]
@@ -95,14 +105,10 @@ def pixels_of(points):
 
 @pytest.mark.slow
 def test_each_hand_comes_from_the_camera_that_sees_it(body):
-    place = beside(60.0)
-    points = points_of(body)
-    first = track_of(body, points, (0.0, 0.9))
-    second = track_of(body, points @ place.R_camera_first.T + place.t_camera_first, (0.9, 0.3))
+    first, second = tracks_of(body, (0.0, 0.9), (0.9, 0.3))
     # What the second camera guesses of the right hand is wrong.
     second.hands[:, 1, :, 3:6] = -second.hands[:, 1, :, 3:6]
-    shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
-    person = PersonInViews(shot, first, [(second, CAMERA, place)], None, lambda *_: None)
+    shot, person = person_in_views(body, first, second)
     (motion,) = solve_people(shot, [person]).motions
     assert hand_frames(body, motion) == {"left_hand_frames": T, "right_hand_frames": T}
     # The file has the hands of the first camera's picture.
@@ -115,14 +121,10 @@ def test_each_hand_comes_from_the_camera_that_sees_it(body):
 
 
 def test_what_one_other_camera_sees_counts_as_from_one_camera(body):
-    place = beside(60.0)
-    points = points_of(body)
-    first = track_of(body, points, (0.9, 0.9))
-    second = track_of(body, points @ place.R_camera_first.T + place.t_camera_first, (0.9, 0.9))
+    first, second = tracks_of(body, (0.9, 0.9), (0.9, 0.9))
     first.seen[10:] = False
     first.confidence[10:] = 0.0
-    shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
-    prepared = PersonInViews(shot, first, [(second, CAMERA, place)], None, lambda *_: None).prepared
+    prepared = person_in_views(body, first, second)[1].prepared
     (other,) = prepared.others
     _, both = prepared.views(5, prepared.measure(5), False)
     _, alone = prepared.views(15, prepared.measure(15), False)
