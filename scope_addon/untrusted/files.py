@@ -63,9 +63,14 @@ UNREADABLE: tuple[type[Exception], ...] = (
     ValueError,
     TypeError,
     ArithmeticError,
+    RuntimeError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    SyntaxError,  # this and the next: a header that is no Python literal
+    tokenize.TokenError,
 )
-UNREADABLE += (RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error, struct.error)
-UNREADABLE += (SyntaxError, tokenize.TokenError)  # a header that is no Python literal
 _HEADER_READERS: dict[tuple[int, int], Any] = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.errors import ModelFileError
-from .files import in_one_line
+from .files import UNREADABLE, in_one_line
 
 # elements of one sparse matrix made dense; SMPL-X's joint regressor has 0.6 million
 LARGEST_DENSE = 5_000_000
@@ -179,13 +179,6 @@ _GLOBALS: dict[str, Any] = {
 }
 
 
-def stand_in(dotted: str) -> Any:
-    """Return the stand-in of an allowed global, given by module and name; None for any other."""
-    return next(
-        (found for pattern, found in _GLOBALS.items() if re.fullmatch(pattern, dotted)), None
-    )
-
-
 def _from_bytes(raw: object, dtype: object, shape: object, is_fortran: bool) -> NDArray[Any]:
     """Return a read-only array over ``raw``; the byte count must agree with the shape exactly."""
     if not isinstance(dtype, PickledDtype) or dtype.dtype.hasobject:
@@ -307,14 +300,7 @@ def _indices(index: NDArray[Any], size: int) -> NDArray[np.intp]:
 LARGEST_FILE = 1 << 30  # bytes; the largest official SMPL-X pickle has half of it
 MAX_OPCODES = 200_000  # official files need a few thousand
 
-UNREADABLE_PICKLE: tuple[type[Exception], ...] = (
-    pickle.UnpicklingError,
-    EOFError,
-    AttributeError,
-    ValueError,
-    TypeError,
-)
-UNREADABLE_PICKLE += (LookupError, OverflowError, struct.error, MemoryError)
+UNREADABLE_PICKLE = (*UNREADABLE, pickle.UnpicklingError, AttributeError)
 _REFUSED = {
     pickle.PERSID,
     pickle.BINPERSID,
@@ -323,8 +309,9 @@ _REFUSED = {
     pickle.EXT4,
     pickle.OBJ,
     pickle.NEWOBJ_EX,
+    pickle.NEXT_BUFFER,
+    pickle.READONLY_BUFFER,
 }
-_REFUSED |= {pickle.NEXT_BUFFER, pickle.READONLY_BUFFER}
 
 
 def read_pickle(path: Path, what: str = "a body") -> dict[str, Any]:
@@ -388,13 +375,13 @@ class _BodyUnpickler(pickle._Unpickler):
             return Global(
                 lambda *given: self._encode(*given) if len(given) == 2 else b"".join(given)
             )
-        found = stand_in(f"{module}.{name}")
-        if found is None:
-            shown = in_one_line(f"{module:.80}.{name:.80}")
-            raise ModelFileError(
-                f"it asks for {shown}, which such a file has no use for and which may be an attack"
-            )
-        return found
+        for pattern, stand_in in _GLOBALS.items():
+            if re.fullmatch(pattern, f"{module}.{name}"):
+                return stand_in
+        shown = in_one_line(f"{module:.80}.{name:.80}")
+        raise ModelFileError(
+            f"it asks for {shown}, which such a file has no use for and which may be an attack"
+        )
 
     def _encode(self, text: str, codec: str | bytes) -> bytes:
         """Return bytes that Python 3 wrote as text for old protocols; each at most once, so that

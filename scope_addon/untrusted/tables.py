@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from ...solver.errors import InputError, ModelFileError
 from .files import (
     LARGEST_BYTES,
-    UNREADABLE,
     check_regular,
     in_one_line,
     is_archive,
@@ -89,7 +88,7 @@ def read_tables(path: Path, error: type[InputError], what: str, wanted: Collecti
         raise error(f"{path} cannot be used as a {what}: {cause}") from None
     except FileNotFoundError as cause:
         raise error(f"{path} does not exist; choose an existing {what}") from cause
-    except (*UNREADABLE, *UNREADABLE_PICKLE) as cause:
+    except UNREADABLE_PICKLE as cause:
         raise error(
             f"{path} is not a readable {what} ({in_one_line(cause)}); choose another file"
         ) from cause
