@@ -300,7 +300,11 @@ def _indices(index: NDArray[Any], size: int) -> NDArray[np.intp]:
 LARGEST_FILE = 1 << 30  # bytes; the largest official SMPL-X pickle has half of it
 MAX_OPCODES = 200_000  # official files need a few thousand
 
-UNREADABLE_PICKLE = (*UNREADABLE, pickle.UnpicklingError, AttributeError)
+UNREADABLE_PICKLE: tuple[type[Exception], ...] = (
+    *UNREADABLE,
+    pickle.UnpicklingError,
+    AttributeError,
+)
 _REFUSED = {
     pickle.PERSID,
     pickle.BINPERSID,
