@@ -17,7 +17,6 @@ from scope.solver import (
     Measurements,
     OrientationField,
     ScopeWarning,
-    View,
     rotations,
 )
 
@@ -191,43 +190,6 @@ def test_clips_motions_and_batches_are_told_as_well(change, message):
     ):
         with pytest.warns(ScopeWarning, match=message):
             fit(body, frames)
-
-
-def seen_around(person, change, pitches):
-    """The views of three cameras, whose pixels are changed."""
-    views = []
-    for angle, pitch in zip((-0.8, 0.1, 0.9), pitches, strict=True):
-        R = rotations.exp([pitch, 0.0, 0.0]) @ rotations.exp([0.0, angle, 0.0])
-        t = np.array([0.1, 0.0, 4.0]) - R @ person.points.mean(axis=0)
-        p = person.points @ R.T + t
-        pixels = change(p[:, :2] / p[:, 2:] * CAMERA[0, 0] + CAMERA[:2, 2])
-        index = person.seen.keypoints2d.indices
-        views.append(View(Measurements(CAMERA, Keypoints2D(index, pixels)), R, t))
-    return views
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (from_right, "from the image's left"),
-        (from_below, "from the image's top"),
-        (row_and_column, r"as \(x, y\) instead"),
-    ],
-)
-def test_pixels_of_several_cameras_are_told_before_the_fit(change, message):
-    body, everyone = people()
-    person = everyone[0]
-    views = seen_around(person, change, (0.0, 0.4, -0.3))
-    short = solver.Options(stages=[solver.Stage(max_iterations=1)])
-    with pytest.warns(ScopeWarning, match=message):
-        solver.fit_motion(body, [views], [0.0], init=[person.state], options=short)
-
-
-def test_cameras_at_one_height_that_measure_from_below_see_a_mirrored_person():
-    """Their rays meet, but no body fits the points."""
-    body, everyone = people()
-    with pytest.warns(ScopeWarning, match="y down"):
-        solver.fit_motion(body, [seen_around(everyone[0], from_below, (0.0, 0.0, 0.0))], [0.0])
 
 
 def test_masked_points_are_no_misfit():
