@@ -93,18 +93,12 @@ def refined(body, measurements, focal=True):
 
 def test_recovers_shape_and_focal_length_without_noise():
     body, states, measurements, beta = clip(0)
-    found, scale = refined(body, measurements)
-    np.testing.assert_allclose(found.beta, beta, atol=1e-4)
-    assert scale == pytest.approx(SCALE, abs=1e-5)
-    for f, state in zip(found.frames, states, strict=True):
-        assert np.linalg.norm(f.t_camera_part - forward(body, *state)[1], axis=1).max() < 1e-3
-
-
-def test_recovers_them_from_three_frames():
-    body, _, measurements, beta = clip(1)
-    found, scale = refined(body, measurements[2:11:4])
-    np.testing.assert_allclose(found.beta, beta, atol=2e-4)
-    assert scale == pytest.approx(SCALE, abs=2e-5)
+    for some in (slice(None), slice(2, 11, 4)):
+        found, scale = refined(body, measurements[some])
+        np.testing.assert_allclose(found.beta, beta, atol=2e-4)
+        assert scale == pytest.approx(SCALE, abs=2e-5)
+        for f, state in zip(found.frames, states[some], strict=True):
+            assert np.linalg.norm(f.t_camera_part - forward(body, *state)[1], axis=1).max() < 1e-3
 
 
 def test_noise_leaves_errors_of_the_size_the_information_says():
@@ -115,13 +109,6 @@ def test_noise_leaves_errors_of_the_size_the_information_says():
     # degrees of freedom
     assert error @ found.beta_information @ error / 3.3 < 22.0
     assert abs(scale - SCALE) < 0.02
-
-
-def test_more_frames_say_more_about_the_shape():
-    body, _, measurements, beta = clip(4, noise=2.0)
-    one, _ = refined(body, measurements[:1], focal=False)
-    all_of_them, _ = refined(body, measurements, focal=False)
-    assert np.linalg.eigvalsh(all_of_them.beta_information - one.beta_information).min() > 0
 
 
 def test_joint_step_is_the_dense_step_of_the_whole_clip():
@@ -237,12 +224,8 @@ def test_temporal_terms_pull_towards_the_last_frame():
     assert len(m.tables["joint_prior"][0]) == K
 
 
-def test_a_gap_and_a_clip_without_measurements_end_well():
-    body, _, measurements, _ = clip(9)
-    measurements[4] = Measurements()
-    found = fit_clip(body, measurements)
-    assert found.frames[4].status is Status.NO_MEASUREMENTS
-    assert np.isfinite(found.frames[4].t_camera_part).all()
+def test_a_clip_without_measurements_ends_well():
+    body, *_ = clip(9, frames=1)
     empty = fit_clip(body, [Measurements(), Measurements()], focal=True)
     assert empty.status is Status.NO_MEASUREMENTS
     assert empty.focal_scale == 1.0

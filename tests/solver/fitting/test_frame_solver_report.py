@@ -5,7 +5,6 @@ stopped.
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from scope.solver import (
     FootContacts,
@@ -14,14 +13,12 @@ from scope.solver import (
     Status,
     Temporal,
     Weights,
-    default_priors,
     fit,
     fit_clip,
-    load_body,
 )
 from scope.solver.residuals.registry import NAMES
 
-from ..residuals.test_foot_contact import BODY, FEET, INTRINSICS, points, seen, standing
+from ..residuals.test_foot_contact import BODY, FEET, points, seen, standing
 from .test_frame_solver import measured, scene
 
 REPORT = Options(report=True)
@@ -74,15 +71,3 @@ def test_rejected_steps_are_counted_among_the_iterations():
     assert found.status in (Status.CONVERGED, Status.STALLED, Status.MAX_ITERATIONS)
     short = fit(body, m, options=Options(stages=[Stage(max_iterations=2, tolerance=0.0)]))
     assert (short.status, short.iterations) == (Status.MAX_ITERATIONS, 2)
-
-
-def test_priors_of_a_real_body_show_in_the_report():
-    body = load_body("scope")
-    found = fit(
-        body,
-        replace(seen(standing(2)), intrinsics=INTRINSICS),
-        priors=default_priors(body),
-        options=REPORT,
-    )
-    assert found.cost_by_term["joint_flow"] > 0.0
-    assert np.isfinite(list(found.cost_by_term.values())).all()

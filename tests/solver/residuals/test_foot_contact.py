@@ -16,7 +16,6 @@ from scope.solver import (
     Priors,
     State,
     fit,
-    fit_clip,
     load_body,
     make_tree,
     rotations,
@@ -149,21 +148,6 @@ def test_the_floor_tells_the_depth_that_a_picture_does_not(size):
         # Of the feet: the rest of the body may lean towards the camera or away.
         error.append(np.linalg.norm((points(found.state) - p)[FEET].mean(axis=0)))
     assert error[1] < 0.1 * error[0]
-
-
-def test_contacts_hold_through_a_clip_with_one_shape():
-    state = standing(1)
-    stand = points(state)[FEET]
-    frames = [seen(state, 0.02, seed) for seed in range(6)]
-    contact = FootContacts(FEET, stand, np.ones(4))
-    slide = {}
-    for name, clip in (
-        ("free", frames),
-        ("held", [replace(m, foot_contacts=contact) for m in frames]),
-    ):
-        feet = np.array([points(f.state)[FEET] for f in fit_clip(BODY, clip).frames])
-        slide[name] = np.linalg.norm(np.diff(feet, axis=0), axis=-1).max()
-    assert slide["held"] < 0.2 * slide["free"]
 
 
 def test_a_point_that_is_not_finite_is_left_out_and_no_probability_is_no_contact():
