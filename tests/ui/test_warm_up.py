@@ -5,6 +5,7 @@ capture.
 
 import sys
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -43,37 +44,27 @@ def test_it_runs_once_for_an_installation(process, tmp_path):
     assert (tmp_path / "said").read_text("utf-8").count("\n") == 1
 
 
-class Layout:
-    """Takes what is drawn."""
-
-    def __init__(self):
-        self.shown = []
-
-    def progress(self, text, factor):
-        self.shown.append((text, round(factor, 2)))
-
-
 def test_progress_is_shown_only_while_something_is_compiled(process):
     earlier = (
         cache().kernels / "solver-01234567-0123456789ab" / "optimizer.optimize-0123456789ab.code"
     )
     earlier.parent.mkdir(parents=True)
     earlier.touch()
-    layout = Layout()
+    layout = MagicMock()
     process("import time; time.sleep(600)")
     warm_up.draw(layout)
     warm_up.step()
     warm_up.draw(layout)
-    assert layout.shown == []
+    layout.progress.assert_not_called()
     for n in range(kernel_count() // 2):
         earlier.with_name(f"{n}.code").touch()
     warm_up.draw(layout)
-    ((text, share),) = layout.shown
-    assert share == pytest.approx(0.5, abs=0.01)
-    assert text == f"Compiling the solver: {100 * share:.0f} %"
+    shown = layout.progress.call_args.kwargs
+    assert shown["factor"] == pytest.approx(0.5, abs=0.01)
+    assert shown["text"] == f"Compiling the solver: {100 * shown['factor']:.0f} %"
     warm_up.stop()
     warm_up.draw(layout)
-    assert len(layout.shown) == 1
+    layout.progress.assert_called_once()
 
 
 def test_after_a_failure_it_runs_again(process, tmp_path):
@@ -96,8 +87,6 @@ def test_it_ends_with_the_extension(process):
 
 
 def test_a_capture_ends_it_for_good(process, fake_worker, footage):
-    import bpy
-
     process("import time; time.sleep(600)")
     fake_worker("finish()")
     assert warm_up.step() is not None
@@ -111,8 +100,6 @@ def test_a_capture_ends_it_for_good(process, fake_worker, footage):
 
 
 def test_without_a_window_it_does_not_begin():
-    import bpy
-
     assert not bpy.app.timers.is_registered(warm_up.step)
 
 

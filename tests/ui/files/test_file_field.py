@@ -2,6 +2,7 @@
 """Fields of files: their texts, and the operator that chooses a file for any of them."""
 
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -27,24 +28,6 @@ def preferences():
     addon.module = "scope"
     yield addon.preferences
     bpy.context.preferences.addons.remove(addon)
-
-
-class Row:
-    """A layout that notes the fields and the buttons that are drawn."""
-
-    def __init__(self):
-        self.fields = []
-        self.buttons = []
-
-    def row(self, align):
-        return self
-
-    def prop(self, _settings, name):
-        self.fields.append(name)
-
-    def operator(self, name, **_):
-        self.buttons.append(SimpleNamespace(name=name))
-        return self.buttons[-1]
 
 
 @pytest.mark.parametrize(("owner", "setting"), [*SETTINGS, ("scope", "footage")])
@@ -104,17 +87,17 @@ def test_without_preferences_no_file_is_chosen_for_them():
 
 def test_the_button_beside_a_field_chooses_the_file_of_that_field(preferences):
     scene = bpy.context.scene
-    row = Row()
-    for settings, path in (
-        (scene.scope, "body_file"),
-        (scene.scope_live, "file"),
-        (preferences, "body_file"),
+    for settings, path, drawn in (
+        (scene.scope, "body_file", ("scope", "body_file")),
+        (scene.scope_live, "file", ("scope_live", "file")),
+        (preferences, "body_file", ("preferences", "body_file")),
     ):
-        draw_file(row, settings, path)
-    assert row.fields == ["body_file_text", "file_text", "body_file_text"]
-    assert {button.name for button in row.buttons} == {"scope.choose_file"}
-    drawn = [(button.owner, button.setting) for button in row.buttons]
-    assert drawn == [("scope", "body_file"), ("scope_live", "file"), ("preferences", "body_file")]
+        layout = MagicMock()
+        row = draw_file(layout, settings, path)
+        assert row.prop.call_args.args == (settings, f"{path}_text")
+        assert row.operator.call_args.args == ("scope.choose_file",)
+        button = row.operator.return_value
+        assert (button.owner, button.setting) == drawn
 
 
 @pytest.mark.parametrize(
