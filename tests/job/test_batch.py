@@ -244,24 +244,6 @@ def test_clips_whose_results_were_damaged_are_captured_again(folder, tmp_path):
     assert report["counts"]["skipped"] == 0
 
 
-def test_results_may_be_on_another_disk(folder, tmp_path):
-    """A folder inside the output folder is a link, as users make it who run out of space."""
-    (folder / "later").mkdir()
-    (folder / "later" / "f.mp4").write_text("ok")
-    out = tmp_path / "out"
-    elsewhere = tmp_path / "elsewhere"
-    out.mkdir()
-    elsewhere.mkdir()
-    (out / "later").symlink_to(elsewhere)
-    report = batch(folder, out).run(1, recursive=True)
-    (entry,) = (e for e in report["files"] if e["name"] == "later/f")
-    assert entry["status"] == "done"
-    assert (elsewhere / "f.npz").is_file()
-    calls(folder / "later")
-    batch(folder, out).run(1, recursive=True)
-    assert calls(folder / "later") == []
-
-
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a privilege for links")
 def test_a_link_in_the_place_of_the_report_is_not_followed(tmp_path):
     (tmp_path / "clips").mkdir()

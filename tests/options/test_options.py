@@ -21,7 +21,6 @@ from scope.scope_addon.capture.options import (
 from scope.scope_addon.capture.perception.sessions import CHOICES, LANDMARK_NETWORK_OF_QUALITY
 from scope.scope_addon.cli import build_parser, main
 from scope.scope_addon.command_line.arguments import (
-    body_and_options,
     non_default_arguments,
     option_values,
 )
@@ -122,43 +121,28 @@ def test_heights_of_more_people_than_can_be_are_refused(capsys):
     assert "must give at most 100 heights, not 101" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("outside", [0.499, 2.601])
-def test_heights_outside_the_declared_range_are_errors(body, outside):
-    declared = option("heights_m")
-    assert (declared.minimum, declared.maximum) == (0.5, 2.6)
-    with pytest.raises(UsageError, match="from 50 to 260 cm"):
-        check_options(body, CaptureOptions(heights_m=(outside,)))
-
-
-def test_arguments_reach_the_pipeline(tmp_path):
-    lens = tmp_path / "lens.json"
-    argv = ["--quality", "fast", "--people", "2", "--start", "1.5", "--end", "3", "--fps", "12"]
-    argv += ["--fov", "60", "--height", "175,162", "--no-smoothing", "--threads", "2"]
-    argv += ["--provider", "cpu"]
-    options = body_and_options(parsed(*argv))[1]
-    assert (options.quality, options.people, options.threads) == ("fast", 2, 2)
-    assert options.fov_deg == 60.0
-    assert (options.wanted.start_s, options.wanted.end_s, options.wanted.fps) == (1.5, 3.0, 12)
-    assert options.heights_m == pytest.approx((1.75, 1.62))
-    assert (options.smoothing, options.provider, options.focal_mm) == (False, "cpu", None)
-    assert capture_options(option_values(parsed("--calibration", str(lens)))).calibration == lens
-
-
 def test_a_request_gives_the_same_options_as_the_command_line(tmp_path):
-    argv = ["--people", "all", "--start", "00:01", "--height", "175", "--hands", "--no-smoothing"]
+    argv = ["--people", "all", "--start", "00:01", "--height", "175,162", "--hands"]
+    argv += ["--no-smoothing", "--fps", "12", "--fov", "60", "--threads", "2"]
     argv += ["--detector", str(tmp_path / "a.onnx"), "--calibration", str(tmp_path / "lens.json")]
     request = JobRequest(
         "walk.mp4",
         people="all",
         start="1",
-        heights_m=[1.75],
+        heights_m=[1.75, 1.62],
+        fps="12",
+        fov_deg=60.0,
+        threads=2,
         hands="on",
         smoothing=False,
         detector=str(tmp_path / "a.onnx"),
         calibration=str(tmp_path / "lens.json"),
     )
     travelled = JobRequest.from_json(request.to_json())
-    assert capture_options(travelled.values) == capture_options(option_values(parsed(*argv)))
+    options = capture_options(option_values(parsed(*argv)))
+    assert capture_options(travelled.values) == options
+    assert (options.people, options.wanted.start_s, options.wanted.fps) == ("all", 1.0, 12)
+    assert (options.fov_deg, options.smoothing, options.focal_mm) == (60.0, False, None)
 
 
 @pytest.mark.parametrize(

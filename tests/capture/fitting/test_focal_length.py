@@ -21,12 +21,8 @@ from scope.scope_addon.capture.fitting.focal_length import (
     camera_by_fits,
     focal_from_edges,
 )
-from scope.scope_addon.capture.media.video_range import VideoRange
-from scope.scope_addon.capture.options import CaptureOptions
 from scope.scope_addon.capture.perception.observation import Observation
 from scope.scope_addon.capture.perception.region import Region
-from scope.scope_addon.capture.pipeline import capture
-from scope.scope_addon.cli import SAMPLE
 from scope.solver.rotations import exp
 
 from ..exact_tracks import centred, network_points, pixels_of
@@ -241,14 +237,3 @@ def test_an_observation_that_is_not_finite_has_no_costs(body):
     observation = observe(body, POSES[0], 1.0, 3.0)
     observation.keypoints_px[3] = np.nan
     assert FocalFits(body).costs(observation, FITS_ASSUMED) is None
-
-
-def test_a_given_focal_length_is_not_estimated(body, monkeypatch):
-    def never(*_):
-        raise AssertionError("a fit of a camera that is known")
-
-    monkeypatch.setattr(FocalFits, "costs", never)
-    options = CaptureOptions(quality="fast", fov_deg=40.0, wanted=VideoRange(0, 0.2))
-    result = capture(SAMPLE, body, options)
-    assert result.report.camera == "given, 40 degrees"
-    assert result.report.focal_deviation == 0.0

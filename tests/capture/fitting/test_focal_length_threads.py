@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scope.scope_addon.capture.camera.heading_drift import FrameEdges
-from scope.scope_addon.capture.camera.intrinsics import assumed_camera
+from scope.scope_addon.capture.camera.intrinsics import assumed_camera, choose_camera
 from scope.scope_addon.capture.camera.line_segments import Segments
 from scope.scope_addon.capture.fitting import focal_length
 from scope.scope_addon.capture.fitting.focal_length import (
@@ -113,6 +113,15 @@ def test_an_error_in_a_parallel_thread_is_raised(monkeypatch):
     monkeypatch.setattr(focal_length, "camera_by_edges", broken)
     with pytest.raises(ValueError, match="no edges today"):
         estimate(len(TIMES))
+
+
+def test_a_given_focal_length_is_not_estimated():
+    given = choose_camera(64, 48, fov_deg=40.0)
+    camera, fits = estimate(len(TIMES), given=given)
+    assert fits.times == []
+    expected = given.between_bars(48.0, 64, 48)
+    assert (camera.source, camera.focal_deviation) == (expected.source, 0.0)
+    np.testing.assert_array_equal(camera.intrinsics, expected.intrinsics)
 
 
 @pytest.mark.parametrize(("frames", "lag"), [(len(TIMES), 0), (len(TIMES), 1), (17, 0), (3, 1)])

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from scope.scope_addon.errors import NO_PERSON
@@ -34,18 +37,34 @@ def test_a_value_that_is_too_long_for_a_name_is_no_file() -> None:
     assert basis(height=heights) != basis(height=heights + ",171")
 
 
-def key(footage: Path, out: Path, **options: str | None) -> str:
-    """Return the key with which a clip is captured, which fails at once."""
-    settings = CaptureSettings({f"--{name}": value for name, value in options.items()}, (".npz",))
-    task = ClipTask("walk", footage.name, str(footage), str(out), "basis", settings)
+def arguments_of(footage: Path, out: Path, settings: CaptureSettings) -> list[str]:
+    """Return the arguments with which a clip is captured, which fails at once."""
     found: list[str] = []
 
     def run(arguments: list[str]) -> tuple[int, str, str]:
-        found.append(arguments[-1])
+        found.extend(arguments)
         return 1, "", ""
 
+    task = ClipTask("clip", footage.name, str(footage), str(out), "basis", settings)
     capture_clip(task, ["scope"], run)
-    return found[0]
+    return found
+
+
+def captured(
+    footage: Path, settings: CaptureSettings, meanwhile: Callable[[], object], status: int = 0
+) -> dict[str, Any]:
+    """Return the entry of a clip in its folder, during whose capture something happens."""
+    out = footage.parent
+    result = out / "clip.npz"
+    basis = settings.basis(program_version())
+
+    def run(arguments: list[str]) -> tuple[int, str, str]:
+        meanwhile()
+        result.touch()
+        return status, json.dumps({"outputs": [str(result)]}), ""
+
+    task = ClipTask("clip", footage.name, str(footage), str(out), basis, settings)
+    return capture_clip(task, ["scope"], run)
 
 
 @pytest.mark.parametrize(("changed", "status"), [("a.mp4", 0), ("body.npz", NO_PERSON)])
@@ -56,16 +75,8 @@ def test_a_clip_is_not_finished_if_what_it_is_made_of_changed_after_its_key_was_
     for name in ("a.mp4", "body.npz"):
         (tmp_path / name).write_text("old")
     settings = CaptureSettings({"--body": str(tmp_path / "body.npz")}, (".npz",))
-    task_basis = settings.basis(program_version())
-    footage = str(tmp_path / "a.mp4")
-    task = ClipTask("a", "a.mp4", footage, str(tmp_path), task_basis, settings)
-
-    def run(arguments: list[str]) -> tuple[int, str, str]:
-        (tmp_path / changed).write_text("new")
-        (tmp_path / "a.npz").touch()
-        return status, json.dumps({"outputs": [str(tmp_path / "a.npz")]}), ""
-
-    entry = capture_clip(task, ["scope"], run)
+    change = partial((tmp_path / changed).write_text, "new")
+    entry = captured(tmp_path / "a.mp4", settings, change, status)
     assert (entry["status"], "was changed" in entry["message"]) == ("failed", True)
 
 
@@ -74,17 +85,12 @@ def test_a_file_manager_that_looks_at_pictures_changes_no_footage(tmp_path: Path
     frames.mkdir()
     for name in ("f_1.png", "f_2.png"):
         (frames / name).write_text(name)
-    settings = CaptureSettings({}, (".npz",))
-    task_basis = settings.basis(program_version())
-    task = ClipTask("frames", "frames", str(frames), str(tmp_path), task_basis, settings)
 
-    def run(arguments: list[str]) -> tuple[int, str, str]:
+    def look() -> None:
         for name in (".DS_Store", "Thumbs.db", "._f_1.png"):
             (frames / name).write_text("thumbnails")
-        (tmp_path / "frames.npz").touch()
-        return 0, json.dumps({"outputs": [str(tmp_path / "frames.npz")]}), ""
 
-    assert capture_clip(task, ["scope"], run)["status"] == "done"
+    assert captured(frames, CaptureSettings({}, (".npz",)), look)["status"] == "done"
 
 
 @pytest.mark.parametrize(
@@ -103,14 +109,7 @@ def test_the_overlay_of_a_sequence_is_a_video(
     for each in ("f_1.png", "f_2.png", "still.png", "a.mp4"):
         (tmp_path / each).touch()
     settings = CaptureSettings(options, (".npz",), Extras(overlays=True))
-    footage = str(tmp_path / name)
-    found: list[str] = []
-
-    def run(arguments: list[str]) -> tuple[int, str, str]:
-        found.extend(arguments)
-        return 1, "", ""
-
-    capture_clip(ClipTask("clip", name, footage, str(tmp_path), "", settings), ["scope"], run)
+    found = arguments_of(tmp_path / name, tmp_path, settings)
     assert found[found.index("--overlay") + 1] == str(tmp_path / f"clip.overlay{suffix}")
 
 
@@ -127,11 +126,15 @@ def test_the_numbers_of_pictures_count_since_they_are_times(
         (frames / f"f_{number}.png").write_bytes(b"picture %d" % number)
     assert is_sequence(pictures_in(frames))
     footage = frames / "f_1.png" if first_alone else frames
-    options = {"fps": "30"} if first_alone else {}
-    keys = [key(footage, tmp_path, **options)]
-    assert key(footage, tmp_path, **options) == keys[0]
+    settings = CaptureSettings({"--fps": "30"} if first_alone else {}, (".npz",))
+
+    def key() -> str:
+        return arguments_of(footage, tmp_path, settings)[-1]
+
+    keys = [key()]
+    assert key() == keys[0]
     (frames / "f_3.png").rename(frames / "f_9.png")
-    keys.append(key(footage, tmp_path, **options))
+    keys.append(key())
     (frames / "f_9.png").write_bytes(b"picture X")
-    keys.append(key(footage, tmp_path, **options))
+    keys.append(key())
     assert len(set(keys)) == 3

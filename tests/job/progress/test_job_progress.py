@@ -74,18 +74,6 @@ def test_captures_have_the_stages_whose_shares_the_bar_shows(name):
         assert abs(took.get(stage, 0.0) / end - STAGES[stage] / (1.0 - loading)) < 0.12, stage
 
 
-def test_start_up_is_not_extrapolated():
-    now = [20.0]
-    progress = JobProgress(clock=lambda: now[0])
-    now[0] = 60.0  # loading the networks
-    progress.update("finding the person", 1, 1000)
-    assert progress.seconds_left is None
-    for second in range(1, 11):
-        now[0] = 60.0 + second
-        progress.update("finding the person", 1 + 10 * second, 1000)
-    assert 80 < progress.seconds_left < 130
-
-
 def test_a_stage_that_slows_down_has_no_remaining_time_until_it_is_steady():
     now = [0.0]
     progress = JobProgress(clock=lambda: now[0])
@@ -111,16 +99,6 @@ def test_several_people_have_a_remaining_time_in_all_stages_for_each_of_them(nam
     assert len(ratios) > 20
     assert all(estimate is not None for _, _, estimate in ratios)
     assert 0.5 < np.median([estimate / left for _, left, estimate in ratios]) < 1.5
-
-
-def test_stages_of_a_second_person_have_no_remaining_time_without_an_earlier_capture():
-    messages = [(1.0, "finding the person", 0, 100)]
-    messages += [(1.0 + 0.2 * k, "finding the person", k, 100) for k in range(101)]
-    messages += [(22.0, "finding the shape", 0, 0), (23.0, "solving", 1, 100)]
-    messages += [(24.0, "finding the shape", 0, 0)]
-    second = [(26.0 + 0.2 * k, "solving", k, 100) for k in range(60)]
-    found, _ = replayed([*messages, *second])
-    assert all(left is None for t, _, left in found if t > 24.0)
 
 
 def test_an_estimate_that_is_gone_a_moment_later_is_shown(monkeypatch):
