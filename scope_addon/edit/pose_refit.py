@@ -22,7 +22,7 @@ bending the knees.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -107,6 +107,11 @@ def limb_of(joint: str) -> str:
         if side in ("left", "right") and bare.startswith(names):
             return f"{side}_{limb}"
     return "trunk" if joint in _TRUNK else f"{side}_arm"  # fingers
+
+
+def moves_trunk(joints: Iterable[str]) -> bool:
+    """Return whether one of the corrected joints moves the trunk with it."""
+    return any(limb_of(joint) == "trunk" or joint.endswith(("hip", "collar")) for joint in joints)
 
 
 def _bent_by(joints: tuple[str, ...]) -> set[str]:
@@ -250,23 +255,20 @@ class PoseRefit:
         """Return the shift (3,) by which hips that are measured in the image move there at their
         depth.
         """
-        numbers = {self.number(name): self.joint(name) for name in ("left_hip", "right_hip")}
-        pixels = [
-            (numbers[n], v)
-            for n, v in zip(points.numbers, points.values, strict=True)
-            if n in numbers
-        ]
-        pixels = [(joint, value) for joint, value in pixels if len(value) == 2]
-        if not pixels or camera is None:
+        if camera is None:
             return np.zeros(3)
+        hips = {self.number(name): self.joint(name) for name in ("left_hip", "right_hip")}
         at = self.place(rotations, root)[1]
-        shifts = [point_at_depth(camera, pixel, at[joint]) - at[joint] for joint, pixel in pixels]
-        mean: Float64Array = np.mean(shifts, axis=0)
-        return mean
+        shifts = [
+            point_at_depth(camera, value, at[hips[number]]) - at[hips[number]]
+            for number, value in zip(points.numbers, points.values, strict=True)
+            if number in hips and len(value) == 2
+        ]
+        return np.array(shifts).mean(axis=0) if shifts else np.zeros(3)
 
     def _root_prior(self, R: Float64Array, t: Float64Array, joints: tuple[str, ...]) -> PosePriors:
         """Return the prior on the pelvis, which may move where the trunk is corrected."""
-        trunk = any(limb_of(j) == "trunk" or j.endswith(("hip", "collar")) for j in joints)
+        trunk = moves_trunk(joints)
         # Legs bend rather than let the body move away.
         share = 0.1 if trunk and not _bent_by(joints) else 1.0
         rotation = PELVIS_ROTATION * (0.1 if trunk else 1.0)

@@ -44,6 +44,7 @@ from .pose_refit import (
     Points,
     PoseRefit,
     limb_of,
+    moves_trunk,
     pixel_of,
     within_reach,
 )
@@ -314,8 +315,7 @@ class _Correction:
                     points.add(refit.number(name), soles[k], PINNED)
             elif self._standing[key, k] > _STANDS:
                 points.add(refit.number(name), soles[k], STANDING * self._standing[key, k])
-        moves_trunk = limb == "trunk" or any(joint.endswith(("hip", "collar")) for joint in own)
-        for name in () if moves_trunk else refit.ends:
+        for name in () if moves_trunk(own) else refit.ends:
             if limb_of(name) != limb:
                 points.add(refit.number(name), joints[refit.joint(name)], HELD)
         for other in self._tracks:
