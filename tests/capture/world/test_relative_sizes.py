@@ -17,23 +17,15 @@ def seen_alone(
     return Stander(camera_m * captured_m / true_m, captured_m, is_known)
 
 
-def test_a_child_beside_somebody_of_known_stature_has_the_size_that_the_floor_says():
-    factors = relative_sizes([seen_alone(1.72, 1.72, is_known=True), seen_alone(1.1, 1.66)])
-    assert factors[0] == 1.0
-    assert factors[1] == pytest.approx(1.1 / 1.66, abs=0.02)
+KNOWN = seen_alone(1.72, 1.72, is_known=True)
 
 
-def test_an_adult_moves_towards_the_size_that_the_floor_says():
-    """Both the floor and the estimate are measurements with an error."""
-    factors = relative_sizes([seen_alone(1.72, 1.72, is_known=True), seen_alone(1.6, 1.7)])
-    assert 1.6 / 1.7 + 0.01 < factors[1] < 1.0 - 0.01
-
-
-def test_the_order_of_people_does_not_matter():
-    people = [seen_alone(1.72, 1.72, is_known=True), seen_alone(1.1, 1.66), seen_alone(1.6, 1.7)]
-    np.testing.assert_allclose(
-        relative_sizes(people[::-1]), relative_sizes(people)[::-1], atol=0.01
-    )
+def test_beside_somebody_of_known_stature_the_floor_tells_the_sizes_of_others():
+    """A child has that size; an adult moves towards it, because floor and estimate have errors."""
+    adult, child, known = relative_sizes([seen_alone(1.6, 1.7), seen_alone(1.1, 1.66), KNOWN])
+    assert known == 1.0
+    assert child == pytest.approx(1.1 / 1.66, abs=0.02)
+    assert 1.6 / 1.7 + 0.01 < adult < 1.0 - 0.01
 
 
 @pytest.mark.parametrize(
@@ -47,16 +39,13 @@ def test_the_order_of_people_does_not_matter():
     ids=["unseen", "at the camera's height", "higher", "lower"],
 )
 def test_who_is_not_on_the_floor_keeps_the_size(other):
-    np.testing.assert_array_equal(
-        relative_sizes([seen_alone(1.72, 1.72, is_known=True), other]), 1.0
-    )
+    np.testing.assert_array_equal(relative_sizes([KNOWN, other]), 1.0)
 
 
 def test_without_a_known_stature_nothing_changes():
     np.testing.assert_array_equal(
         relative_sizes([seen_alone(1.72, 1.72), seen_alone(1.1, 1.66)]), 1.0
     )
-    np.testing.assert_array_equal(relative_sizes([seen_alone(1.72, 1.72, is_known=True)]), 1.0)
 
 
 def test_the_height_of_the_camera_is_measured_from_feet_in_contact():

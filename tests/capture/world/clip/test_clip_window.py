@@ -60,17 +60,14 @@ def _points(noise_m: float) -> np.ndarray:
 
 
 def test_each_rest_has_one_place_where_the_point_is_on_average():
-    places, p = resting_places(_points(0.01), RESTING)
+    points = _points(0.01)
+    places, p = resting_places(points, RESTING)
     np.testing.assert_allclose(p, np.where(RESTING > 0.5, RESTING, 0.0))
     for rest in (slice(0, 12), slice(18, T)):
-        np.testing.assert_allclose(
-            places[rest, 0], np.tile(_points(0.01)[rest, 0].mean(axis=0), (12, 1))
-        )
+        mean = points[rest, 0].mean(axis=0)
+        np.testing.assert_allclose(places[rest, 0], np.tile(mean, (12, 1)))
 
 
-def test_a_point_that_strays_has_no_place():
+def test_a_point_that_strays_or_never_rests_has_no_place():
     assert not resting_places(_points(0.1), RESTING)[1].any()
-
-
-def test_a_point_that_never_rests_has_no_place():
     assert not resting_places(_points(0.0), np.zeros((T, 1)))[1].any()
