@@ -7,6 +7,7 @@ import time
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import pytest
@@ -154,25 +155,6 @@ def test_escape_cancels_only_over_the_panel(x, y, window, cancels):
     end_capture()
 
 
-class Drawn:
-    """A layout that notes what is drawn."""
-
-    def __init__(self):
-        self.texts = []
-        self.operators = []
-
-    def column(self):
-        return self
-
-    row = column
-
-    def label(self, text, **_):
-        self.texts.append(text)
-
-    def operator(self, name, **_):
-        self.operators.append(name)
-
-
 @pytest.mark.parametrize(("seconds", "asks"), [(3.0, False), (30.0, True)])
 def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, seconds, asks):
     state.job = SimpleNamespace(cancelled=False, close=lambda: None)
@@ -181,7 +163,7 @@ def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, second
         capture_operators, "time", SimpleNamespace(monotonic=lambda: 100.0 + seconds)
     )
     questions = []
-    drawn = Drawn()
+    layout = MagicMock()
     monkeypatch.setattr(capture_operators, "ask_to_stop", lambda: questions.append(True))
     monkeypatch.setattr(capture_operators.bpy, "app", SimpleNamespace(background=False))
     operator = SimpleNamespace(
@@ -191,9 +173,11 @@ def test_cancelling_asks_when_more_than_ten_seconds_are_done(monkeypatch, second
         SCOPE_OT_cancel.invoke(operator, None, None)
         assert bool(questions) is asks
         assert state.job.cancelled is not asks
-        SCOPE_PT_stop_capture.draw(SimpleNamespace(layout=drawn), None)
-        assert any(f"{seconds:.0f} s" in text for text in drawn.texts)
-        assert drawn.operators == ["scope.keep_capturing", "scope.cancel"]
+        SCOPE_PT_stop_capture.draw(SimpleNamespace(layout=layout), None)
+        assert f"{seconds:.0f} s" in str(layout.column.return_value.label.call_args)
+        row = layout.column.return_value.row.return_value
+        assert row.operator.call_args.args == ("scope.keep_capturing",)
+        assert row.row.return_value.operator.call_args.args == ("scope.cancel",)
     finally:
         monkeypatch.undo()
         state.job = None

@@ -4,6 +4,8 @@ armatures.
 """
 
 from functools import partial
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -230,36 +232,15 @@ def test_a_rig_finds_its_person_after_renaming(two):
 LONG = [f"2026-03-14_interview_camera_left_take_{k:03d}" for k in (1, 2)]
 
 
-def drawn(name: str, width: int) -> dict[str, list]:
-    """What the list draws of a capture in a sidebar of a width, by kind of widget."""
-    found: dict[str, list] = {"prop": [], "operator": [], "label": []}
-
-    class Layout:
-        active = alignment = None
-
-        def split(self, **_):
-            return self
-
-        row = split
-
-        def prop(self, data, prop, **_):
-            found["prop"].append(getattr(data, prop))
-
-        def operator(self, _name, text, **_):
-            properties = type("Properties", (), {"name": ""})()
-            found["operator"].append((text, properties))
-            return properties
-
-        def label(self, text, **_):
-            found["label"].append(text)
-
-    preferences = type("P", (), {"system": type("S", (), {"ui_scale": 1.0})()})()
-    context = type(
-        "C", (), {"preferences": preferences, "region": type("R", (), {"width": width})()}
-    )()
+def drawn(name: str, width: int) -> MagicMock:
+    """Draw a capture in the list of a sidebar of a width; return its row."""
+    layout = MagicMock()
+    region = SimpleNamespace(width=width)
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    context = SimpleNamespace(preferences=preferences, region=region)
     item = bpy.data.collections[name]
-    bpy.types.SCOPE_UL_captures.draw_item(None, context, Layout(), bpy.data, item, 0, None, "")
-    return found
+    bpy.types.SCOPE_UL_captures.draw_item(None, context, layout, bpy.data, item, 0, None, "")
+    return layout.split.return_value
 
 
 def test_long_names_are_told_apart_in_a_narrow_sidebar(two):
@@ -268,19 +249,22 @@ def test_long_names_are_told_apart_in_a_narrow_sidebar(two):
     texts = []
     for name in LONG:
         narrow = drawn(name, 260)
-        assert narrow["prop"] == []
-        [(text, properties)] = narrow["operator"]
+        narrow.prop.assert_not_called()
+        cell = narrow.row.return_value
+        properties = cell.operator.return_value
         assert properties.name == name  # the tooltip and what a click shows
         tip = bpy.types.SCOPE_OT_show_capture.description(bpy.context, properties)
         assert tip == f"{name}\nRename it with Object > Motion Capture > Rename Take"
+        text = cell.operator.call_args.kwargs["text"]
         assert "…" in text
         assert text.startswith(LONG[0][:4])
         assert 10 < len(text) < 30
-        assert drawn(name, 700)["prop"] == [name]
+        assert drawn(name, 700).prop.call_args.args == (bpy.data.collections[name], "name")
         texts.append(text)
     assert texts[0] != texts[1]
-    assert drawn(LONG[0], 260)["label"] == ["1", ""]
-    assert drawn(LONG[0], 700)["label"] == ["1 person", ""]
+    for width, people in ((260, "1"), (700, "1 person")):
+        labels = drawn(LONG[0], width).row.return_value.label.call_args_list
+        assert [label.kwargs["text"] for label in labels] == [people, ""]
 
 
 def test_a_name_that_is_clicked_is_shown(two):
