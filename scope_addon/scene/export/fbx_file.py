@@ -32,7 +32,6 @@ Bones are no objects here: they keep their own scale, which may be animated.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -232,45 +231,76 @@ def _encoded(node: Node, element: Any) -> Any:
     return out
 
 
-@dataclass
-class _Model:
-    """A model of the file, and what belongs to it."""
+class _Connected:
+    """The objects of a file by their numbers, and how they are connected."""
 
-    node: Node
-    parent: int = 0
-    geometries: list[int] = field(default_factory=list)
-    curves: dict[bytes, list[int]] = field(default_factory=dict)  # nodes of animation, by channel
-    own: float | None = 1.0  # the scale that is moved out of it; None: its scale stays
+    def __init__(self, root: Node) -> None:
+        self.nodes = {node.props[0]: node for node in _objects(root)}
+        self.models = {number: node for number, node in self.nodes.items() if node.id == b"Model"}
+        self.sources: dict[int, list[int]] = {}  # of each, what is connected to it
+        self.owner: dict[int, int] = {}  # what it is connected to as an object
+        self.parent: dict[int, int] = {}  # of models
+        self.animation: dict[tuple[int, bytes], list[int]] = {}  # by model and channel
+        for kind, source, target, *channel in _links(root):
+            self.sources.setdefault(target, []).append(source)
+            if kind != b"OO":
+                self.animation.setdefault((target, channel[0]), []).append(source)
+                continue
+            self.owner[source] = target
+            if source in self.models and target in self.models:
+                self.parent[source] = target
+
+    def geometries(self, model: int) -> list[int]:
+        """Return the geometries of a model, and the blend shapes that belong to them."""
+        found = []
+        waiting = self._sources_of_kind(model, b"Geometry")
+        while waiting:
+            number = waiting.pop()
+            if self.nodes[number].id == b"Geometry":
+                found.append(number)
+            waiting += self._sources_of_kind(number, b"Geometry", b"Deformer")
+        return found
+
+    def curves(self, model: int, channel: bytes) -> list[Node]:
+        """Return the curves of a channel."""
+        numbers = [
+            source
+            for node in self.animation.get((model, channel), ())
+            for source in self.sources.get(node, ())
+        ]
+        return [self.nodes[number] for number in numbers if number in self.nodes]
+
+    def _sources_of_kind(self, number: int, *kinds: bytes) -> list[int]:
+        sources = self.sources.get(number, ())
+        return [each for each in sources if each in self.nodes and self.nodes[each].id in kinds]
 
 
 def fold_scales(root: Node) -> None:
     """Give every object with one positive, constant scale the scale 1, in place."""
-    nodes = {node.props[0]: node for node in _objects(root)}
-    links = _links(root)
-    models = _models(nodes, links)
-    for number, model in models.items():
-        model.own = _movable_scale(nodes, links, models, number)
-    if all(model.own in (1.0, None) for model in models.values()):
+    file = _Connected(root)
+    geometries = {number: file.geometries(number) for number in file.models}
+    own = {number: _movable_scale(file, geometries, number) for number in file.models}
+    if all(scale in (1.0, None) for scale in own.values()):
         return
-    total = {number: _total(models, number) for number in models}
-    for number, model in models.items():
-        above = total.get(model.parent, 1.0)
-        _scale_channel(nodes, links, model, b"Lcl Translation", above)
-        _scale_channel(nodes, links, model, b"Lcl Scaling", 1.0 / model.own if model.own else above)
-        for geometry in model.geometries if model.own else ():
-            for vertices in below(nodes[geometry], b"Vertices"):
+    total = {number: _total(own, file.parent, number) for number in file.models}
+    for number, scale in own.items():
+        above = total.get(file.parent.get(number, 0), 1.0)
+        _scale_channel(file, number, b"Lcl Translation", above)
+        _scale_channel(file, number, b"Lcl Scaling", 1.0 / scale if scale else above)
+        for geometry in geometries[number] if scale else ():
+            for vertices in below(file.nodes[geometry], b"Vertices"):
                 _multiply(vertices, total[number])
-    _scale_matrices(nodes, links, models, total)
+    _scale_matrices(file, total)
 
 
-def _total(models: dict[int, _Model], number: int) -> float:
+def _total(own: dict[int, float | None], parent: dict[int, int], number: int) -> float:
     """Return by what a model's matrix in the world is divided: all that is moved out of it and the
     ones above.
+
+    :param own: the scale that is moved out of each model; None: its scale stays.
     """
-    model = models.get(number)
-    if model is None or model.own is None:
-        return 1.0
-    return model.own * _total(models, model.parent)
+    scale = own.get(number)
+    return 1.0 if scale is None else scale * _total(own, parent, parent.get(number, 0))
 
 
 def below(node: Node, *names: bytes) -> Iterator[Node]:
@@ -295,128 +325,61 @@ def properties(node: Node) -> list[Node]:
     return [entry for block in below(node, b"Properties70") for entry in below(block, b"P")]
 
 
-def _models(nodes: dict[int, Node], links: list[list[Any]]) -> dict[int, _Model]:
-    """Return all models with their parents, geometries and animation."""
-    models = {number: _Model(node) for number, node in nodes.items() if node.id == b"Model"}
-    users: dict[int, list[int]] = {}
-    for link in links:
-        if link[0] == b"OO":
-            users.setdefault(link[2], []).append(link[1])
-        elif link[2] in models:
-            models[link[2]].curves.setdefault(link[3], []).append(link[1])
-    for number, model in models.items():
-        for child in users.get(number, ()):
-            if child in models:
-                models[child].parent = number
-            elif child in nodes and nodes[child].id == b"Geometry":
-                model.geometries += _with_shapes(nodes, users, child)
-    return models
-
-
-def _with_shapes(nodes: dict[int, Node], users: dict[int, list[int]], geometry: int) -> list[int]:
-    """Return a geometry and the blend shapes that belong to it."""
-    found = []
-    waiting = [geometry]
-    while waiting:
-        number = waiting.pop()
-        if nodes[number].id == b"Geometry":
-            found.append(number)
-        waiting += [
-            child
-            for child in users.get(number, ())
-            if child in nodes and nodes[child].id in (b"Geometry", b"Deformer")
-        ]
-    return found
-
-
-def _movable_scale(
-    nodes: dict[int, Node], links: list[list[Any]], models: dict[int, _Model], number: int
-) -> float | None:
+def _movable_scale(file: _Connected, geometries: dict[int, list[int]], number: int) -> float | None:
     """Return the scale that can be moved out of a model; None if there are several, or others use
     its mesh.
     """
-    model = models[number]
-    if model.node.props[2] not in _OBJECTS:
+    model = file.models[number]
+    if model.props[2] not in _OBJECTS:
         return 1.0
     scale = next(
-        (entry.props[-3:] for entry in properties(model.node) if entry.props[0] == b"Lcl Scaling"),
+        (entry.props[-3:] for entry in properties(model) if entry.props[0] == b"Lcl Scaling"),
         [1.0] * 3,
     )
-    values = [*scale, *_channel_values(nodes, links, model, b"Lcl Scaling")]
+    values = list(scale)
+    for curve in file.curves(number, b"Lcl Scaling"):
+        for keys in below(curve, b"KeyValueFloat"):
+            values += np.frombuffer(keys.props[0], keys.props_type.decode()).tolist()
     size = float(scale[0])
     is_one_size = size > 0 and all(abs(value - size) <= _SAME * size for value in values)
     is_shared = any(
-        set(model.geometries) & set(other.geometries)
-        for key, other in models.items()
-        if key != number
+        set(geometries[number]) & set(theirs)
+        for other, theirs in geometries.items()
+        if other != number
     )
     if not is_one_size or is_shared:
         return None
     return size if abs(size - 1.0) > _SAME else 1.0
 
 
-def _channel_values(
-    nodes: dict[int, Node], links: list[list[Any]], model: _Model, channel: bytes
-) -> Iterator[float]:
-    """Yield the values of all keys of a channel."""
-    for curve in _curves(nodes, links, model, channel):
-        for keys in below(curve, b"KeyValueFloat"):
-            yield from np.frombuffer(keys.props[0], keys.props_type.decode()).tolist()
-
-
-def _curves(
-    nodes: dict[int, Node], links: list[list[Any]], model: _Model, channel: bytes
-) -> Iterator[Node]:
-    """Yield the curves of a channel."""
-    curve_nodes = model.curves.get(channel, [])
-    for link in links:
-        if link[2] in curve_nodes and nodes.get(link[1]) is not None:
-            yield nodes[link[1]]
-
-
-def _scale_channel(
-    nodes: dict[int, Node], links: list[list[Any]], model: _Model, channel: bytes, factor: float
-) -> None:
+def _scale_channel(file: _Connected, number: int, channel: bytes, factor: float) -> None:
     """Multiply a channel of a model and its animation, in place."""
     if factor == 1.0:
         return
-    for entry in properties(model.node):
-        if entry.props[0] == channel:
-            _multiply(entry, factor)
-    for number in model.curves.get(channel, ()):
-        for entry in properties(nodes[number]):
-            _multiply(entry, factor)
-    for curve in _curves(nodes, links, model, channel):
-        for keys in below(curve, b"KeyValueFloat"):
-            _multiply(keys, factor)
+    entries = [e for e in properties(file.models[number]) if e.props[0] == channel]
+    for node in file.animation.get((number, channel), ()):
+        entries += properties(file.nodes[node])
+    for curve in file.curves(number, channel):
+        entries += below(curve, b"KeyValueFloat")
+    for entry in entries:
+        _multiply(entry, factor)
 
 
-def _scale_matrices(
-    nodes: dict[int, Node],
-    links: list[list[Any]],
-    models: dict[int, _Model],
-    total: dict[int, float],
-) -> None:
+def _scale_matrices(file: _Connected, total: dict[int, float]) -> None:
     """Correct the matrices of rest poses and skins, in place."""
-    users: dict[int, list[int]] = {}
-    owner: dict[int, int] = {}
-    for link in links:
-        if link[0] == b"OO":
-            users.setdefault(link[2], []).append(link[1])
-            owner[link[1]] = link[2]
-    for pose in (node for node in nodes.values() if node.id == b"Pose"):
+    for pose in (node for node in file.nodes.values() if node.id == b"Pose"):
         for entry in below(pose, b"PoseNode"):
             number = next(below(entry, b"Node")).props[0]
-            if number in models:
+            if number in file.models:
                 for matrix in below(entry, b"Matrix"):
                     _multiply(matrix, 1.0 / total[number], _LINEAR)
-    for number, cluster in nodes.items():
-        bones = [child for child in users.get(number, ()) if child in models]
+    for number, cluster in file.nodes.items():
+        bones = [child for child in file.sources.get(number, ()) if child in file.models]
         if cluster.id != b"Deformer" or not bones:
             continue
         mesh = number
-        while mesh in owner and mesh not in models:
-            mesh = owner[mesh]
+        while mesh in file.owner and mesh not in file.models:
+            mesh = file.owner[mesh]
         of_bone = total[bones[0]]
         of_mesh = total.get(mesh, 1.0)
         for matrix in below(cluster, b"Transform"):
@@ -425,7 +388,7 @@ def _scale_matrices(
         for matrix in below(cluster, b"TransformLink"):
             _multiply(matrix, 1.0 / of_bone, _LINEAR)
         armature = bones[0]
-        while armature in models and models[armature].node.props[2] not in _OBJECTS:
-            armature = models[armature].parent
+        while armature in file.models and file.models[armature].props[2] not in _OBJECTS:
+            armature = file.parent.get(armature, 0)
         for matrix in below(cluster, b"TransformAssociateModel"):
             _multiply(matrix, 1.0 / total.get(armature, 1.0), _LINEAR)
