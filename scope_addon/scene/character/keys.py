@@ -90,7 +90,6 @@ def channel_values(
 
     :return: quaternions (T, K+1, 4) on one hemisphere; root locations (T, 3) in the armature's
         space.
-    :raises UsageError: when a bone is missing.
     """
     C = _axes(armature, body)
     rotations = clip.rotations.copy()
@@ -107,8 +106,9 @@ def write_clip(
 
     :raises UsageError: when a bone or its keys are missing.
     """
+    curves = _curves(armature, body)
     values = _values_by_path(body, *channel_values(armature, body, clip))
-    for path, bone in _curves(armature, body).items():
+    for path, bone in curves.items():
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames, values[path][:, index])
 
@@ -127,8 +127,9 @@ def write_keys(
     :param which: (T,) the keys to write.
     :raises UsageError: when a bone or its keys are missing.
     """
+    curves = _curves(armature, body)
     values = _values_by_path(body, *channel_values(armature, body, clip))
-    for path, bone in _curves(armature, body).items():
+    for path, bone in curves.items():
         new = values[path]
         # the sign of the quaternion that is there, since the keys around it stay
         if len(bone) == 4:
@@ -178,7 +179,7 @@ def reduce_keys(
     :param rate: scene frames per second.
     :param angle: maximum error of any bone's rotation, radians.
     :param distance: maximum error of the pelvis's position, metres.
-    :raises UsageError: when a bound is not positive, or a bone or its keys are missing.
+    :raises UsageError: when a bone or its keys are missing.
     """
     clip, frames = read_clip(armature, body, rate)
     q, location = channel_values(armature, body, clip)
@@ -187,9 +188,9 @@ def reduce_keys(
     for path, bone in _curves(armature, body).items():
         before += sum(len(curve.keyframe_points) for curve in bone)
         if path == location_path(body):
-            keep = select_position_keys(clip.times, location, distance)
+            keep = _kept_keys(clip.times, location, _distances, distance)
         else:
-            keep = select_quaternion_keys(clip.times, values[path], angle)
+            keep = _kept_keys(clip.times, values[path], angles_between, angle)
         for index, curve in enumerate(bone):
             rewrite_keys(curve, frames[keep], values[path][keep, index])
         after += len(keep) * len(bone)
@@ -282,60 +283,23 @@ def _check_bones(armature: bpy.types.Object, body: Body) -> None:
 
 def _axes(armature: bpy.types.Object, body: Body) -> NDArray[np.float64]:
     """Return C_i = M_iᵀ R_world_model (K+1, 3, 3)."""
-    _check_bones(armature, body)
     axes: NDArray[np.float64] = np.swapaxes(rest_orientations(armature, body), 1, 2) @ R_WORLD_MODEL
     return axes
 
 
-def select_quaternion_keys(
-    times: NDArray[np.float64], q: NDArray[np.float64], bound: float
-) -> NDArray[np.intp]:
-    """Select the keys that keep every rotation within an error bound.
-
-    :param times: (T,) seconds.
-    :param q: (T, 4) quaternions, all on one hemisphere.
-    :param bound: maximum error, radians.
-    :return: indices of the keys to keep.
-    :raises UsageError: when the bound is not positive.
-    """
-    _check(bound)
-    return _keep(
-        times, lambda a, b, part: angles_between(_lerp(times, q, a, b, part), q[part]), bound
-    )
-
-
-def select_position_keys(
-    times: NDArray[np.float64], p: NDArray[np.float64], bound: float
-) -> NDArray[np.intp]:
-    """Select the keys that keep every position within an error bound.
-
-    :param times: (T,) seconds.
-    :param p: (T, n) positions.
-    :param bound: maximum error, in the unit of ``p``.
-    :return: indices of the keys to keep.
-    :raises UsageError: when the bound is not positive.
-    """
-    _check(bound)
-    return _keep(
-        times,
-        lambda a, b, part: np.linalg.norm(_lerp(times, p, a, b, part) - p[part], axis=1),
-        bound,
-    )
-
-
-def _check(bound: float) -> None:
-    if not np.isfinite(bound) or bound <= 0:
-        raise UsageError(f"the error bound must be above zero, not {bound}")
-
-
-def _keep(
+def _kept_keys(
     times: NDArray[np.float64],
-    error: Callable[[int, int, slice], NDArray[np.float64]],
+    values: NDArray[np.float64],
+    errors: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
     bound: float,
 ) -> NDArray[np.intp]:
-    """Split a span at its worst key while the error exceeds the bound (Ramer, Douglas and Peucker).
+    """Return the indices of keys between which all others are interpolated within an error bound.
 
-    :param error: returns the errors of the keys in a slice, interpolated between two keys.
+    A span is split at its worst key while the error exceeds the bound (Ramer, Douglas and Peucker).
+
+    :param times: (T,) seconds.
+    :param values: (T, n); quaternions are all on one hemisphere.
+    :param errors: of N interpolated values (N, n) and the keys' own, (N,) in the unit of ``bound``.
     """
     keep = np.zeros(len(times), bool)
     keep[[0, -1]] = True
@@ -344,7 +308,9 @@ def _keep(
         a, b = spans.pop()
         if b - a < 2:
             continue
-        off = error(a, b, slice(a + 1, b))
+        inside = slice(a + 1, b)
+        share = ((times[inside] - times[a]) / (times[b] - times[a]))[:, None]
+        off = errors(values[a] + share * (values[b] - values[a]), values[inside])
         worst = int(off.argmax())
         if off[worst] > bound:
             middle = a + 1 + worst
@@ -353,12 +319,10 @@ def _keep(
     return np.flatnonzero(keep)
 
 
-def _lerp(
-    times: NDArray[np.float64], values: NDArray[np.float64], a: int, b: int, part: slice
-) -> NDArray[np.float64]:
-    share: NDArray[np.float64] = ((times[part] - times[a]) / (times[b] - times[a]))[:, None]
-    interpolated: NDArray[np.float64] = values[a] + share * (values[b] - values[a])
-    return interpolated
+def _distances(p: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distances (N,) between positions (N, 3)."""
+    distances: NDArray[np.float64] = np.linalg.norm(p - wanted, axis=1)
+    return distances
 
 
 def angles_between(q: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
