@@ -144,13 +144,11 @@ def add_shape_keys(mesh: bpy.types.Object, body: Body, betas: NDArray[np.floatin
             "for shape keys; "
             "bake the shape into the mesh instead"
         )
-    basis = mesh.shape_key_add(name="Basis", from_mix=False)
-    rest = np.empty(3 * len(body.v_template), np.float32)
-    basis.data.foreach_get("co", rest)
+    rest = key_vertices(mesh.shape_key_add(name="Basis", from_mix=False))
     for p, beta in enumerate(betas):
         key = mesh.shape_key_add(name=shape_key_name(p), from_mix=False)
         offset = body.shapedirs[:, :, p] @ R_WORLD_MODEL.T
-        key.data.foreach_set("co", (rest + offset.ravel()).astype(np.float32))
+        key.data.foreach_set("co", (rest + offset).astype(np.float32).ravel())
         # Must come first: Blender silently clamps values and keys to this range.
         key.slider_min = -SLIDER_LIMIT
         key.slider_max = SLIDER_LIMIT
@@ -182,12 +180,16 @@ def mixed_vertices(mesh: bpy.types.Object, without: Container[str] = ()) -> NDAr
     :param without: names of keys that are left out.
     """
     blocks = mesh.data.shape_keys.key_blocks
-    basis = np.empty(3 * len(mesh.data.vertices), np.float32)
-    blocks[0].data.foreach_get("co", basis)
+    basis = key_vertices(blocks[0])
     mixed = basis.astype(float)
-    key = np.empty_like(basis)
     for block in blocks[1:]:
         if not block.mute and block.name not in without:
-            block.data.foreach_get("co", key)
-            mixed += block.value * (key - basis)
-    return mixed.astype(np.float32).reshape(-1, 3)
+            mixed += block.value * (key_vertices(block) - basis)
+    return mixed.astype(np.float32)
+
+
+def key_vertices(key: bpy.types.ShapeKey) -> NDArray[np.float32]:
+    """Return where a shape key has the vertices (V, 3)."""
+    vertices = np.empty((len(key.data), 3), np.float32)
+    key.data.foreach_get("co", vertices.ravel())
+    return vertices

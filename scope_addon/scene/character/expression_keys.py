@@ -15,7 +15,7 @@ from ...kinematics.face import EXPRESSIONS, expressions_of, mouth_faces_of
 from ...motion import Motion
 from ..actions import Channels, fcurves, read_keys, shape_key_path
 from ..timing import whole_frames_of
-from .body_mesh import colour_faces
+from .body_mesh import colour_faces, key_vertices
 
 MOUTH_COLOR = (0.06, 0.01, 0.01)  # linear
 MOVES = 1e-3  # change of a weight from which an expression counts as moving
@@ -37,7 +37,7 @@ def add_expression_keys(mesh: bpy.types.Object, body: Body) -> bool:
         return False
     if mesh.data.shape_keys is None:
         mesh.shape_key_add(name="Basis", from_mix=False)
-    rest = _places(mesh.data.shape_keys.key_blocks[0])
+    rest = key_vertices(mesh.data.shape_keys.key_blocks[0])
     for expression in expressions:
         moved = rest.copy()
         moved[expression.vertices] += (expression.offsets @ R_WORLD_MODEL.T).astype(np.float32)
@@ -79,8 +79,8 @@ def expression_offsets(mesh: bpy.types.Object) -> dict[str, NDArray[np.float32]]
     such keys.
     """
     blocks = mesh.data.shape_keys.key_blocks
-    basis = _places(blocks[0])
-    return {name: _places(blocks[name]) - basis for name in EXPRESSIONS if name in blocks}
+    basis = key_vertices(blocks[0])
+    return {name: key_vertices(blocks[name]) - basis for name in EXPRESSIONS if name in blocks}
 
 
 def copy_expressions(
@@ -91,7 +91,7 @@ def copy_expressions(
     :param source: the other mesh's shape keys.
     :param offsets: (V, 3) each, as from `expression_offsets`.
     """
-    rest = _places(mesh.shape_key_add(name="Basis", from_mix=False))
+    rest = key_vertices(mesh.shape_key_add(name="Basis", from_mix=False))
     for name, offset in offsets.items():
         _add_key(mesh, name, rest + offset, source.key_blocks[name].value)
     animated = {curve.data_path: curve for curve in fcurves(source)}
@@ -101,13 +101,6 @@ def copy_expressions(
             keys = read_keys(curve).astype(float)
             if len(keys):
                 channels.write(curve.data_path, keys[:, 0], keys[:, 1])
-
-
-def _places(key: bpy.types.ShapeKey) -> NDArray[np.float32]:
-    """Return where a shape key has the vertices (V, 3)."""
-    places = np.empty((len(key.data), 3), np.float32)
-    key.data.foreach_get("co", places.ravel())
-    return places
 
 
 def _add_key(mesh: bpy.types.Object, name: str, places: NDArray[np.float32], value: float) -> None:

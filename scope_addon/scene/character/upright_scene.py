@@ -53,9 +53,7 @@ def turn_camera(
 
 def _place(camera: bpy.types.Object) -> list[list[float]]:
     """Return the camera's keys, or without keys its own transform, as exact numbers."""
-    keys = [
-        curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")
-    ]
+    keys = _curves(camera)
     own = [*camera.location, *camera.rotation_quaternion, *camera.rotation_euler, *camera.scale]
     return [[] if keys else own, *(read_keys(c).ravel().tolist() for c in keys)]
 
@@ -80,17 +78,19 @@ def _is_like(place: object, now: list[list[float]]) -> bool:
 
 def _put(camera: bpy.types.Object, place: list[list[float]]) -> None:
     """Put the camera where ``_place`` found it."""
-    keys = [
-        curve for curve in fcurves(camera) if curve.data_path in ("location", "rotation_quaternion")
-    ]
     if own := place[0]:
         camera.location = own[:3]
         camera.rotation_quaternion = own[3:7]
         camera.rotation_euler = own[7:10]
         camera.scale = own[10:13]
-    for curve, values in zip(keys, place[1:], strict=True):
+    for curve, values in zip(_curves(camera), place[1:], strict=True):
         frames, numbers = np.array(values).reshape(-1, 2).T
         rewrite_keys(curve, frames, numbers)
+
+
+def _curves(camera: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Return the curves of a camera's place."""
+    return [c for c in fcurves(camera) if c.data_path in ("location", "rotation_quaternion")]
 
 
 def move_camera(

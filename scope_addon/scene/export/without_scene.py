@@ -76,7 +76,7 @@ def write_without_scene(
             check_rows(motion)
     for target, motion, body in zip(targets, motions, bodies, strict=True):
         if suffix == ".trc":
-            write_trc(target, motion, body)
+            write_result(target, trc_text(target.name, motion, body))
         elif suffix == ".c3d":
             write_c3d(target, motion, body, start_s)
         elif suffix == ".vrma":
@@ -127,19 +127,11 @@ def _in_gap(motion: Motion, times_s: NDArray[np.float64]) -> NDArray[np.bool_]:
     return is_long & between
 
 
-def write_trc(path: Path, motion: Motion, body: Body) -> None:
-    """Write the markers of a motion.
-
-    :param body: that the motion was fitted with.
-    :raises OutputError: the file cannot be written.
-    """
-    write_result(path, trc_text(path.name, motion, body))
-
-
 def trc_text(name: str, motion: Motion, body: Body) -> str:
-    """Return the content of the file.
+    """Return the content of a .trc file with the markers of a motion.
 
     :param name: of the file, which stands in it.
+    :param body: that the motion was fitted with.
     """
     names, markers, _ = world_markers(motion, body)
     rate = motion.mocap_framerate
