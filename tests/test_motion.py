@@ -9,36 +9,15 @@ import pytest
 from scope.scope_addon.errors import MotionFileError, OutputError
 from scope.scope_addon.motion import FACE_KEYS, SIGMA_KEYS, VIEW_KEYS, Motion
 from scope.scope_addon.scene_gaps import SCENE_GAP_S
+from scope.solver.body_file import load_body
 
-from .made_motion import made_face, made_views
+from .made_motion import made_face, made_motion, made_views
 
 
-def make_motion(T=4, K1=24, J=33, P=10):
+def make_motion():
     rng = np.random.default_rng(0)
-    return Motion(
-        poses=rng.normal(size=(T, 3 * K1)),
-        trans=rng.normal(size=(T, 3)),
-        poses_raw=rng.normal(size=(T, 3 * K1)),
-        trans_raw=rng.normal(size=(T, 3)),
-        betas=rng.normal(size=P),
-        body_model="scope",
-        gender="neutral",
-        mocap_framerate=30000 / 1001,
-        frames=np.arange(T),
-        timestamps=np.arange(T) * 1001 / 30000,
-        valid=np.ones(T, bool),
-        joints_cam=rng.normal(size=(T, K1, 3)),
-        keypoints2d=rng.normal(size=(T, J, 3)),
-        keypoints2d_names=np.array([f"k{j}" for j in range(J)]),
-        intrinsics=np.eye(3),
-        dist=np.zeros(5),
-        joint_confidence=np.ones((T, K1)),
-        world_from_camera=np.tile(np.eye(4), (T, 1, 1)),
-        foot_contact=np.zeros((T, 4)),
-        residual_px=np.ones(T),
-        image_size=np.array([640, 480]),
-        source="clip.mp4",
-    )
+    poses, trans, joints = (rng.normal(size=(4, *shape)) for shape in ((72,), (3,), (24, 3)))
+    return made_motion(load_body("scope"), poses, trans, rate=30000 / 1001, joints_cam=joints)
 
 
 def test_a_saved_motion_loads_the_same(tmp_path):
