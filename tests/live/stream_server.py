@@ -39,23 +39,35 @@ def served(folder, name, data):
         yield f"http://127.0.0.1:{port}/{name}"
 
 
-def encoded(images, codec="mpeg2video", kind="mpegts", group=10, begins_s=0.0, rate=30):
-    """Return RGB images as a stream whose key frames are ``group`` frames apart."""
+def encoded(
+    images,
+    codec="mpeg2video",
+    kind="mpegts",
+    group=10,
+    begins_s=0.0,
+    rate=30,
+    pixels="yuv420p",
+    **how,
+):
+    """Return RGB images as a stream whose key frames are ``group`` frames apart.
+
+    :param how: options of the encoder.
+    """
     target = io.BytesIO()
     with av.open(
         target, "w", format=kind, options=FRAGMENTED if kind == "mp4" else {}
     ) as container:
-        stream = container.add_stream(codec, rate=rate)
+        stream = container.add_stream(codec, rate=30)
         stream.height, stream.width = images[0].shape[:2]
-        stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+        stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else pixels
         stream.bit_rate = 4_000_000
         stream.gop_size = group
         stream.max_b_frames = 0
-        stream.options = _WITHOUT_SCENE_CUTS.get(codec, {})
+        stream.options = how or _WITHOUT_SCENE_CUTS.get(codec, {})
         for k, image in enumerate(images):
             frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-            frame.time_base = Fraction(1, rate)
-            frame.pts = round(begins_s * rate) + k
+            frame.time_base = Fraction(1, 30)
+            frame.pts = round(begins_s * 30) + k
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return target.getvalue()

@@ -5,12 +5,13 @@ others do.
 
 import io
 import re
-from fractions import Fraction
 
 import av
 import numpy as np
 import pytest
 from scope.scope_addon.live.damage import FrameNumbers
+
+from .stream_server import encoded
 
 WAYS = {
     "baseline": ("mpegts", {"profile": "baseline"}, "yuv420p"),
@@ -28,23 +29,10 @@ WAYS = {
 def packets_of(way, count=80):
     """The packets of a stream, and its extradata."""
     kind, options, pixels = WAYS[way]
-    random = np.random.default_rng(0)
-    target = io.BytesIO()
-    with av.open(target, "w", format=kind) as container:
-        stream = container.add_stream(
-            "libx264", rate=30, options={"preset": "ultrafast", "bf": "0"} | options
-        )
-        stream.height = 64
-        stream.width = 64
-        stream.pix_fmt = pixels
-        for k in range(count):
-            picture = random.integers(0, 255, (64, 64, 3), np.uint8)
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            frame.time_base = Fraction(1, 30)
-            frame.pts = k
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
-    with av.open(io.BytesIO(target.getvalue())) as container:
+    pictures = np.random.default_rng(0).integers(0, 255, (count, 64, 64, 3), np.uint8)
+    how = {"preset": "ultrafast", "bf": "0"} | options
+    data = encoded(pictures, "libx264", kind, group=250, pixels=pixels, **how)
+    with av.open(io.BytesIO(data)) as container:
         stream = container.streams.video[0]
         packets = [packet for packet in container.demux(stream) if packet.dts is not None]
         return [bytes(packet) for packet in packets], stream.codec_context.extradata
