@@ -14,20 +14,15 @@ from scope.tools.train_prior.data import (
     ALWAYS,
     FOLDS,
     MIRROR,
-    MODELS,
     PAIRED,
     RESERVED,
     TEST,
     TRUNK,
     group_of,
-    load_samples,
     mirrored,
 )
 from scope.tools.train_prior.export import flat
 from scope.tools.train_prior.export import mirrored as mirrored_parameters
-from scope.tools.train_prior.rotation_statistics import balanced, mean_rotation
-
-from ...required import missing
 
 FIXTURE = Path(__file__).with_name("flow_by_torch.npz")
 
@@ -109,39 +104,3 @@ def test_built_in_prior_is_a_density_of_each_joint(prior, joint):
     np.testing.assert_allclose(jf.transform(wide, Omega)[0], z, atol=1e-4)
     ratio = np.exp(prior.log_density(joint, Omega) - jf.log_density(wide, Omega))
     assert ratio.mean() == pytest.approx(1.0, abs=5.0 * ratio.std() / np.sqrt(len(ratio)))
-
-
-@pytest.fixture(scope="module")
-def samples():
-    motions = Path(__file__).resolve().parents[3] / "build" / "mocap" / "motions.npz"
-    if not motions.exists():
-        missing(
-            f"{motions} is not built: python -m scope.tools.mocap.fit_body makes it",
-            allowed_by="SCOPE_WITHOUT_TRAINING",
-        )
-    return load_samples(motions, load_body("scope").joint_names)
-
-
-def test_samples_of_the_prior_look_like_the_data(prior, samples):
-    """Mean rotation, and spread about it along its principal axes, of training performers and of
-    samples.
-    """
-    rng = np.random.default_rng(4)
-    for model in MODELS:
-        joint = model if model in TRUNK else f"left_{model}"
-        s = samples[model]
-        data = s.rotations[s.is_training]
-        weights = balanced(s.group[s.is_training], 0.7)
-        drawn = prior.sample(joint, 4000, rng)
-        M = mean_rotation(data, weights)
-        x = rotations.log(M.T @ data)
-        y = rotations.log(M.T @ drawn)
-        C = np.einsum("n,ni,nj->ij", weights, x, x)
-        spread, axes = np.linalg.eigh(C)
-        found = np.diag(axes.T @ (y.T @ y / len(y)) @ axes)
-        assert np.linalg.norm(y.mean(0)) < 0.35 * np.sqrt(spread[2]) + np.radians(1.0), model
-        ratio = np.sqrt(found[1:] + np.radians(1.0) ** 2) / np.sqrt(
-            spread[1:] + np.radians(1.0) ** 2
-        )
-        assert (0.6 < ratio).all(), (model, ratio)
-        assert (ratio < 1.6).all(), (model, ratio)
