@@ -69,13 +69,30 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class Contact:
-    """A foot that stands still on the floor from one frame to another, both inclusive, or another
-    part that rests there.
-    """
+class Span:
+    """From one frame to another, both inclusive."""
 
     first: int
     last: int
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        :raises UsageError: the span is empty.
+        """
+        if max(abs(self.first), abs(self.last)) > _LAST_FRAME:
+            raise UsageError(f"there are no frames from {self.first} to {self.last}")
+        if self.last < self.first:
+            raise UsageError(
+                f"the span ends in frame {self.last}, before it begins in frame {self.first}; swap "
+                "them"
+            )
+
+
+@dataclass(frozen=True)
+class Contact(Span):
+    """A foot that stands still on the floor, or another part that rests there."""
+
     part: str  # "left" or "right" for the foot, or one of `RESTING_PARTS`
 
     def __post_init__(self) -> None:
@@ -88,15 +105,13 @@ class Contact:
                 f"the foot must be left or right, or what rests one of {', '.join(RESTING_PARTS)}, "
                 f"not {self.part!r}"
             )
-        _check_span(self.first, self.last)
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
-class Exchange:
-    """Left and right limbs are exchanged from one frame to another, both inclusive."""
+class Exchange(Span):
+    """Left and right limbs are exchanged."""
 
-    first: int
-    last: int
     limbs: str = "both"  # "arms", "legs" or "both"
 
     def __post_init__(self) -> None:
@@ -106,17 +121,13 @@ class Exchange:
         """
         if self.limbs not in ("arms", "legs", "both"):
             raise UsageError(f"limbs must be arms, legs or both, not {self.limbs!r}")
-        _check_span(self.first, self.last)
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
-class DepthFlip:
-    """A limb or the body is mirrored in depth, as the camera sees it, from one frame to another,
-    both inclusive.
-    """
+class DepthFlip(Span):
+    """A limb or the body is mirrored in depth, as the camera sees it."""
 
-    first: int
-    last: int
     part: str  # One of `DEPTH_PARTS`.
 
     def __post_init__(self) -> None:
@@ -126,24 +137,12 @@ class DepthFlip:
         """
         if self.part not in DEPTH_PARTS:
             raise UsageError(f"part must be one of {', '.join(DEPTH_PARTS)}, not {self.part!r}")
-        _check_span(self.first, self.last)
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
-class Interpolation:
-    """The motion from one frame to another, both inclusive, is interpolated from the frames around
-    them.
-    """
-
-    first: int
-    last: int
-
-    def __post_init__(self) -> None:
-        """Check the values.
-
-        :raises UsageError: the span is empty.
-        """
-        _check_span(self.first, self.last)
+class Interpolation(Span):
+    """The motion is interpolated from the frames around the span."""
 
 
 @dataclass(frozen=True)
@@ -256,15 +255,6 @@ def floor_height(corrections: Iterable[Correction]) -> float:
 def feet_on_floor(corrections: Iterable[Correction]) -> FeetOnFloor | None:
     """Return how feet are put on the floor; None where they are not."""
     return _only(corrections, FeetOnFloor)
-
-
-def _check_span(first: int, last: int) -> None:
-    if max(abs(first), abs(last)) > _LAST_FRAME:
-        raise UsageError(f"there are no frames from {first} to {last}")
-    if last < first:
-        raise UsageError(
-            f"the span ends in frame {last}, before it begins in frame {first}; swap them"
-        )
 
 
 def added(corrections: tuple[Correction, ...], new: Correction) -> tuple[Correction, ...]:

@@ -19,7 +19,7 @@ With the pose as it was as the prior of step 3, only to 46 pixels and 11 cm.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,9 +68,8 @@ class Shot:
     times: Float64Array  # (N,) seconds, on the clock of the clip that is corrected
     world_from_camera: Float64Array  # (N, 4, 4)
     intrinsics: Float64Array  # (N, 3, 3)
-    valid: BoolArray | None = None  # (N,) whether the person was seen; None: in all
-    # (M,) seconds, when the footage cuts to another scene, on the same clock
-    cuts_s: Float64Array = field(default_factory=lambda: np.zeros(0))
+    valid: BoolArray  # (N,) whether the person was seen
+    cuts_s: Float64Array  # (M,) when the footage cuts to another scene, on the same clock
 
     def with_gaps(self) -> Shot:
         """Return the shot on a clock that has gaps at scene cuts."""
@@ -83,8 +82,6 @@ class Shot:
 
     def seen_at(self, times: Float64Array) -> BoolArray:
         """Return whether the person was seen in the frames nearest to times, (T,)."""
-        if self.valid is None:
-            return np.ones(len(times), bool)
         seen: BoolArray = self.valid[
             np.searchsorted(0.5 * (self.times[1:] + self.times[:-1]), times)
         ]

@@ -21,6 +21,8 @@ SHOT = Shot(
     TRUTH.times,
     level_camera(T),
     np.tile([[900.0, 0, 320], [0, 900.0, 240], [0, 0, 1]], (T, 1, 1)),
+    np.ones(T, bool),
+    np.zeros(0),
 )
 JOINTS = TRUTH.joints(BODY, BETAS)
 # the corrupted span
@@ -148,7 +150,7 @@ def test_a_body_that_is_pulled_down_in_the_image_bends_its_knees_in_place(joint,
     soles = still.soles(BODY, BETAS)
     camera = level_camera(T)
     camera[:, 2, 3] = height
-    shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
+    shot = replace(SHOT, world_from_camera=camera)
     pin = Pin(45, joint, tuple(shot.project(45, at[45, number] - [0.0, 0.0, down])))
     moved = resolve(still, BODY, BETAS, [pin], shot)
     assert missed(moved, BODY, BETAS, pin, shot) < 0.5
@@ -166,7 +168,7 @@ def test_a_pelvis_in_the_image_stays_at_its_depth_whatever_the_camera_looks_at(p
     s = np.sin(np.radians(pitch))
     camera[:, :3, :3] = np.stack([[1.0, 0, 0], [0, -s, -c], [0, c, -s]], axis=1)
     camera[:, :3, 3] = at - 3.0 * camera[0, :3, 2]
-    shot = Shot(SHOT.frames, SHOT.times, camera, SHOT.intrinsics)
+    shot = replace(SHOT, world_from_camera=camera)
     u, v = shot.project(45, at)
     pin = Pin(45, "pelvis", (u + 15.0, v + 15.0))
     moved = resolve(TRUTH, BODY, BETAS, [pin], shot)
@@ -299,7 +301,7 @@ def test_corrections_at_frames_without_keys_are_left_out():
 def test_a_span_has_no_key_of_a_frame_beside_it_whatever_the_rate():
     times = np.cumsum([0.0, *[0.033] * 10, 0.012, *[0.033] * 10])
     n = len(times)
-    shot = Shot(np.arange(n), times, level_camera(n), np.tile(np.eye(3), (n, 1, 1)))
+    shot = replace(SHOT, frames=np.arange(n), times=times)
     clip = Clip(times, np.zeros((n, 1, 3, 3)), np.zeros((n, 3)))
     np.testing.assert_array_equal(keys_of_span(clip, 11, 14, shot), np.arange(11, 15))
     np.testing.assert_array_equal(keys_of_span(clip, 8, 10, shot), np.arange(8, 11))
