@@ -45,7 +45,6 @@ def encoded(
     kind="mpegts",
     group=10,
     begins_s=0.0,
-    rate=30,
     pixels="yuv420p",
     **how,
 ):
@@ -73,14 +72,14 @@ def encoded(
     return target.getvalue()
 
 
-def without(data, numbers, kind="mpegts"):
+def without(data, numbers):
     """Return a stream without its packets of these numbers, of whose loss it says nothing
     itself.
     """
     target = io.BytesIO()
     with (
         av.open(io.BytesIO(data)) as source,
-        av.open(target, "w", format=kind, options=FRAGMENTED) as container,
+        av.open(target, "w", format="mpegts") as container,
     ):
         stream = container.add_stream_from_template(source.streams.video[0])
         for k, packet in enumerate(source.demux(video=0)):

@@ -48,17 +48,11 @@ def walking(count=COUNT):
 
 
 @cache
-def _encoded(codec, kind):
-    return encoded(walking(), codec, kind, GROUP)
-
-
-def encoded_once(codec, kind="mpegts"):
+def encoded_once(codec):
     """The stream of ``walking``. x264 sometimes encodes the same pictures otherwise, so every test
     has to get the same.
-
-    (To `cache`, a call without a default value is not that with it.)
     """
-    return _encoded(codec, kind)
+    return encoded(walking(), codec, group=GROUP)
 
 
 def shown(address, clock=None):
@@ -80,7 +74,7 @@ def truth_of(tmp_path_factory):
     with.
     """
     folder = tmp_path_factory.mktemp("intact")
-    return cache(lambda codec, kind="mpegts": served_pictures(folder, encoded_once(codec, kind)))
+    return cache(lambda codec: served_pictures(folder, encoded_once(codec)))
 
 
 @pytest.fixture(scope="module")
