@@ -12,21 +12,21 @@ from scope.scope_addon.capture.fitting.hand_measurements import HAND_KEYPOINT_NA
 from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.perception.face_record import RECORD, parts, with_expression
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_POINTS
-from scope.scope_addon.capture.perception.landmark_network import HIPS, KEYPOINT_NAMES
+from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import camera_towards
 from scope.scope_addon.capture.reporting import hand_frames
 from scope.scope_addon.capture.several_views.best_view import best_camera, with_best_faces
 from scope.scope_addon.capture.several_views.bundle import CameraPlace
 from scope.scope_addon.capture.several_views.person_in_views import PersonInViews
 from scope.scope_addon.capture.solve import solve_people
-from scope.scope_addon.capture.tracking.track import Track
 from scope.scope_addon.capture.world.assemble import Shot
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
+from ..exact_tracks import pixels_of, track_of_points
+
 T = 20
-TIMES = np.arange(T) / 30.0
 K = np.array([[1200.0, 0.0, 640.0], [0.0, 1200.0, 360.0], [0.0, 0.0, 1.0]])
 CAMERA = Camera(K, np.zeros(5), "given")
 SIDES = ("left", "right")
@@ -71,19 +71,10 @@ def track_of(body, points, hand_confidence):
         of_hand = points[[body.keypoint_names.index(n) for n in names]]
         middle = of_hand.mean(axis=0)
         R_virtual_camera = camera_towards((middle[:2] / middle[2])[None])[0]
-        hands[:, side, :, :2] = pixels_of(of_hand)
+        hands[:, side, :, :2] = pixels_of(of_hand, K)
         hands[:, side, :, 2] = hand_confidence[side]
         hands[:, side, :, 3:6] = (of_hand - middle) @ R_virtual_camera.T
-    return Track(
-        frames=np.arange(T),
-        times=TIMES,
-        seen=np.ones(T, bool),
-        keypoints_px=np.tile(pixels_of(own), (T, 1, 1)),
-        confidence=np.full((T, len(own)), 0.9),
-        world_landmarks=np.tile(own - own[HIPS].mean(axis=0), (T, 1, 1)),
-        acquired=np.arange(T) == 0,
-        hands=hands,
-    )
+    return track_of_points(np.tile(own, (T, 1, 1)), K, hands=hands)
 
 
 def tracks_of(body, *hand_confidence):
@@ -96,11 +87,6 @@ def tracks_of(body, *hand_confidence):
 def person_in_views(body, first, second):
     shot = Shot(body, CAMERA, CameraPath.static(T), Lines.none(), Fraction(30), (1280, 720), "made")
     return shot, PersonInViews(shot, first, [(second, CAMERA, BESIDE)], None, lambda *_: None)
-
-
-def pixels_of(points):
-    projected = points @ K.T
-    return projected[:, :2] / projected[:, 2:]
 
 
 @pytest.mark.slow
@@ -152,15 +138,7 @@ def test_a_hand_does_not_change_between_cameras_that_see_it_equally_well():
 
 def test_expressions_come_from_the_camera_that_sees_the_face():
     rng = np.random.default_rng(2)
-    empty = Track(
-        np.arange(T),
-        TIMES,
-        np.ones(T, bool),
-        np.zeros((T, 33, 2)),
-        np.zeros((T, 33)),
-        np.zeros((T, 33, 3)),
-        np.zeros(T, bool),
-    )
+    seen = track_of_points(np.ones((T, 33, 3)), K)
     faces = []
     for weight in (0.1, 0.7):
         rows = rng.uniform(0.0, 1.0, (T, RECORD))
@@ -170,7 +148,7 @@ def test_expressions_come_from_the_camera_that_sees_the_face():
     faces[0][10:, 0] = 0.0
     faces[1][:, 0] = 0.5
     faces[1][:10, 0] = 0.0
-    tracks = [replace(empty, face=face) for face in faces]
+    tracks = [replace(seen, face=face) for face in faces]
     alone, whole = with_best_faces(tracks)
     confidence, _, weights, _, contours = parts(whole.face)
     np.testing.assert_array_equal(confidence, np.repeat([0.9, 0.5], 10))

@@ -6,8 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
-from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.several_views import bundle
 from scope.scope_addon.capture.several_views import calibrate as calibration
 from scope.scope_addon.capture.several_views.bundle import CameraPlace, Given, adjust
@@ -31,12 +29,12 @@ from scope.scope_addon.capture.several_views.synchronize import likely_offsets
 from scope.scope_addon.errors import CancelledError
 from scope.solver import load_body, rotations
 
+from ..exact_tracks import network_points
+
 SECONDS = 4.0
-BODY = with_keypoint_offsets(load_body("scope"))
-AT = BODY.keypoint_set("blazepose")
-INDICES = [AT[KEYPOINT_NAMES[k]] for k in KEYPOINTS]
+BODY = load_body("scope")
 REST = np.tile(np.eye(3), (BODY.K + 1, 1, 1))
-MEAN_LENGTHS = bone_lengths(BODY.keypoints(REST, BODY.rest_joints(), which=INDICES))
+MEAN_LENGTHS = bone_lengths(network_points(BODY, REST, BODY.rest_joints())[KEYPOINTS])
 FIRST = CameraPlace.first()
 
 
@@ -63,7 +61,7 @@ def moving_points(seed=0, center=(0.0, 0.0, 4.0)):
         walk = np.array([0.4 * np.sin(0.8 * time_s), 0.0, 0.4 * np.cos(1.1 * time_s)])
         root = np.asarray(center) + walk
         R, t = BODY.forward_kinematics(omega, root - BODY.rest_joints()[0])
-        return BODY.keypoints(R, t, which=INDICES)
+        return network_points(BODY, R, t)[KEYPOINTS]
 
     return points
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scope.scope_addon.capture.fitting.prepared_track import Stance
 from scope.scope_addon.capture.fitting.weights import motion_priors
+from scope.scope_addon.capture.perception.landmark_network import HIPS
 from scope.scope_addon.capture.world import clip_fit
 from scope.scope_addon.capture.world.camera_path import CameraPath
 from scope.scope_addon.capture.world.clip_fit import ACROSS, ALONG, joint_sigma
@@ -21,12 +22,12 @@ from scope.scope_addon.capture.world.placement import place_track
 from scope.scope_addon.kinematics.body_surface import BodySurface, with_arm_points
 from scope.solver.rotations import exp
 
+from ...exact_tracks import centred
 from .waving_person import (
     ARM,
     BODY,
     FPS,
     FRAMES,
-    HIPS,
     JOINTS,
     LEG,
     fit,
@@ -236,7 +237,6 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it():
     start.rotations[:, shoulder] = exp(np.array([0.0, 0.0, -1.8]))
     track.confidence[:, ARM] = 0.0
     points = keypoints(start.rotations, start.t_camera_root)
-    inside = points - points[:, HIPS].mean(axis=1, keepdims=True)
     surface = BodySurface(with_arm_points(BODY), np.zeros(BODY.P))
 
     def lowest(states):
@@ -245,7 +245,7 @@ def test_a_hand_that_is_lifted_into_the_trunk_lies_on_it():
         return surface.planes(*poses).height.min(axis=1)
 
     assert lowest(start).max() < -0.03
-    found = fit(prepare(track, inside).with_stance(stance_of(true), true.betas), start)
+    found = fit(prepare(track, centred(points)).with_stance(stance_of(true), true.betas), start)
     assert lowest(found).min() > -0.015
 
 

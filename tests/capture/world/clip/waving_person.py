@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from scope.scope_addon.capture.camera.intrinsics import choose_camera
 from scope.scope_addon.capture.fitting.frame_sequence import FittedTrack
-from scope.scope_addon.capture.fitting.keypoint_offsets import with_keypoint_offsets
 from scope.scope_addon.capture.fitting.prepared_track import PreparedTrack, prepare_track
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.perception.lifter import Lifted
@@ -18,12 +17,13 @@ from scope.scope_addon.capture.world.clip_fit import fit_clip
 from scope.solver import load_body
 from scope.solver.rotations import exp
 
+from ...exact_tracks import network_points, track_of_points
+
 FPS = 30.0
 FRAMES = 24
 BODY = load_body("scope")
 CAMERA = choose_camera(1080, 1920)
 JOINTS = len(KEYPOINT_NAMES)
-HIPS = [KEYPOINT_NAMES.index(f"{side}_hip") for side in ("left", "right")]
 ARM = [
     KEYPOINT_NAMES.index(f"left_{name}") for name in ("elbow", "wrist", "pinky", "index", "thumb")
 ]
@@ -36,27 +36,17 @@ def person(frames: int = FRAMES, path: CameraPath | None = None) -> tuple[Track,
     :param path: of the camera; by default it is static.
     :return: what the camera sees, and the true states in the first frame's axes.
     """
-    times = np.arange(frames) / FPS
     rotations = np.tile(np.eye(3), (frames, BODY.K + 1, 1, 1))
     rotations[:, 0] = np.diag([1.0, -1.0, -1.0])  # body y up, OpenCV y down
     for joint, angle in (("right_hip", 0.3), ("right_knee", 0.9)):
         rotations[:, BODY.joint_names.index(joint)] = exp(np.array([angle, 0.0, 0.0]))
-    wave = 0.5 * np.sin(2 * np.pi * times)
+    wave = 0.5 * np.sin(2 * np.pi * np.arange(frames) / FPS)
     rotations[:, BODY.joint_names.index("left_shoulder")] = exp(wave[:, None] * [0.0, 0.0, 1.0])
     root = np.tile([0.0, 0.0, 4.0], (frames, 1))
     points = keypoints(rotations, root)
     if path is not None:
         points = path.points_to_frames(points)
-    pixels = points[..., :2] / points[..., 2:] * CAMERA.intrinsics[0, 0] + CAMERA.intrinsics[:2, 2]
-    track = Track(
-        frames=np.arange(frames),
-        times=times,
-        keypoints_px=pixels,
-        confidence=np.ones((frames, JOINTS)),
-        world_landmarks=points - points[:, HIPS].mean(axis=1, keepdims=True),
-        seen=np.ones(frames, bool),
-        acquired=np.arange(frames) == 0,
-    )
+    track = track_of_points(points, CAMERA.intrinsics, FPS)
     seen = np.ones((frames, BODY.K + 1))
     return track, FittedTrack(rotations, root, np.zeros(BODY.P), np.ones(frames, bool), seen, 1.0)
 
@@ -70,11 +60,7 @@ def moving_path(frames: int = FRAMES) -> CameraPath:
 
 def keypoints(rotations: np.ndarray, root: np.ndarray) -> np.ndarray:
     """The network's keypoints (T, J, 3) of states, in their axes."""
-    R, t = BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0], np.zeros(BODY.P))
-    at = BODY.keypoint_set("blazepose")
-    return with_keypoint_offsets(BODY).keypoints(
-        R, t, np.zeros(BODY.P), [at[name] for name in KEYPOINT_NAMES]
-    )
+    return network_points(BODY, *BODY.forward_kinematics(rotations, root - BODY.rest_joints()[0]))
 
 
 def prepare(
