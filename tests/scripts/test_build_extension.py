@@ -102,7 +102,11 @@ def blenders_tool():
         "cli",
         "blender_ext.py",
     )
-    spec = importlib.util.spec_from_file_location("blender_ext", path)
+    return module_at(path)
+
+
+def module_at(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -284,9 +288,7 @@ def test_blender_installs_a_wheel_that_is_compressed_again(builder, tmp_path):
         assert {entry.compress_type for entry in file.infolist()} == {zipfile.ZIP_LZMA}
         assert {name: file.read(name).decode() for name in file.namelist()} == files
     (installer,) = Path(bpy.utils.resource_path("LOCAL")).rglob("wheel_manager.py")
-    spec = importlib.util.spec_from_file_location("wheel_manager", installer)
-    manager = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(manager)
+    manager = module_at(installer)
     problems = []
     settings = {
         "local_dir": str(tmp_path / "local"),

@@ -83,7 +83,13 @@ def test_networks_of_other_inputs_than_pictures_equal_tflite_on_noise(network: N
 
 
 @pytest.mark.parametrize(
-    "network", [n for n in NETWORKS if len(n.input_shape) == 4], ids=lambda n: n.name
+    "network",
+    [
+        pytest.param(n, marks=pytest.mark.slow if n.name.endswith(("_heavy", "_full")) else ())
+        for n in NETWORKS
+        if len(n.input_shape) == 4
+    ],
+    ids=lambda n: n.name,
 )
 def test_equals_tflite_on_real_crops(network: Network, shared: Path) -> None:
     cv2 = package("cv2")
