@@ -20,7 +20,6 @@ _WITHOUT_SCENE_CUTS = {
     "libx264": {"sc_threshold": "0"},
     "libx265": {"x265-params": "scenecut=0:log-level=none"},
 }
-FRAGMENTED = {"movflags": "frag_every_frame+empty_moov+default_base_moof"}
 
 
 @contextmanager
@@ -53,9 +52,7 @@ def encoded(
     :param how: options of the encoder.
     """
     target = io.BytesIO()
-    with av.open(
-        target, "w", format=kind, options=FRAGMENTED if kind == "mp4" else {}
-    ) as container:
+    with av.open(target, "w", format=kind) as container:
         stream = container.add_stream(codec, rate=30)
         stream.height, stream.width = images[0].shape[:2]
         stream.pix_fmt = "yuvj420p" if codec == "mjpeg" else pixels
