@@ -151,6 +151,7 @@ def test_finds_the_squatting_person(
     left, top, right, bottom = person.box_px
     assert 0 < left < right < 720
     assert 0 < top < bottom < person.points_px[0, 1]  # the face is above the hips
+    assert 0.2 < (right - left) / person.region.side_px < 0.3
     assert abs(person.region.rotation) < 0.3
 
 
