@@ -67,6 +67,7 @@ RISE_M = 0.03
 DISPLACED_M = 0.12
 DISPLACED_S = 0.3
 REHOLD_DELAY_S = 0.5  # after that, in which smoothing has come to where the foot really is
+SOLE_ROWS = slice(len(SOLES))  # of the contact points
 SOFT_M = 0.005  # the floor raises soles from about this height on
 
 
@@ -127,14 +128,14 @@ class FootHold:
         if not self._window:
             return None
         last = self._window[-1]
-        moved_m = np.linalg.norm(soles - last.rays, axis=1) * last.points[: len(SOLES), 2]
+        moved_m = np.linalg.norm(soles - last.rays, axis=1) * last.points[SOLE_ROWS, 2]
         contact = self._probability.copy()
-        contact[: len(SOLES)] *= logistic(8 * (1 - moved_m / MOVED_M))
+        contact[SOLE_ROWS] *= logistic(8 * (1 - moved_m / MOVED_M))
         R = T_world_camera[:3, :3]
         t = T_world_camera[:3, 3]
         by_height = floor_probability(last.points @ R[2] + t[2])
         on_floor = contact * by_height
-        stands = float(by_height[: len(SOLES)].max())
+        stands = float(by_height[SOLE_ROWS].max())
         # Points that are not in contact may be below the floor as well as above it, as on stairs.
         rests = self._is_held * contact
         return Support(
@@ -181,13 +182,13 @@ class FootHold:
         self._release_displaced(T_world_camera, step_s)
         self._update(points_world, step_s, DRIFT_S if is_settled else EARLY_DRIFT_S)
         new = self._away(before), self._away(points_world)
-        changed = (self._is_held != was_held)[: len(SOLES)].reshape(2, 2).any(axis=1)
+        changed = (self._is_held != was_held)[SOLE_ROWS].reshape(2, 2).any(axis=1)
         self._transition.change(changed, old, new, step_s)
         self._transition.advance(step_s)
         self._points_world = points_world
         self._shift = new[1] + self._transition.remainder
         self._shift[:, 2] += _rise(
-            (points_world[: len(SOLES), 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1)
+            (points_world[SOLE_ROWS, 2].reshape(2, 2) + self._shift[:, 2:]).min(axis=1)
         )
         poses = R_parts[None], t_parts[None]
         shift = (self._shift @ R)[None]
@@ -208,27 +209,26 @@ class FootHold:
         contact *= visible[-1]
         # Depth is left out: a mean one turns the motion in the image into metres.
         seen = np.concatenate([rays, np.ones((*rays.shape[:2], 1))], axis=2)
-        seen *= points[:, : len(SOLES), 2].mean(axis=0)[:, None]
+        seen *= points[:, SOLE_ROWS, 2].mean(axis=0)[:, None]
         self._speed = speed_across(seen, times, None)[-1]
-        contact[: len(SOLES)] *= logistic(4 * (1 - self._speed / CONTACT_SPEED_M_S))
+        contact[SOLE_ROWS] *= logistic(4 * (1 - self._speed / CONTACT_SPEED_M_S))
         return contact
 
     def _release_displaced(self, T_world_camera: Float64Array, step_s: float) -> None:
         """Let go of the feet that the image has shown elsewhere for long."""
         newest = self._window[-1]
-        n = len(SOLES)
-        places = (self._anchors[:n] - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
+        places = (self._anchors[SOLE_ROWS] - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
         depth = np.maximum(places[:, 2:], 1e-6)
         away_m = np.linalg.norm(places[:, :2] - newest.rays * depth, axis=1)
         # Keypoints of heels and toes are not exactly where a foot touches the floor: both must be
         # away.
         is_elsewhere = (
-            (self._is_held[:n] & (newest.visible[:n] > 0.5) & (away_m > DISPLACED_M))
+            (self._is_held[SOLE_ROWS] & (newest.visible[SOLE_ROWS] > 0.5) & (away_m > DISPLACED_M))
             .reshape(2, 2)
             .all(axis=1)
         )
-        self._elsewhere_s[:n] = np.where(
-            np.repeat(is_elsewhere, 2), self._elsewhere_s[:n] + step_s, 0.0
+        self._elsewhere_s[SOLE_ROWS] = np.where(
+            np.repeat(is_elsewhere, 2), self._elsewhere_s[SOLE_ROWS] + step_s, 0.0
         )
         is_displaced = self._elsewhere_s > DISPLACED_S
         self._rehold_delay_s = np.where(is_displaced, REHOLD_DELAY_S, self._rehold_delay_s - step_s)
@@ -241,7 +241,7 @@ class FootHold:
         self._anchors[:, :2] += share[:, None] * (points_world - self._anchors)[:, :2]
         begins = ~self._is_held & (contact > BEGIN) & (self._rehold_delay_s <= 0)
         shown = points_world.copy()
-        shown[: len(SOLES)] += np.repeat(self._shift, 2, axis=0)
+        shown[SOLE_ROWS] += np.repeat(self._shift, 2, axis=0)
         self._anchors[begins] = shown[begins]
         self._anchors[begins, 2] *= 1 - floor_probability(shown[begins, 2])
         far = np.linalg.norm(points_world - self._anchors, axis=1) > LONGEST_STRETCH_M
@@ -255,7 +255,7 @@ class FootHold:
         """
         swings = self._speed.reshape(2, 2).mean(axis=1) > SWING_M_S
         is_passed = np.zeros(len(points_world), bool)
-        is_passed[: len(SOLES)] = np.repeat(swings[::-1], 2)
+        is_passed[SOLE_ROWS] = np.repeat(swings[::-1], 2)
         rise = (points_world - self._anchors)[:, 2]
         return np.asarray(is_passed & (self._moving_s < PASSED_S) & (rise < RISE_M))
 
@@ -263,8 +263,8 @@ class FootHold:
         """Return by how much each foot (2, 3) is away from where it is held, world; 0 where it is
         not.
         """
-        away = (self._anchors - points_world)[: len(SOLES)].reshape(2, 2, 3)
-        held = self._is_held[: len(SOLES)].reshape(2, 2, 1)
+        away = (self._anchors - points_world)[SOLE_ROWS].reshape(2, 2, 3)
+        held = self._is_held[SOLE_ROWS].reshape(2, 2, 1)
         return np.asarray((held * away).sum(axis=1) / np.maximum(held.sum(axis=1), 1))
 
 
