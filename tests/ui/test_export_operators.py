@@ -19,16 +19,13 @@ from scope.solver.body_file import load_body
 
 from ..edit.walking import motion_of, walk
 from ..made_motion import made_views
-from ..scene.made_rigs import build_rig, captured
+from ..scene.made_rigs import build_rig, captured, captured_with
 
 
 @pytest.fixture
 def both(tmp_path):
     """The armatures of a capture of this file, and of the same one linked from another file."""
-    own = captured(motion := motion_of(walk(1.0)))
-    motion.save(tmp_path / "person1.npz")
-    own["scope_motion"] = str(tmp_path / "person1.npz")
-    own["scope_body_file"] = "scope"
+    own = captured_with(motion_of(walk(1.0)))
     collection = own.users_collection[0]
     bpy.data.libraries.write(str(tmp_path / "läuferin.blend"), {collection})
     with bpy.data.libraries.load(str(tmp_path / "läuferin.blend"), link=True) as (_, there):
@@ -56,9 +53,7 @@ def test_the_person_of_the_selected_capture_is_found(both, which):
 
 @pytest.mark.skipif(os.name == "nt" or sys.platform == "darwin", reason="names there are Unicode")
 def test_a_file_whose_name_is_not_utf8_is_written_and_reported(tmp_path, capfd):
-    rig = captured(motion := motion_of(walk(1.0)))
-    motion.save(tmp_path / "person1.npz")
-    rig["scope_motion"] = str(tmp_path / "person1.npz")
+    captured_with(motion_of(walk(1.0)))
     name = os.fsdecode(b"l\xe4ufer.npz")
     assert bpy.ops.scope.export(filepath=str(tmp_path / name), format="NPZ") == {"FINISHED"}
     assert (tmp_path / name).is_file()

@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What corrections change, to compare before and after."""
+"""What corrections change, to compare before and after, in the view of the capture's camera."""
 
 import bpy
 import numpy as np
 from scope.scope_addon.scene.actions import fcurves, read_keys
 from scope.scope_addon.scene.character.correction_list import listed_corrections
 from scope.scope_addon.scene.packed_motion import stored_motion
+
+
+def look_through_camera(frame):
+    """Make the capture's camera and its resolution the scene's, in a frame."""
+    scene = bpy.context.scene
+    scene.camera = next(obj for obj in scene.objects if obj.type == "CAMERA")
+    scene.render.resolution_x = 640
+    scene.render.resolution_y = 480
+    scene.frame_set(frame)
 
 
 def keys(*objects):

@@ -25,7 +25,7 @@ from scope.scope_addon.ui.correction_operators import last_pin_warnings
 from ...edit.walking import BETAS, BODY, NAMES, motion_of, walk
 from ...scene import made_rigs
 from ...scene.made_rigs import captured_with
-from .changes import assert_same, keys
+from .changes import assert_same, keys, look_through_camera
 
 FRAME = 46  # of the scene; the footage's frame 45, as the capture starts at frame 1
 WRIST = NAMES.index("left_wrist")
@@ -36,11 +36,7 @@ ANKLE = NAMES.index("right_ankle")
 def rig():
     """A captured walk, with its motion."""
     armature = captured_with(motion_of(walk(3.0), noise=0.05))
-    scene = bpy.context.scene
-    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
-    scene.render.resolution_x = 640
-    scene.render.resolution_y = 480
-    scene.frame_set(FRAME)
+    look_through_camera(FRAME)
     return armature
 
 

@@ -15,7 +15,7 @@ from scope.scope_addon.scene.packed_motion import stored_motion
 from ...edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ...scene import made_rigs
 from ...scene.made_rigs import captured_together, captured_with
-from .changes import assert_same, everything, kinds
+from .changes import assert_same, everything, kinds, look_through_camera
 
 FRAME = 20
 FRAMES = (5, 20, 50)
@@ -28,9 +28,7 @@ def rig():
     T = np.eye(4)
     T[2, 3] = RAISED
     armature = captured_with(moved_motion(motion_of(walk(2.0), noise=0.02), BODY, T))
-    scene = bpy.context.scene
-    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
-    scene.frame_set(FRAME)
+    look_through_camera(FRAME)
     return armature
 
 

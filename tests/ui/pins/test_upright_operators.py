@@ -17,10 +17,17 @@ from ...edit.walking import BODY, NAMES, motion_of, walk
 from ...made_motion import level_camera, made_views
 from ...scene import made_rigs
 from ...scene.made_rigs import captured_together, captured_with
-from .changes import assert_same, everything, kinds
+from .changes import assert_same, everything, kinds, look_through_camera
 
 POST = ((0.4, 1.0, 0.2), (0.4, 1.0, 1.9))
 FRAMES = (5, 25, 50)
+
+
+def rotation(*degrees):
+    """(4, 4) about an axis whose length is the angle."""
+    out = np.eye(4)
+    out[:3, :3] = exp(np.radians(degrees))
+    return out
 
 
 @pytest.fixture(params=["static", "panning"])
@@ -33,15 +40,10 @@ def rig(request):
         turn = exp(np.linspace(0, 0.1, len(motion))[:, None] * np.array([0.0, 1.0, 0.0]))
         motion.world_from_camera[:, :3, :3] = level_camera(1)[0, :3, :3] @ turn
     line = [tuple(shot_of(motion).project(19, np.array(point))) for point in POST]
-    tilt = np.eye(4)
-    tilt[:3, :3] = exp(np.radians([0.0, 8.0, 0.0]))
+    tilt = rotation(0.0, 8.0, 0.0)
     tilted = moved_motion(motion, BODY, tilt)
     armature = captured_with(tilted)
-    scene = bpy.context.scene
-    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
-    scene.render.resolution_x = 640
-    scene.render.resolution_y = 480
-    scene.frame_set(20)
+    look_through_camera(20)
     return armature, line
 
 
@@ -161,19 +163,14 @@ def leaning():
     """A walk captured by a camera whose world leans by 8 degrees towards it; the armature is turned
     and moved.
     """
-    tilt = np.eye(4)
-    tilt[:3, :3] = exp(np.radians([8.0, 0.0, 0.0]))
+    tilt = rotation(8.0, 0.0, 0.0)
     armature = captured_with(moved_motion(motion_of(walk(2.0)), BODY, tilt))
     place = Matrix.LocRotScale(
         Vector((3.0, 1.0, 0.0)), Matrix.Rotation(0.7, 3, "Z").to_quaternion(), None
     )
-    scene = bpy.context.scene
-    scene.camera = next(o for o in scene.objects if o.type == "CAMERA")
-    for obj in (armature, scene.camera):
+    look_through_camera(20)
+    for obj in (armature, bpy.context.scene.camera):
         obj.matrix_world = place @ obj.matrix_world
-    scene.render.resolution_x = 640
-    scene.render.resolution_y = 480
-    scene.frame_set(20)
     view = place.to_3x3() @ Vector((1.0, 0.0, 0.0))
     post = [place @ Vector(tilt[:3, :3] @ np.array(point)) for point in POST]
     return armature, {"start": post[0] - 5 * view, "end": post[1] - 5 * view, "direction": view}
@@ -233,8 +230,7 @@ def test_a_refused_line_changes_nothing(rig):
 def test_all_cameras_of_a_capture_turn_together(collections):
     motion = motion_of(walk(1.0))
     line = [tuple(shot_of(motion).project(19, np.array(point))) for point in POST]
-    tilt = np.eye(4)
-    tilt[:3, :3] = exp(np.radians([0.0, 8.0, 0.0]))
+    tilt = rotation(0.0, 8.0, 0.0)
     tilted = replace(moved_motion(motion, BODY, tilt), views=made_views(0.5, -0.2))
     armature = captured_with(tilted)
     scene = bpy.context.scene

@@ -29,30 +29,27 @@ from ...edit.walking import BODY, motion_of, walk
 HALF_AT_ZOOM_0 = (1322, 661)
 
 
-def regions(width, height, tools=58, sidebar=291, headers=54):
+def regions(width, height):
     sizes = [
         ("WINDOW", 500, 97, width, height),
-        ("TOOLS", 500, 97, tools, height - headers),
-        ("UI", 500 + width - sidebar, 97, sidebar, height - headers),
-        ("HEADER", 500, 97 + height - headers // 2, width, headers // 2),
-        ("TOOL_HEADER", 500, 97 + height - headers, width, headers // 2),
+        ("TOOLS", 500, 97, 58, height - 54),
+        ("UI", 500 + width - 291, 97, 291, height - 54),
+        ("HEADER", 500, 97 + height - 27, width, 27),
+        ("TOOL_HEADER", 500, 97 + height - 54, width, 27),
         ("HUD", 0, 0, 1, 1),
     ]
     return [SimpleNamespace(type=t, x=x, y=y, width=w, height=h) for t, x, y, w, h in sizes]
 
 
-def viewport(width, height, **given):
+def viewport(width, height):
     view = SimpleNamespace(view_camera_zoom=12.0, view_camera_offset=(0.1, 0.2))
     space = SimpleNamespace(region_3d=view)
     space.as_pointer = lambda: id(space)
-    return SimpleNamespace(
-        regions=regions(width, height, **given), spaces=SimpleNamespace(active=space)
-    )
+    return SimpleNamespace(regions=regions(width, height), spaces=SimpleNamespace(active=space))
 
 
-def scene(size, fit="AUTO"):
+def scene(size):
     camera = bpy.data.cameras.new("camera")
-    camera.sensor_fit = fit
     bpy.context.scene.camera = bpy.data.objects.new("camera", camera)
     render = bpy.context.scene.render
     render.resolution_x, render.resolution_y = size
@@ -112,8 +109,6 @@ def people(*clips):
     """Return the captured armatures of some clips."""
     motions = [motion_of(clip) for clip in clips]
     found = [person.armature for person in build_scene(motions, BODY, None, BuildOptions()).people]
-    for armature in found:
-        armature["scope_body_file"] = "scope"
     bpy.context.view_layer.update()
     return found
 
