@@ -22,15 +22,11 @@ from scope.solver import (
     fit,
     fit_clip,
     load_body,
-    make_tree,
     rotations,
     with_previous,
 )
-from scope.solver.fitting.clip import _Joint
-from scope.solver.gauss_newton.terms import make_terms
 
 from .. import person
-from ..dense import jacobian, residuals, robust_factors
 from ..synthetic import INTRINSICS, forward, project, random_body, random_state
 
 K = 12
@@ -109,71 +105,6 @@ def test_noise_leaves_errors_of_the_size_the_information_says():
     # degrees of freedom
     assert error @ found.beta_information @ error / 3.3 < 22.0
     assert abs(scale - SCALE) < 0.02
-
-
-def test_joint_step_is_the_dense_step_of_the_whole_clip():
-    frames = 3
-    body, states, measurements, _ = clip(5, noise=1.0, frames=frames)
-    rng = np.random.default_rng(0)
-    options = Options()
-    beta = rng.standard_normal(P)
-    starts = [
-        State(R0, t0, Om @ rotations.exp(0.02 * rng.standard_normal((K, 3))), beta)
-        for R0, t0, Om, _ in states
-    ]
-    tree = make_tree(body, focal=True)
-    flat = Options(stages=[Stage(Weights(joint_prior=0.0, joint_limits=0.0))])
-    joint = _Joint(
-        tree,
-        [make_terms(tree, m, Priors()) for m in measurements],
-        starts,
-        Priors(),
-        flat,
-        7.0,
-    )
-    joint.cost = joint._linearize(0, trial=False)
-    predicted = joint._step(0, 20.0)
-    n = 6 + 3 * K
-    G = P + 1
-    H = np.zeros((frames * n + G,) * 2)
-    g = np.zeros(frames * n + G)
-    cost = 0.5 * Weights().shape * beta @ beta
-    for k, (m, s) in enumerate(zip(measurements, starts, strict=True)):
-        data = {
-            "pixels": m.keypoints2d.pixels,
-            "points": m.keypoints3d.points,
-            "directions": np.ones((M, 3)),
-        }
-        state = (s.R_camera_root, s.t_camera_root, s.Omega, s.beta)
-        raw = residuals(body, data, focal=True)
-        sigmas = [options.robust_keypoints2d, options.robust_keypoints3d]
-        weights = [1e6 * np.ones(M), Weights().keypoints3d * np.ones(M)]
-        factors, part_cost = robust_factors(raw(state, np.zeros(n + G))[:2], sigmas, weights)
-        cost += part_cost
-
-        def stacked(moved, d, raw=raw, factors=factors):
-            return np.concatenate(
-                [(f[:, None] * r).ravel() for f, r in zip(factors, raw(moved, d), strict=False)]
-            )
-
-        J = jacobian(body, state, stacked, extra=1)
-        r = np.real(stacked(state, np.zeros(n + G)))
-        at = np.r_[k * n : (k + 1) * n, frames * n : frames * n + G]
-        H[np.ix_(at, at)] += J.T @ J
-        g[at] += J.T @ r
-        H[range(k * n, (k + 1) * n), range(k * n, (k + 1) * n)] += (
-            20.0 * np.r_[np.ones(3), np.full(3, 1 / 0.09), np.ones(3 * K)]
-        )
-    shape = slice(frames * n, frames * n + P)
-    H[shape, shape] += Weights().shape * np.eye(P)
-    g[shape] += Weights().shape * beta
-    H[-1, -1] += 7.0
-    expected = -np.linalg.solve(H, g)
-    found = [np.r_[f.work.x[0], f.work.u[1:].ravel()] for f in joint.frames]
-    found = np.concatenate([*found, joint.frames[0].work.dbeta[:G]])
-    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
-    assert joint.cost == pytest.approx(cost, rel=1e-11)
-    assert predicted > 0
 
 
 def test_carried_information_equals_what_the_frames_say_together():

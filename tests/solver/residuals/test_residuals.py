@@ -136,22 +136,25 @@ def differences(residual, part, h=1e-6):
     return np.split(np.array(J).T, [6, 9], axis=1)
 
 
-def check_blocks(body, tree, pose, residual, weight, cost, blocks, tolerance=1e-7):
-    """The blocks of part I hold JᵀJ and Jᵀr of one residual of its keypoint, and nothing else
-    does.
+def check_blocks(body, tree, pose, residual, weight, cost, blocks, tolerance=1e-7, sigma=np.inf):
+    """The blocks of part I hold JᵀJ and Jᵀr of one residual of its keypoint, with the weight of a
+    robust kernel, and nothing else does.
     """
     k = keypoint_of(body)
     parent = pose.R[tree.parents[I]]
     D = pose.D[I, :, :P]
     part = Part(pose.R[I], pose.t[I], D, pose.Omega[I], parent, pose.t[0], pose.beta[:P])
 
-    def weighted(part):
-        return np.sqrt(weight) * residual(part, body.v_bar[k], body.V[k])
+    r = residual(part, body.v_bar[k], body.V[k])
+    rho, slope = accumulation.geman_mcclure(r @ r, 1.0 / sigma)
 
+    def weighted(part):
+        return np.sqrt(weight * slope) * residual(part, body.v_bar[k], body.V[k])
+
+    assert r.any()
+    assert cost == pytest.approx(0.5 * weight * rho, rel=1e-9)
     r = weighted(part)
     J_x, J_u, J_b = differences(weighted, part)
-    assert r.any()
-    assert cost == pytest.approx(0.5 * r @ r, rel=1e-9)
     for expected, got in (
         (J_x.T @ J_x, blocks.A[I, :, :6]), (J_x.T @ r, blocks.A[I, :, GRADIENT]),
         (J_x.T @ J_b, blocks.A[I, :, SHAPE : SHAPE + P]), (J_u.T @ J_u, blocks.H_uu[I]),
@@ -205,19 +208,20 @@ def test_every_registered_residual_is_in_these_tests():
 
 
 @pytest.mark.parametrize(
-    ("way", "behind_m"), [("image", 0.0), ("image", 6.0), ("space", 0.0), ("direction", 0.0)]
+    ("way", "behind_m", "sigma"),
+    [("image", 0.0, 0.1), ("image", 6.0, np.inf), ("space", 0.0, 1.0), ("direction", 0.0, 1.0)],
 )
-def test_a_measurement_adds_its_residual_to_the_blocks(way, behind_m):
+def test_a_measurement_adds_its_residual_to_the_blocks(way, behind_m, sigma):
     body, tree, pose = chain()
     pose.t[0, 2] -= behind_m
     place_parts(tree, pose)
     measured, residual = MEASURED[way]
     weights = Weights(30.0, 30.0, 30.0, joint_prior=0.0, joint_limits=0.0, shape=0.0)
-    table, _, _ = Options(None, np.inf, np.inf, np.inf).stage_table([Stage(weights)])
+    table, _, _ = Options(None, sigma, sigma, sigma).stage_table([Stage(weights)])
     blocks = make_blocks(tree)
     terms = make_terms(tree, Measurements(INTRINSICS, **measured(keypoint_of(body))), Priors())
     cost = linearize(tree, terms, table[0], pose, blocks, make_scratch(tree))
-    check_blocks(body, tree, pose, residual, 15.0, cost, blocks)
+    check_blocks(body, tree, pose, residual, 15.0, cost, blocks, sigma=sigma)
 
 
 def test_direction_between_two_joints_and_between_two_keypoints_of_one_part():
