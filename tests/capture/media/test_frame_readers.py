@@ -23,27 +23,15 @@ from scope.scope_addon.errors import VideoError
 
 from .made_video import write_film, write_video
 
-COUNT = 24
 
-
-FPS = 12.0
-
-
-@pytest.fixture(scope="module")
-def video(tmp_path_factory):
-    """Frames that become lighter by 10 grey levels each."""
-    path = tmp_path_factory.mktemp("readers") / "grey.mp4"
-    return write_video(path, [np.full((32, 48, 3), 10 * k, np.uint8) for k in range(COUNT)], FPS)
-
-
-def test_without_the_decoder_a_video_is_refused(video, monkeypatch):
+def test_without_the_decoder_a_video_is_refused(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(
         VideoError,
         match=r"grey\.mp4 is a video.*package 'av' that is not "
         r"installed",
     ):
-        PyavReader(video)
+        PyavReader(tmp_path / "grey.mp4")
 
 
 def test_a_stream_that_begins_later_does_not_end_the_video(tmp_path):

@@ -11,6 +11,8 @@ from scope.scope_addon.capture.tracking.appearance import SIZE
 from scope.scope_addon.capture.tracking.people import assign, link
 from scope.scope_addon.capture.tracking.track import Tracklet
 
+from .made_tracklets import seen_at
+
 TIMES = (np.arange(120) / 30).tolist()
 RED = np.eye(SIZE)[0] + np.eye(SIZE)[SIZE // 2]
 BLUE = np.eye(SIZE)[3] + np.eye(SIZE)[SIZE // 2 + 3]
@@ -28,52 +30,20 @@ def test_the_assignment_is_the_cheapest_of_all(shape: tuple[int, int]) -> None:
         assert cost[rows, chosen].sum() == pytest.approx(best)
 
 
-def tracklet(
-    first: int,
-    last: int,
-    start_px: float,
-    speed_px: float,
-    appearance: np.ndarray,
-) -> Tracklet:
-    """A person who moves horizontally at ``speed_px`` per frame, and would be at ``start_px`` in
-    frame 0.
-    """
-    rows = list(range(first, last))
-    centers = [np.array([start_px + speed_px * row, 200.0]) for row in rows]
-    values = [np.zeros((33, 6), np.float32)] * len(rows)
-    return Tracklet(
-        rows=rows,
-        values=values,
-        centers_px=centers,
-        sides_px=[200.0] * len(rows),
-        appearance=appearance,
-    )
-
-
-RIGHT = (0.0, 8.0)  # place and speed of somebody who walks so
-LEFT = (880.0, -8.0)
-
-
-def test_a_crossing_is_resolved_by_motion() -> None:
-    """Two people in the same clothes pass each other between frames 50 and 60, where neither is
-    seen.
-    """
-    tracklets = [
-        tracklet(*rows, *motion, RED) for rows in ((0, 50), (60, 120)) for motion in (RIGHT, LEFT)
-    ]
-    assert sorted(link(tracklets, TIMES)) == [[0, 2], [1, 3]]
+RIGHT = 8.0 * np.arange(120)  # where somebody is who walks so
+LEFT = 880.0 - RIGHT
 
 
 @pytest.mark.parametrize(("others", "people"), [(RED, [[0, 3], [1, 2]]), (BLUE, [[0, 2], [1, 3]])])
-def test_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
+def test_motion_and_clothes_tell_people_who_turn_back_from_people_who_pass_each_other(
     others: np.ndarray, people: list[list[int]]
 ) -> None:
     """They come towards each other and leave again; nobody is seen between frames 50 and 60."""
-    before = [tracklet(0, 50, *RIGHT, RED), tracklet(0, 50, *LEFT, others)]
-    after = [tracklet(60, 120, *LEFT, RED), tracklet(60, 120, *RIGHT, others)]
+    before = [seen_at(RIGHT[:50], appearance=RED), seen_at(LEFT[:50], appearance=others)]
+    after = [seen_at(LEFT[60:], 60, appearance=RED), seen_at(RIGHT[60:], 60, appearance=others)]
     assert sorted(link(before + after, TIMES)) == people
 
 
 def test_tracklets_at_the_same_time_are_different_people() -> None:
-    tracklets = [tracklet(0, 60, 100.0, 0.0, RED), tracklet(20, 60, 100.0, 0.0, RED), Tracklet()]
+    tracklets = [seen_at([100.0] * 60), seen_at([100.0] * 40, 20), Tracklet()]
     assert sorted(link(tracklets, TIMES)) == [[0], [1]]

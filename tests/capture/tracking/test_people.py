@@ -23,6 +23,7 @@ from scope.scope_addon.capture.tracking.tracker import PeopleTracker
 from ..composites import composite
 from ..fake_people import FakeDetector, FakeLandmarks, Person, pictures
 from ..followed_people import FollowedPeople
+from .made_tracklets import seen_at
 
 RED = (200, 40, 40)
 BLUE = (40, 60, 200)
@@ -272,14 +273,6 @@ def test_a_short_reappearance_is_cut_off(rows: list[int], kept: int) -> None:
     assert frames_before_flicker(tracklet, (np.arange(60) / FPS).tolist()) == kept
 
 
-def seen_at(xs: list[float], first: int = 0) -> Tracklet:
-    """A tracklet of a body that moves with the hips at these places, one in each frame."""
-    body = np.random.default_rng(1).normal(scale=40.0, size=(33, 2))
-    values = [np.pad(body + [x, 200.0], ((0, 0), (0, 4))).astype(np.float32) for x in xs]
-    rows = list(range(first, first + len(xs)))
-    return Tracklet(rows, values, [np.array([x, 200.0]) for x in xs], [200.0] * len(xs))
-
-
 @pytest.mark.parametrize(
     ("drifting", "goes_on", "kept"),
     [
@@ -324,9 +317,7 @@ def test_who_is_seen_for_three_seconds_beside_the_main_person_is_kept(
     rate = 5
     times = (np.arange(clip_s * rate) / rate).tolist()
     main = seen_at([300.0] * len(times))
-    passes = [seen_at([700.0] * len(part), part[0]) for part in rows]
-    for part in passes:
-        part.sides_px = [side] * len(part.rows)
+    passes = [seen_at([700.0] * len(part), part[0], side) for part in rows]
     people, doubtful = people_of(times, [main, *passes])
     assert people == ([[main], passes] if is_person else [[main]])
     assert doubtful == ([] if is_person else [passes])
