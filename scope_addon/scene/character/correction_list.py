@@ -83,60 +83,59 @@ def _entry(
     armature: bpy.types.Object, motion: Motion, correction: Correction, rate: float
 ) -> dict[str, Any]:
     """Describe a correction."""
-    from ...edit.corrections import (
-        FEET,
-        Contact,
-        DepthFlip,
-        FeetOnFloor,
-        Floor,
-        Interpolation,
-        Pin,
-        Upright,
-    )
+    from ...edit.corrections import FeetOnFloor, Floor, Pin, Upright
     from .corrected_keys import frames_that_show, scene_frame
 
-    whole = int(motion.frames[0]), int(motion.frames[-1])
-    if isinstance(correction, Pin):
-        kind = "PIN"
-        text = correction.joint.replace("_", " ").title()
+    kind, text = _kind_and_text(correction)
+    if isinstance(correction, Pin | Floor):
         span = (correction.frame,) * 2
-    elif isinstance(correction, Contact):
-        kind = "CONTACT"
-        part = correction.part.replace("_", " ").title()
-        text = f"{part} Foot Stands" if correction.part in FEET else part
-        span = (correction.first, correction.last)
-    elif isinstance(correction, DepthFlip):
-        kind = "FLIP"
-        part = correction.part.replace("_", " ").title()
-        text = "Turned Around" if correction.part == "body" else part
-        span = (correction.first, correction.last)
-    elif isinstance(correction, Interpolation):
-        kind = "INTERPOLATION"
-        text = "Interpolated"
-        span = (correction.first, correction.last)
-    elif isinstance(correction, Upright):
-        kind = "UPRIGHT"
-        text = "Upright Line"
-        span = whole
-    elif isinstance(correction, FeetOnFloor):
-        kind = "FEET"
-        text = "Feet on the Floor"
-        span = whole
-    elif isinstance(correction, Floor):
-        kind = "FLOOR"
-        text = "Floor"
-        span = (correction.frame,) * 2
+    elif isinstance(correction, Upright | FeetOnFloor):
+        span = int(motion.frames[0]), int(motion.frames[-1])
     else:
-        what = {"both": "Sides", "arms": "Arms", "legs": "Legs"}[correction.limbs]
-        kind = "EXCHANGE"
-        text = f"{what} Exchanged"
-        span = (correction.first, correction.last)
+        span = correction.first, correction.last
     if span[0] == span[1]:
         first, last = frames_that_show(armature, motion, span[0], rate)
     else:
         first, last = (round(scene_frame(armature, motion, frame, rate)) for frame in span)
     joint = correction.joint if isinstance(correction, Pin) else ""
     return {"kind": kind, "text": text, "first": first, "last": last, "joint": joint}
+
+
+def _kind_and_text(correction: Correction) -> tuple[str, str]:
+    """Return the kind of a correction, and what the list calls it."""
+    from ...edit.corrections import (
+        FEET,
+        Contact,
+        DepthFlip,
+        Exchange,
+        FeetOnFloor,
+        Interpolation,
+        Pin,
+        Upright,
+    )
+
+    if isinstance(correction, Pin):
+        return "PIN", _title(correction.joint)
+    if isinstance(correction, Contact):
+        part = _title(correction.part)
+        return "CONTACT", f"{part} Foot Stands" if correction.part in FEET else part
+    if isinstance(correction, DepthFlip):
+        is_body = correction.part == "body"
+        return "FLIP", "Turned Around" if is_body else _title(correction.part)
+    if isinstance(correction, Exchange):
+        what = {"both": "Sides", "arms": "Arms", "legs": "Legs"}[correction.limbs]
+        return "EXCHANGE", f"{what} Exchanged"
+    if isinstance(correction, Interpolation):
+        return "INTERPOLATION", "Interpolated"
+    if isinstance(correction, Upright):
+        return "UPRIGHT", "Upright Line"
+    if isinstance(correction, FeetOnFloor):
+        return "FEET", "Feet on the Floor"
+    return "FLOOR", "Floor"
+
+
+def _title(name: str) -> str:
+    return name.replace("_", " ").title()
 
 
 def _missed(motion: Motion, pin: Pin, place: NDArray[np.float64] | None) -> str:
