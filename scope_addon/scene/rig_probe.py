@@ -27,7 +27,8 @@ from ..retarget.rest_pose import RestPose
 from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import assign_action, used_slot
 from .character.root_object import root_object, topmost
-from .datablocks import is_deformed_by
+from .datablocks import changed, is_deformed_by
+from .visibility import evaluated
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
 SWITCHES = ("IK_FK", "neck_follow", "head_follow")
@@ -319,64 +320,35 @@ def at_rest(rig: bpy.types.Object) -> Iterator[None]:
     """
     if rig.mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
-    state = _RigState(rig)
-    try:
-        state.clear()
-        yield
-    finally:
-        state.restore()
-
-
-class _RigState:
-    """A rig's visibility, animation, pose and root object."""
-
-    def __init__(self, rig: bpy.types.Object) -> None:
-        self._rig = rig
-        # this collection cannot be hidden or excluded
-        self._shown = bpy.context.scene.collection.objects
-        self._hidden, self._linked = rig.hide_viewport, rig in self._shown.values()
-        self._position = rig.data.pose_position
-        self._animation = rig.animation_data
-        self._action = self._animation.action if self._animation else None
-        self._slot = used_slot(self._animation)
-        self._nla = self._animation.use_nla if self._animation else False
-        self._bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
-        self._top = topmost(rig)
-        self._empty = root_object(rig)
-
-    def clear(self) -> None:
-        """Show the rig without animation, pose and root object, and switch limbs to FK."""
-        rig = self._rig
-        if not self._linked:
-            self._shown.link(rig)
-        rig.hide_viewport = False
-        rig.data.pose_position = "POSE"
-        self._top.parent = None
-        if self._animation:
-            self._animation.action = None
-            self._animation.use_nla = False
-        for bone, _ in self._bases:
-            bone.matrix_basis = Matrix()
-            for switch in SWITCHES:
-                if switch in bone:
-                    bone[switch] = 1.0
-        rig.update_tag()
-        bpy.context.view_layer.update()  # or its place is read as below the root object
-
-    def restore(self) -> None:
-        """Restore everything except the switches."""
-        rig = self._rig
-        for bone, matrix in self._bases:
-            bone.matrix_basis = matrix
-        self._top.parent = self._empty
-        rig.hide_viewport = self._hidden
-        rig.data.pose_position = self._position
-        if not self._linked:
-            self._shown.unlink(rig)
-        if self._animation:
-            self._animation.use_nla = self._nla
-            if self._action is not None:
-                assign_action(self._animation, self._action, self._slot)
+    animation = rig.animation_data
+    action = animation.action if animation else None
+    slot = used_slot(animation)
+    bases = [(bone, bone.matrix_basis.copy()) for bone in rig.pose.bones]
+    top = topmost(rig)
+    empty = root_object(rig)
+    with (
+        evaluated(rig),
+        changed([rig.data], pose_position="POSE"),
+        changed([animation] if animation else [], use_nla=False),
+    ):
+        try:
+            top.parent = None
+            if animation:
+                animation.action = None
+            for bone, _ in bases:
+                bone.matrix_basis = Matrix()
+                for switch in SWITCHES:
+                    if switch in bone:
+                        bone[switch] = 1.0
+            rig.update_tag()
+            bpy.context.view_layer.update()  # or its place is read as below the root object
+            yield
+        finally:
+            for bone, matrix in bases:
+                bone.matrix_basis = matrix
+            top.parent = empty
+            if action is not None:
+                assign_action(animation, action, slot)
 
 
 def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:
