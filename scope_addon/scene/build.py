@@ -70,16 +70,23 @@ class BuildOptions:
 
         :raises UsageError: when a value is unknown.
         """
-        choices = {
-            "frame_rate": timing.RATE_POLICIES,
-            "resolution": timing.POLICIES,
-            "shape": body_mesh.MODES,
-        }
-        for option, valid in choices.items():
-            if getattr(self, option) not in valid:
-                raise UsageError(
-                    f"{option} must be one of {', '.join(valid)}, but is '{getattr(self, option)}'"
-                )
+        check_choices(
+            self,
+            frame_rate=timing.RATE_POLICIES,
+            resolution=timing.POLICIES,
+            shape=body_mesh.MODES,
+        )
+
+
+def check_choices(options: object, **choices: Iterable[str]) -> None:
+    """Check that options have one of their valid values.
+
+    :raises UsageError: one has another.
+    """
+    for option, valid in choices.items():
+        value = getattr(options, option)
+        if value not in valid:
+            raise UsageError(f"{option} must be one of {', '.join(valid)}, but is '{value}'")
 
 
 NEW_SCENE = BuildOptions(frame_rate="set", resolution="set", active_camera=True)

@@ -29,7 +29,7 @@ from .actions import (
 from .datablocks import NewDatablocks, enter_object_mode
 
 _SCENE = ("frame_start", "frame_end", "frame_preview_start", "frame_preview_end", "camera")
-_RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
+RENDER = ("fps", "fps_base", "resolution_x", "resolution_y", "pixel_aspect_x", "pixel_aspect_y")
 _SETTINGS = ("use_frame_range", "use_cyclic", "frame_start", "frame_end")
 _CURVE = (
     "extrapolation",
@@ -85,7 +85,7 @@ class _SavedScene:
         self._scene = scene
         self.layer = bpy.context.view_layer
         self._settings = {name: getattr(scene, name) for name in _SCENE}
-        self._render = {name: getattr(scene.render, name) for name in _RENDER}
+        self._render = {name: getattr(scene.render, name) for name in RENDER}
         self._current = scene.frame_current, scene.frame_subframe
         self._active = self.layer.objects.active
         self._mode = self._active.mode if self._active else "OBJECT"

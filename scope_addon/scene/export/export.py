@@ -29,7 +29,7 @@ from ...output_paths import WITHOUT_SCENE, check_output, person_paths
 from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
-from ..build import NEW_SCENE, BuildOptions, build_scene
+from ..build import NEW_SCENE, BuildOptions, build_scene, check_choices
 from ..datablocks import captures_of, temporary_datablocks
 from ..packed_motion import pack_motion
 from . import formats
@@ -75,16 +75,7 @@ class ExportOptions:
 
         :raises UsageError: when ``shape``, ``skeleton`` or ``bvh_unit`` is unknown.
         """
-        if self.bvh_unit not in UNITS_PER_METRE:
-            raise UsageError(
-                f"bvh_unit must be one of {', '.join(UNITS_PER_METRE)}, but is '{self.bvh_unit}'"
-            )
-        if self.skeleton not in SKELETONS:
-            raise UsageError(
-                f"skeleton must be one of {', '.join(SKELETONS)}, but is '{self.skeleton}'"
-            )
-        if self.shape not in SHAPES:
-            raise UsageError(f"shape must be one of {', '.join(SHAPES)}, but is '{self.shape}'")
+        check_choices(self, bvh_unit=UNITS_PER_METRE, skeleton=SKELETONS, shape=SHAPES)
 
     def bakes(self, suffix: str) -> bool:
         """Return whether the shape is baked into the mesh in files with this suffix."""

@@ -20,6 +20,7 @@ from ..character.animation import on_one_hemisphere
 from ..character.body_mesh import mixed_vertices, shape_key_name
 from ..character.expression_keys import copy_expressions, expression_offsets
 from ..datablocks import changed, is_deformed_by
+from ..transaction import RENDER
 from ..visibility import world_matrix
 from ..window_scene import window_shows
 
@@ -58,14 +59,7 @@ def scene_of(
     with temporary_scene("Capture") as scene:
         for collection in collections:
             scene.collection.children.link(collection)
-        for name in (
-            "fps",
-            "fps_base",
-            "resolution_x",
-            "resolution_y",
-            "pixel_aspect_x",
-            "pixel_aspect_y",
-        ):
+        for name in RENDER:
             setattr(scene.render, name, getattr(source.render, name))
         scene.unit_settings.scale_length = unit
         for marker in source.timeline_markers:
