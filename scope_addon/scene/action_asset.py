@@ -87,7 +87,7 @@ def set_preview(action: bpy.types.Action, armature: bpy.types.Object, frame: flo
         scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
         radii = scale * np.array([_radius(bone) for bone in bones])
         colors = np.array([SIDES[side_of(bone.name)] for bone in bones])
-    pixels = skeleton_picture(ends[:, 0], ends[:, 1], radii, colors, _SIZE)
+    pixels = _skeleton_picture(ends[:, 0], ends[:, 1], radii, colors)
     preview = action.preview_ensure()
     preview.image_size = (_SIZE, _SIZE)
     preview.image_pixels_float.foreach_set(pixels.ravel())
@@ -156,12 +156,11 @@ def _radius(bone: bpy.types.PoseBone) -> float:
     return float(np.clip(_THICKNESS * bone.length, _THIN, _THICK))
 
 
-def skeleton_picture(
+def _skeleton_picture(
     heads: NDArray[np.float64],
     tails: NDArray[np.float64],
     radii: NDArray[np.float64],
     colors: NDArray[np.float64],
-    size: int = 256,
 ) -> NDArray[np.float32]:
     """Draw bones as capsules on a transparent background.
 
@@ -169,17 +168,16 @@ def skeleton_picture(
     :param tails: (B, 3) metres.
     :param radii: (B,) metres.
     :param colors: (B, 3) display-referred red, green, blue, 0 to 1.
-    :param size: width and height in pixels.
-    :return: (size, size, 4) red, green, blue, alpha, not premultiplied; the first row is the lowest
-        one.
+    :return: (_SIZE, _SIZE, 4) red, green, blue, alpha, not premultiplied; the first row is the
+        lowest one.
     """
-    fine = _FINER * size
+    fine = _FINER * _SIZE
     a, b, r = _on_screen(heads, tails, radii, fine)
     depth = np.full((fine, fine), -np.inf)
     picture = np.zeros((fine, fine, 4))
     for start, end, radius, color in zip(a, b, r, colors, strict=True):
         _draw_capsule(picture, depth, start, end, float(radius), color)
-    blocks = picture.reshape(size, _FINER, size, _FINER, 4)
+    blocks = picture.reshape(_SIZE, _FINER, _SIZE, _FINER, 4)
     alpha = blocks[..., 3].mean(axis=(1, 3))
     color = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-6)[
         ..., None
