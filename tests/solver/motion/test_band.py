@@ -14,14 +14,14 @@ DAMPING = 3.0
 ROOT_SCALE = 1 / 0.3
 
 
-def dense_step(clip):
+def dense_step(clip, focal=True):
     """Return (poses' steps (T, n), globals' step, predicted decrease) by one dense solve, the
     Hessian and the cost.
     """
-    residuals = gauss_newton_residuals(clip)
+    residuals = gauss_newton_residuals(clip, focal=focal)
     n = 6 + 3 * K
     T = len(clip.times)
-    size = T * n + P + 1
+    size = T * n + P + focal
     at_rest = residuals(np.zeros(size))
     factors = [np.sqrt(w * kernel(r, sigma)[1])[:, None] for r, w, sigma in at_rest]
 
