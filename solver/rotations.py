@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from .arrays import as_arrays
 from .errors import UnitsWarning
-from .kernel import kernel
+from .kernel import expanded_kernel, kernel
 from .part import Array
 
 # above cos(angle) = -1 + this, the antisymmetric part of R still fixes the axis accurately
@@ -124,6 +124,24 @@ def left_jacobian_inverse3(x: float, y: float, z: float) -> tuple[float, ...]:
         k * x * y - hz, 1.0 - k * (x * x + z * z), k * y * z + hx,
         k * x * z + hy, k * y * z - hx, 1.0 - k * (x * x + y * y),
     )  # fmt: skip
+
+
+@expanded_kernel
+def entries(R):  # type: ignore[no-untyped-def]
+    """Return the nine entries of R (3, 3), row by row."""
+    return (
+        R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2],
+    )  # fmt: skip
+
+
+@expanded_kernel
+def turn_back(R, x, y, z):  # type: ignore[no-untyped-def]
+    """Return the three numbers Rᵀ (x, y, z)."""
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
 
 
 def hat(phi: ArrayLike) -> Array:

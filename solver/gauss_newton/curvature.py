@@ -20,6 +20,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import GRADIENT, Array, Blocks, Pose
+from ..rotations import turn_back
 from ..tree import Tree
 
 MIN_SHARE = 0.2  # of JᵀJ that H + t S keeps
@@ -125,8 +126,8 @@ def set_current(tree: Tree, pose: Pose, blocks: Blocks, curvature: Curvature) ->
         x = blocks.H_u[i, 0, GRADIENT]
         y = blocks.H_u[i, 1, GRADIENT]
         z = blocks.H_u[i, 2, GRADIENT]
-        for c in range(3):
-            curvature.g[i, c] = R[0, c] * x + R[1, c] * y + R[2, c] * z
+        g = curvature.g[i]
+        g[0], g[1], g[2] = turn_back(R, x, y, z)
 
 
 @kernel
@@ -149,9 +150,7 @@ def update(
     for i in range(1, tree.parents.shape[0]):
         R = pose.R[tree.parents[i]]
         Q = trial.R[tree.parents[i]]
-        w0 = R[0, 0] * u[i, 0] + R[1, 0] * u[i, 1] + R[2, 0] * u[i, 2]
-        w1 = R[0, 1] * u[i, 0] + R[1, 1] * u[i, 1] + R[2, 1] * u[i, 2]
-        w2 = R[0, 2] * u[i, 0] + R[1, 2] * u[i, 1] + R[2, 2] * u[i, 2]
+        w0, w1, w2 = turn_back(R, u[i, 0], u[i, 1], u[i, 2])
         length = w0 * w0 + w1 * w1 + w2 * w2
         if not length > SHORTEST_STEP * SHORTEST_STEP:
             continue
@@ -167,9 +166,10 @@ def update(
         m11 = h[3] + S[1, 1]
         m12 = h[4] + S[1, 2]
         m22 = h[5] + S[2, 2]
-        d0 = Q[0, 0] * x + Q[1, 0] * y + Q[2, 0] * z - g[0] - m00 * w0 - m01 * w1 - m02 * w2
-        d1 = Q[0, 1] * x + Q[1, 1] * y + Q[2, 1] * z - g[1] - m01 * w0 - m11 * w1 - m12 * w2
-        d2 = Q[0, 2] * x + Q[1, 2] * y + Q[2, 2] * z - g[2] - m02 * w0 - m12 * w1 - m22 * w2
+        g0, g1, g2 = turn_back(Q, x, y, z)
+        d0 = g0 - g[0] - m00 * w0 - m01 * w1 - m02 * w2
+        d1 = g1 - g[1] - m01 * w0 - m11 * w1 - m12 * w2
+        d2 = g2 - g[2] - m02 * w0 - m12 * w1 - m22 * w2
         along = d0 * w0 + d1 * w1 + d2 * w2
         if along * along > MIN_COSINE * MIN_COSINE * length * (d0 * d0 + d1 * d1 + d2 * d2):
             k = 1.0 / along

@@ -28,6 +28,7 @@ from ..residuals.registry import (
     SHAPE_PRIOR,
     accumulate_tables,
 )
+from ..rotations import entries
 from ..tree import Tree
 from .rows import add_origin, add_point, place_origin
 from .terms import HAS_2D, HAS_3D, HAS_DIRECTION, HAS_SHAPE, Terms
@@ -83,8 +84,7 @@ def place_parts(tree: Tree, pose: Pose) -> None:
             x += tree.S[i, 0, a] * b
             y += tree.S[i, 1, a] * b
             z += tree.S[i, 2, a] * b
-        turn = (Q[0, 0], Q[0, 1], Q[0, 2], Q[1, 0], Q[1, 1], Q[1, 2], Q[2, 0], Q[2, 1], Q[2, 2])
-        place_origin(pose.D[j], turn, tree.S[i], pose.D[i])
+        place_origin(pose.D[j], entries(Q), tree.S[i], pose.D[i])
         for r in range(3):
             q0 = Q[r, 0]
             q1 = Q[r, 1]
@@ -293,8 +293,7 @@ def _add_points(  # type: ignore[no-untyped-def]
     c = blocks.c
     P = tree.shape
     fit_focal = tree.globals > P
-    R = pose.R[i]
-    r = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
+    r = entries(pose.R[i])
     a = _ZERO6
     x = _ZERO9
     y = _ZERO6

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..kernel import expanded_kernel, kernel
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
-from ..rotations import exp3
+from ..rotations import exp3, turn_back
 from ..tree import Tree
 from .linearize import make_scratch
 from .rows import add_to_parent, scale_rows, subtract_eliminated, take_moment
@@ -309,11 +309,7 @@ def move(tree, pose, x, u, dg, trial):  # type: ignore[no-untyped-def]
             new = trial.R[0]
         else:
             R = pose.R[tree.parents[i]]
-            E = exp3(
-                R[0, 0] * u[i, 0] + R[1, 0] * u[i, 1] + R[2, 0] * u[i, 2],
-                R[0, 1] * u[i, 0] + R[1, 1] * u[i, 1] + R[2, 1] * u[i, 2],
-                R[0, 2] * u[i, 0] + R[1, 2] * u[i, 1] + R[2, 2] * u[i, 2],
-            )
+            E = exp3(*turn_back(R, u[i, 0], u[i, 1], u[i, 2]))
             old = pose.Omega[i]
             new = trial.Omega[i]
         for k in range(3):

@@ -18,7 +18,7 @@ camera's. Source: section 3 of the paper.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernel import kernel
+from ..kernel import expanded_kernel, kernel
 from ..part import GRADIENT, SHAPE, Array
 from ..rotations import log3
 
@@ -73,6 +73,12 @@ def add_to_joint(  # type: ignore[no-untyped-def]
         for s in range(3):
             blocks.H_uu[i, r, s] += a * R[s, 0] + b * R[s, 1] + c * R[s, 2]
         blocks.H_u[i, r, GRADIENT] += x * g0 + y * g1 + z * g2
+
+
+@expanded_kernel
+def outer(w, a, b, c):  # type: ignore[no-untyped-def]
+    """Return the upper triangle of w (a, b, c)ᵀ(a, b, c) by rows, six numbers."""
+    return w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import Array
-from .accumulation import add_to_point, lever, rows_of
+from .accumulation import add_to_point, lever, outer, rows_of
 
 INTS = 1  # point, numbered as in the measurements
 FLOATS = 6  # n (3), a unit vector, d, w_below, w_above
@@ -40,8 +40,9 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         if w <= 0.0:
             continue
         cost += 0.5 * w * h * h
-        W = (w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c)
-        add_to_point(tree, pose, blocks, j, x, y, z, *W, w * h * a, w * h * b, w * h * c)
+        add_to_point(
+            tree, pose, blocks, j, x, y, z, *outer(w, a, b, c), w * h * a, w * h * b, w * h * c
+        )
     return cost
 
 

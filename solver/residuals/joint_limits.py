@@ -19,8 +19,8 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import Array
-from ..rotations import left_jacobian_inverse3, log3
-from .accumulation import add_to_joint, rows_of
+from ..rotations import entries, left_jacobian_inverse3, log3
+from .accumulation import add_to_joint, outer, rows_of
 
 INTS = 1  # joint
 FLOATS = 8  # axis (3), lower, upper, swing_limit, w, w_swing
@@ -46,10 +46,7 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
     for k in range(ints.shape[0]):
         i = ints[k, 0]
         f = floats[k]
-        Om = pose.Omega[i]
-        x, y, z = log3(
-            Om[0, 0], Om[0, 1], Om[0, 2], Om[1, 0], Om[1, 1], Om[1, 2], Om[2, 0], Om[2, 1], Om[2, 2]
-        )  # fmt: skip
+        x, y, z = log3(*entries(pose.Omega[i]))
         angle = f[0] * x + f[1] * y + f[2] * z
         r = max(0.0, angle - f[4]) - max(0.0, f[3] - angle)
         sx = x - angle * f[0]
@@ -70,7 +67,7 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         a2 = f[0] * J[2] + f[1] * J[5] + f[2] * J[8]
         if hinged:
             cost += 0.5 * w * r * r
-            H = (w * a0 * a0, w * a0 * a1, w * a0 * a2, w * a1 * a1, w * a1 * a2, w * a2 * a2)
+            H = outer(w, a0, a1, a2)
             g = (w * r * a0, w * r * a1, w * r * a2)
         if swung:
             share = 1.0 - f[5] / swing

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..kernel import kernel
 from ..part import Array
-from .accumulation import add_to_point, geman_mcclure, lever, rows_of
+from .accumulation import add_to_point, geman_mcclure, lever, outer, rows_of
 from .keypoint2d import Z_MIN
 
 INTS = 1  # point, numbered as in the measurements
@@ -58,8 +58,9 @@ def accumulate(tree, ints, floats, weight, pose, blocks):  # type: ignore[no-unt
         a = f[5] / z
         b = f[6] / z
         c = -(f[5] * u + f[6] * v) / z
-        W = (w * a * a, w * a * b, w * a * c, w * b * b, w * b * c, w * c * c)
-        add_to_point(tree, pose, blocks, j, lx, ly, lz, *W, w * d * a, w * d * b, w * d * c)
+        add_to_point(
+            tree, pose, blocks, j, lx, ly, lz, *outer(w, a, b, c), w * d * a, w * d * b, w * d * c
+        )
     return cost
 
 
