@@ -155,7 +155,6 @@ class PoseRefit:
         self._tree = with_fixed_shape(make_tree(self.body), self.betas)
         self._options = _options()
         self._points = len(self.body.keypoint_names)
-        self._priors: dict[tuple[str, ...], Priors] = {}
         self._limits = joint_limits.hinges_of(self.names)
         self.ends = [name for name in _ENDS if name in self.names]
 
@@ -320,11 +319,17 @@ def nearest_on_ray(camera: Camera, pixel: Float64Array, point: Float64Array) -> 
     """Return the point (3,) nearest to another one of those in front of the camera that project to
     a pixel (2,).
     """
+    center = camera[0][:3, 3]
+    ray = _ray(camera, pixel)
+    return center + max(float((point - center) @ ray), 1e-3) * ray
+
+
+def _ray(camera: Camera, pixel: Float64Array) -> Float64Array:
+    """Return the unit vector (3,), world, from a camera to what it sees in a pixel (2,)."""
     T, K = camera
     ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
-    ray /= np.linalg.norm(ray)
-    nearest: Float64Array = T[:3, 3] + max(float((point - T[:3, 3]) @ ray), 1e-3) * ray
-    return nearest
+    unit: Float64Array = ray / np.linalg.norm(ray)
+    return unit
 
 
 def point_at_depth(camera: Camera, pixel: Float64Array, point: Float64Array) -> Float64Array:
@@ -334,16 +339,17 @@ def point_at_depth(camera: Camera, pixel: Float64Array, point: Float64Array) -> 
     crouches does so in place. A camera that looks steeply down or up moves it in a plane that is
     parallel to the image.
     """
-    T, K = camera
-    normal = T[:3, 2] * [1.0, 1.0, 0.0]
+    ahead = camera[0][:3, 2]
+    center = camera[0][:3, 3]
+    normal = ahead * [1.0, 1.0, 0.0]
     if np.linalg.norm(normal) < np.cos(_STEEP):
-        normal = T[:3, 2]
-    ray = T[:3, :3] @ np.linalg.solve(K, np.array([*pixel, 1.0]))
+        normal = ahead
+    ray = _ray(camera, pixel)
     along = float(ray @ normal)
     # The ray meets the plane beside or behind the camera, or nowhere.
-    if along < 1e-3 * float(np.linalg.norm(ray) * np.linalg.norm(normal)):
+    if along < 1e-3 * float(np.linalg.norm(normal)):
         return nearest_on_ray(camera, pixel, point)
-    place: Float64Array = T[:3, 3] + ray * (float((point - T[:3, 3]) @ normal) / along)
+    place: Float64Array = center + ray * (float((point - center) @ normal) / along)
     return place
 
 
