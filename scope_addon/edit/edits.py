@@ -109,9 +109,11 @@ def moved_motion(motion: Motion, body: Body, transform: Float64Array) -> Motion:
     rest = body.rest_joints(motion.betas)[0]
     changed: dict[str, Any] = {"world_from_camera": transform @ motion.world_from_camera}
     for poses, trans in (("poses", "trans"), ("poses_raw", "trans_raw")):
-        changed[poses], changed[trans] = _moved(
-            getattr(motion, poses), getattr(motion, trans), rest, transform
-        )
+        turned = getattr(motion, poses).copy()
+        turned[:, :3] = log(transform[:3, :3] @ exp(turned[:, :3].astype(float)))
+        before = getattr(motion, trans)
+        pelvis = (rest + before) @ transform[:3, :3].T + transform[:3, 3]
+        changed |= {poses: turned, trans: (pelvis - rest).astype(before.dtype)}
     return replace(motion, **changed)
 
 
@@ -120,21 +122,6 @@ def moved_clip(clip: Clip, transform: Float64Array) -> Clip:
     rotations = clip.rotations.copy()
     rotations[:, 0] = transform[:3, :3] @ rotations[:, 0]
     return Clip(clip.times, rotations, clip.root @ transform[:3, :3].T + transform[:3, 3])
-
-
-def _moved(
-    poses: FloatArray,
-    trans: FloatArray,
-    rest: Float64Array,
-    transform: Float64Array,
-) -> tuple[FloatArray, FloatArray]:
-    """Move poses (T, 3(K+1)) and translations (T, 3) of a body whose pelvis rests at ``rest``
-    (3,).
-    """
-    new = poses.copy()
-    new[:, :3] = log(transform[:3, :3] @ exp(poses[:, :3].astype(float)))
-    pelvis = (rest + trans) @ transform[:3, :3].T + transform[:3, 3]
-    return new, (pelvis - rest).astype(trans.dtype)
 
 
 def refloor(
