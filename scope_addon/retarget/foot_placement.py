@@ -299,7 +299,8 @@ def ankle_goal(
     :param one_floor: (...) where feet are kept above the floor.
     :return: (..., 3) metres.
     """
-    yaw = _heading(turn)
+    # About the vertical alone, from the sideways axis, which stays horizontal.
+    yaw = about_z(np.arctan2(turn[..., 1, 0], turn[..., 0, 0])).reshape(turn.shape)
     goals = []
     heights = []
     rolled = []
@@ -384,10 +385,3 @@ def pelvis_drop(
     weight = 1 + np.cos(np.pi * width / (frames + 1))
     smooth: Float64Array = needed[near].max(axis=1)[near] @ (weight / weight.sum())
     return smooth
-
-
-def _heading(turn: Float64Array) -> Float64Array:
-    """Return the rotations (..., 3, 3) about the vertical alone, from the sideways axis, which
-    stays horizontal.
-    """
-    return about_z(np.arctan2(turn[..., 1, 0], turn[..., 0, 0])).reshape(turn.shape)

@@ -353,12 +353,8 @@ def _left_out(arrays: Mapping[str, NDArray[Any]], joint_names: Sequence[str]) ->
     expression = _first(arrays, _EXPRESSION)
     if expression is not None:
         found.append(expression)
-    return tuple(name for name in found if _moves(arrays[name]))
-
-
-def _moves(array: NDArray[Any]) -> bool:
-    """Return whether an array holds numbers other than 0."""
-    return array.dtype.kind in "fiu" and bool(np.any(array))
+    # Zeros say nothing.
+    return tuple(n for n in found if arrays[n].dtype.kind in "fiu" and np.any(arrays[n]))
 
 
 def _has_w_last(*arrays: NDArray[Any]) -> bool:
