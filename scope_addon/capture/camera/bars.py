@@ -79,13 +79,11 @@ def _black_bars(bright: FloatArray) -> tuple[int, int] | None:
     picture = np.flatnonzero(bright > MAX_BRIGHT_SHARE)
     if not len(picture):
         return None
-    first = int(picture[0])
-    last = int(picture[-1])
-    begin = first
-    end = n - 1 - last
+    begin = int(picture[0])
+    end = n - 1 - int(picture[-1])
     edges = (
-        bright[first : first + EDGE_PX].max(),
-        bright[max(0, last - EDGE_PX + 1) : last + 1].max(),
+        bright[begin : begin + EDGE_PX].max(),
+        bright[max(0, n - end - EDGE_PX) : n - end].max(),
     )
     if (
         min(edges) < MIN_EDGE_SHARE

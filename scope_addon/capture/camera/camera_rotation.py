@@ -125,26 +125,23 @@ class BackgroundTracker:
         if R_camera_key is None:
             if self.edge_frames:  # what is seen from now on may be something else
                 self._hidden.reveal([])
-            self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(image, boxes)
             self._rotations.append(None)
             return
         self._R_key_last = R_camera_key.T
         R_first_camera = self._R_first_key @ self._R_key_last
         self._rotations.append(R_first_camera)
-        if self._is_edge_frame(R_first_camera):
-            self.edge_frames.append(
-                FrameEdges(row, find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars))
-            )
-        elif self._may_reveal_edges(R_first_camera, people):
-            segments = find_segments(image_rgb, people, bars=self.bars)
-            self.edge_frames.append(
-                FrameEdges(row, segments.where(self._hidden.hides(segments.ends_px.mean(axis=1))))
-            )
-            self._hidden.reveal(people)
+        if self.edge_frames and self._seconds_since(self.edge_frames[-1]) >= EDGE_INTERVAL_S:
+            if is_rotated(R_first_camera):
+                segments = find_segments(image_rgb, people, EDGE_SIDE_PX, self.bars)
+                self.edge_frames.append(FrameEdges(row, segments))
+            elif self._reveal_edges(people):
+                segments = find_segments(image_rgb, people, bars=self.bars)
+                was_hidden = self._hidden.hides(segments.ends_px.mean(axis=1))
+                self.edge_frames.append(FrameEdges(row, segments.where(was_hidden)))
+                self._hidden.reveal(people)
         self._image = image
         if len(self._points) < max(KEY_SHARE * self._key_count, MIN_CORNERS):
-            self._R_first_key = self._R_first_key @ self._R_key_last
             self._begin_key(image, boxes)
 
     def record(self) -> BackgroundRecord:
@@ -157,30 +154,18 @@ class BackgroundTracker:
             times, R, known, list(self._inlier_shares), list(self.edge_frames), self.bars, corners
         )
 
-    def _is_edge_frame(self, R_first_camera: Float64Array) -> bool:
-        """Return whether to detect edges in the last frame: at intervals, once the camera (3, 3)
-        has rotated.
-        """
-        if not self.edge_frames:
-            return False
-        elapsed_s = self._times[-1] - self._times[self.edge_frames[-1].row]
-        return elapsed_s >= EDGE_INTERVAL_S and is_rotated(R_first_camera)
+    def _seconds_since(self, edges: FrameEdges) -> float:
+        return self._times[-1] - self._times[edges.row]
 
-    def _may_reveal_edges(
-        self, R_first_camera: Float64Array, people: Sequence[NDArray[Any]]
-    ) -> bool:
+    def _reveal_edges(self, people: Sequence[NDArray[Any]]) -> bool:
         """Return whether people of the first edge frame have moved away from background that they
-        hid in it.
+        hid in it, before a camera that has not rotated.
 
-        The camera (3, 3) must not have rotated. Without anybody in the frame, somebody may have
-        been missed.
+        Without anybody in the frame, somebody may have been missed.
         """
-        if not self.edge_frames or not people or is_rotated(R_first_camera):
+        if not people or self._seconds_since(self.edge_frames[0]) > REVEALING_S:
             return False
-        elapsed_s = self._times[-1] - self._times[self.edge_frames[-1].row]
-        since_first_s = self._times[-1] - self._times[self.edge_frames[0].row]
-        is_due = elapsed_s >= EDGE_INTERVAL_S and since_first_s <= REVEALING_S
-        return is_due and self._hidden.share_in_view(people) >= REVEALED_SHARE
+        return self._hidden.share_in_view(people) >= REVEALED_SHARE
 
     def _follow(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> Float64Array | None:
         """Return the rotation (3, 3) from the key frame's axes to the current camera's, or None if
@@ -215,12 +200,14 @@ class BackgroundTracker:
         return cast(Uint8Array, grey)
 
     def _begin_key(self, image: Uint8Array, boxes: Sequence[Float64Array]) -> None:
+        """Begin the next key frame, at the last known rotation."""
         mask = background_mask(image, boxes)
         corners = cv2.goodFeaturesToTrack(image, MAX_CORNERS, 0.01, 7, mask=mask)
         self._points = np.asarray([] if corners is None else corners, np.float32).reshape(-1, 2)
         self._key_rays = self._rays(self._points)
         self._key_count = len(self._points)
         self._image = image
+        self._R_first_key = self._R_first_key @ self._R_key_last
         self._R_key_last = np.eye(3)
 
     def _rays(self, points: Float32Array) -> Float64Array:

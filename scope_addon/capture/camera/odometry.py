@@ -189,7 +189,7 @@ class _Tracker:
             earliest = 0 if before is None else max(before.first, before.end - COMMON[1])
             self._extend_backwards(part, earliest)
             part.places = self._places[~np.isnan(self._places[:, 0])]
-            start = max(part.end - 1, pair[1])
+            start = part.end - 1
             continued = None if before is None else _continued(before, part)
             if before is None:
                 parts.append(part)
