@@ -444,33 +444,23 @@ def _people_in_views(
         ]
         spans = contradicting_spans(seen, places)
         others = []
+        person = 0 if len(everyone) == 1 else k + 1
         for v in range(1, len(views)):
             number = numbers[v]
             place = places[v]
-            person = 0 if len(everyone) == 1 else k + 1
-            if number is None or place is None:
-                if place is not None:
-                    notices.append(notice("not_in_view", footage=views[v].name, person=person))
+            if place is None:
                 continue
-            missed_s = unseen_spans(views[0].people[k], views[v].people[number], place)
-            if missed_s:
-                notices.append(
-                    notice(
-                        "unseen_in_view",
-                        footage=views[v].name,
-                        person=person,
-                        times=[start * shot.speed for start, _ in missed_s],
-                    )
-                )
+            where: dict[str, str | int] = {"footage": views[v].name, "person": person}
+            if number is None:
+                notices.append(notice("not_in_view", **where))
+                continue
+            unseen = unseen_spans(views[0].people[k], views[v].people[number], place)
+            if unseen:
+                times_s = [start * shot.speed for start, _ in unseen]
+                notices.append(notice("unseen_in_view", times=times_s, **where))
             if spans[v]:
-                notices.append(
-                    notice(
-                        "view_contradicts",
-                        footage=views[v].name,
-                        person=person,
-                        times=[start * shot.speed for start, _ in spans[v]],
-                    )
-                )
+                times_s = [start * shot.speed for start, _ in spans[v]]
+                notices.append(notice("view_contradicts", times=times_s, **where))
             track = _without(views[v].tracks[number], spans[v], place)
             others.append((track, with_focal_scale(views[v].camera, place), place))
         track = _without(views[0].tracks[k], spans[0], CameraPlace.first())

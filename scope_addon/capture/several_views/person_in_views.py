@@ -49,9 +49,7 @@ STEP = 1e-3  # of a coefficient, for derivatives
 
 def with_focal_scale(camera: Camera, place: CameraPlace) -> Camera:
     """Return a camera with the focal length that several cameras agree on."""
-    intrinsics = camera.intrinsics.copy()
-    intrinsics[[0, 1], [0, 1]] *= np.exp(place.log_focal)
-    return replace(camera, intrinsics=intrinsics)
+    return camera.zoomed(float(np.exp(place.log_focal)))
 
 
 def track_at(track: Track, times: Float64Array) -> Track:

@@ -25,7 +25,12 @@ from ..perception.landmark_network import KEYPOINT_NAMES
 from ..tracking.expression_motion import expression_motion
 from ..tracking.track import Track
 from .camera_path import CameraPath
-from .placement import PlacedTrack, RawMotion, rotation_vectors_of_joints
+from .placement import (
+    PlacedTrack,
+    RawMotion,
+    joints_and_contact_points,
+    rotation_vectors_of_joints,
+)
 
 MIN_CONFIDENCE = 0.5  # of keypoints that count in the reprojection error
 MIN_DEPTH_M = 1e-3
@@ -65,7 +70,7 @@ def assemble_motion(
         placed.root,
         rotation_vectors_of_joints(placed.rotations),
     )
-    joints = placed.place(placed.rotations, placed.root)[0]
+    joints, _ = joints_and_contact_points(placed.body, betas, placed.rotations, placed.root)
     seen = track.as_seen(shot.camera)
     keypoints = np.concatenate([seen.keypoints_px, seen.confidence[..., None]], axis=-1)
     names: tuple[str, ...] = KEYPOINT_NAMES

@@ -59,15 +59,6 @@ class PlacedTrack:
         """The (T, 4, 3) contact points of the soles."""
         return self.contact_points[:, : len(SOLES)]
 
-    def place(self, rotations: FloatArray, root: FloatArray) -> tuple[Float32Array, Float32Array]:
-        """Return joints (T, K+1, 3) and contact points (T, 6, 3) of another motion of this body,
-        camera frame.
-
-        :param rotations: (T, K+1, 3, 3), as the field.
-        :param root: (T, 3) the pelvis.
-        """
-        return _place(self.body, self.betas, rotations, root)
-
     def contact_center(self, contact: FloatArray) -> FloatArray:
         """Return the (T, 3) mean of the contact points weighted by ``contact`` (T, 6); of the soles
         if all are 0.
@@ -123,7 +114,7 @@ def place_track(
         rotations = smooth_rotations(rotations, times)
         root = path.center + smooth_root(root - path.center, times)
     body_with_contacts = with_contact_points(body, betas)
-    joints, contact_points = _place(body_with_contacts, betas, rotations, root)
+    joints, contact_points = joints_and_contact_points(body_with_contacts, betas, rotations, root)
     parts = [body.joint_names.index(name) for name in (*FOOT_PARTS, "left_wrist", "right_wrist")]
     visible = np.clip(fitted.joint_confidence[:, parts] / VISIBLE_CONFIDENCE, 0.0, 1.0)
     return to_single_precision(
@@ -155,9 +146,10 @@ def without_gaps(
     return rotations, fill_gaps(fitted.t_camera_root, fitted.valid, track.times)
 
 
-def _place(
+def joints_and_contact_points(
     body_with_contacts: Body, betas: FloatArray, rotations: FloatArray, root: FloatArray
 ) -> tuple[Float32Array, Float32Array]:
+    """Return joints (T, K+1, 3) and contact points (T, 6, 3) of a motion, in its axes."""
     pelvis_at_rest = body_with_contacts.rest_joints(betas)[0]
 
     def place(rotations: FloatArray, root: FloatArray) -> tuple[Float32Array, Float32Array]:
