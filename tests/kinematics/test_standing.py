@@ -100,25 +100,14 @@ def s(x):
     return 1 / (1 + np.exp(-x))
 
 
-UP = np.array([0.0, 0.0, 1.0])
-TIMES = np.arange(60) / 30
-
-
-def sliding(heights, speeds, away=(0.0, 5.0)):
-    """Return points (T, n, 3) at constant heights that move along x at constant speeds, through
-    `away` in frame 30.
-    """
-    points = np.zeros((len(TIMES), len(heights), 3))
-    points[..., 0] = (TIMES - TIMES[30])[:, None] * speeds
-    points[..., :2] += away
-    points[..., 2] = heights
-    return points
-
-
 def test_without_a_camera_the_probability_is_the_documented_function_of_speed_and_height():
+    times = np.arange(60) / 30
     heights = np.array([0.0, 0.02, 0.05, 0.08])
     speeds = np.array([0.1, 0.35, 0.5, 0.0])
-    p = standing.standing_probability(sliding(heights, speeds), UP, TIMES)[30]
+    points = np.zeros((60, 4, 3))
+    points[..., 0] = times[:, None] * speeds
+    points[..., 2] = heights
+    p = standing.standing_probability(points, np.array([0.0, 0.0, 1.0]), times)[30]
     np.testing.assert_allclose(
         p, s(4 * (1 - speeds / 0.35)) * s(4 * (1 - heights / 0.05)), rtol=1e-6
     )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
 from scope.scope_addon.kinematics.face import EXPRESSIONS
 from scope.scope_addon.retarget.expression_map import (
@@ -18,6 +17,8 @@ from scope.scope_addon.retarget.expression_map import (
 )
 from scope.solver.errors import InputError
 
+from .face.test_face_controls import weights
+
 OCULUS = [f"viseme_{v}" for v in "sil PP FF TH DD kk CH SS nn RR aa E I O U".split()]
 VRM0 = "A I U E O Blink Blink_L Blink_R Joy Angry Sorrow Fun LookUp LookLeft".split()
 VRM1 = "aa ih ou ee oh blink blinkLeft blinkRight happy angry sad surprised".split()
@@ -25,13 +26,6 @@ VROID = [
     f"Face.M_F00_000_00_Fcl_{n}"
     for n in ("ALL_Joy", "EYE_Close", "EYE_Close_L", "EYE_Close_R", "MTH_A", "MTH_O")
 ]
-
-
-def weights(**values: float) -> np.ndarray:
-    out = np.zeros((1, len(EXPRESSIONS)))
-    for name, value in values.items():
-        out[0, EXPRESSIONS.index(name)] = value
-    return out
 
 
 @pytest.mark.parametrize(
