@@ -44,11 +44,6 @@ from .reporting import refuse, rpt_
 from .translations import CONTEXT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy as np
-    from numpy.typing import NDArray
-
     from ...solver.body import Body
     from ..edit.clip import Clip
     from ..edit.corrections import Correction
@@ -393,27 +388,7 @@ class SCOPE_OT_bake_rate(EditOperator):
         )
 
 
-class KeptSpanOperator(CorrectSpanOperator):
-    """An edit of a span of frames that the motion keeps. Not registered."""
-
-    if TYPE_CHECKING:  # implemented by each operator
-
-        def change(self, body: Body, rate: float) -> Callable[[Clip, NDArray[np.float64]], Clip]:
-            """Return the edit of keys whose motion is lost, for ``edit_clip``."""
-
-    def edit(
-        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
-    ) -> str:
-        """Edit the keys, and keep that with the motion."""
-        motion = _correctable_motion(armature)
-        if motion is None:
-            edit_clip(armature, body, rate, self.change(body, rate))
-        else:
-            self.correct(armature, body, rate, motion)
-        return ""
-
-
-class SCOPE_OT_interpolate_span(KeptSpanOperator):
+class SCOPE_OT_interpolate_span(CorrectSpanOperator):
     """Replace frames by an interpolation between the pose before and the pose after them"""
 
     bl_idname = "scope.interpolate_span"
@@ -425,11 +400,20 @@ class SCOPE_OT_interpolate_span(KeptSpanOperator):
 
         return Interpolation(first, last)
 
-    def change(self, body: Body, rate: float) -> Callable[[Clip, NDArray[np.float64]], Clip]:
-        """Return the interpolation of keys."""
+    def edit(
+        self, context: bpy.types.Context, armature: bpy.types.Object, body: Body, rate: float
+    ) -> str:
+        """Edit the keys, and keep that with the motion."""
         from ..edit.spans import interpolate
 
-        return lambda clip, _: interpolate(clip, self.start / rate, self.end / rate)
+        motion = _correctable_motion(armature)
+        if motion is None:
+            first_s = self.start / rate
+            last_s = self.end / rate
+            edit_clip(armature, body, rate, lambda clip, _: interpolate(clip, first_s, last_s))
+        else:
+            self.correct(armature, body, rate, motion)
+        return ""
 
 
 class SCOPE_OT_refloor(CorrectionOperator):
