@@ -257,7 +257,8 @@ def build_capture(
         warnings.append(notice("missing_footage", footage=footage))
     with window_shows(scene):
         result = build_scene(motions, load_body(body), footage if shows_footage else None, options)
-    store_motions(result, [content for _, content in contents], body)
+    for person, (_, content) in zip(result.people, contents, strict=True):
+        pack_motion(person.armature, content)
     keeps_rate = options.frame_rate == "keep"
     show_build(scene, result, footage, replace(report, warnings=warnings), keeps_rate=keeps_rate)
     hide_others(scene, [result.collection])
@@ -355,18 +356,10 @@ def build_options(scene: bpy.types.Scene) -> BuildOptions:
         frame_rate=frame_rate,
         set_frame_range=settings.set_frame_range,
         start_frame=float(settings.start_frame),
-        # empty in a .blend file that has a value which is offered no more
-        shape=settings.shape.lower() or "keyed",
+        shape=settings.shape.lower(),
         with_camera=settings.with_camera,
         with_markers=settings.with_markers,
     )
-
-
-def store_motions(result: BuildResult, contents: Sequence[bytes], body: str) -> None:
-    """Store with each armature the bytes of its motion file, and the body."""
-    for person, content in zip(result.people, contents, strict=True):
-        pack_motion(person.armature, content)
-        person.armature["scope_body_file"] = body
 
 
 def _automatic_frame_rate(scene: bpy.types.Scene) -> str:

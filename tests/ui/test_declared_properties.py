@@ -16,7 +16,7 @@ from scope.scope_addon.options import OPTIONS, Option, Place, Property, Section,
 from scope.scope_addon.scene.character.body_mesh import MODES
 from scope.scope_addon.scene.timing import RATE_POLICIES
 from scope.scope_addon.ui import capture_panel
-from scope.scope_addon.ui.capture_job import build_options, capture_request
+from scope.scope_addon.ui.capture_job import capture_request
 from scope.scope_addon.ui.declared_properties import (
     choices_of,
     draw_section,
@@ -113,14 +113,6 @@ def test_settings_of_the_panel_are_sent_to_the_worker(footage, settings, name, v
 def test_choices_of_the_scene_are_those_that_building_supports():
     assert set(option("shape").values) == set(MODES)
     assert set(option("frame_rate").values) - {"auto"} <= set(RATE_POLICIES)
-
-
-def test_a_shape_that_is_offered_no_more_is_the_default():
-    settings = bpy.context.scene.scope
-    of_blender_5 = hasattr(settings, "bl_system_properties_get")
-    stored = settings.bl_system_properties_get(do_create=True) if of_blender_5 else settings
-    stored["shape"] = 1
-    assert build_options(bpy.context.scene).shape == "keyed"
 
 
 def test_a_new_option_appears_in_the_panel(monkeypatch):
