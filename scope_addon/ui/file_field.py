@@ -94,19 +94,26 @@ class SavingOperator(ReportingOperator):
         return bool(changed)
 
 
+def selected_paths(operator: Any) -> list[Path]:
+    """Return the paths that are selected in the browser of an operator with ``directory``,
+    ``files`` and ``filepath``; the current folder if there is none.
+    """
+    names = [each.name for each in operator.files if each.name]
+    chosen = [os.path.join(operator.directory, name) for name in names] or [operator.filepath]
+    return [Path(bpy.path.abspath(path)) for path in chosen]
+
+
 def chosen_files(operator: Any) -> list[str]:
     """Return the paths of the files that are chosen in the browser of an operator, a
     `SeveralFootageBrowser`; none, and an error of the operator, if one does not exist.
     """
-    names = [each.name for each in operator.files if each.name]
-    chosen = [os.path.join(operator.directory, name) for name in names] or [operator.filepath]
-    paths = [str(Path(bpy.path.abspath(path))) for path in chosen]
+    paths = selected_paths(operator)
     for path in paths:
         if not os.path.isfile(path):  # Path.is_file raises where a name is too long
             said = rpt_("{path} is not a file; choose a video or image", path=path)
             operator.report({"ERROR"}, said)
             return []
-    return paths
+    return [str(path) for path in paths]
 
 
 def present(path: str) -> str:

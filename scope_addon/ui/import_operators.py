@@ -17,6 +17,7 @@ from ..options import option
 from ..scene.datablocks import captures_of
 from .captures import hide_others
 from .declared_properties import blender_property
+from .file_field import selected_paths
 from .preferences import body_file
 from .reporting import ReportingOperator, iface_, rpt_, sentence
 from .view_operators import show_new_capture
@@ -95,14 +96,10 @@ class SCOPE_OT_import_motion(ReportingOperator):
 
         :raises UsageError: there are none.
         """
-        folder = Path(bpy.path.abspath(self.directory)) if self.directory else None
-        names = [each.name for each in self.files if each.name]
-        if folder and names:
-            return [folder / name for name in names]
-        path = Path(bpy.path.abspath(self.filepath))
-        if not self.filepath or path.is_dir():
+        paths = selected_paths(self)
+        if os.path.isdir(paths[0]):
             raise UsageError("no motion file is chosen; choose an .npz file")
-        return [path]
+        return paths
 
     def _body(self, context: bpy.types.Context) -> str:
         """Return the name or file of the body.
