@@ -100,13 +100,6 @@ def test_a_large_moving_object_does_not_disturb_the_estimate(panorama):
     assert angle_deg(found.R_first_camera, truth).max() < 0.4
 
 
-def test_a_blank_picture_is_static_and_unknown():
-    found = follow(np.full((HEIGHT, WIDTH, 3), 90, np.uint8) for _ in range(10))
-    assert found.is_static
-    np.testing.assert_array_equal(found.R_first_camera, np.tile(np.eye(3), (10, 1, 1)))
-    assert follow(iter([])).R_first_camera.shape == (0, 3, 3)
-
-
 def test_a_short_blackout_is_bridged(panorama):
     truth = exp(np.linspace(0, 0.3, 48)[:, None] * [0.0, 1.0, 0.0])
     pictures = [view(panorama, R) for R in truth]
