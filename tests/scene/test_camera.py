@@ -31,6 +31,20 @@ def projected_by_blender(camera: bpy.types.Object, points_world: np.ndarray) -> 
     return np.stack([(ndc[:, 0] + 1) / 2 * width, (1 - ndc[:, 1]) / 2 * height], axis=1)
 
 
+def built_camera(motion, body, footage=None, options=NEW_SCENE) -> bpy.types.Object:
+    """Return the camera of a capture, which is built without warnings."""
+    result = build_scene([motion], body, footage, options)
+    assert result.warnings == []
+    return result.people[0].camera
+
+
+def save_picture(path: Path) -> None:
+    image = bpy.data.images.new("picture", 64, 48)
+    image.filepath_raw = str(path)
+    image.file_format = "PNG"
+    image.save()
+
+
 def projected_by_intrinsics(motion, t: int) -> np.ndarray:
     p = motion.joints_cam[t] @ motion.intrinsics_of_frames[t].T
     return p[:, :2] / p[:, 2:]
@@ -48,14 +62,14 @@ def test_the_camera_sees_joints_at_their_pixels(body, make_motion, joints_world,
     fx, fy, x, y = lens
     K = np.array([[fx, 0, x * size[0]], [0, fy, y * size[1]], [0, 0, 1]])
     motion = make_motion(body, 8, image_size=size, intrinsics=K)
-    camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
+    camera = built_camera(motion, body)
     pixels = projected_by_blender(camera, joints_world(motion)[5])
     np.testing.assert_allclose(pixels, projected_by_intrinsics(motion, 5), atol=0.05)
 
 
 def test_a_moving_camera_is_keyed(body, make_motion, joints_world, blender):
     motion = make_motion(body, 20, moving_camera=True)
-    camera = build_scene([motion], body, options=NEW_SCENE).people[0].camera
+    camera = built_camera(motion, body)
     for t in (0, 9, 19):
         blender.go_to(t)
         pixels = projected_by_blender(camera, joints_world(motion)[t])
@@ -118,17 +132,14 @@ def clip(film, tmp_path) -> Path:
 
 def test_footage_is_shown_in_the_background(body, make_motion, clip):
     motion = make_motion(body, 5, image_size=(64, 48))
-    result = build_scene(
-        [motion], body, footage=clip, options=BuildOptions(frame_rate="set", start_frame=1.0)
-    )
-    camera = result.people[0].camera
+    options = BuildOptions(frame_rate="set", start_frame=1.0)
+    camera = built_camera(motion, body, clip, options)
     background = camera.data.background_images[0]
     assert (background.source, background.image.source) == ("IMAGE", "MOVIE")
     assert background.image.filepath.endswith(clip.name)
     assert [frame_shown(camera, f) for f in (1, 3, 5)] == [0, 2, 4]
     assert camera.data.animation_data is None
     assert camera.data.show_background_images
-    assert result.warnings == []
     assert not bpy.data.movieclips  # Blender crashes when one is deleted that is shown
 
 
@@ -191,7 +202,7 @@ def test_blender_undistorts_as_opencv_distorts(body, make_motion, tmp_path, dist
     image.save()
     motion = make_motion(body, 1, image_size=(width, height), intrinsics=K)
     motion.dist[:] = dist
-    camera = build_scene([motion], body, footage=picture, options=NEW_SCENE).people[0].camera
+    camera = built_camera(motion, body, picture)
     (background,) = camera.data.background_images
     assert background.clip_user.use_render_undistorted
     clip = background.clip
@@ -260,9 +271,7 @@ def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
     motion = make_motion(
         body, timestamps=np.array([0, 1, 3, 4]) / 24, rate=24.0, image_size=(64, 48)
     )
-    result = build_scene([motion], body, footage=tmp_path / "walk_0007.png", options=NEW_SCENE)
-    assert result.warnings == []
-    camera = result.people[0].camera
+    camera = built_camera(motion, body, tmp_path / "walk_0007.png")
     assert camera.data.background_images[0].image.source == "SEQUENCE"
     assert camera.data.background_images[0].image.filepath.endswith("walk_0007.png")
     # Pictures are named by a count from 1.
@@ -273,10 +282,7 @@ def test_numbered_pictures_are_shown_in_sequence(body, make_motion, tmp_path):
 
 def save_pictures(folder, numbers):
     for number in numbers:
-        image = bpy.data.images.new("picture", 64, 48)
-        image.filepath_raw = str(folder / f"walk_{number:04d}.png")
-        image.file_format = "PNG"
-        image.save()
+        save_picture(folder / f"walk_{number:04d}.png")
 
 
 @pytest.mark.parametrize(
@@ -304,10 +310,7 @@ def test_numbered_pictures_of_a_further_camera_are_shown_by_its_clock(
 
 def test_pictures_numbered_beyond_blenders_frames_are_warned_about(body, make_motion, tmp_path):
     for number in (20261122101500, 20261122101501):
-        image = bpy.data.images.new("picture", 64, 48)
-        image.filepath_raw = str(tmp_path / f"{number}.png")
-        image.file_format = "PNG"
-        image.save()
+        save_picture(tmp_path / f"{number}.png")
     motion = make_motion(body, 2, image_size=(64, 48))
     result = build_scene([motion], body, footage=tmp_path / "20261122101500.png", options=NEW_SCENE)
     assert result.people[0].camera.data.background_images[0].image.source == "FILE"
@@ -336,25 +339,31 @@ def shown_by_blender(
     return np.diag([2 / frame[0], 2 / frame[1]]) @ np.array([[c, -s], [s, c]]) @ fitted
 
 
-@pytest.mark.parametrize(("turn", "mirrored"), [(90, False), (180, True), (270, True)])
-def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(
-    body, make_motion, clip, turn, mirrored
-):
-    view = FootageView(turn, mirrored)
-    size = view.size(64, 48)
-    motion = make_motion(body, 5, image_size=size)
-    motion.footage_rotation, motion.footage_mirrored = turn, mirrored
-    result = build_scene([motion], body, footage=clip, options=NEW_SCENE)
-    assert result.warnings == []
-    background = result.people[0].camera.data.background_images[0]
-    shows = shown_by_blender(background, (64, 48), size)
-    # A mark near the top left corner of the file's picture.
-    picture = np.zeros((48, 64, 3), np.uint8)
-    picture[4, 8] = 255
-    row, column = np.argwhere(view.show(picture)[..., 0])[0]
-    u, v = shows @ [2 * 8.5 / 64 - 1, 1 - 2 * 4.5 / 48]
-    assert (u + 1) / 2 * size[0] == pytest.approx(column + 0.5, abs=1e-3)
-    assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=1e-3)
+def assert_corner_is_shown(body, motion, footage, view: FootageView, captured: np.ndarray) -> None:
+    """Check that Blender shows the white corner of the file's picture, ``CORNER``, where
+    the captured picture (H, W, 3) has it.
+
+    :param view: by which the user has turned the picture.
+    """
+    size = captured.shape[1], captured.shape[0]
+    motion.footage_rotation, motion.footage_mirrored = view.clockwise_deg, view.is_mirrored
+    background = built_camera(motion, body, footage).data.background_images[0]
+    u, v = shown_by_blender(background, (64, 48), size) @ [2 * 8 / 64 - 1, 1 - 2 * 4 / 48]
+    row, column = np.argwhere(captured[..., 0] > 128).mean(axis=0)
+    assert (u + 1) / 2 * size[0] == pytest.approx(column + 0.5, abs=0.1)
+    assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=0.1)
+
+
+CORNER = np.zeros((48, 64, 3), np.uint8)
+CORNER[:8, :16] = 255
+
+
+@pytest.mark.parametrize(
+    "view", [FootageView(90), FootageView(180, True), FootageView(270, True)], ids=str
+)
+def test_turned_and_mirrored_footage_is_shown_as_it_was_captured(body, make_motion, clip, view):
+    motion = make_motion(body, 5, image_size=view.size(64, 48))
+    assert_corner_is_shown(body, motion, clip, view, view.show(CORNER))
 
 
 @pytest.mark.parametrize(
@@ -371,23 +380,12 @@ def test_a_picture_is_turned_as_its_exif_says(body, make_motion, tmp_path, orien
     cv2 = package("cv2")
     from ..capture.media.stills.test_exif import exif_block, jpeg_with_exif
 
-    stored = np.zeros((48, 64, 3), np.uint8)
-    stored[:8, :16] = 255  # in the corner
     path = tmp_path / "photo.jpg"
-    path.write_bytes(jpeg_with_exif(stored, exif_block(orientation)))
-    upright = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
-    captured = chosen.show(upright)
-    size = captured.shape[1], captured.shape[0]
-    motion = make_motion(body, 1, image_size=size)
-    motion.footage_rotation, motion.footage_mirrored = chosen.clockwise_deg, chosen.is_mirrored
+    path.write_bytes(jpeg_with_exif(CORNER, exif_block(orientation)))
+    captured = chosen.show(cv2.imread(str(path)))
+    motion = make_motion(body, 1, image_size=(captured.shape[1], captured.shape[0]))
     motion.dist[0] = k1  # a distorting lens is shown as a clip
-    result = build_scene([motion], body, footage=path, options=NEW_SCENE)
-    assert result.warnings == []
-    background = result.people[0].camera.data.background_images[0]
-    u, v = shown_by_blender(background, (64, 48), size) @ [2 * 8 / 64 - 1, 1 - 2 * 4 / 48]
-    row, column = np.argwhere(captured[..., 0] > 128).mean(axis=0)
-    assert (u + 1) / 2 * size[0] == pytest.approx(column + 0.5, abs=0.1)
-    assert (1 - v) / 2 * size[1] == pytest.approx(row + 0.5, abs=0.1)
+    assert_corner_is_shown(body, motion, path, chosen, captured)
 
 
 @pytest.mark.parametrize("k1", [0.0, -0.1])
@@ -401,9 +399,7 @@ def test_footage_that_lacks_frames_before_the_captured_ones_is_shown_by_time(
     motion = make_motion(body, timestamps=times, rate=30.0, image_size=(64, 48))
     motion.frames[:] = [1, 2, 3]
     motion.dist[0] = k1  # a distorting lens is shown as a clip
-    result = build_scene([motion], body, footage=clip, options=NEW_SCENE)
-    assert result.warnings == []
-    camera = result.people[0].camera
+    camera = built_camera(motion, body, clip)
     if k1:
         assert camera.data.background_images[0].clip.frame_start == 0
     else:
