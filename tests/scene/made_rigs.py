@@ -17,6 +17,7 @@ from scope.scope_addon.scene.rig_retarget import RetargetOptions, guess_bone_map
 
 from ..edit.walking import BODY, NAMES, RATE, motion_of, walk
 from ..retarget.naming_schemes import PARENTS, PLACES, SIDED, names_of
+from .conftest import truth_of
 
 FRAMES = range(1, 60, 6)
 FBX = Matrix.LocRotScale(
@@ -156,21 +157,7 @@ def captured_together(seconds=1.0):
 
 def truth(motion=None, body=BODY):
     """Return the joints (T, K+1, 3) by forward kinematics of the motion."""
-    motion = motion or motion_of(walk(2.0))
-    rest = body.rest_joints(np.zeros(body.P))
-    out = np.empty((len(motion), body.K + 1, 3))
-    for t, row in enumerate(motion.poses.reshape(len(motion), -1, 3)):
-        R = []
-        for i, w in enumerate(row):
-            w = Vector(w)
-            local = np.array(Matrix.Rotation(w.length, 3, w if w.length else Vector((1, 0, 0))))
-            parent = body.parents[i]
-            R.append(local if parent < 0 else R[parent] @ local)
-            if parent < 0:
-                out[t, i] = rest[0] + motion.trans[t]
-            else:
-                out[t, i] = out[t, parent] + R[parent] @ (rest[i] - rest[parent])
-    return out
+    return truth_of(body, motion or motion_of(walk(2.0))).joints
 
 
 def renamed(rig, names):
