@@ -348,12 +348,15 @@ def test_smoothing_a_loop_restores_the_motion_and_the_frame_range(rig):
     last = 1 + round(SECONDS * RATE)
     bpy.ops.scope.smooth()
     before = seen(rig, [1, last, last + 20])
+    keys_before = {curve.data_path: len(curve.keyframe_points) for curve in fcurves(rig)}
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     cycle = scene.frame_start, scene.frame_end
     # again, within the first one
     bpy.ops.scope.loop(start=cycle[0], end=cycle[1] + 1, shortest=0.5)
     bpy.ops.scope.smooth()
     assert (scene.frame_start, scene.frame_end) == (2, 120)
+    keys_after = {curve.data_path: len(curve.keyframe_points) for curve in fcurves(rig)}
+    assert keys_after == keys_before  # also those of the confidence
     np.testing.assert_allclose(seen(rig, [1, last, last + 20]), before, atol=1e-5)
     bpy.ops.scope.loop(start=5, end=85, shortest=0.8)
     scene.frame_start = 1  # a manual setting is kept
