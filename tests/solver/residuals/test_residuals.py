@@ -39,53 +39,58 @@ HAT = rotations.exp([0.2, -0.5, 0.3])
 FLOW = random_flow(np.random.default_rng(11), HAT)
 SIDES = ([2.0], [3.0]), ([np.inf], [np.inf])
 
-# Of each kernel one row, of part I or a point k of it, and the residual that it stands for.
-CASES = {
-    "pose_prior": (
-        lambda k: pose_prior.pack([I], HAT[None], PLACE[None], [2.0], [3.0]),
-        lambda part, v_bar, V: ref.pose_prior(part, HAT, PLACE, 2.0, 3.0),
-    ),
-    "joint_prior": (
-        lambda k: joint_prior.pack([I], HAT[None], [1.0]),
-        lambda part, v_bar, V: ref.joint_prior(part, HAT),
-    ),
-    "joint_flow": (
-        lambda k: joint_flow.pack([I], FLOW[None], [1.0]),
-        lambda part, v_bar, V: ref.joint_flow(part, FLOW),
-    ),
-    "joint_limits": (
-        lambda k: joint_limits.pack([I], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0]),
-        lambda part, v_bar, V: ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0),
-    ),
-    "joint_limits whose kink is elsewhere": (
-        lambda k: joint_limits.pack([I], AXIS[None], [0.2], [0.4], [0.3], [2.0], [3.0]),
-        lambda part, v_bar, V: ref.joint_limits(part, AXIS, 0.2, 0.4, 0.3, 2.0, 3.0),
-    ),
-    "foot_contact": (
-        lambda k: foot_contact.pack([k], PLACE[None], [1.0]),
-        lambda part, v_bar, V: ref.keypoint3d(part, v_bar, V, PLACE),
-    ),
-    "foot_contact of a joint": (
-        lambda k: foot_contact.pack([M + I], PLACE[None], [1.0]),
-        lambda part, v_bar, V: ref.keypoint3d(part, 0.0 * v_bar, 0.0 * V, PLACE),
-    ),
-    "floor": (
-        lambda k: floor.pack([k], AXIS, 9.0, [2.0], [3.0]),
-        lambda part, v_bar, V: ref.floor(part, v_bar, V, AXIS, 9.0, 2.0, 3.0),
-    ),
-    "floor from above": (
-        lambda k: floor.pack([k], AXIS, -9.0, [2.0], [3.0]),
-        lambda part, v_bar, V: ref.floor(part, v_bar, V, AXIS, -9.0, 2.0, 3.0),
-    ),
-    "outline": (
-        lambda k: outline.pack([k], DELTA[None], CONTOUR[None], NORMAL[None], *SIDES),
-        lambda part, v_bar, V: ref.outline(part, v_bar + DELTA, V, CONTOUR, NORMAL, 2.0, 3.0),
-    ),
-    "outline from the other side": (
-        lambda k: outline.pack([k], DELTA[None], CONTOUR[None], -NORMAL[None], *SIDES),
-        lambda part, v_bar, V: ref.outline(part, v_bar + DELTA, V, CONTOUR, -NORMAL, 2.0, 3.0),
-    ),
-}
+
+def cases():
+    """Of each kernel one row, of part I or a point k of it, and the residual that it stands for."""
+    return {
+        "pose_prior": (
+            lambda k: pose_prior.pack([I], HAT[None], PLACE[None], [2.0], [3.0]),
+            lambda part, v_bar, V: ref.pose_prior(part, HAT, PLACE, 2.0, 3.0),
+        ),
+        "joint_prior": (
+            lambda k: joint_prior.pack([I], HAT[None], [1.0]),
+            lambda part, v_bar, V: ref.joint_prior(part, HAT),
+        ),
+        "joint_flow": (
+            lambda k: joint_flow.pack([I], FLOW[None], [1.0]),
+            lambda part, v_bar, V: ref.joint_flow(part, FLOW),
+        ),
+        "joint_limits": (
+            lambda k: joint_limits.pack([I], AXIS[None], [-0.1], [0.1], [0.05], [2.0], [3.0]),
+            lambda part, v_bar, V: ref.joint_limits(part, AXIS, -0.1, 0.1, 0.05, 2.0, 3.0),
+        ),
+        "joint_limits whose kink is elsewhere": (
+            lambda k: joint_limits.pack([I], AXIS[None], [0.2], [0.4], [0.3], [2.0], [3.0]),
+            lambda part, v_bar, V: ref.joint_limits(part, AXIS, 0.2, 0.4, 0.3, 2.0, 3.0),
+        ),
+        "foot_contact": (
+            lambda k: foot_contact.pack([k], PLACE[None], [1.0]),
+            lambda part, v_bar, V: ref.keypoint3d(part, v_bar, V, PLACE),
+        ),
+        "foot_contact of a joint": (
+            lambda k: foot_contact.pack([M + I], PLACE[None], [1.0]),
+            lambda part, v_bar, V: ref.keypoint3d(part, 0.0 * v_bar, 0.0 * V, PLACE),
+        ),
+        "floor": (
+            lambda k: floor.pack([k], AXIS, 9.0, [2.0], [3.0]),
+            lambda part, v_bar, V: ref.floor(part, v_bar, V, AXIS, 9.0, 2.0, 3.0),
+        ),
+        "floor from above": (
+            lambda k: floor.pack([k], AXIS, -9.0, [2.0], [3.0]),
+            lambda part, v_bar, V: ref.floor(part, v_bar, V, AXIS, -9.0, 2.0, 3.0),
+        ),
+        "outline": (
+            lambda k: outline.pack([k], DELTA[None], CONTOUR[None], NORMAL[None], *SIDES),
+            lambda part, v_bar, V: ref.outline(part, v_bar + DELTA, V, CONTOUR, NORMAL, 2.0, 3.0),
+        ),
+        "outline from the other side": (
+            lambda k: outline.pack([k], DELTA[None], CONTOUR[None], -NORMAL[None], *SIDES),
+            lambda part, v_bar, V: ref.outline(part, v_bar + DELTA, V, CONTOUR, -NORMAL, 2.0, 3.0),
+        ),
+    }
+
+
+CASES = cases()
 MEASURED = {
     "image": (
         lambda k: {"keypoints2d": Keypoints2D([k], [[700.0, 300.0]], [0.5])},
