@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scope_addon.capture.perception.face_landmarks import FaceEstimate
-from ...scope_addon.capture.perception.face_record import parts, record
+from ...scope_addon.capture.perception.face_record import gaze, parts, record, with_expression
 from ...scope_addon.capture.perception.region import Region
 from ...scope_addon.capture.tracking.expression_fit import fitted
 from ...scope_addon.capture.tracking.expression_motion import expression_motion
@@ -166,17 +166,13 @@ def rows_of(seen: SeenFaces, rows: NDArray[np.intp], scale: float) -> NDArray[np
     """Return what a capture keeps (n, RECORD) of these pictures (n,)."""
     region = Region((0.0, 0.0), 1.0, 0.0)
     light = np.ones(len(seen.presence)) if seen.eye_light is None else seen.eye_light
-    return np.array(
-        [
-            record(
-                FaceEstimate(
-                    scale * seen.landmarks[t], float(seen.presence[t]), region, float(light[t])
-                ),
-                seen.weights[t],
-            )
-            for t in rows
-        ]
-    )
+    estimates = [
+        FaceEstimate(scale * seen.landmarks[t], float(seen.presence[t]), region, float(light[t]))
+        for t in rows
+    ]
+    directions = np.array([gaze(estimate.landmarks) for estimate in estimates])
+    found = np.array([record(estimate) for estimate in estimates])
+    return np.asarray(with_expression(found, seen.weights[rows], directions))
 
 
 def _values(rows: NDArray[np.float64]) -> Found:

@@ -48,14 +48,11 @@ _RADIUS = 0.4  # of the eyeball, 12 mm, over the distance of the eye's corners, 
 _LARGEST_SINE = 0.9
 
 
-def record(estimate: FaceEstimate | None, weights: Float64Array | None = None) -> Float64Array:
+def record(estimate: FaceEstimate | None) -> Float64Array:
     """Return the row (RECORD,) of a face; zeros if there is none.
 
     Its numbers: confidence, size in pixels, weights, gaze, landmarks, and the light around the
-    eyes.
-
-    :param weights: (52,) of the expressions; None: they and the gaze stay 0, for `with_expressions`
-        to find.
+    eyes. Weights and gaze stay 0, for `with_expressions` to find.
     """
     row = np.zeros(RECORD)
     if estimate is None:
@@ -65,9 +62,6 @@ def record(estimate: FaceEstimate | None, weights: Float64Array | None = None) -
     confidence = estimate.presence * _ramp(size, *_FACE_PX) * _ramp(facing, *_FACING)
     row[0] = max(confidence, 1e-3)
     row[1] = size
-    if weights is not None:
-        row[_WEIGHTS] = weights
-        row[_GAZE] = gaze(estimate.landmarks).ravel()
     row[_POINTS] = estimate.landmarks[_KEPT].ravel()
     row[_LIGHT] = estimate.eye_light
     return row

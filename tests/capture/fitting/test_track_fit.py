@@ -141,7 +141,7 @@ def test_a_head_leans_as_its_face_does_although_the_bodys_keypoints_say_that_it_
     face = 30.0 * response.reference @ exp(np.radians([0.0, 0.0, lean_deg])).T * [1, -1, -1]
     landmarks = np.tile([*track.keypoints_px[0, :11].mean(axis=0), 0.0], (FACE_POINTS, 1))
     landmarks[response.landmarks] += face
-    row = record(FaceEstimate(landmarks, 1.0, Region((0.0, 0.0), 1.0, 0.0)), None)
+    row = record(FaceEstimate(landmarks, 1.0, Region((0.0, 0.0), 1.0, 0.0)))
     for each, expected in (
         (track, 0.0),
         (replace(track, face=np.tile(row, (FRAMES, 1))), lean_deg),

@@ -88,13 +88,7 @@ def modelled(weights: np.ndarray, noise: float, size: float = 120.0) -> np.ndarr
     landmarks = np.zeros((T, FACE_POINTS, 3))
     landmarks[:] = pixels[:, :1]  # elsewhere, all of them in one place
     landmarks[:, response.landmarks] = pixels
-    # The network reports nonsense.
-    return np.array(
-        [
-            record(FaceEstimate(p, 0.99, REGION), rng.uniform(0, 1, len(EXPRESSIONS)))
-            for p in landmarks
-        ]
-    )
+    return np.array([record(FaceEstimate(p, 0.99, REGION)) for p in landmarks])
 
 
 def test_expressions_are_found_whatever_the_face_at_rest():

@@ -59,7 +59,7 @@ def seen(tmp_path_factory):
 
 @pytest.mark.parametrize("turn_deg", [(0, 0, -35), (0, 35, 0), (15, -30, 10)])
 def test_the_direction_across_a_rendered_head(seen, turn_deg):
-    (found,) = across_head(record(seen(turn_deg), None)[None], camera_of(focal_px(DISTANCE_M)))
+    (found,) = across_head(record(seen(turn_deg))[None], camera_of(focal_px(DISTANCE_M)))
     true = (FRONTAL @ exp(np.radians(turn_deg)))[:, 0]
     assert np.degrees(np.arccos(found @ true)) < 5
 
@@ -69,9 +69,7 @@ def test_a_face_that_looks_frontal_at_the_edge_of_the_image_is_turned(seen):
     estimate = seen((0, 0, 0))
     focal = 300.0
     places = (0.0, focal * np.tan(np.radians(30.0)))
-    rows = [
-        record(replace(estimate, landmarks=estimate.landmarks + [x, 0, 0]), None) for x in places
-    ]
+    rows = [record(replace(estimate, landmarks=estimate.landmarks + [x, 0, 0])) for x in places]
     middle, aside = np.degrees(
         [np.arctan2(d[2], d[0]) for d in across_head(np.array(rows), camera_of(focal))]
     )
@@ -79,7 +77,7 @@ def test_a_face_that_looks_frontal_at_the_edge_of_the_image_is_turned(seen):
 
 
 def test_a_face_of_which_the_network_is_unsure_counts_by_the_cube_of_its_presence(seen):
-    rows = np.array([record(replace(seen((0, 0, 0)), presence=p), None) for p in (1.0, 0.5)])
+    rows = np.array([record(replace(seen((0, 0, 0)), presence=p)) for p in (1.0, 0.5)])
     across = across_head(rows, camera_of(300.0))
     sure, unsure = certainty(rows, across, across)
     assert unsure == pytest.approx(sure / 8, rel=1e-6)
