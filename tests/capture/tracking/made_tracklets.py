@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scope.scope_addon.capture.tracking.appearance import SIZE
 from scope.scope_addon.capture.tracking.track import Tracklet
 
 
 def seen_at(
-    xs: Sequence[float],
+    xs: list[float] | np.ndarray,
     first: int = 0,
     side_px: float = 200.0,
     appearance: np.ndarray | None = None,
