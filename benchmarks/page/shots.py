@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scope_addon.capture.fitting.outline import spread
 from ...scope_addon.capture.media.video import open_video
 from ...scope_addon.capture.overlay_video import body_colors, draw_overlay, painted_frames
 from ...scope_addon.motion import Motion
-from ...scope_addon.report.page import Markup, Picture, small_picture, spread_rows
+from ...scope_addon.report.page import Markup, Picture, small_picture
 from ...solver.body import Body
 from ...solver.rotations import exp
 from ...tools.readme_pictures.view import level_camera
@@ -46,7 +47,7 @@ def strips(
     """
     times = motions[0].timestamps
     part = np.flatnonzero((times >= first_s) & (times <= last_s))
-    rows = part[spread_rows(len(part), SHOTS)]
+    rows = spread(part, SHOTS)
     wanted = motions[0].frames[rows].tolist()
     footage = frames_of(video, wanted)
     overlay = dict(painted_frames(video, motions, body, wanted))

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...solver.body import Body
+from ..capture.fitting.outline import spread
 from ..capture.media.video_range import FootageRange
 from ..capture.overlay_video import painted_frames
 from ..errors import OutputError
@@ -261,7 +262,7 @@ def overlay_pictures(
     :raises ShapeError: a motion does not have the joints of the body.
     :raises OutputError: OpenCV cannot write WebP.
     """
-    chosen = spread_rows(len(rows), PICTURES)
+    chosen = spread(np.arange(len(rows)), PICTURES)
     row_of = dict(zip(motions[0].frames[rows[chosen]].tolist(), chosen.tolist(), strict=True))
     pictures = []
     for index, image in painted_frames(video, motions, body, list(row_of), wanted=wanted):
@@ -269,16 +270,6 @@ def overlay_pictures(
         if progress is not None:
             progress(len(pictures), len(chosen))
     return bounded(pictures, MAX_BYTES)
-
-
-def spread_rows(count: int, most: int) -> NDArray[np.int64]:
-    """Return at most ``most`` of the rows from 0 to ``count`` − 1, (n,), spread evenly, the first
-    and last included.
-    """
-    rows: NDArray[np.int64] = np.unique(
-        np.round(np.linspace(0, count - 1, min(count, most))).astype(np.int64)
-    )
-    return rows
 
 
 def small_picture(row: int, image: NDArray[np.uint8], longest_side: int = LONGEST_SIDE) -> Picture:

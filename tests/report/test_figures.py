@@ -14,8 +14,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 from scope.scope_addon import installed
+from scope.scope_addon.capture.fitting.outline import spread
 from scope.scope_addon.report.capture_page import height_text, motion_figures
-from scope.scope_addon.report.page import Picture, bounded, small_picture, spread_rows
+from scope.scope_addon.report.page import Picture, bounded, small_picture
 from scope.scope_addon.review_spans import find_review_spans
 
 from ..made_motion import made_motion
@@ -136,9 +137,9 @@ def test_the_height_with_its_deviation():
 
 
 def test_pictures_are_spread_from_the_first_to_the_last_and_become_fewer_where_they_are_too_large():
-    assert spread_rows(101, 5).tolist() == [0, 25, 50, 75, 100]
-    assert spread_rows(3, 40).tolist() == [0, 1, 2]
-    assert spread_rows(1, 40).tolist() == [0]
+    assert spread(np.arange(101), 5).tolist() == [0, 25, 50, 75, 100]
+    assert spread(np.arange(3), 40).tolist() == [0, 1, 2]
+    assert spread(np.arange(1), 40).tolist() == [0]
     pictures = [Picture(row, b"x" * 100, 1, 1) for row in range(9)]
     assert [p.row for p in bounded(pictures, 300)] == [0, 4, 8]
     assert len(bounded(pictures, 900)) == 9
