@@ -8,9 +8,8 @@ from functools import cache
 
 import cv2
 import numpy as np
-import pytest
 from numpy.typing import NDArray
-from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker, HiddenBackground
+from scope.scope_addon.capture.camera.camera_rotation import BackgroundTracker
 from scope.scope_addon.capture.camera.intrinsics import Camera, pinhole
 from scope.scope_addon.capture.camera.line_segments import Lines
 from scope.scope_addon.capture.camera.verticals import estimate_up_from_lines
@@ -110,18 +109,3 @@ def test_another_scene_adds_no_edges() -> None:
     positions = [560.0, *np.linspace(560.0, 300.0, 12)]
     lines = lines_after(positions, lambda k: other if k >= 1 else first, cut=1)
     assert len(lines.lengths) == len(lines_after(positions[:1]).lengths)
-
-
-def test_what_all_frames_hid_is_hidden() -> None:
-    background = HiddenBackground((720, 480))
-    background.reveal([np.array([[100.0, 100.0], [300.0, 400.0]])])
-    points = np.array([[200.0, 250.0], [600.0, 50.0], [110.0, 110.0]])
-    assert background.hides(points).tolist() == [True, False, True]
-    assert background.share_in_view([np.array([[90.0, 90.0], [310.0, 410.0]])]) == 0.0
-    moved = [np.array([[300.0, 100.0], [500.0, 400.0]])]
-    margin = 30.0  # around each
-    in_view = 200.0 * (300.0 + 2 * margin) / (720 * 480)
-    assert background.share_in_view(moved) == pytest.approx(in_view, rel=0.1)
-    background.reveal(moved)
-    assert background.hides(points).tolist() == [False, False, False]
-    assert background.hides(np.array([[300.0, 250.0], [719.4, 479.4]])).tolist() == [True, False]
