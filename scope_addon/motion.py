@@ -237,12 +237,8 @@ class Motion:
         }
         sizes["3K1"] = 3 * sizes["K1"]
         for name, (shape, dtype) in _SCHEMA.items():
-            if dtype is str:
-                continue
-            expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
-            got = getattr(self, name).shape
-            if got != expected:
-                raise MotionFileError(f"motion: {name} must have shape {expected}, but has {got}")
+            if dtype is not str:
+                _check_shape(name, getattr(self, name), shape, sizes)
         if self.zoom is not None and (
             self.zoom.shape != (T,)
             or not ((self.zoom >= 1.0 / _LARGEST_ZOOM) & (self.zoom <= _LARGEST_ZOOM)).all()
@@ -325,11 +321,7 @@ class Motion:
                 f"motion has {what}, but lacks {', '.join(missing)}; capture again"
             )
         for name, (shape, dtype) in schema.items():
-            expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
-            if group[name].shape != expected:
-                raise MotionFileError(
-                    f"motion: {name} must have shape {expected}, but has {group[name].shape}"
-                )
+            _check_shape(name, group[name], shape, sizes)
             if issubclass(dtype, np.floating) and not np.isfinite(group[name]).all():
                 raise MotionFileError(
                     f"motion: {name} has values that are not finite; capture again"
@@ -413,6 +405,15 @@ class Motion:
             raise MotionFileError(
                 f"{path} holds a value of the wrong kind ({in_one_line(error)}); capture again"
             ) from error
+
+
+def _check_shape(
+    name: str, array: NDArray[Any], shape: tuple[str | int, ...], sizes: dict[str, int]
+) -> None:
+    """Refuse an array that does not have the shape of the schema, whose letters ``sizes`` has."""
+    expected = tuple(sizes[s] if isinstance(s, str) else s for s in shape)
+    if array.shape != expected:
+        raise MotionFileError(f"motion: {name} must have shape {expected}, but has {array.shape}")
 
 
 def _is_lens(intrinsics: Float64Array, image_size: NDArray[np.int64]) -> bool:
