@@ -347,13 +347,11 @@ def _written(value: Value, spec: str, translate: Translate) -> list[str | TimeTe
         return [translate(ONE_FRAME if value == 1 else FRAMES).format(count=value)]
     if spec == "phrase":
         return [translate(PHRASES[str(value)])]
-    if spec == "times":
+    if spec in ("times", "names"):
         if not isinstance(value, list):
-            raise TypeError(f"times must be a list, not {value!r}")
-        return _times([float(each) for each in value], translate)
-    if spec == "names":
-        if not isinstance(value, list):
-            raise TypeError(f"names must be a list, not {value!r}")
+            raise TypeError(f"{spec} must be a list, not {value!r}")
+        if spec == "times":
+            return _times([float(each) for each in value], translate)
         listed = ", ".join(f"'{name}'" for name in value[:MAX_NAMES])
         return [listed + (" …" if len(value) > MAX_NAMES else "")]
     return [format(value, spec)]
