@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,6 +59,7 @@ WRITES = {
 }
 
 
+@cache
 def called(path: Path) -> set[str]:
     """The names of all functions and methods that a module calls, and how it opens files."""
     names = set()

@@ -72,10 +72,9 @@ def make_tables(
     for j in range(n):
         near = np.flatnonzero(owner == j)[:6]
         regressor[j, near] = rng.dirichlet(np.ones(len(near)))
-    for v in range(vertices):
-        others = rng.choice(n, 3, replace=False)
-        weights[v, others] = rng.uniform(0, 0.3, 3)
-        weights[v, owner[v]] += 1.0
+    others = rng.random((vertices, n)).argsort(axis=1)[:, :3]
+    np.put_along_axis(weights, others, rng.uniform(0, 0.3, (vertices, 3)), axis=1)
+    weights[np.arange(vertices), owner] += 1.0
     weights /= weights.sum(axis=1, keepdims=True)
     # the root's parent becomes 2**32 - 1
     kintree = np.array([parents, range(n)], np.int64).astype(np.uint32)
