@@ -71,36 +71,31 @@ CHANGES = {
         0.02,
         lambda h: replace(SEEN, keypoints2d=replace(PIXELS, sigma_px=2.0 + h)),
     ),
+    "weights.keypoints2d": ((), 0.02 * Weights().keypoints2d, None),
+    "weights.shape": ((), 0.02, None),
+    "weights.joint_prior": ((), 0.08, None),
 }
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_they_are_those_of_fits_to_changed_measurements(solution, name):
+def test_they_are_those_of_fits_to_changed_measurements_and_weights(solution, name):
     at, step, change = CHANGES[name]
     found = solution_derivatives(BODY, SEEN, solution, [name], priors=PRIORS, options=options())
-    ahead = solved(change(step), solution, options()).t_camera_part
-    behind = solved(change(-step), solution, options()).t_camera_part
-    expected = (ahead - behind) / (2.0 * step)
+    _, _, weight = name.partition("weights.")
+    fits = []
+    for h in (step, -step):
+        if weight:
+            chosen = options(**{weight: getattr(Weights(), weight) + h})
+            fits.append(solved(SEEN, solution, chosen).t_camera_part)
+        else:
+            fits.append(solved(change(h), solution, options()).t_camera_part)
+    expected = (fits[0] - fits[1]) / (2.0 * step)
     joints = found.joints[name]
     assert joints.shape == (K + 1, 3, *np.shape(joints[0, 0]))
     np.testing.assert_allclose(
         joints[(..., *at)], expected, rtol=0, atol=2e-3 * np.abs(expected).max()
     )
     assert found.unknowns[name].shape[0] == 6 + 3 * K + P
-
-
-@pytest.mark.parametrize("name", ["keypoints2d", "shape", "joint_prior"])
-def test_they_are_those_of_fits_with_other_weights(solution, name):
-    found = solution_derivatives(
-        BODY, SEEN, solution, [f"weights.{name}"], priors=PRIORS, options=options()
-    )
-    weight = getattr(Weights(), name)
-    step = 0.02 * weight
-    ahead = solved(SEEN, solution, options(**{name: weight + step})).t_camera_part
-    behind = solved(SEEN, solution, options(**{name: weight - step})).t_camera_part
-    expected = (ahead - behind) / (2.0 * step)
-    joints = found.joints[f"weights.{name}"]
-    np.testing.assert_allclose(joints, expected, rtol=0, atol=2e-3 * np.abs(expected).max())
 
 
 NAMES = ["keypoints3d.points", "keypoints2d.pixels", "keypoints2d.sigma_px", "weights.shape"]

@@ -14,7 +14,6 @@ from scope.solver import (
     Keypoints3D,
     Measurements,
     Options,
-    OrientationField,
     PosePriors,
     Stage,
     State,
@@ -83,15 +82,6 @@ def half_turned(m):
     )
 
 
-def opposite_directions(m):
-    o = m.orientation_field
-    both = [
-        np.concatenate([a, b])
-        for a, b in ((o.starts, o.starts), (o.ends, o.ends), (o.directions, -o.directions))
-    ]
-    return Measurements(orientation_field=OrientationField(*both))
-
-
 def zero_directions(m):
     o = m.orientation_field
     return Measurements(orientation_field=replace(o, directions=np.zeros((len(o.starts), 3))))
@@ -115,7 +105,6 @@ SPOILED = {
     "all in the camera": (lambda m: placed(m, lambda p: 0.0 * p), STOPPED),
     "far away": (lambda m: placed(m, lambda p: p + 1e9), STOPPED),
     "huge pixels": (lambda m: with_pixels(m, 1e12), STOPPED),
-    "opposite directions": (opposite_directions, STOPPED),
     "contradictory": (contradiction, STOPPED),
     "beneath its own floor": (beneath_its_own_floor, STOPPED),
     "against its prior": (half_turned, STOPPED),

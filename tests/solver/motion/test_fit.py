@@ -26,7 +26,7 @@ from scope.solver.motion.prior import MotionPrior, StandingPoints
 from scope.solver.motion.views import View
 
 from ..synthetic import RandomBody, forward, random_body
-from .clips import K, M, P, noisy_clip, walk
+from .clips import K, P, noisy_clip, walk
 
 MARKERS = 28  # four on each part
 TIGHT = Options(stages=[Stage(Weights(joint_prior=1e-2, joint_limits=0.0, shape=1.0), 1e-12, 60)])
@@ -200,15 +200,6 @@ def test_several_cameras_without_a_state_to_start_from():
     found = solved(clip.body, frames, clip.times, motion=loose)
     error = np.linalg.norm(found.t_world_part - joints(clip.body, clip.starts), axis=-1)
     assert np.median(error) < 0.03
-    # one camera elsewhere in the world, alone
-    alone = []
-    for f, (_, view) in enumerate(frames):
-        in_camera = clip.points[f] @ np.asarray(view.R_camera_world).T + view.t_camera_world
-        points = Keypoints3D(np.arange(M), in_camera)
-        alone.append([replace(view, measurements=replace(view.measurements, keypoints3d=points))])
-    one = solved(clip.body, alone, clip.times, motion=loose)
-    error = np.linalg.norm(one.t_world_part - joints(clip.body, clip.starts), axis=-1)
-    assert np.median(error) < 0.05
 
 
 def test_a_standing_point_stands():
@@ -258,17 +249,9 @@ FRAMES_REFUSED = {
         [Measurements()],
         "frames[1][0] must be View, but is a Measurements",
     ),
-    "a view of None": (
-        [View(None)],  # type: ignore[arg-type]
-        "measurements of frames[1][0] must be Measurements, but is None",
-    ),
     "scaled": (
         [View(Measurements()), View(Measurements(), 2.0 * TURNED)],
         "R_camera_world of frames[1][1] must be",
-    ),
-    "flat": (
-        [View(Measurements(), TURNED, np.zeros(2))],
-        "t_camera_world of frames[1][0] must have shape (3,)",
     ),
     "far": (
         [View(Measurements(), TURNED, [0.0, np.inf, 0.0])],

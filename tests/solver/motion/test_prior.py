@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from scope.solver import InvalidValueError, ShapeError
+from scope.solver import ShapeError
 from scope.solver.motion.prior import MotionPrior, StandingPoints
 
 
@@ -29,7 +29,6 @@ def test_weights_and_kernels_have_their_rows() -> None:
     ("prior", "error"),
     [
         (lambda: MotionPrior([1.0, 2.0]).packed(3), ShapeError),
-        (lambda: MotionPrior(contact=-1.0), InvalidValueError),
     ],
 )
 def test_what_is_no_weight_is_refused(prior, error) -> None:
