@@ -39,7 +39,7 @@ def write_film(
     *,
     times_s: Sequence[float] | None = None,
     metadata: dict[str, str] | None = None,
-    **options: str,
+    options: dict[str, str] | None = None,
 ) -> Path:
     """Encode pictures (H, W, 3), or frames, with the tags of the first one.
 
@@ -52,9 +52,7 @@ def write_film(
     ]
     with av.open(str(path), "w", options={"movflags": "use_metadata_tags"}) as container:
         container.metadata.update(metadata or {})
-        stream = container.add_stream(
-            codec, rate=rate, options={name.replace("_", "-"): v for name, v in options.items()}
-        )
+        stream = container.add_stream(codec, rate=rate, options=options or {})
         context = stream.codec_context
         stream.width = frames[0].width
         stream.height = frames[0].height

@@ -76,8 +76,10 @@ def test_fields_and_frames_may_alternate():
 
 @pytest.mark.parametrize("is_interlaced", [False, True])
 def test_frames_that_are_interlaced_may_have_packets_of_fields(tmp_path, is_interlaced):
-    options = {"x264_params": "interlaced=1"} if is_interlaced else {}
-    path = write_film(tmp_path / "a.ts", np.zeros((5, 64, 64, 3), np.uint8), "libx264", **options)
+    options = {"x264-params": "interlaced=1"} if is_interlaced else {}
+    path = write_film(
+        tmp_path / "a.ts", np.zeros((5, 64, 64, 3), np.uint8), "libx264", options=options
+    )
     with closing(PyavReader(path)) as reader:
         reader.read()
         assert reader.may_have_field_packets == is_interlaced

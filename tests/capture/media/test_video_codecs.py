@@ -20,7 +20,7 @@ COUNT = 12
 RATE = 25
 FILES = {
     "phone.mp4": ("libx264", "yuv420p", {}),
-    "newer phone.mp4": ("libx265", "yuv420p", {"x265_params": "log-level=none"}),
+    "newer phone.mp4": ("libx265", "yuv420p", {"x265-params": "log-level=none"}),
     "web.webm": ("libvpx-vp9", "yuv420p", {"deadline": "realtime"}),
     "newer web.mp4": ("libsvtav1", "yuv420p", {}),
     "editor.mov": ("prores_ks", "yuv422p10le", {}),
@@ -35,7 +35,7 @@ def write(path: Path) -> Path:
     need_encoder(codec)
     colours = [(255 * k / COUNT, 128, 255 - 255 * k / COUNT) for k in range(COUNT)]
     images = [np.full((64, 96, 3), colour).astype(np.uint8) for colour in colours]
-    return write_film(path, images, codec, pixels, RATE, **options)
+    return write_film(path, images, codec, pixels, RATE, options=options)
 
 
 @pytest.mark.parametrize("name", FILES)

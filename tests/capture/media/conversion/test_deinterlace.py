@@ -129,7 +129,7 @@ def write(path: Path, count: int, rate: int, codec: str = "libx264", order: str 
     pixels = "yuv422p10le" if codec == "prores_ks" else "yuv420p"
     frames = with_fields([moving_bar(k) for k in range(2 * count)], order, pixels)
     flags = "+ildct+ilme" if codec == "mpeg2video" else "+ildct"
-    return write_film(path, frames, codec, pixels, rate, flags=flags)
+    return write_film(path, frames, codec, pixels, rate, options={"flags": flags})
 
 
 def combs(image: np.ndarray) -> float:

@@ -149,7 +149,7 @@ def picture() -> np.ndarray:
 
 
 FILES = {
-    "phone.mp4": (HLG, "libx265", "yuv420p10le", {"x265_params": "log-level=none:lossless=1"}),
+    "phone.mp4": (HLG, "libx265", "yuv420p10le", {"x265-params": "log-level=none:lossless=1"}),
     "eight bits.mp4": (PQ, "libx264", "yuv420p", {"crf": "5"}),
     "tags of the container.webm": (
         PQ,
@@ -166,7 +166,7 @@ def test_files_show_what_was_filmed(tmp_path: Path, name: str) -> None:
     transfer, codec, pixels, options = FILES[name]
     need_encoder(codec)
     frames = [coded_frame(as_hdr(picture(), transfer), transfer)] * 3
-    path = write_film(tmp_path / name, frames, codec, pixels, **options)
+    path = write_film(tmp_path / name, frames, codec, pixels, options=options)
     with open_video(path) as video:
         frames = list(video)
     assert [f.timestamp_s for f in frames] == pytest.approx([0, 0.04, 0.08], abs=1e-3)
