@@ -34,7 +34,7 @@ from .guess import IMPOSSIBLE, by_name, guess
 from .rest_pose import RestPose
 from .skeleton import Skeleton
 from .smpl_motion import FARTHEST_M, MAX_PEOPLE
-from .transfer import heading_alignment, leg_length, rest_alignment
+from .transfer import leg_length, rest_alignment
 
 # The axes along which people may stand in a file, the usual ones first.
 _UP_AXES = {
@@ -91,10 +91,9 @@ class Performer:
             bone_ends(whole, names, self.parts),
             R_first[joints],
         )
-        F = heading_alignment(skeleton, row)
-        A = rest_alignment(skeleton, part_of, row, rest @ R_WORLD_MODEL.T, index, F)
+        alignment = rest_alignment(skeleton, part_of, row, rest @ R_WORLD_MODEL.T, index)
         # To the file's axes at rest from those of the body's part in its T-pose.
-        R_joint_part = np.swapaxes(R_first[joints], -1, -2) @ np.swapaxes(A @ F, -1, -2)
+        R_joint_part = np.swapaxes(alignment @ R_first[joints], -1, -2)
         file_legs = leg_length(skeleton.heads, row)
         if not file_legs > 0:
             raise MotionFileError(

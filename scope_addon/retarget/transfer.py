@@ -78,9 +78,9 @@ class Transfer:
         }
         part_of = [bone_map.parts[name] for name in rig.names]
         self._first, self._second, self._shares = _between(part_of, index)
-        F = heading_alignment(rig, row)
+        F = _heading_alignment(rig, row)
         self._facing = float(np.arctan2(F[1, 0], F[0, 0]))
-        alignment = rest_alignment(rig, part_of, row, rest, index, F) @ F
+        alignment = rest_alignment(rig, part_of, row, rest, index)
         self._rested = alignment @ rig.rotations
         legs = leg_ratio(body, betas, rig, bone_map)
         self._scales = np.array([legs if travel is None else travel] * 2 + [legs])
@@ -168,7 +168,7 @@ def _between(
     return first, second, shares
 
 
-def heading_alignment(rig: Skeleton, row: dict[str, int]) -> Float64Array:
+def _heading_alignment(rig: Skeleton, row: dict[str, int]) -> Float64Array:
     """Return F (3, 3), the rotation about the vertical that turns the rig's left to the body's, +x.
 
     :param row: the rig's bone of each body part.
@@ -183,17 +183,16 @@ def rest_alignment(
     row: dict[str, int],
     rest: Float64Array,
     index: dict[str, int],
-    F: Float64Array,
 ) -> Float64Array:
-    """Return A_b of every bone.
+    """Return A_b F of every bone.
 
     :param part_of: the body part of each bone.
     :param row: the rig's bone of each body part.
     :param rest: (K+1, 3) the body's rest joints, metres, world axes.
     :param index: the joint of each body part.
-    :param F: (3, 3) the heading alignment.
     :return: (B, 3, 3) rotations.
     """
+    F = _heading_alignment(rig, row)
     A = np.tile(np.eye(3), (len(part_of), 1, 1))
     for b, part in enumerate(part_of):
         side, _, kind = part.partition("_")
@@ -224,7 +223,7 @@ def rest_alignment(
             )
             if palm is not None and (np.trace(palm @ A[b].T) - 1) / 2 > np.cos(_MAX_PALM_TURN):
                 A[b] = palm
-    return A
+    return A @ F
 
 
 def _heading_turn(along: Float64Array, wanted: Float64Array) -> Float64Array:
