@@ -307,6 +307,17 @@ class Priors:
         return mean, 0.5 * (information + information.T)
 
 
+def given_priors(body: object, priors: Priors | None, options: Options) -> Priors:
+    """Return the priors, those of `default_priors` if None.
+
+    :raises InvalidValueError: `priors` or `options` is of another type.
+    """
+    priors = default_priors(body) if priors is None else priors
+    check_type(priors, Priors, "priors")
+    check_type(options, Options, "options")
+    return priors
+
+
 def default_priors(body: object) -> Priors:
     """Return what is known of any person: the learned prior of the joints that `body` names as SMPL
     does, the limits of its knees and elbows, and the population's shape. Joints without a learned

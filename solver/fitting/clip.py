@@ -32,7 +32,7 @@ from ..gauss_newton.recursion import (
 )
 from ..gauss_newton.terms import Terms, fill_terms, pack_priors, usable
 from ..measurements import Measurements, as_confidence
-from ..options import Options, Priors, default_priors
+from ..options import Options, Priors, given_priors
 from ..part import Array, Blocks, Pose
 from ..points import frames_of
 from ..residuals.external import raise_failure
@@ -111,9 +111,7 @@ def fit_clip(
     check_switch(focal, "focal")
     states, cold = given_states(init, len(measurements))
     by_default = priors is None and states is None
-    priors = default_priors(body) if priors is None else priors
-    check_type(priors, Priors, "priors")
-    check_type(options, Options, "options")
+    priors = given_priors(body, priors, options)
     check_type(temporal, (Temporal, type(None)), "temporal")
     tree = make_tree(body)
     if states is None:

@@ -95,10 +95,8 @@ def solution_derivatives(
     :raises InvalidValueError: a value that no fit can use, a name of nothing that was given, or the
         measurements and priors do not fix the solution.
     """
-    check_type(measurements, Measurements, "measurements")
-    check_type(state, State, "state")
     check_list(wrt, "wrt", "derivative")
-    problem = _Problem(body, numbered(body, measurements), state, priors, options)
+    problem = _Problem(body, measurements, state, priors, options)
     H = problem.hessian()
     curvatures = np.linalg.eigvalsh(H)
     if not curvatures[0] > _LEAST_CURVATURE * curvatures[-1]:
@@ -132,10 +130,8 @@ def solution_gradient(
     :raises ShapeError: an array does not fit the body.
     :raises InvalidValueError: as of `solution_derivatives`, whose other parameters these are.
     """
-    check_type(measurements, Measurements, "measurements")
-    check_type(state, State, "state")
     check_list(wrt, "wrt", "gradient")
-    problem = _Problem(body, numbered(body, measurements), state, priors, options)
+    problem = _Problem(body, measurements, state, priors, options)
     motion = _motion_of_joints(problem.tree, state)
     if np.ndim(loss) == 1:
         by_unknowns = as_array(loss, motion.shape[2:], "loss")
@@ -158,10 +154,14 @@ class _Problem:
         priors: Priors | None,
         options: Options,
     ) -> None:
-        self.measurements = measurements
+        check_type(measurements, Measurements, "measurements")
+        check_type(state, State, "state")
+        self.measurements = numbered(body, measurements)
         self.state = state
         self.priors = default_priors(body) if priors is None else priors
-        self.tree, self.terms, self.stage = problem_of(body, measurements, self.priors, options)
+        self.tree, self.terms, self.stage = problem_of(
+            body, self.measurements, self.priors, options
+        )
 
     def hessian(self) -> Array:
         """Return H (n, n)."""

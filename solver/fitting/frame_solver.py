@@ -24,7 +24,7 @@ from ..gauss_newton.terms import (
 )
 from ..kernel import announce_compilation
 from ..measurements import SIGMA_3D, Measurements
-from ..options import Options, Priors, Stage, default_priors
+from ..options import Options, Priors, Stage, given_priors
 from ..part import Array, Blocks, Pose
 from ..points import numbered
 from ..residuals.external import external_residuals, raise_failure
@@ -128,10 +128,8 @@ class FrameSolver:
         announce_compilation(optimize)
         self.body = body
         self.tree = body if isinstance(body, Tree) else make_tree(body)
-        self.priors = default_priors(body) if priors is None else priors
+        self.priors = given_priors(body, priors, options)
         self.options = options
-        check_type(self.priors, Priors, "priors")
-        check_type(self.options, Options, "options")
         tree = self.tree
         poses = (make_pose(tree), make_pose(tree))
         blocks = (make_blocks(tree), make_blocks(tree))

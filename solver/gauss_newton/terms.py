@@ -33,13 +33,9 @@ _RANGES = {
     "indices": (0, None),
 }
 _UNLIMITED = np.iinfo(np.int64).max
-_POSE_PRIOR = [k for k, name in enumerate(RESIDUALS) if name == "pose_prior"]
+_TABLES = list(RESIDUALS)
 # Of the tables that say where a body is, the first column of a row's weights.
-_WEIGHED = {
-    k: {"foot_contact": 3, "floor": 4, "outline": 7}[name]
-    for k, name in enumerate(RESIDUALS)
-    if name in ("foot_contact", "floor", "outline")
-}
+_WEIGHED = {"foot_contact": 3, "floor": 4, "outline": 7}
 
 
 class Terms(NamedTuple):
@@ -316,10 +312,11 @@ def usable(terms: Terms, slots: int | None = None) -> tuple[int, int]:
     """
     if slots is None:
         slots = int(np.count_nonzero(terms.flags & ~HAS_SHAPE))
-    seen = slots + sum(len(terms.ints[k]) for k in _POSE_PRIOR)
+    seen = slots + len(terms.ints[_TABLES.index("pose_prior")])
     everything = seen + int(terms.external.calls[:, 1].sum())
-    for k, first_weight in _WEIGHED.items():
-        if len(terms.floats[k]):
-            weights = terms.floats[k][:, first_weight : first_weight + 2]
+    for name, first_weight in _WEIGHED.items():
+        rows = terms.floats[_TABLES.index(name)]
+        if len(rows):
+            weights = rows[:, first_weight : first_weight + 2]
             everything += int(np.count_nonzero((weights > 0.0).any(axis=1)))
     return seen, everything

@@ -23,7 +23,7 @@ from ..gauss_newton.optimizer import SharedPriors, make_settings, optimize
 from ..gauss_newton.terms import pack_priors
 from ..kernel import announce_compilation
 from ..measurements import Measurements
-from ..options import Options, Priors, default_priors
+from ..options import Options, Priors, given_priors
 from ..part import Array, Pose
 from ..points import has_names, with_numbers
 from ..rotations import nearest_rotation
@@ -144,9 +144,7 @@ def fit_motion(
     check_switch(focal, "focal")
     check_switch(covariance, "covariance")
     by_default = priors is None and states is None
-    priors = default_priors(body) if priors is None else priors
-    check_type(priors, Priors, "priors")
-    check_type(options, Options, "options")
+    priors = given_priors(body, priors, options)
     announce_compilation(linearize_half, optimize)
     tree = make_tree(body)
     has_wrong_cameras = warn_of_cameras(views, len(tree.point_part))
