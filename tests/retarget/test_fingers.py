@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fingers of rigs, by names that have a finger's twice, and by shape alone."""
+"""Fingers of rigs, by names alone, and by shape alone."""
 
 from __future__ import annotations
 
@@ -12,9 +12,15 @@ from scope.scope_addon.retarget.rest_pose import RestPose
 
 HAND = {"hand_l": "left_wrist"}
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-# Names that have those of two fingers, of each finger and its three phalanges from the knuckle on.
-# Those of common tools: tests/scene/test_rig_retarget_fingers.py.
+# Names of the left hand's bones, of each finger and its three phalanges from the knuckle on.
 NAMES = {
+    "Unity": (
+        "Left{finger}{k}",
+        ("Thumb", "Index", "Middle", "Ring", "Little"),
+        ("Proximal", "Intermediate", "Distal"),
+    ),
+    "Character Creator": ("CC_Base_L_{finger}{k}", ("Thumb", "Index", "Mid", "Ring", "Pinky")),
+    "Biped, from the thumb on": ("Bip01 L Finger{finger}{k}", "01234", ("", "1", "2")),
     "phalanges with the name of a finger": ("{finger}{k}_L", FINGERS, ("Base", "Mid", "Top")),
     "a rig with the name of a finger": ("Little_{finger}{k}_L", FINGERS, ("Base", "Mid", "Top")),
 }
