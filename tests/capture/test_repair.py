@@ -16,8 +16,8 @@ from scope.scope_addon.capture.camera.intrinsics import Camera
 from scope.scope_addon.capture.perception.hand_landmarks import HAND_LENGTH_M, pixels_per_metre
 from scope.scope_addon.capture.perception.landmark_network import KEYPOINT_NAMES
 from scope.scope_addon.capture.repair import repair, wrists_at_hands
-from scope.scope_addon.capture.tracking.track import Track
 
+from .exact_tracks import track_of_points
 from .walking import someone_walking, track_without_depth
 
 T = 12
@@ -33,16 +33,7 @@ def test_tentative_hands_are_believed_beside_sure_ones_and_dropped_elsewhere(
     hands[..., 2] = -0.4
     hands[3, 0, :, 2] = 0.9
     hands[4, 0] = 0.0
-    track = Track(
-        frames=np.arange(T),
-        times=np.arange(T) / 10,
-        seen=np.ones(T, bool),
-        keypoints_px=np.zeros((T, 33, 2), np.float32),
-        confidence=np.ones((T, 33), np.float32),
-        world_landmarks=np.zeros((T, 33, 3), np.float32),
-        acquired=np.arange(T) == 0,
-        hands=hands,
-    )
+    track = track_of_points(np.ones((T, 33, 3)), np.eye(3), 10.0, hands=hands)
     repaired = repair(track, Camera(np.eye(3), np.zeros(5), ""))
     assert repaired.hands is not None
     np.testing.assert_allclose(

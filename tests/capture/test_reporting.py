@@ -130,15 +130,6 @@ def test_times_are_those_of_the_footage_as_it_plays(body):
     assert "the floor at 4.0 s" in str(found)
 
 
-def test_the_reprojection_error_is_that_of_frames_the_first_camera_sees(body):
-    motion = standing(body, np.zeros(90))
-    motion.residual_px[:] = 0.0
-    motion.residual_px[:30] = 4.0
-    assert motion.mean_residual_px == pytest.approx(4.0)
-    motion.residual_px[:] = 0.0
-    assert motion.mean_residual_px == 0.0
-
-
 @pytest.mark.parametrize(
     ("given", "cause"),
     [(0, "give everybody's height"), (1, "give everybody's height"), (2, "in another order")],

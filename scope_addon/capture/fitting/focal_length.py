@@ -195,11 +195,9 @@ def costs_before_zoom(costs: Float64Array, zoom: float) -> Float64Array:
 def log_likelihood(costs: list[Float64Array], log_ratio: Float64Array) -> Float64Array:
     """Return the (n,) log likelihood of focal lengths, up to a constant.
 
-    :param costs: (5,) of each fitted frame, from `FocalFits.costs`.
+    :param costs: (5,) of each fitted frame, at least one, from `FocalFits.costs`.
     :param log_ratio: (n,) logarithms of the focal lengths, relative to the camera's.
     """
-    if not costs:
-        return np.zeros(len(log_ratio))
     return -SHARE * np.interp(log_ratio, LOG_RATIOS, np.mean(costs, axis=0))
 
 
