@@ -14,7 +14,7 @@ import av
 import cv2
 import numpy as np
 import pytest
-from scope.scope_addon.capture.media import frame_readers
+from scope.scope_addon.capture.media import frame_readers, guards
 from scope.scope_addon.capture.media.frame_readers import PyavReader
 from scope.scope_addon.capture.media.still_images import read_picture
 from scope.scope_addon.capture.media.video import open_video
@@ -171,6 +171,13 @@ def test_an_image_up_to_that_length_is_read(tmp_path, width, height):
     path = tmp_path / "long.png"
     cv2.imwrite(str(path), np.zeros((height, width, 3), np.uint8))
     assert (open_video(path).width, open_video(path).height) == (width, height)
+
+
+def test_a_video_with_too_many_pixels_is_refused(tmp_path, monkeypatch):
+    path = write_video(tmp_path / "large.mp4", [np.zeros((48, 64, 3), np.uint8)] * 2)
+    monkeypatch.setattr(guards, "MAX_PIXELS", 64 * 48 - 1)
+    with pytest.raises(VideoError, match=r"large\.mp4 has 64 × 48 pixels"):
+        open_video(path)
 
 
 @pytest.mark.parametrize("display_width", [64 * 255, 64 * 16])

@@ -101,7 +101,7 @@ def test_tiles_of_different_sizes_are_refused() -> None:
     assert layout is not None
     pieces = {n: np.zeros((64, 64, 3), np.uint8) for n in layout.tiles.ravel().tolist()}
     assert assemble(layout, pieces) is not None
-    assert assemble(layout, pieces | {2: np.zeros((64, 32, 3), np.uint8)}) is None
+    assert assemble(layout, pieces | {3: np.zeros((64, 32, 3), np.uint8)}) is None
     del pieces[3]
     assert assemble(layout, pieces) is None
 

@@ -17,7 +17,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scope.scope_addon.capture.perception.adapters import graph, network_server
-from scope.scope_addon.capture.perception.adapters.graph import SERVER, NetworkProcess
+from scope.scope_addon.capture.perception.adapters.description import Description
+from scope.scope_addon.capture.perception.adapters.graph import (
+    SERVER,
+    Graph,
+    NetworkProcess,
+    Normalization,
+)
 from scope.scope_addon.capture.perception.adapters.keypoint_network import KeypointNetwork
 from scope.scope_addon.capture.perception.adapters.network_server import (
     OUT_OF_MEMORY,
@@ -108,14 +114,14 @@ def test_results_are_those_of_this_process_and_the_process_ends_with_the_network
     import onnxruntime
 
     path = simcc(tmp_path / "m.onnx", 17, 32, 32)
-    network = NetworkProcess("cpu", path, 1)
-    image = np.random.default_rng(0).normal(size=(1, 3, 32, 32)).astype(np.float32)
+    network = Graph(path, Description(), threads=1)
+    picture = np.random.default_rng(0).integers(0, 255, (32, 32, 3), np.uint8)
     here = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"]).run(
-        None, {"images": image}
+        None, {"images": picture.transpose(2, 0, 1)[None].astype(np.float32)}
     )
-    for ours, truth in zip(network.run(None, {"images": image}), here, strict=True):
+    for ours, truth in zip(network.run(picture, Normalization()), here, strict=True):
         np.testing.assert_array_equal(ours, truth)
-    process = network._process
+    process = network._session._process
     del network
     gc.collect()
     assert process.returncode is not None
