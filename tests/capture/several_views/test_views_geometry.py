@@ -122,7 +122,7 @@ def test_waiting_for_the_clock_can_be_cancelled():
 
 
 def test_offset_of_somebody_who_stands_still_is_uncertain():
-    own = np.arange(10) / 5.0
+    own = np.arange(20) / 10.0
     people = [[seen(place, standing_points, own=own)] for place in (FIRST, beside(60.0))]
     found = calibrate(people, [Given(), Given()], MEAN_LENGTHS)
     assert not found[1].is_offset_certain
