@@ -37,7 +37,14 @@ from .actions import (
     used_slot,
 )
 from .character.expression_keys import MOVES, has_expression_keys
-from .rig_action import channel_of_rotation, leave_tweak_mode, mark_written, override_nla, retire
+from .rig_action import (
+    channel_of_rotation,
+    leave_tweak_mode,
+    mark_written,
+    override_nla,
+    replace_action,
+    retire,
+)
 from .transaction import all_or_nothing
 
 # change of a channel, as a share of the bone's length or in radians, below which it is none
@@ -241,10 +248,7 @@ def retarget_face_bones(
         else:
             assign_action(rig.animation_data, former.copy(), used_slot(rig.animation_data))
         action = key_face(rig, keys, name)
-        rig.data.pose_position = "POSE"
-        override_nla(rig.animation_data)
-        retire(former, name)
-        action.name = f"{rig.name}_{name}"
+        replace_action(rig, former, name)
     rest_face(rig, keys)
     return action
 

@@ -142,6 +142,17 @@ def retire(former: bpy.types.Action | None, source: str) -> None:
         former.use_fake_user = True
 
 
+def replace_action(rig: bpy.types.Object, former: bpy.types.Action | None, source: str) -> None:
+    """Let a rig show its new action in place of the former one; name it after rig and capture.
+
+    :param source: name of the captured armature.
+    """
+    rig.data.pose_position = "POSE"
+    override_nla(rig.animation_data)
+    retire(former, source)
+    rig.animation_data.action.name = f"{rig.name}_{source}"
+
+
 def retime_written_keys(action: bpy.types.Action, retiming: Retiming) -> None:
     """Move the keys of a retargeted action; it counts as edited only if it was."""
     unedited = action.get(_CHECKSUM) == _checksum(action)

@@ -44,8 +44,7 @@ from .rig_action import (
     clear_offsets,
     leave_tweak_mode,
     mark_written,
-    override_nla,
-    retire,
+    replace_action,
     root_locations,
     write_action,
 )
@@ -234,10 +233,7 @@ def retarget(
         _set_parent(rig, frames, motion)
         if is_cyclic(source):
             _repeat(rig, action, keys)
-        rig.data.pose_position = "POSE"
-        override_nla(rig.animation_data)
-        retire(former, source.name)
-        action.name = f"{rig.name}_{source.name}"
+        replace_action(rig, former, source.name)
     clear_offsets(rig, [key.bone for key in keys])
     if face is not None:
         rest_face(rig, face)

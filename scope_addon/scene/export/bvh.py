@@ -51,9 +51,12 @@ def bvh_text(pose: SampledPose, unit: str = "cm") -> str:
     """
     scale = UNITS_PER_METRE[unit]
     pose = replace(
-        pose, heads=scale * pose.heads, tails=scale * pose.tails, joints=scale * pose.joints
+        pose,
+        names=_words(pose.names),
+        heads=scale * pose.heads,
+        tails=scale * pose.tails,
+        joints=scale * pose.joints,
     )
-    pose = replace(pose, names=_words(pose.names))
     children: list[list[int]] = [[] for _ in pose.names]
     for i, parent in enumerate(pose.parents):
         if parent >= 0:
