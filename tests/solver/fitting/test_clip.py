@@ -107,6 +107,12 @@ def test_noise_leaves_errors_of_the_size_the_information_says():
     assert abs(scale - SCALE) < 0.02
 
 
+def test_a_strong_prior_keeps_the_focal_length():
+    body, _, measurements, _ = clip(0, frames=4)
+    found = fit_clip(body, measurements, focal=True, focal_weight=1e9, priors=Priors())
+    assert found.focal_scale == pytest.approx(1.0, abs=0.02)
+
+
 def test_carried_information_equals_what_the_frames_say_together():
     """With the pose eliminated at the same states, information adds up; the causal estimate nears
     the joint one.
