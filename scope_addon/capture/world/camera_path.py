@@ -151,14 +151,11 @@ def camera_travel(
     :param times: (T,) seconds.
     :param uneven_ground: soles may carry at any height.
     """
-    T = len(times)
-    unknown = np.zeros((T, 3))
-    if T < MIN_SAMPLES:
-        return unknown
+    unknown = np.zeros((len(times), 3))
     velocity = np.gradient(gaussian_smooth(soles, times, FOOT_CUTOFF_HZ), times, axis=0)
     height = soles @ up
     lowest = height.argmin(axis=1)
-    row = np.arange(T)
+    row = np.arange(len(times))
     v = velocity[row, lowest]
     h = height[row, lowest]
     carries: BoolArray = valid & (np.abs(v @ up) < MAX_VERTICAL_M_S)

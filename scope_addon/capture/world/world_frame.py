@@ -66,8 +66,6 @@ def up_from_standing(people: Sequence[PlacedTrack]) -> Float64Array:
         total = level + (np.maximum(trunk @ level, 0.0)[:, None] ** 2 * trunk).mean(0)
     else:
         total = level + (weight[:, None] * body_up).sum(0)
-    if np.linalg.norm(total) < 1e-6:
-        total = level
     return _unit(total)
 
 
