@@ -40,6 +40,11 @@ def test_highlights_are_raised(level: int, becomes: int) -> None:
     np.testing.assert_allclose(found, before * (becomes / level), atol=0.08 * becomes)
 
 
+def test_a_black_frame_is_returned_itself() -> None:
+    black = picture(2)
+    assert AutoExposure().brighten(black) is black
+
+
 def test_brightness_does_not_flicker() -> None:
     exposure = AutoExposure()
     levels = [40 + 8 * (k % 2) for k in range(40)]

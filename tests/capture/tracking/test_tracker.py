@@ -94,7 +94,7 @@ def test_two_people_are_tracked_and_nobody_twice(
     tracker_of_many: PeopleTracker, frames: Frames
 ) -> None:
     tracker_of_many.reset()
-    for image in frames("clips/two_people_portrait", stop=5):
+    for image in frames("clips/two_people_portrait", stop=9):
         observations = dict(tracker_of_many.step(image))
         assert sorted(observations) == [0, 1]
         assert observations[0].region.center_px[0] > 500 > observations[1].region.center_px[0]
