@@ -72,20 +72,15 @@ class CaptureJob:
         self.progress = JobProgress(earlier=load_stage_times(self._cache.root, self._kind))
         self._key = self._request.key(code_version(ROOT))
         self._captured: CachedCapture | None = self._cache.find(self._key)
-        self._worker: WorkerProcess | None = None
+        self.worker: WorkerProcess | None = None  # none if the result was cached
         self._result: dict[str, Any] | None = None  # of a worker that may still be ending
         self._result_s = 0.0
         self._building = False
         if self._captured is None:
             folder = self._cache.new_job_folder()
-            self._worker = WorkerProcess(
+            self.worker = WorkerProcess(
                 self._request, folder, self._cache.kernels, python_command(), START_SCRIPT
             )
-
-    @property
-    def worker(self) -> WorkerProcess | None:
-        """Worker process; None if the result was cached."""
-        return self._worker
 
     def step(self) -> bool:
         """Continue as far as possible without waiting; return False once the scene is built.
@@ -100,8 +95,8 @@ class CaptureJob:
 
     def close(self) -> None:
         """Stop in any state, without leaving a process or an unfinished file behind."""
-        if self._worker is not None:
-            self._worker.close()
+        if self.worker is not None:
+            self.worker.close()
 
     def _step(self) -> bool:
         if self._captured is None:
@@ -119,8 +114,8 @@ class CaptureJob:
         return False
 
     def _listen(self) -> None:
-        assert self._worker is not None
-        for message in self._worker.poll():
+        assert self.worker is not None
+        for message in self.worker.poll():
             self.messages += 1
             if message["event"] == "progress":
                 self.progress.update(message["stage"], message["done"], message["total"])
@@ -130,19 +125,19 @@ class CaptureJob:
                 self._result = message
                 self._result_s = time.monotonic()
         if self._result is None or (
-            self._worker.alive and time.monotonic() - self._result_s < _ENDING_S
+            self.worker.alive and time.monotonic() - self._result_s < _ENDING_S
         ):
             return  # its files are moved once they are closed
-        self._worker.wait(0.0)
+        self.worker.wait(0.0)
         key = self._key if self._is_as_requested() else uuid4().hex  # which no request has
         self._captured = self._cache.keep(
-            self._worker.job_folder, key, self._result["motions"], self._result["report"]
+            self.worker.job_folder, key, self._result["motions"], self._result["report"]
         )
         self.progress.update(BUILDING, 0, 0)
         save_stage_times(self._cache.root, self._kind, self.progress.seconds, self.progress.frames)
         limit = preferences()
         self._cache.prune((limit.cache_limit_gb if limit else 2) * 10**9)
-        self._worker.close()
+        self.worker.close()
 
     def _is_as_requested(self) -> bool:
         """Return whether the footage and all files are as they were when the key was made: the
@@ -153,9 +148,9 @@ class CaptureJob:
         return False
 
     def _show_preview(self, message: dict[str, Any]) -> None:
-        assert self._worker is not None
+        assert self.worker is not None
         try:
-            pixels = (self._worker.job_folder / Path(message["file"]).name).read_bytes()
+            pixels = (self.worker.job_folder / Path(message["file"]).name).read_bytes()
         except OSError:
             return  # on Windows, while the worker replaces the file
         preview_picture.show(pixels, message["width"], message["height"])

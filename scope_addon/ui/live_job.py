@@ -109,7 +109,7 @@ class LiveJob:
         self.created = self._was_created = False
         self._cache = cache()
         try:
-            self._worker = LiveProcess(
+            self.worker = LiveProcess(
                 self._request,
                 self._cache.new_job_folder(),
                 self._cache.kernels,
@@ -120,11 +120,6 @@ class LiveJob:
             if self._rig is not None:  # which is ready to follow
                 self._rig.restore()
             raise
-
-    @property
-    def worker(self) -> LiveProcess:
-        """The process."""
-        return self._worker
 
     @property
     def has_body(self) -> bool:
@@ -159,7 +154,7 @@ class LiveJob:
         ):
             self._record_at_s = None
             self.recording = True
-            self._worker.record()
+            self.worker.record()
 
     def stop(self) -> None:
         """End the capture; ``step`` returns False when all is done. Without a recording, the last
@@ -168,15 +163,15 @@ class LiveJob:
         self.finishing = True
         self._stopped_s = time.monotonic()
         if self.recording:
-            self._worker.stop()
+            self.worker.stop()
         else:
-            self._worker.close()
+            self.worker.close()
 
     def cancel(self) -> None:
         """End the process, and remove what was created and recorded."""
         self._end()
         for path in self._cache.recordings():
-            if path.stem == self._worker.job_folder.name:
+            if path.stem == self.worker.job_folder.name:
                 remove_recording(path)
         if self._kept:
             remove(unfinished_video(Path(self._kept)))
@@ -192,7 +187,7 @@ class LiveJob:
 
     def close(self) -> None:
         """End the process in any state; the scene stays as it is, and a recording on the disk."""
-        self._worker.close()
+        self.worker.close()
 
     def step(self) -> bool:
         """Continue as far as possible without waiting; return False at the end.
@@ -220,7 +215,7 @@ class LiveJob:
         poses = (
             []
             if self.finishing
-            else self._worker.newest_poses(self._scene_body.K + 1, self._scene_body.P)
+            else self.worker.newest_poses(self._scene_body.K + 1, self._scene_body.P)
         )
         if poses:
             self._show(scene, poses)
@@ -228,14 +223,14 @@ class LiveJob:
             if self.finishing and time.monotonic() - self._stopped_s > _WRITING_S:
                 raise UsageError("the recording was not written in time; record again")
             return True
-        if self._worker.alive and time.monotonic() - self._result_s < _ENDING_S:
+        if self.worker.alive and time.monotonic() - self._result_s < _ENDING_S:
             return True  # its files are read once they are closed
         self._build(scene, self._result)
         return False
 
     def _listen(self) -> None:
         """Read the messages."""
-        for message in self._worker.poll():
+        for message in self.worker.poll():
             if message["event"] == "status":
                 for name in ("presence", "rate", "latency_ms", "recorded_s"):
                     setattr(self.status, name, message[name])
@@ -297,8 +292,8 @@ class LiveJob:
         """Write the recording's keys, as a capture of footage does, and remove the body that
         followed.
         """
-        self._worker.wait(0.0)
-        paths = [self._worker.job_folder / Path(name).name for name in result["motions"]]
+        self.worker.wait(0.0)
+        paths = [self.worker.job_folder / Path(name).name for name in result["motions"]]
         contents = [(path, path.read_bytes()) for path in paths]
         body = self._request.values["body"]
         options = build_options(scene)
@@ -318,7 +313,7 @@ class LiveJob:
         if self._rig is not None and self._rig.rig is not None:
             self._rig.restore()
             self.warnings = self._retargeted(scene, built.people[0].armature, paths[0].name)
-        self._worker.close()
+        self.worker.close()
         if self._unfinished is not None:
             remove_recording(self._unfinished)
 

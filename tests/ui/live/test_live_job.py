@@ -99,7 +99,7 @@ def following_rig():
 def test_the_newest_pose_is_shown_and_stays_after_stop(live):
     job = live("pose(1); pose(2); pose(7, [0.5] * 10); receive()")
     until(job, lambda: job.poses)
-    while job.poses < 3 and job._worker._newest:
+    while job.poses < 3 and job.worker._newest:
         job.step()
     assert job.has_body
     armature = job._bodies[0].armature
@@ -149,7 +149,7 @@ def test_a_body_follows_each_of_the_people_and_all_are_recorded(live):
         assert receive() == "stop"
         finish(2)
     """)
-    until(job, lambda: len(job._worker._newest) == 0 and all(body.armature for body in job._bodies))
+    until(job, lambda: len(job.worker._newest) == 0 and all(body.armature for body in job._bodies))
     assert [body.armature.name for body in job._bodies] == ["Live", "Live 2"]
     assert job.status.presence == "lost"  # by whom camera and floor are estimated
     assert bpy.context.view_layer.objects.active == job._bodies[0].armature
