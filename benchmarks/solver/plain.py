@@ -39,7 +39,7 @@ def against_plain(rounds: int) -> dict[str, float]:
         leave_out = shutil.ignore_patterns("fast", "__pycache__")
         shutil.copytree(ROOT / "solver", package / "solver", ignore=leave_out)
         rows = package / "solver" / "gauss_newton" / "rows.py"
-        switched = rows.read_text().replace("USE_FAST = True", "USE_FAST = False")
+        switched = rows.read_text().replace("..fast.rows", ".plain_rows")
         rows.write_text(switched)
         plain = []
         fast = []
