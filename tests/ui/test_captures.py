@@ -150,6 +150,7 @@ def test_what_is_chosen_is_exported_and_not_remembered(two, tmp_path, which, fil
     export = partial(bpy.ops.scope.export, "INVOKE_DEFAULT", format="BVH")
     export(filepath=str(tmp_path / "a.bvh"), which=which)
     assert len(list(tmp_path.glob("a*.bvh"))) == files
+    assert bpy.ops.scope.export.get_rna_type().properties["which"].is_skip_save
     export(filepath=str(tmp_path / "b.bvh"))
     assert len(list(tmp_path.glob("b*.bvh"))) == 1
     bpy.context.view_layer.objects.active = None
