@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,8 @@ from scope.scope_addon.cli import PROGRAM, SAMPLE, main
 from scope.scope_addon.cluster.runner import MAX_WINDOWS, window_ranges
 from scope.scope_addon.job.batch import REPORT_NAME
 
-from .test_runner import files, run
+from ..job.processes import runs, wait_for
+from .test_runner import calls, files, run
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals to worker processes")
 
@@ -115,3 +118,32 @@ def test_real_windows_of_two_workers_give_the_result_in_one_piece(
         assert set(one.files) == set(other.files)
         different = [name for name in one.files if not np.array_equal(one[name], other[name])]
     assert set(different) <= {"source", "report"}
+
+
+@pytest.mark.slow
+def test_the_windows_of_a_killed_worker_are_observed_by_another(cluster: Any, folder: Path) -> None:
+    clip = folder / "a.mp4"
+    clip.write_text("6")
+    clip.with_suffix(".hangs").write_text("4")
+
+    def kill() -> None:
+        wait_for(lambda: calls(clip) and not clip.with_suffix(".hangs").exists())
+        (hung,) = [
+            c
+            for c in calls(clip)
+            if ":" in c["windows"] and 4 in range(*map(int, c["windows"].split(":")))
+        ]
+        os.kill(hung["parent"], signal.SIGKILL)
+        wait_for(lambda: not runs(hung["pid"]))
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    status, report = run(cluster, folder, program=CLIP)
+    thread.join()
+    assert status == 0
+    assert result(folder, "a") == "0 1 2 3 4 5 "
+    assert sum(row["attempts_lost"] for row in report["workers"]) == 1
+    assert sum(row["frames"] for row in report["workers"]) == 18
+    again = [call["windows"] for call in calls(clip) if ":" in call["windows"]]
+    assert len(again) == len(set(again)) + 1  # nothing else was repeated
+    assert any("a.mp4 (windows" in event["event"] for event in report["log"])
