@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from scope.scope_addon.scene.actions import fcurves
-from scope.scope_addon.scene.timing import Retiming, retime_keys
+from scope.scope_addon.scene.timing import Retiming, action_strips, retime_keys, retime_strip
 
 DOUBLED = Retiming(1.0, 2.0)
 
@@ -49,3 +49,19 @@ def test_a_span_contains_what_it_contained() -> None:
     assert Retiming(1.0, 24 / 30).span(2, 9) == (1, 8)
     # 49 / 49 is less than 1 in double precision
     assert Retiming(0.0, 1 / 49).span(49, 98) == (1, 2)
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.5])
+def test_strips_move_with_the_part_that_they_play(moved: bpy.types.Object, factor: float) -> None:
+    animation = moved.animation_data
+    action = animation.action
+    strip = animation.nla_tracks.new().strips.new("walk", 21, action)
+    strip.action_frame_start = 2.0
+    strip.action_frame_end = 8.0
+    strip.frame_start_raw = 21.0
+    strip.frame_end_raw = 27.0
+    (strip,) = action_strips(animation)
+    assert strip.action == action
+    retime_strip(strip, Retiming(1.0, factor))
+    ends = strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end
+    assert ends == pytest.approx([1 + factor * (frame - 1) for frame in (21, 27, 2, 8)])
