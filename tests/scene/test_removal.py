@@ -6,6 +6,7 @@ scene.
 import bpy
 import numpy as np
 import pytest
+from scope.scope_addon.scene.character.root_object import parent_to_root_object, remove_root_object
 from scope.scope_addon.scene.datablocks import remove_blocks
 from scope.scope_addon.scene.live_body import LiveBody
 from scope.scope_addon.scene.transaction import all_or_nothing
@@ -29,6 +30,14 @@ def scene():
     return bpy.context.scene
 
 
+@pytest.fixture
+def rig(scene):
+    rig = bpy.data.objects.new("rig", bpy.data.armatures.new("rig"))
+    scene.collection.objects.link(rig)
+    bpy.context.view_layer.update()
+    return rig
+
+
 def test_objects_of_a_hidden_scene(scene):
     before = in_graph(scene)
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -40,6 +49,17 @@ def test_objects_of_a_hidden_scene(scene):
     assert in_graph(scene) == before
 
 
+def test_objects_of_several_scenes(scene, rig):
+    show_another_scene()
+    other = bpy.context.scene
+    other.collection.objects.link(rig)
+    bpy.context.view_layer.update()
+    before = in_graph(scene), in_graph(other)
+    remove_blocks([rig])
+    assert in_graph(scene) < before[0]
+    assert in_graph(other) < before[1]
+
+
 def test_the_body_of_a_live_capture(scene, body):
     empty = in_graph(scene)
     live = LiveBody(scene, "Live", body)
@@ -49,6 +69,19 @@ def test_the_body_of_a_live_capture(scene, body):
     show_another_scene()
     live.remove()
     assert in_graph(scene) == empty
+
+
+def test_a_root_object_that_another_scene_has_too(scene, rig):
+    before = in_graph(scene)
+    one = np.ones(1)
+    empty = parent_to_root_object(rig, one, np.zeros((1, 3)), one)
+    if not empty.users_scene:
+        scene.collection.objects.link(empty)
+    bpy.context.view_layer.update()
+    assert in_graph(scene) > before
+    show_another_scene()
+    remove_root_object(rig)
+    assert in_graph(scene) == before
 
 
 def fail_in(scene):
