@@ -145,6 +145,18 @@ class NewDatablocks:
         """Remove them."""
         bpy.data.batch_remove([block for _, block in self.all()])
 
+    def remove_unused(self) -> None:
+        """Remove those that nothing uses, and then those that only these used. Another add-on may
+        make data of its own in every frame, which it goes on using.
+        """
+        while unused := [
+            block
+            for _, block in self.all()
+            # a fake user that a part of a capture has is Scope's
+            if block.users == int(block.use_fake_user and is_part(block))
+        ]:
+            bpy.data.batch_remove(unused)
+
 
 @contextmanager
 def temporary_datablocks() -> Iterator[None]:
@@ -154,6 +166,16 @@ def temporary_datablocks() -> Iterator[None]:
         yield
     finally:
         new.remove()
+
+
+@contextmanager
+def without_leftovers() -> Iterator[None]:
+    """Remove the datablocks that the block has added to the file and no longer uses."""
+    new = NewDatablocks()
+    try:
+        yield
+    finally:
+        new.remove_unused()
 
 
 def remove_blocks(blocks: Sequence[bpy.types.ID]) -> None:

@@ -62,6 +62,26 @@ def test_only_the_capture_leaves_a_users_scene(body, motion, person, tmp_path, s
     assert [obj.type for obj in bpy.context.scene.objects].count("MESH") == 1
 
 
+@pytest.mark.parametrize("suffix", [".bvh", ".glb", ".fbx", ".usdc"])
+def test_only_what_the_export_made_is_removed(person, tmp_path, suffix):
+    """Another add-on makes data in a frame that the export shows, and keeps it."""
+
+    def make_data(*_):
+        if "trail" not in bpy.data.meshes:
+            bpy.data.meshes.new("trail").use_fake_user = True
+            bpy.data.texts.new("log")
+
+    kinds = ("objects", "meshes", "armatures", "actions", "collections", "materials", "texts")
+    before = {kind: set(getattr(bpy.data, kind).keys()) for kind in kinds}
+    bpy.app.handlers.frame_change_post.append(make_data)
+    try:
+        export(tmp_path / f"walk{suffix}")
+    finally:
+        bpy.app.handlers.frame_change_post.remove(make_data)
+    made = {kind: set(getattr(bpy.data, kind).keys()) - before[kind] for kind in kinds}
+    assert {name for names in made.values() for name in names} == {"trail", "log"}
+
+
 @pytest.mark.parametrize("overridden", [False, True])
 def test_a_linked_capture_is_exported_with_its_shape_baked(
     body, motion, built, tmp_path, blender, truth, overridden
