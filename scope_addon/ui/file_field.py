@@ -97,8 +97,10 @@ class SavingOperator(ReportingOperator):
 def selected_paths(operator: Any) -> list[Path]:
     """Return the paths that are selected in the browser of an operator with ``directory``,
     ``files`` and ``filepath``; the current folder if there is none.
+
+    A script may give ``filepath`` and no directory.
     """
-    names = [each.name for each in operator.files if each.name]
+    names = [each.name for each in operator.files if each.name and operator.directory]
     chosen = [os.path.join(operator.directory, name) for name in names] or [operator.filepath]
     return [Path(bpy.path.abspath(path)) for path in chosen]
 
