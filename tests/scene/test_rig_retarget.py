@@ -195,6 +195,7 @@ def test_bones_that_were_moved_and_scaled_before_follow_as_at_rest(source, pose)
         pose(rig.pose.bones[bone_of[part]])
     run(source, rig)
     np.testing.assert_allclose(seen(rig, bones), wanted, atol=1e-5)
+    assert rig.animation_data.use_nla
 
 
 @pytest.mark.parametrize("step", ["rig_retarget.probe", "rig_retarget.remove_root_object"])

@@ -15,6 +15,11 @@ from ...scene.made_rigs import build_rig, captured
 
 
 def test_dropped_files_become_the_footage(footage):
+    motions = file_field.SCOPE_FH_motion
+    assert (motions.bl_file_extensions, motions.bl_import_operator) == (
+        ".npz",
+        "scope.import_motion",
+    )
     suffixes = file_field.SCOPE_FH_footage.bl_file_extensions.split(";")
     assert {".mp4", ".mov", ".png", ".jpg"} <= set(suffixes)
     # What Blender does with a dropped file: the handler's operator, with a path.

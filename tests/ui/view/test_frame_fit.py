@@ -251,6 +251,7 @@ def test_the_tab_opens_in_the_largest_viewport_of_a_menu():
         True,
     ]
     assert large.regions[1].tab == "Scope"
+    assert sidebar.viewport_of(context([small, large], small)) is small  # where a file is dropped
 
 
 def test_without_a_viewport_or_before_the_first_drawing_nothing_fails():
