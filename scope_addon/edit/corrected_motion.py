@@ -94,6 +94,8 @@ def distance_from_pin(motion: Motion, pin: Pin, place: Float64Array | None = Non
 
 def pin_in_world(motion: Motion, pin: Pin) -> Pin:
     """Return a pin in the world of the motion, which an upright line or a floor may have moved."""
+    if pin.position is None:  # a pin in the image stays there
+        return pin
     return _in_world(pin, world_of(corrections_of(motion)))
 
 
