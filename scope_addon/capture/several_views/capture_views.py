@@ -457,10 +457,10 @@ def _people_in_views(
             unseen = unseen_spans(views[0].people[k], views[v].people[number], place)
             if unseen:
                 times_s = [start * shot.speed for start, _ in unseen]
-                notices.append(notice("unseen_in_view", times=times_s, **where))
+                notices.append(notice("unseen_in_view", **where, times=times_s))
             if spans[v]:
                 times_s = [start * shot.speed for start, _ in spans[v]]
-                notices.append(notice("view_contradicts", times=times_s, **where))
+                notices.append(notice("view_contradicts", **where, times=times_s))
             track = _without(views[v].tracks[number], spans[v], place)
             others.append((track, with_focal_scale(views[v].camera, place), place))
         track = _without(views[0].tracks[k], spans[0], CameraPlace.first())
