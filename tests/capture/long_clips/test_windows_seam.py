@@ -110,3 +110,32 @@ def test_keypoints_go_over_evenly() -> None:
     )
     # 0.07 of the region apart
     assert faded(earlier, tracklet(range(40), 110.0), BEFORE - OVERLAP, OVERLAP) == {}
+
+
+@pytest.mark.parametrize(
+    ("x", "sides", "is_same"),
+    [
+        (119.0, (SIDE, SIDE), True),
+        (119.0, (SIDE, 60.0), False),
+        (119.0, (60.0, SIDE), False),
+    ],
+)
+def test_how_near_is_measured_by_the_smaller_region(
+    x: float, sides: tuple[float, float], is_same: bool
+) -> None:
+    """Keypoints lie 1.41 times as far apart as their coordinates: 0.15 of 200 pixels are 21 in
+    each.
+    """
+    before = tracklet(range(BEFORE), 100.0, sides[0])
+    after = tracklet(range(40), x, sides[1])
+    assert same_people(*windows({3: before}, {0: after})) == ({0: 3} if is_same else {})
+
+
+def test_windows_that_do_not_share_their_frames_share_nobody() -> None:
+    before, after = windows({3: tracklet(range(BEFORE), 100.0)}, {0: tracklet(range(40), 100.0)})
+    before.anchor += 1
+    assert same_people(before, after) == {}
+    before.anchor = BEFORE
+    after.first = 0
+    assert same_people(before, after) == {}
+    assert not missed_people(before, after)
