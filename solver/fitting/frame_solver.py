@@ -33,7 +33,12 @@ from ..state import MULTI, Fit, State, Status
 from ..tree import BodyArrays, Tree, make_tree
 from ..validation import check_type, warn_of_start
 from .initialize import initial_states
-from .misfit import warn_of_mirrored_clip, warn_of_unlikely_shape, warn_of_wrong_points
+from .misfit import (
+    warn_of_mirrored_clip,
+    warn_of_unlikely_shape,
+    warn_of_wrong_pixels,
+    warn_of_wrong_points,
+)
 
 # Cost for each measurement above which a cold start from exact 3D keypoints is repeated. Of 2,000
 # random people with deviations of 2 mm, all but six that have a twisted limb cost more; of all,
@@ -80,6 +85,7 @@ def fit(
         is_told = warn_of_mirrored_clip([seen], [found], solver.priors, solver.fit)
     if not is_told:
         is_told = warn_of_wrong_points(solver.tree, seen, found)
+        is_told |= warn_of_wrong_pixels(solver.tree, seen, found)
     if not is_told and priors is None:
         warn_of_unlikely_shape([found.state.beta], solver.priors)
     return found

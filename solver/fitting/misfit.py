@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays import as_array, as_numbers
 from ..errors import ScopeWarning
-from ..measurements import LARGEST, Measurements
+from ..measurements import LARGEST, SIGMA_2D, Measurements
 from ..options import Priors
 from ..part import Array
 from ..state import Fit, Status
@@ -33,6 +33,9 @@ _MANY_ITERATIONS = 40  # after which a fit that has not converged is judged as w
 _FAR_M = 0.13
 _FAR_M_IF_STATED = 0.05
 _FAR_SIGMAS = 5.0
+# Of the extent of 2D keypoints, in the median: of those with the intrinsics of another image size
+# 0.36 and more beside 3D keypoints, of the numbers of other points 0.04, of right ones up to 0.012.
+_FAR_IN_IMAGE = 0.02
 # Cost for each measured point, above which something is wrong. With true standard deviations, it is
 # at most 2 of 3D keypoints and 4 of 2D and 3D ones; of mirrored ones it is at least 3 and 7.
 _COSTLY_IN_SPACE = 3.0
@@ -135,12 +138,7 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     usable = (np.abs(points) < LARGEST).all(axis=1) & (confidence > 0.0)
     if usable.sum() < _FEWEST_POINTS:
         return False
-    indices = np.asarray(seen.indices)[usable]
-    part = tree.point_part[indices]
-    shape = tree.V[indices][:, :, : tree.shape] @ found.state.beta
-    levers = tree.v_bar[indices] + shape
-    turned = np.einsum("nij,nj->ni", found.R_camera_part[part], levers)
-    fitted = found.t_camera_part[part] + turned
+    fitted = _fitted_points(tree, np.asarray(seen.indices)[usable], found)
     off = float(np.median(np.linalg.norm(fitted - points[usable], axis=1)))
     most = _FAR_M
     if seen.sigma_m is not None:
@@ -156,6 +154,45 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
             stacklevel=3,
         )
     return is_far
+
+
+def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> bool:
+    """Warn of 2D keypoints most of which the fitted body is far away from; return whether it is."""
+    seen = measurements.keypoints2d
+    intrinsics = measurements.intrinsics
+    if seen is None or intrinsics is None or found.status is not Status.CONVERGED:
+        return False
+    K = as_array(intrinsics, (3, 3), "Intrinsics")
+    pixels = as_numbers(seen.pixels, "Pixels of 2D keypoints")
+    confidence = as_numbers(seen.confidence, "Confidence of 2D keypoints")
+    usable = (np.abs(pixels) < LARGEST).all(axis=1) & (confidence > 0.0)
+    if usable.sum() < _FEWEST_POINTS:
+        return False
+    fitted = _fitted_points(tree, np.asarray(seen.indices)[usable], found) @ K.T
+    with np.errstate(all="ignore"):  # a point may be in the camera's own plane
+        image = fitted[:, :2] / fitted[:, 2:]
+    off = float(np.median(np.linalg.norm(image - pixels[usable], axis=1)))
+    stated = SIGMA_2D * K[0, 0] if seen.sigma_px is None else np.median(np.asarray(seen.sigma_px))
+    extent = np.ptp(pixels[usable], axis=0).max()
+    is_far = off > max(_FAR_SIGMAS * float(stated), _FAR_IN_IMAGE * float(extent))
+    if is_far:
+        warnings.warn(
+            f"The body fits the 2D keypoints badly, by {off:.0f} pixels in the median; check that "
+            "each has its own point, by name or by number, that the intrinsics belong to pixels of "
+            "this size, and that other measurements are of the same person and time.",
+            ScopeWarning,
+            stacklevel=3,
+        )
+    return is_far
+
+
+def _fitted_points(tree: Tree, indices: Array, found: Fit) -> Array:
+    """Return where a fitted body has its points of these numbers (n,), (n, 3), camera frame."""
+    part = tree.point_part[indices]
+    levers = tree.v_bar[indices] + tree.V[indices][:, :, : tree.shape] @ found.state.beta
+    turned = np.einsum("nij,nj->ni", found.R_camera_part[part], levers)
+    fitted: Array = found.t_camera_part[part] + turned
+    return fitted
 
 
 def warn_of_unlikely_shape(betas: Sequence[Array], priors: Priors) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scope import solver
 from scope.benchmarks.solver.cold_starts import (
+    CAMERA,
     COSTLY,
     FOCAL,
     SIGMA_M,
@@ -213,6 +214,19 @@ def joints_in_another_order():
         solver.fit(body, Measurements(keypoints3d=seen))
 
 
+def intrinsics_of_half_the_size():
+    body, _, everyone = people()
+    solver.fit(body, replace(everyone[0].seen, intrinsics=np.diag([0.5, 0.5, 1.0]) @ CAMERA))
+
+
+def numbers_of_another_detector():
+    body, _, everyone = people()
+    image = replace(everyone[0].seen, keypoints3d=None)
+    assert image.keypoints2d is not None
+    blazepose = replace(image.keypoints2d, indices=np.arange(17))
+    solver.fit(body, replace(image, keypoints2d=blazepose))
+
+
 def with_pose(t):
     return fitted(Measurements(pose_priors=PosePriors([0], [np.eye(3)], [t], [1.0], [1.0])))
 
@@ -244,6 +258,16 @@ MISTAKES = {
     ),
     "joints numbered as keypoints": (joints_as_keypoints, ScopeWarning, "joint i is M "),
     "joints in the wrong order": (joints_in_another_order, ScopeWarning, "each has its own point"),
+    "the intrinsics of half the size": (
+        intrinsics_of_half_the_size,
+        ScopeWarning,
+        "intrinsics belong to pixels of this size",
+    ),
+    "the numbers of another detector": (
+        numbers_of_another_detector,
+        ScopeWarning,
+        "fits the 2D keypoints badly, by .* pixels",
+    ),
     "a floor's normal down": (
         on_floor(-UP, -LOWEST, intrinsics=INTRINSICS),
         ScopeWarning,
