@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # the public names and their modules, in the only place that lists them
+    from . import kernels as kernels
     from . import rotations as rotations
     from .body import Body as Body
     from .body_file import load_body as load_body
@@ -93,7 +94,7 @@ if not TYPE_CHECKING:
     __all__ = sorted(name for name, module in _MODULE_OF.items() if name != module)
 
     def __getattr__(name: str) -> Any:
-        """Import a public name, or the module `rotations`, when it is first used (PEP 562)."""
+        """Import a public name, or one of the modules above, when it is first used (PEP 562)."""
         if name == "__version__":
             return _version()
         if name not in _MODULE_OF:

@@ -142,37 +142,46 @@ def given_states(
 
 @dataclass
 class Fit:
-    """Result of one frame, and how it was reached: `status` says why the optimizer stopped."""
+    """Result of one frame, and how it was reached.
+
+    state; R_camera_part (K+1, 3, 3) and t_camera_part (K+1, 3), the joints, metres, are its parts.
+    status: why the optimizer stopped. cost: of the last stage's weights; cost_by_term adds up to
+    it, with Options.report only. iterations: evaluations of the blocks after the first; rejected:
+    of them, those whose step did not lower the cost. beta_information (P, P): of this frame's
+    measurements alone, pose eliminated; shape prior not included. measurements: usable points,
+    directions, rows of pose priors, such as the pull of `Temporal`, contacts, points above a floor,
+    and rows of further tables; seen: of them, the points, directions and rows of pose priors.
+    """
 
     state: State
     status: Status
-    cost: float  # of the last stage's weights
-    iterations: int  # evaluations of the blocks after the first
-    R_camera_part: Array  # (K+1, 3, 3)
-    t_camera_part: Array  # (K+1, 3), the joints
-    # (P, P), of this frame's measurements alone, pose eliminated; shape prior not included
+    cost: float
+    iterations: int
+    R_camera_part: Array
+    t_camera_part: Array
     beta_information: Array
-    # usable points, directions, rows of pose priors, such as the pull of `Temporal`, contacts,
-    # points above a floor, and rows of further tables
     measurements: int
-    seen: int = 0  # of them, the points, directions and rows of pose priors
-    rejected: int = 0  # of the iterations, those whose step did not lower the cost
-    # adds up to `cost`; with Options.report only
+    seen: int = 0
+    rejected: int = 0
     cost_by_term: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
 class ClipFit:
-    """Result of a clip with one shape."""
+    """Result of a clip with one shape.
+
+    frames: each with a status and a cost of its own. beta (P,); beta_information (P, P): summed
+    over the frames, shape prior included. focal_scale: estimated focal length over that of the
+    intrinsics; 1 if it was not estimated. status, cost, cost_by_term, iterations, rejected: as of
+    `Fit`, of the fit of all frames that found the shape.
+    """
 
     frames: list[Fit]
-    beta: Array  # (P,)
-    beta_information: Array  # (P, P), summed over the frames, shape prior included
-    # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    beta: Array
+    beta_information: Array
     focal_scale: float
     status: Status
     cost: float
     iterations: int
     rejected: int = 0
-    # adds up to `cost`; with Options.report only
     cost_by_term: dict[str, float] = field(default_factory=dict)

@@ -25,7 +25,7 @@ from ..gauss_newton.linearize import make_blocks
 from ..gauss_newton.optimizer import MIN_DAMPING
 from ..gauss_newton.recursion import Workspace, make_workspace, step
 from ..gauss_newton.terms import Terms, make_terms
-from ..measurements import Measurements
+from ..measurements import Keypoints3D, Measurements
 from ..options import Options, Priors, Stage, Weights, default_priors
 from ..part import GRADIENT, SHAPE, Array, Blocks, Pose
 from ..points import numbered
@@ -38,20 +38,28 @@ from ..validation import check_count, check_type, check_weight
 
 @dataclass
 class NormalEquations:
-    """H d = -g of 1/2 sum |r|^2 at a state; n = 6 + 3K + P unknowns, as the module orders them."""
+    """H d = -g of 1/2 sum |r|^2 at a state, in n = 6 + 3K + P unknowns: the root's turn and shift
+    in camera axes about the pelvis, the turns of joints 1..K in camera axes, and the shape.
+
+    cost; g (n,): gradient Jᵀr; H (n, n): JᵀJ, of robust kernels with their weights.
+    """
 
     cost: float
-    g: Array  # (n,) gradient Jᵀr
-    H: Array  # (n, n) JᵀJ, of robust kernels with their weights
+    g: Array
+    H: Array
 
 
 @dataclass
 class GaussNewtonStep:
-    """A solution of (H + Lambda) d = -g."""
+    """A solution d of (H + Lambda) d = -g.
 
-    direction: Array  # (n,)
-    predicted_decrease: float  # of the cost: 1/2 gᵀ(H + Lambda)^-1 g + 1/2 dᵀ Lambda d
-    state: State  # moved by the direction
+    direction (n,): d, in the order of `NormalEquations`. predicted_decrease: of the cost,
+    1/2 gᵀ(H + Lambda)^-1 g + 1/2 dᵀ Lambda d. state: moved by the direction.
+    """
+
+    direction: Array
+    predicted_decrease: float
+    state: State
 
 
 def linearize(
@@ -245,8 +253,10 @@ def check_residual(
     :param seed: of the state: the root 3 m in front of the camera, joints rotated by about 50°, the
         shape as varied as the population's.
     :return: the largest difference for the root's six unknowns ("root"), the joints' rotations
-        ("joints") and the shape ("shape"), and by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g /
-        2 cost - 1, with g = Jᵀr ("curvature"); infinite where JᵀJ is missing.
+        ("joints") and the shape ("shape"); by how much JᵀJ is too small for them: gᵀ (JᵀJ)⁺ g /
+        2 cost - 1, with g = Jᵀr ("curvature"), infinite where JᵀJ is missing; and how far, relative
+        to their own size, cost, g and JᵀJ beside other residuals and with twice the weight are from
+        twice those alone ("sum"): a kernel has to multiply by its weight, and to add to the blocks.
     :raises ShapeError: the rows do not fit the residual or the body.
     :raises InvalidValueError: there is no residual of that name, its kernel does not compile, or
         its cost is 0 or not finite at that state, where derivatives say nothing; its Jᵀr or JᵀJ is
@@ -255,10 +265,17 @@ def check_residual(
     check_type(name, str, "name")
     check_count(seed, "seed", 0)
     tree = make_tree(body)
-    terms = make_terms(tree, Measurements(tables={name: (ints, floats)}), Priors())
-    alone = Weights(tables={name: 1.0}, **_OTHERS_OFF)
-    stage = Options().stage_table([Stage(alone)])[0][0]
     state = _random_state(tree, seed)
+    points = np.arange(len(tree.v_bar))
+    beside = Keypoints3D(points, np.zeros((len(points), 3)))
+
+    def weighted(weight: float, measurements: Measurements) -> tuple[Terms, Array]:
+        weights = Weights(tables={name: weight}, **_OTHERS_OFF)
+        stage = Options().stage_table([Stage(weights)])[0][0]
+        return make_terms(tree, measurements, Priors()), stage
+
+    tables = {name: (ints, floats)}
+    terms, stage = weighted(1.0, Measurements(tables=tables))
     at_state = equations(tree, terms, stage, state)
     cost = at_state.cost
     g = at_state.g
@@ -286,11 +303,22 @@ def check_residual(
     # the pseudoinverse drops that part of g
     is_missing = np.linalg.norm(g - H @ x) > _UNEXPLAINED * np.linalg.norm(g)
     explained = np.inf if is_missing else float(g @ x) / (2.0 * cost)
+    others = equations(tree, *weighted(0.0, Measurements(keypoints3d=beside)), state)
+    seen = Measurements(keypoints3d=beside, tables=tables)
+    together = equations(tree, *weighted(2.0, seen), state)
+    differences = [
+        np.abs(
+            getattr(together, kind) - getattr(others, kind) - 2.0 * getattr(at_state, kind)
+        ).max()
+        / np.abs(getattr(at_state, kind)).max(initial=1e-300)
+        for kind in ("cost", "g", "H")
+    ]
     return {
         "root": float(off[:6].max()),
         "joints": float(off[6:joints].max(initial=0.0)),
         "shape": float(off[joints:].max(initial=0.0)),
         "curvature": max(0.0, explained - 1.0),
+        "sum": float(max(differences)),
     }
 
 

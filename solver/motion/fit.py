@@ -52,26 +52,31 @@ _FRAMES_FOR_TWO_THREADS = 16
 class MotionFit:
     """Result of a clip of T frames, in the axes of the world: the camera's, where no view says
     otherwise.
+
+    states (T); R_world_part (T, K+1, 3, 3) and t_world_part (T, K+1, 3), the joints, metres.
+    beta (P,); beta_information (P, P): shape prior included; zeros for a shape that was given.
+    focal_scale: estimated focal length over that of the intrinsics; 1 if it was not estimated.
+    measurements (T,): of each frame, over its views, what `Fit.measurements` counts. status,
+    iterations, rejected: as of `Fit`. cost: with windows, their sum: frames in two of them count
+    twice; cost_by_term: what couples the frames, and the shared priors. joint_covariance and
+    covariance_from_root (T, K+1, 3, 3): of the joints' positions, and of these relative to the
+    root, metres^2; with `covariance` only. Millions and more where nothing fixes a joint's pose or
+    the shape; NaN where the cost is not finite.
     """
 
     states: list[State]
-    R_world_part: Array  # (T, K+1, 3, 3)
-    t_world_part: Array  # (T, K+1, 3), the joints, metres
-    beta: Array  # (P,)
-    beta_information: Array  # (P, P), shape prior included; zeros for a shape that was given
-    # estimated focal length over that of the intrinsics; 1 if it was not estimated
+    R_world_part: Array
+    t_world_part: Array
+    beta: Array
+    beta_information: Array
     focal_scale: float
-    measurements: Array  # (T,) of each frame, over its views, what `Fit.measurements` counts
+    measurements: Array
     status: Status
-    cost: float  # with windows, their sum: frames in two of them count twice
+    cost: float
     iterations: int
     rejected: int
-    # (T, K+1, 3, 3) of the joints' positions, metres^2; with `covariance` only. Millions and more
-    # where nothing fixes a joint's pose or the shape; NaN where the cost is not finite
     joint_covariance: Array | None = None
-    # (T, K+1, 3, 3) of their positions relative to the root; likewise
     covariance_from_root: Array | None = None
-    # what couples the frames, and the shared priors
     cost_by_term: dict[str, float] = field(default_factory=dict)
 
 

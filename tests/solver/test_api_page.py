@@ -40,7 +40,7 @@ def seen():
         cameras.append((person.INTRINSICS, R, t, pixels))
     pixels = cameras[0][3]
     return {
-        "K": person.INTRINSICS,
+        "intrinsics": person.INTRINSICS,
         "joints": truth[0][1],
         "pixels": pixels[0],
         "confidence": np.full(17, 0.9),

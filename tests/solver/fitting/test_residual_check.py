@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from numba.extending import register_jitable
 from scope.solver import (
     InvalidValueError,
     check_residual,
@@ -21,6 +22,7 @@ BODY = random_body(np.random.default_rng(1), K, P, M)
 ROWS = [[2], [4]], [[0.3, 1.0], [-0.2, 2.0]]
 
 
+@register_jitable
 def accumulate_mistaken(tree, ints, floats, weight, pose, blocks):
     """The example's kernel, with its Jᵀr and JᵀJ times a factor each: floats[:, 2:4]."""
     cost = 0.0
@@ -49,7 +51,21 @@ def everything(part, ints, floats):
     return np.concatenate([part.t, part.beta, rotations.log(part.R @ part.Omega)])
 
 
+def accumulate_unweighted(tree, ints, floats, weight, pose, blocks):
+    """The right kernel, but for its weight."""
+    return accumulate_mistaken(tree, ints, floats, 1.0, pose, blocks)
+
+
+def accumulate_alone(tree, ints, floats, weight, pose, blocks):
+    """The right kernel, but that it begins with empty blocks."""
+    for k in range(ints.shape[0]):
+        blocks.A[ints[k, 0]] = 0.0
+    return accumulate_mistaken(tree, ints, floats, weight, pose, blocks)
+
+
 register_residual("mistaken", kernel=accumulate_mistaken, floats=4)
+register_residual("unweighted", kernel=accumulate_unweighted, floats=4)
+register_residual("alone", kernel=accumulate_alone, floats=4)
 register_residual("everything", function=everything, floats=0)
 
 
@@ -66,7 +82,7 @@ def tables():
 @pytest.mark.parametrize(("name", "rows"), list(tables()))
 def test_right_derivatives_differ_by_rounding_only(name, rows):
     found = check_residual(BODY, name, *rows)
-    assert set(found) == {"root", "joints", "shape", "curvature"}
+    assert set(found) == {"root", "joints", "shape", "curvature", "sum"}
     assert max(found.values()) < 1e-5, found
 
 
@@ -79,6 +95,10 @@ def test_each_kind_of_mistake_shows():
     assert found.pop("curvature") == pytest.approx(1.0, abs=1e-6)
     assert max(found.values()) < 1e-8
     assert mistaken(1.0, 0.0)["curvature"] == np.inf
+    for name in ("unweighted", "alone"):
+        found = check_residual(BODY, name, ROWS[0], np.hstack([ROWS[1], np.ones((2, 2))]))
+        assert found.pop("sum") > 0.3
+        assert max(found.values()) < 1e-5
 
 
 def test_a_residual_without_a_cost_at_the_state_says_nothing():
