@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Networks that loop for ever, or take all memory."""
+"""Networks that loop for ever."""
 
 from __future__ import annotations
 
@@ -44,20 +44,3 @@ def looping(path: Path, *, while_bright: bool = False) -> Path:
     return save(
         path, nodes, [picture_input(32, 32)], [out], {"longest": LONGEST, "threshold": threshold}
     )
-
-
-def huge(path: Path, elements: int) -> Path:
-    """Write a network with a constant of so many floats, which depends on the image, so that it is
-    made in a run.
-    """
-    nodes = [
-        helper.make_node("ReduceMin", ["images"], ["least"], keepdims=0),
-        helper.make_node("Cast", ["least"], ["zero"], to=TensorProto.INT64),
-        helper.make_node("Mul", ["zero", "nothing"], ["none"]),
-        helper.make_node("Add", ["none", "elements"], ["shape"]),
-        helper.make_node("ConstantOfShape", ["shape"], ["block"]),
-        helper.make_node("ReduceSum", ["block"], ["out"], keepdims=0),
-    ]
-    constants = {"elements": np.array([elements], np.int64), "nothing": np.array([0], np.int64)}
-    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, [])
-    return save(path, nodes, [picture_input(32, 32)], [out], constants)
