@@ -16,10 +16,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import as_array, as_numbers
 from ..errors import ScopeWarning
-from ..measurements import LARGEST, SIGMA_2D, Measurements
+from ..measurements import LARGEST, SIGMA_2D, Keypoints2D, Keypoints3D, Measurements
 from ..options import Priors
 from ..part import Array
 from ..state import Fit, Status
@@ -133,13 +134,10 @@ def warn_of_wrong_points(tree: Tree, measurements: Measurements, found: Fit) -> 
     is_done = found.status is Status.CONVERGED or found.iterations >= _MANY_ITERATIONS
     if seen is None or not is_done:
         return False
-    points = as_numbers(seen.points, "Points of 3D keypoints")
-    confidence = as_numbers(seen.confidence, "Confidence of 3D keypoints")
-    usable = (np.abs(points) < LARGEST).all(axis=1) & (confidence > 0.0)
-    if usable.sum() < _FEWEST_POINTS:
+    points, fitted = _seen_and_fitted(tree, seen, seen.points, found)
+    if len(points) < _FEWEST_POINTS:
         return False
-    fitted = _fitted_points(tree, np.asarray(seen.indices)[usable], found)
-    off = float(np.median(np.linalg.norm(fitted - points[usable], axis=1)))
+    off = float(np.median(np.linalg.norm(fitted - points, axis=1)))
     most = _FAR_M
     if seen.sigma_m is not None:
         stated = float(np.median(np.asarray(seen.sigma_m, dtype=float)))
@@ -163,17 +161,15 @@ def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> 
     if seen is None or intrinsics is None or found.status is not Status.CONVERGED:
         return False
     K = as_array(intrinsics, (3, 3), "Intrinsics")
-    pixels = as_numbers(seen.pixels, "Pixels of 2D keypoints")
-    confidence = as_numbers(seen.confidence, "Confidence of 2D keypoints")
-    usable = (np.abs(pixels) < LARGEST).all(axis=1) & (confidence > 0.0)
-    if usable.sum() < _FEWEST_POINTS:
+    pixels, fitted = _seen_and_fitted(tree, seen, seen.pixels, found)
+    if len(pixels) < _FEWEST_POINTS:
         return False
-    fitted = _fitted_points(tree, np.asarray(seen.indices)[usable], found) @ K.T
+    projected = fitted @ K.T
     with np.errstate(all="ignore"):  # a point may be in the camera's own plane
-        image = fitted[:, :2] / fitted[:, 2:]
-    off = float(np.median(np.linalg.norm(image - pixels[usable], axis=1)))
+        image = projected[:, :2] / projected[:, 2:]
+    off = float(np.median(np.linalg.norm(image - pixels, axis=1)))
     stated = SIGMA_2D * K[0, 0] if seen.sigma_px is None else np.median(np.asarray(seen.sigma_px))
-    extent = np.ptp(pixels[usable], axis=0).max()
+    extent = np.ptp(pixels, axis=0).max()
     is_far = off > max(_FAR_SIGMAS * float(stated), _FAR_IN_IMAGE * float(extent))
     if is_far:
         warnings.warn(
@@ -186,13 +182,22 @@ def warn_of_wrong_pixels(tree: Tree, measurements: Measurements, found: Fit) -> 
     return is_far
 
 
-def _fitted_points(tree: Tree, indices: Array, found: Fit) -> Array:
-    """Return where a fitted body has its points of these numbers (n,), (n, 3), camera frame."""
+def _seen_and_fitted(
+    tree: Tree, seen: Keypoints2D | Keypoints3D, values: ArrayLike, found: Fit
+) -> tuple[Array, Array]:
+    """Return the usable points or pixels (n, 3 or 2) of keypoints, and where the fitted body has
+    them (n, 3), camera frame.
+
+    :param values: what `seen` has of each.
+    """
+    measured = as_numbers(values, "Measured keypoints")
+    confidence = as_numbers(seen.confidence, "Confidence of keypoints")
+    usable = (np.abs(measured) < LARGEST).all(axis=1) & (confidence > 0.0)
+    indices = np.asarray(seen.indices)[usable]
     part = tree.point_part[indices]
     levers = tree.v_bar[indices] + tree.V[indices][:, :, : tree.shape] @ found.state.beta
     turned = np.einsum("nij,nj->ni", found.R_camera_part[part], levers)
-    fitted: Array = found.t_camera_part[part] + turned
-    return fitted
+    return measured[usable], found.t_camera_part[part] + turned
 
 
 def warn_of_unlikely_shape(betas: Sequence[Array], priors: Priors) -> None:
