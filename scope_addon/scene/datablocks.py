@@ -159,23 +159,19 @@ class NewDatablocks:
 
 
 @contextmanager
-def temporary_datablocks() -> Iterator[None]:
-    """Remove all datablocks that the block has added to the file."""
+def temporary_datablocks(*, used: bool = True) -> Iterator[None]:
+    """Remove the datablocks that the block has added to the file.
+
+    :param used: also those that something uses afterwards, see `NewDatablocks.remove_unused`.
+    """
     new = NewDatablocks()
     try:
         yield
     finally:
-        new.remove()
-
-
-@contextmanager
-def without_leftovers() -> Iterator[None]:
-    """Remove the datablocks that the block has added to the file and no longer uses."""
-    new = NewDatablocks()
-    try:
-        yield
-    finally:
-        new.remove_unused()
+        if used:
+            new.remove()
+        else:
+            new.remove_unused()
 
 
 def remove_blocks(blocks: Sequence[bpy.types.ID]) -> None:

@@ -30,7 +30,7 @@ from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
 from ..build import NEW_SCENE, BuildOptions, build_scene, check_choices
-from ..datablocks import captures_of, without_leftovers
+from ..datablocks import captures_of, temporary_datablocks
 from ..packed_motion import pack_motion
 from . import formats
 from .bone_names import OWN, SKELETONS, bone_names
@@ -141,7 +141,7 @@ def _write_one(
     by_scene = suffix in (".fbx", ".blend")  # which regard the scene's unit
     is_in_metres = by_scene or abs(unit - 1.0) < 1e-6
     with (
-        without_leftovers(),
+        temporary_datablocks(used=False),
         out_of_edit_mode(collections),
         # A .blend file goes on as a capture, whose bones are known by their names.
         renamed_bones(rigs, OWN if suffix == ".blend" else options.skeleton),
@@ -206,7 +206,7 @@ def export_motions(
         check_output(each)
     written: list[Path] = []
     build_options = build_options or replace(NEW_SCENE, name=paths[0].stem)
-    with without_leftovers(), temporary_scene("Capturing"):
+    with temporary_datablocks(used=False), temporary_scene("Capturing"):
         result = build_scene(motions, body, footage, build_options)
         if any(each.suffix.lower() == ".blend" for each in paths):
             for person in result.people:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Context managers that prepare captures for an exporter and restore them afterwards. What they
-make stays in the file: use them within ``without_leftovers`` or ``temporary_datablocks``.
+make stays in the file: use them within ``temporary_datablocks``.
 """
 
 from __future__ import annotations
