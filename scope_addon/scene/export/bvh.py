@@ -151,8 +151,8 @@ def _at_parents(pose: SampledPose) -> tuple[NDArray[np.float64], NDArray[np.floa
 def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
     """Decompose ``R = Rz Ry Rx``, continuously in time where possible.
 
-    At gimbal lock (y = ±90°) x is set to zero; elsewhere, the equivalent angles nearest to the
-    previous frame are chosen.
+    Of the equivalent angles, those nearest to the previous frame are chosen; at gimbal lock
+    (y = ±90°) x is that of the previous frame, in the first frame zero.
 
     :param R: (T, N, 3, 3) rotations of N joints.
     :return: (T, N, 3) angles z, y, x, degrees.
@@ -170,6 +170,10 @@ def euler_zyx_degrees(R: NDArray[np.float64]) -> NDArray[np.float64]:
     out: NDArray[np.float64] = direct.copy()
     for t in range(1, len(out)):
         before = out[t - 1][:, None]
+        # At gimbal lock, only z - x is known, or where y is negative, z + x.
+        x_before = np.where(locked[t], before[:, 0, 2], 0.0)
+        both[t, :, 0, 0] += np.sign(sin_y[t]) * x_before
+        both[t, :, 0, 2] += x_before
         both[t] += 360.0 * np.round((before - both[t]) / 360.0)
         nearer = np.abs(both[t] - before).sum(axis=-1).argmin(axis=-1)
         out[t] = both[t, np.arange(len(nearer)), nearer]

@@ -119,6 +119,17 @@ def test_angles_are_those_of_blenders_decomposition_nearest_to_the_frame_before(
         np.testing.assert_allclose(angles, np.degrees(before)[::-1], atol=1e-2)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_angles_do_not_jump_where_a_joint_passes_gimbal_lock(side):
+    """As when an arm is raised to exactly 90° and on: a made turn, of which one frame is locked."""
+    angles = np.tile([120.0, 0.0, side * 110.0], (13, 1))
+    angles[:, 1] = side * np.arange(60.0, 125.0, 5.0)
+    R = [np.array(mathutils.Euler(np.radians(each[::-1])).to_matrix(), float) for each in angles]
+    exact = np.round(np.array(R), 6)[:, None]
+    assert abs(exact[6, 0, 2, 0]) == 1.0
+    np.testing.assert_allclose(euler_zyx_degrees(exact)[:, 0], angles, atol=1e-2)
+
+
 def test_the_files_hold_the_angles_at_one_rate(tmp_path, posed, whole_body):
     motion = posed({"right_knee": ("x", 50.0)})
     expected = joint_angles(motion, whole_body)
