@@ -6,7 +6,8 @@ clips are skipped.
 can continue. A clip is finished if its content (SHA-256), the options and the program are unchanged
 and its result files have the sizes and SHA-256 that the report says. Clips whose results were
 complete when a batch was killed, before it has written the report, are known by `clips.finished`.
-A folder whose clips would replace results of another folder is refused.
+A folder whose clips would replace results of another folder is refused: the report keeps the
+entries of all folders that were captured there.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ from .request import program_version
 
 REPORT_NAME = "scope-batch.json"
 STATUSES = ("done", "skipped", "no_person", "failed")
+OTHERS = "other_folders"  # the report's entries of clips of other folders, each with its folder
 # of the time that may be spent on writing the report, which grows with the number of clips
 _WRITING_SHARE = 0.1
 _QUICK_S = 0.1  # a report that is written faster is written after every clip
@@ -88,7 +90,8 @@ class Batch:
         # Entries of results of the same names from the report's folder, which only the clips that
         # they are of may replace; workers compare the keys, since the footage is not here.
         self._kept: dict[str, Entry] = {}
-        self._former_folder = ""  # of which they are
+        # Entries of other folders' clips whose names no clip has here.
+        self._others: list[Entry] = []
 
     def clips(self, recursive: bool, views: bool = False) -> dict[str, Path]:
         """Return the clips by the name of their results; see `find_clips`."""
@@ -155,16 +158,17 @@ class Batch:
                 f"cannot create the folder {out}: {error.strerror}; choose another with --out"
             ) from error
         runner = runner or LocalRunner(self._program, jobs)
-        previous = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
+        known = self._previous_entries(clips, runner.report().get("folder", str(self.folder)))
+        previous = known
         if again:
-            previous = dict(self._kept)
+            previous = {n: e for n, e in known.items() if n in self._kept or n not in clips}
         entries: dict[str, Entry] = {}
         try:
             # The tasks are made within the try, because a signal can arrive as soon as the first
             # clip has begun.
             for finished in runner.outcomes(self._tasks(clips, previous, again)):
                 for name, entry in finished.items():
-                    entries[name] = entry | self._what_remains(name, entry)
+                    entries[name] = entry | _what_remains(entry, known.get(name, {}))
                     _print_outcome(entry, f"{len(entries)}/{len(clips)}", say)
                 if finished:
                     self._write_report(_in_order(entries, clips), previous, runner, last=False)
@@ -184,7 +188,7 @@ class Batch:
         for name, path in clips.items():
             file = path.relative_to(self.folder).as_posix()
             entry = None if again else previous.get(name)
-            known = entry if entry and self._is_finished(name, entry) else None
+            known = _as_own(entry) if entry and self._is_finished(name, entry) else None
             yield ClipTask(
                 name,
                 file,
@@ -197,15 +201,6 @@ class Batch:
                 again=again,
                 only_key=self._kept.get(name, {}).get("key", ""),
             )
-
-    def _what_remains(self, name: str, entry: Entry) -> Entry:
-        """Return what the report keeps of another folder's results of a clip's name, which the clip
-        did not replace: its next run has to know their key.
-
-        :param entry: the clip's own.
-        """
-        kept = self._kept.get(name, {}) if entry["status"] == "failed" else {}
-        return {field: kept[field] for field in ("key", "outputs", "content") if field in kept}
 
     def _is_finished(self, name: str, entry: Entry) -> bool:
         """Return whether an entry of the previous report is of a finished clip whose files are
@@ -228,35 +223,37 @@ class Batch:
 
     def _previous_entries(self, clips: dict[str, Path], folder: str) -> dict[str, Entry]:
         """Return the entries of the previous report by name; empty if the report is missing or
-        damaged. Of a report of another folder, only entries of clips that are here, too, as after
-        the folder was renamed. Where the footage is at a URL, they are kept for the workers to
-        compare.
+        damaged. Of other folders, only entries of clips that are here, too, as after the folder was
+        renamed. Where the footage is at a URL, they are kept for the workers to compare.
 
         :param folder: of the footage, as the report has it.
         :raises OutputError: what has its name is no file, so that no report could be written.
-        :raises UsageError: the report is of another folder, and a clip has the name of its results.
+        :raises UsageError: a clip has the name of another folder's results.
         """
         resolve_link(self.report_file)
         try:
             report = json.loads(self.report_file.read_text(encoding="utf-8"))
-            former = str(Path(report["folder"]).resolve())
-            is_same = unicode_text(folder) == report["folder"]
-            is_same |= unicode_text(self.folder) == former
             of_clips = {unicode_text(name): name for name in clips}
             entries = {
-                of_clips.get(e["name"], e["name"]): e
-                for e in report["files"]
+                of_clips.get(e["name"], e["name"]): {"folder": report["folder"]} | e
+                for e in [*report["files"], *report.get(OTHERS, [])]
                 if isinstance(e["status"], str)
+            }
+            ours = {
+                each
+                for each in {e["folder"] for e in entries.values()}
+                if unicode_text(folder) == each
+                or unicode_text(self.folder) == str(Path(each).resolve())
             }
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return {}
-        if is_same:
-            return entries
-        shared = {name: e for name, e in entries.items() if name in clips and e.get("outputs")}
+        own = {name: _as_own(e) for name, e in entries.items() if e["folder"] in ours}
+        others = {name: e for name, e in entries.items() if name not in own}
+        self._others = [e for name, e in others.items() if name not in clips]
+        shared = {name: e for name, e in others.items() if name in clips and e.get("outputs")}
         if is_url(folder):
             self._kept = {n: e for n, e in shared.items() if isinstance(e.get("key"), str)}
-            self._former_folder = report["folder"]
-            return shared
+            return own | shared
         for name, entry in shared.items():
             with suppress(OSError):  # what cannot be read replaces nothing
                 key = clip_key(self._basis, clips[name], RATE in self.settings.options)
@@ -264,10 +261,10 @@ class Batch:
                 if entry.get("key") != key:
                     raise UsageError(
                         f"'{display_text(name)}' of {folder} would replace the result of the same "
-                        f"name of {display_text(report['folder'])}; give another --out, or remove "
+                        f"name of {display_text(entry['folder'])}; give another --out, or remove "
                         f"{self.report_file} if it may be replaced"
                     )
-        return shared
+        return own | {name: _as_own(e) for name, e in shared.items()}
 
     def _write_report(
         self, entries: dict[str, Entry], previous: dict[str, Entry], runner: Runner, *, last: bool
@@ -290,11 +287,9 @@ class Batch:
                 ({n: e for n, e in previous.items() if n not in entries} | entries).values()
             ),
             "exit_status": status,
+            **({OTHERS: self._others} if self._others else {}),
             **runner.report(),
         }
-        open_names = {n for n in self._kept if entries.get(n, {}).get("status") not in FINISHED}
-        if open_names:  # until they are compared, so that another run compares them
-            report["folder"] = self._former_folder
         try:
             # A link of that name leads where nobody has asked to write.
             with complete_file(self.report_file) as temporary:
@@ -322,6 +317,21 @@ def how_to_continue(again: bool) -> str:
     """
     command = "the same command without --again" if again else "the same command again"
     return f"finished clips are kept; run {command} to continue"
+
+
+def _what_remains(entry: Entry, before: Entry) -> Entry:
+    """Return what the report keeps of earlier results, which a clip that failed did not replace:
+    another folder's clips may not replace them either, so that their key has to be known.
+
+    :param before: the entry of the results.
+    """
+    fields = ("key", "outputs", "content", "folder") if entry["status"] == "failed" else ()
+    return {field: before[field] for field in fields if field in before}
+
+
+def _as_own(entry: Entry) -> Entry:
+    """Return an entry as one of the report's own folder."""
+    return {field: value for field, value in entry.items() if field != "folder"}
 
 
 def _in_order(entries: dict[str, Entry], clips: dict[str, Path]) -> dict[str, Entry]:

@@ -157,6 +157,40 @@ def test_results_of_another_folder_are_kept(folder, tmp_path):
     (other / "a.mp4").rename(other / "f.mp4")
     assert [entry["name"] for entry in batch(other, out).run(1)["files"]] == ["f"]
 
+    third = tmp_path / "third"
+    third.mkdir()
+    (third / "f.mp4").write_text("a third day")
+    for name, text, first in (("a", "ok", renamed), ("f", "another day", other)):
+        (third / "f.mp4").rename(third / f"{name}.mp4")
+        with pytest.raises(UsageError, match=f"'{name}' of {third} .* name of {first}; .* --out"):
+            batch(third, out).run(1)
+        assert (out / f"{name}.npz").read_text() == f"result of {text}"
+        (third / f"{name}.mp4").rename(third / "f.mp4")
+    calls(renamed)
+    assert batch(renamed, out).run(1)["counts"]["skipped"] == 2
+    assert calls(renamed) == []
+
+
+@pytest.mark.parametrize("later", ["fails", "is gone"])
+def test_results_of_another_folder_are_kept_after_a_later_run(tmp_path, later):
+    """A run of the same folder that has not replaced them."""
+    clips, other = tmp_path / "clips", tmp_path / "other"
+    for each in (clips, other):
+        each.mkdir()
+    out = tmp_path / "out"
+    (clips / "a.mp4").write_text("ok")
+    (clips / "b.mp4").write_text("ok")
+    batch(clips, out).run(1)
+    if later == "fails":
+        (clips / "a.mp4").write_text("broken")
+    else:
+        (clips / "a.mp4").unlink()
+    batch(clips, out).run(1, again=True)
+    (other / "a.mp4").write_text("another day")
+    with pytest.raises(UsageError, match=f"'a' of {other} .* name of {clips}; .* --out"):
+        batch(other, out).run(1)
+    assert (out / "a.npz").read_text() == "result of ok"
+
 
 class StoreRunner(LocalRunner):
     """Captures footage of a store, which the batch has the names of."""
