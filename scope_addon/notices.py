@@ -37,7 +37,8 @@ SENTENCES = {
     "assumed; set another with --fps on the command line",
     "changed_footage": "{footage} has been changed since a capture of it was stopped, so that one "
     "was not continued, and everything was captured anew",
-    "range_of_image": "{footage} is a single image: a start, an end or a frame rate has no effect",
+    "range_of_image": "{footage} is a single image: a start, an end, a frame rate, a speed or a "
+    "treadmill has no effect",
     "first_of_animation": "{footage} is an animation of {images} images, and only the first was "
     "captured; convert it to an .mp4 or a .gif to capture all of them",
     "mirrored": "{footage} is mirrored by its metadata, which Blender ignores; there, switch on "
@@ -63,6 +64,8 @@ SENTENCES = {
     "consecutive_images": "{footage}: {missing} numbers between {first} and {last} have no image, "
     "so the images were read as consecutive frames",
     # networks
+    "preset_of_own_network": "{network} replaces the built-in keypoint networks, so the quality "
+    "preset has no effect",
     "provider_missing": "{provider} was requested, but this onnxruntime has only {available}; the "
     "networks run on the CPU",
     "provider_failed": "{provider} cannot run the networks ({reason}); they run on the CPU instead",

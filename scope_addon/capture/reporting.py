@@ -18,9 +18,11 @@ from ..kinematics.foot_skin import UNDER_FLOOR_M, foot_heights, lower_floors, st
 from ..kinematics.sequences import runs
 from ..motion import Motion
 from ..notices import Notice, Value, notice
+from ..options import option
 from ..options.capture import ON
 from ..review_spans import has_bent_knees, implausible
 from .media.video import Video
+from .media.video_range import VideoRange
 from .observe import Footage
 from .options import CaptureOptions
 from .solve import Solved
@@ -78,6 +80,7 @@ def make_report(
         iterations=solved.iterations,
         cuts_s=[round(t, 3) for t in footage.cuts_s],
         warnings=footage.warnings
+        + unused_option_warnings(video, options)
         + speed_warnings(video, options)
         + up_warnings(name, solved.up_source, is_still)
         + capture_warnings(name, body, options, footage, motions)
@@ -181,6 +184,23 @@ def up_warnings(name: str, up_source: str, is_still: bool) -> list[Notice]:
     if up_source in (LINES, GIVEN) or not is_still:
         return []
     return [notice("guessed_up", footage=name, degrees=UP_DEVIATIONS_DEG[up_source][is_still])]
+
+
+def unused_option_warnings(video: Video, options: CaptureOptions) -> list[Notice]:
+    """Say which options were given that have no effect on this footage or with these networks.
+
+    They are no errors: a batch has pictures among its videos, and a user's network is set for all
+    captures.
+    """
+    warnings = []
+    whole = VideoRange(view=options.wanted.view)
+    asks_for_time = options.wanted != whole or options.speed is not None or options.treadmill
+    if video.is_still and asks_for_time:
+        warnings.append(notice("range_of_image", footage=Path(video.path).name))
+    preset = option("quality").default
+    if options.keypoints is not None and options.quality != preset:
+        warnings.append(notice("preset_of_own_network", network=options.keypoints.name))
+    return warnings
 
 
 def speed_warnings(video: Video, options: CaptureOptions) -> list[Notice]:

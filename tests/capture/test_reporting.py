@@ -7,11 +7,20 @@ What a report says of feet that are not on the floor, for motions whose heights 
 from dataclasses import replace
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture import reporting
-from scope.scope_addon.capture.reporting import camera_warnings, face_frames, up_warnings
+from scope.scope_addon.capture.media.video import open_video
+from scope.scope_addon.capture.options import capture_options
+from scope.scope_addon.capture.reporting import (
+    camera_warnings,
+    face_frames,
+    unused_option_warnings,
+    up_warnings,
+)
 from scope.scope_addon.capture.world.world_frame import BODIES, LINES
+from scope.scope_addon.options import Place, options_at
 from scope.solver import load_body, rotations
 
 from ..made_motion import made_face, made_motion
@@ -184,3 +193,41 @@ def test_a_zoom_of_which_some_may_be_missing_is_told(motion, is_certain, codes):
     solved = SimpleNamespace(travel_source=None, motions=[motion], contradictions=[None])
     warnings = camera_warnings("made.mp4", footage, solved)
     assert [warning.code for warning in warnings] == codes
+
+
+VALUES = {each.name: each.default for each in options_at(Place.WORKER)}
+TIMES = [
+    {"start": "5"},
+    {"start": "00:00:01:00"},
+    {"fps": "9"},
+    {"speed": 8.0},
+    {"treadmill": True},
+]
+
+
+def unused(path, **given):
+    options = capture_options(VALUES | given)
+    with open_video(path, options.wanted) as video:
+        return [each.code for each in unused_option_warnings(video, options)]
+
+
+@pytest.mark.parametrize("given", TIMES)
+def test_what_has_no_effect_on_a_picture_is_said(tmp_path, given):
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((48, 64, 3), 90, np.uint8))
+    assert unused(tmp_path / "a.png", **given) == ["range_of_image"]
+    assert unused(tmp_path / "a.png", rotate="90", mirror=True, uneven_ground=True) == []
+
+
+def test_a_sequence_of_pictures_has_times(tmp_path):
+    for k in range(30):
+        cv2.imwrite(str(tmp_path / f"a_{k}.png"), np.full((48, 64, 3), 90, np.uint8))
+    for given in TIMES[2:]:
+        assert unused(tmp_path / "a_#.png", **given) == []
+
+
+def test_a_preset_that_ones_own_network_ignores_is_said(tmp_path):
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((48, 64, 3), 90, np.uint8))
+    own = {"keypoints": str(tmp_path / "mine.onnx")}
+    assert unused(tmp_path / "a.png", quality="fast", **own) == ["preset_of_own_network"]
+    assert unused(tmp_path / "a.png", **own) == []
+    assert unused(tmp_path / "a.png", quality="fast") == []

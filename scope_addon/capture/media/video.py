@@ -94,6 +94,11 @@ class Video:
     _decoders: list[_Decoder] = field(default_factory=list, repr=False)
 
     @property
+    def is_still(self) -> bool:
+        """Whether this is a single picture, which has no times."""
+        return self._still is not None
+
+    @property
     def source_fps(self) -> Fraction:
         """Frame rate of the file, frames per second."""
         return self._source_fps or self.fps
@@ -291,8 +296,6 @@ def _open_still(path: Path, requested: FootageRange) -> Video:
     video = Video(
         path, width, height, DEFAULT_FPS, 1, picture.focal_35mm, wanted=wanted, _still=image
     )
-    if requested != wanted:
-        video.warnings.append(notice("range_of_image", footage=path.name))
     if picture.length > 1:
         video.warnings.append(
             notice("first_of_animation", footage=path.name, images=picture.length)

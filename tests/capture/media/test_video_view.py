@@ -36,7 +36,6 @@ def test_footage_of_every_kind_is_turned_and_mirrored(
         with open_video(path, wanted) as video:
             frame = next(iter(video)).image_rgb
             assert (video.width, video.height) == frame.shape[1::-1]
-            assert not [each for each in video.warnings if each.code == "range_of_image"]
         turned = np.rot90(corner_image(), -asked[0] // 90)
         expected = corners(np.ascontiguousarray(turned[:, ::-1] if asked[1] else turned))
         assert corners(frame) == expected

@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 from scope.scope_addon.capture.media.video import open_video
-from scope.scope_addon.capture.media.video_range import parse_range
 from scope.scope_addon.errors import VideoError
 
 from ....required import need_encoder, package
@@ -72,22 +71,6 @@ def test_other_formats_are_refused_with_advice(tmp_path: Path, suffix: str) -> N
         (tmp_path / f"a_{k}.png").write_bytes(path.read_bytes())
     with pytest.raises(VideoError, match=r"a_1\.png is an image that cannot be decoded"):
         open_video(tmp_path / "a_#.png")
-
-
-@pytest.mark.parametrize(
-    "asked", [("5", None, None), ("00:00:01:00", None, None), (None, None, "9")]
-)
-def test_a_range_of_a_single_picture_gives_a_warning(
-    tmp_path: Path, asked: tuple[str | None, ...]
-) -> None:
-    (tmp_path / "a.png").write_bytes(png(GREY))
-    with open_video(tmp_path / "a.png", parse_range(*asked)) as video:
-        assert len(list(video)) == 1
-        assert "a.png is a single image: a start, an end or a frame rate has no effect" in map(
-            str, video.warnings
-        )
-    with open_video(tmp_path / "a.png") as video:
-        assert not video.warnings
 
 
 @pytest.mark.parametrize("name", ["a.webp", "a.png"])
