@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from ..live.unfinished import (
     unfinished_video,
 )
 from ..notices import counted
-from ..options import Place
+from ..options import Place, option, options_at
 from ..options.body_choice import chosen_body
 from ..output_paths import check_output, left_over, person_paths
 from ..temporary import is_held
@@ -62,6 +62,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
     values = values_in_range(args, Place.LIVE)
     check_installed(CAPTURE if values["vmc"] is None else (*CAPTURE, "pythonosc"))
     if values["list_formats"]:
+        used = ("list_formats", "json", "quiet")
+        _refuse_others(values, used, "a capture, and --list-formats captures nothing")
         return _list_formats(args.source, quiet=args.json)
     check_memory_limit(with_scene=False)
     options = _checked(values)
@@ -73,7 +75,8 @@ def run_live_command(args: argparse.Namespace) -> dict[str, Any]:
 
     to_finish = [Path(args.source)] if is_recording(args.source) else []
     if to_finish:
-        _check_finishing(values)
+        used = ("record", "json", "quiet")
+        _refuse_others(values, used, "a running capture, and this finishes a recording")
     is_served = values["json_port"] is not None or values["preview"]
     connects = is_stream(args.source) or values["vmc"] is not None or is_served
     confine(args, to_finish, connects=connects)
@@ -99,9 +102,13 @@ def _capture(
     from ..live.open_source import open_source
     from ..live.recording import Keep, PeopleRecording
     from ..live.run import Listeners, run_live
+    from ..live.source import FileSource
     from ..untrusted.body_file import load_body
 
     source = open_source(args.source)
+    if isinstance(source, FileSource):
+        others = {each.name for each in options_at(Place.LIVE)} - {"reconnect_s"}
+        _refuse_others(values, others, "cameras and streams, and this is a file")
     name = chosen_body(values)
     body = load_body(name)
     with ExitStack() as stack:
@@ -256,18 +263,16 @@ def _paths(values: Mapping[str, Any]) -> list[Path]:
     )
 
 
-def _check_finishing(values: Mapping[str, Any]) -> None:
-    """Check that nothing is asked of a finished recording but to write it.
+def _refuse_others(values: Mapping[str, Any], used: Collection[str], advice: str) -> None:
+    """Refuse options that have no effect here.
 
-    :raises UsageError: another output is given.
+    :param used: names of those that have one.
+    :param advice: what another one is for.
+    :raises UsageError: it is given.
     """
-    outputs = ("--json-port", "--vmc", "--preview", "--keep-footage")
-    for flag in outputs:
-        value = values[flag.removeprefix("--").replace("-", "_")]
-        if value is not None and value is not False:
-            raise UsageError(
-                f"{flag} is for a running capture, and this finishes a recording: leave it out"
-            )
+    for each in options_at(Place.LIVE):
+        if each.name not in used and values[each.name] != each.default:
+            raise UsageError(f"{each.flag} is for {advice}: leave it out")
 
 
 def _checked(values: Mapping[str, Any]) -> LiveOptions:
@@ -287,6 +292,8 @@ def _checked(values: Mapping[str, Any]) -> LiveOptions:
         raise UsageError(
             "--listen is empty, which would mean all networks; give an address, or leave it out"
         )
+    if values["listen"] != option("listen").default and values["json_port"] is None:
+        raise UsageError("--listen is the address on which --json-port listens: give it too")
     if len(values["heights_m"]) > values["live_people"]:
         raise UsageError(
             f"{len(values['heights_m'])} heights are given, but --people is {values['live_people']}"

@@ -57,6 +57,9 @@ from ..live.test_vmc import parsed
         ),
         (["x.mp4", "--height", "170,180"], 2, "2 heights are given, but --people is 1"),
         (["x.mp4", "--json-port", "70000"], 2, "--json-port must be from 0 to 65535, not 70000"),
+        ([str(SAMPLE), "--listen", "0.0.0.0"], 2, "--listen is the address on which --json-port"),
+        ([str(SAMPLE), "--reconnect", "0"], 2, "--reconnect is for cameras and streams"),
+        (["0", "--list-formats", "--record", "a.npz"], 2, "--record is for a capture"),
         (["x.mp4", "--list-formats"], 2, "x.mp4 is not a camera; give its number, 0 for the first"),
         (
             ["rtsp://me:secret@host/a", "--list-formats"],
@@ -107,11 +110,12 @@ def test_an_empty_address_does_not_mean_all_networks(capsys):
     assert "--listen is empty" in capsys.readouterr().err
 
 
-def test_finishing_a_recording_serves_nothing(tmp_path, capsys):
+@pytest.mark.parametrize("given", [["--json-port", "0"], ["--people", "2"], ["--height", "170"]])
+def test_finishing_a_recording_does_nothing_else(tmp_path, capsys, given):
     left = tmp_path / "take.recording"
     left.write_text("{}\n")
-    assert main(["live", str(left), "--json-port", "0"]) == 2
-    assert "--json-port is for a running capture" in capsys.readouterr().err
+    assert main(["live", str(left), *given]) == 2
+    assert f"{given[0]} is for a running capture" in capsys.readouterr().err
 
 
 def test_the_extension_says_where_live_captures_are(capsys, monkeypatch):
