@@ -11,7 +11,7 @@ Its rest pose is read as well: its bones, and the skin that each of them moves.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 import bpy
 import numpy as np
@@ -27,7 +27,7 @@ from ..retarget.rest_pose import RestPose
 from ..retarget.skeleton import BoneMotion, Skeleton
 from .actions import assign_action, used_slot
 from .character.root_object import root_object, topmost
-from .datablocks import changed, is_deformed_by
+from .datablocks import changed, is_deformed_by, modifiers_off
 from .visibility import evaluated
 
 # Rigify's properties: limbs by FK, neck and head with the chest.
@@ -328,6 +328,7 @@ def at_rest(rig: bpy.types.Object) -> Iterator[None]:
     empty = root_object(rig)
     with (
         evaluated(rig),
+        skin_unmodified(rig),
         changed([rig.data], pose_position="POSE"),
         changed([animation] if animation else [], use_nla=False),
     ):
@@ -349,6 +350,13 @@ def at_rest(rig: bpy.types.Object) -> Iterator[None]:
             top.parent = empty
             if action is not None:
                 assign_action(animation, action, slot)
+
+
+def skin_unmodified(rig: bpy.types.Object) -> AbstractContextManager[None]:
+    """Leave out the modifiers of the meshes that a rig deforms inside the block: only bones are
+    measured.
+    """
+    return modifiers_off(obj for obj in bpy.context.scene.objects if is_deformed_by(obj, rig))
 
 
 def rest_pose(rig: bpy.types.Object, *, with_skin: bool = False) -> RestPose:

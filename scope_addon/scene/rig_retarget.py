@@ -48,7 +48,7 @@ from .rig_action import (
     root_locations,
     write_action,
 )
-from .rig_probe import at_rest, blocked_bones, probe, rest_pose
+from .rig_probe import at_rest, blocked_bones, probe, rest_pose, skin_unmodified
 from .rigify_ik import ik_keys
 from .timing import current_frame_kept, show_frame
 from .transaction import all_or_nothing
@@ -193,9 +193,9 @@ def retarget(
         if captured is not None and options.face is not None
         else None
     )
-    places = _places(source, frames)
     leave_tweak_mode(rig)
-    with all_or_nothing(bpy.context.scene, rig, topmost(rig)):
+    with all_or_nothing(bpy.context.scene, rig, topmost(rig)), skin_unmodified(rig):
+        places = _places(source, frames)
         back_above = _back_above_root_object(rig, frames)
         with at_rest(rig):
             skeleton = probe(rig, bone_map.parts)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scope.scope_addon.errors import UsageError
 from scope.scope_addon.retarget.bone_map import BoneMap
+from scope.scope_addon.scene.export.export import ExportOptions
+from scope.scope_addon.scene.rig_export import export_rig
 from scope.scope_addon.scene.rig_retarget import guess_bone_map
 from scope.solver.errors import InputError
 from scope.solver.rotations import exp
@@ -14,6 +16,7 @@ from ..edit.walking import NAMES, motion_of, walk
 from .made_rigs import (
     ARMS,
     FBX,
+    FRAMES,
     LEGS,
     added_empty,
     build_rig,
@@ -72,6 +75,38 @@ def test_a_hidden_or_edited_rig_moves(source, hide):
     # it would not be seen to move otherwise
     assert (rig.mode, rig.data.pose_position) == ("OBJECT", "POSE")
     rig.hide_viewport = collections[0].hide_viewport = False
+    assert direction_error(rig, bone_of, ARMS + LEGS, JOINTS) < 1.0
+
+
+def test_a_subdivided_mesh_is_not_evaluated_for_bones(source, tmp_path):
+    """A character of half a million vertices would take minutes: its modifiers are left out while
+    the rig is measured, moved by its parent and written as a .bvh file.
+    """
+    rig, bone_of = build_rig("mixamo")
+    rig.parent = added_empty("carrier")
+    rig.parent.keyframe_insert("location", frame=1)
+    mesh = bpy.data.meshes.new("skin")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    skin = bpy.data.objects.new("skin", mesh)
+    bpy.context.scene.collection.objects.link(skin)
+    skin.modifiers.new("rig", "ARMATURE").object = rig
+    subdivision = skin.modifiers.new("smooth", "SUBSURF")
+    skin.modifiers.new("waves", "WAVE")  # after the other two, for which Blender evaluates them
+    counts = []
+
+    def count(scene, depsgraph):
+        counts.append(len(skin.evaluated_get(depsgraph).data.vertices))
+
+    handlers = bpy.app.handlers.frame_change_post, bpy.app.handlers.depsgraph_update_post
+    for handler in handlers:
+        handler.append(count)
+    run(source, rig, feet=False)
+    export_rig(tmp_path / "rig.bvh", rig, ExportOptions())
+    for handler in handlers:
+        handler.remove(count)
+    assert counts.count(3) > 2 * len(FRAMES)
+    assert sum(each > 3 for each in counts) < 10
+    assert subdivision.show_viewport
     assert direction_error(rig, bone_of, ARMS + LEGS, JOINTS) < 1.0
 
 

@@ -30,7 +30,7 @@ from ...temporary import remove
 from .. import actions
 from ..budget import check_samples
 from ..build import NEW_SCENE, BuildOptions, build_scene, check_choices
-from ..datablocks import captures_of, temporary_datablocks
+from ..datablocks import captures_of, modifiers_off, temporary_datablocks
 from ..packed_motion import pack_motion
 from . import formats
 from .bone_names import OWN, SKELETONS, bone_names
@@ -148,6 +148,7 @@ def _write_one(
         # keeps hidden objects as they are
         nullcontext() if suffix == ".blend" else all_evaluated(collections),
         scene_of(collections, rigs, options.camera, unit if by_scene else 1.0) as scene,
+        modifiers_off(scene.objects) if suffix == ".bvh" else nullcontext(),
         external_parents_replaced(scene)
         if suffix == ".glb" or not is_in_metres
         else nullcontext(),  # the exporter of .glb omits children of objects outside the scene
