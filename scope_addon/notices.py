@@ -178,6 +178,9 @@ SENTENCES = {
     "image_numbers": "Blender cannot show the image sequence from {first} on, because images are "
     "missing or their numbers are too large, so the camera shows that image only; renumber the "
     "files consecutively to show all",
+    # files
+    "left_over": "these files are of another capture, not part of this result: {files:names}; "
+    "remove what you do not need",
     # a rig
     "guessed_bones": "these bones of '{rig}' were guessed from its rest pose alone: {bones:names}; "
     "check the result",

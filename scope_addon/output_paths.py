@@ -14,6 +14,7 @@ from pathlib import Path
 
 from .atomic_write import reason, resolve_link
 from .errors import OutputError, UsageError
+from .notices import Notice, notice
 
 # Formats that are written from the motion, without Blender.
 WITHOUT_SCENE = (".trc", ".c3d", ".vrma", ".mot", ".csv", ".npz")
@@ -84,18 +85,12 @@ def files_of_people(path: Path) -> list[Path]:
     return [path, *people] if path.exists() else people
 
 
-def left_over(paths: Collection[Path], written: Collection[Path]) -> str:
-    """Say which files lie beside results as if they were a part of them, though they are of a
-    capture with more people, or fewer; empty if there are none.
+def left_over(paths: Collection[Path], written: Collection[Path]) -> Notice | None:
+    """Return which files lie beside results as if they were a part of them, though they are of a
+    capture with more people, or fewer; None if there are none.
 
     :param paths: as the user has given them.
     :param written: the results.
     """
     others = [each for path in paths for each in files_of_people(path) if each not in written]
-    if not others:
-        return ""
-    names = ", ".join(each.name for each in others)
-    return (
-        f"{names} {'is' if len(others) == 1 else 'are'} not part of this result, but of another "
-        "capture; remove what you do not need"
-    )
+    return notice("left_over", files=[each.name for each in others]) if others else None

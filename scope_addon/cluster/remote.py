@@ -29,9 +29,7 @@ from ..atomic_write import atomic_path, reason, replace_durably, resolve_link
 from ..errors import OutputError, UsageError
 from ..footage import PICTURE_SUFFIXES, display_address, is_url, sequence_pattern
 from ..job.batch import REPORT_NAME
-from ..job.clip_task import ClipTask
 from ..job.finished_clip import file_hash
-from ..output_paths import left_over
 from ..private_folder import lasting_folder
 from ..temporary import claim, discard, hold, is_abandoned, release, remove
 
@@ -242,10 +240,6 @@ class RemoteStaging:
                 self._move(f"{root}/{name}", name)
         return True
 
-    def left_over(self, task: ClipTask, outputs: list[str]) -> str:
-        """Return that nothing is known of other files in the store; see `Staging.left_over`."""
-        return ""
-
     def write_report(self, file: Path) -> None:
         """Upload the batch's report.
 
@@ -345,13 +339,6 @@ class Staging:
         for name in outputs:
             _rename(Path(attempt, name), (folder or self._out) / name)
         return True
-
-    def left_over(self, task: ClipTask, outputs: list[str]) -> str:
-        """Say which files of an earlier capture lie beside the results of a clip; see
-        `output_paths.left_over`. The worker cannot: it has captured to the attempt's folder.
-        """
-        paths = [self._out / f"{task.name}{suffix}" for suffix in task.settings.suffixes]
-        return left_over(paths, [self._out / name for name in outputs])
 
     def write_report(self, file: Path) -> None:
         """Do nothing: the report is written to the output folder itself."""

@@ -29,8 +29,7 @@ from ..footage import display_address, is_url
 from ..job.batch import how_to_continue
 from ..job.clip_task import COUNT, DIVIDED, ClipTask, Entry, failure
 from ..job.request import program_version
-from ..notices import OTHER, notice
-from ..output_paths import WITHOUT_SCENE
+from ..output_paths import WITHOUT_SCENE, left_over
 from ..temporary import remove
 from . import worker as worker_side
 from .remote import RemoteStaging, Staging
@@ -298,9 +297,12 @@ class DaskRunner:
             text = system_error_message(error) if isinstance(error, OSError) else str(error)
             entry = failure(task, text)
         if entry["status"] == "done":
-            others = self._staging.left_over(task, entry["outputs"])
-            notices = [notice(OTHER, text=others)] if others else []
-            for name, values in warnings_as_json(notices).items():
+            # The worker cannot know: it has captured to the attempt's folder. Of a store, the
+            # task's folder has the names that were there before.
+            out = Path(task.out)
+            paths = [out / f"{task.name}{suffix}" for suffix in task.settings.suffixes]
+            others = left_over(paths, [out / name for name in entry["outputs"]])
+            for name, values in warnings_as_json([others] if others else []).items():
                 entry["report"].setdefault(name, []).extend(values)
         self._forget(key)
         return self._ended(task, attempt.worker, entry)

@@ -17,7 +17,7 @@ from ..errors import UsageError
 from ..footage import display_text, files_of_footage, is_url
 from ..installed import check_installed
 from ..motion import Motion
-from ..notices import OTHER, Notice, counted, notice
+from ..notices import Notice, counted
 from ..options import option
 from ..output_paths import WITHOUT_SCENE, check_output, files_of_people, left_over
 from ..scene.export.without_scene import write_without_scene
@@ -363,7 +363,7 @@ def write_outputs(
             files, warnings = export_motions(motions, body, scene_files, footage, options, separate)
             written += files
     if others := left_over(outputs, written):
-        warnings = [*warnings, notice(OTHER, text=others)]
+        warnings = [*warnings, others]
     return written, warnings
 
 

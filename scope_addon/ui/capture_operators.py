@@ -413,8 +413,7 @@ class SCOPE_OT_capture_queue(CapturingOperator):
                     f"no file was written, because there is no folder '{folder}' any more; choose "
                     "another one, and export the capture"
                 )
-            with window_shows(scene):
-                path = unused_path(Path(folder), capture, kind)
+            with window_shows(scene), unused_path(Path(folder), capture, kind) as path:
                 if settings.frame_rate == AUTOMATIC and differs(scene):
                     write_at_own_rate(path, kind, capture, build_options(scene))
                 else:

@@ -6,6 +6,8 @@ from __future__ import annotations
 import itertools
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +17,9 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..errors import UsageError
 from ..options import Place
-from ..output_paths import person_paths
+from ..output_paths import files_of_people, left_over, person_paths
 from ..scene.datablocks import captures_of, holds
+from ..temporary import hold, release
 from .captured_person import body_of, motion_of, stored_person
 from .captures import people_of, shown_capture
 from .comparison import cameras_of
@@ -193,6 +196,8 @@ class SCOPE_OT_export(SavingOperator):
             written = self._write_rig(context.scene, path, options)
         else:
             written = write_captures(path, self.format, self._captures(context), options)
+        if others := left_over([path], written):
+            warnings.append(others)
         message = rpt_(
             "Wrote {files} in {folder}",
             files=", ".join(p.name for p in written),
@@ -294,19 +299,42 @@ def write_at_own_rate(
     return written
 
 
-def unused_path(folder: Path, capture: bpy.types.Collection, kind: str) -> Path:
-    """Return a path for a capture's file, with the capture's name, and a number where files of that
-    name exist.
+@contextmanager
+def unused_path(folder: Path, capture: bpy.types.Collection, kind: str) -> Iterator[Path]:
+    """Give a path for a capture's file, with the capture's name, and a number where files of that
+    name exist, or another Blender is going to write them.
 
     :param kind: a key of ``FORMATS``.
     """
     name = _file_name(capture)
+    held: list[Path] = []
     for number in itertools.count(1):
         stem = name if number == 1 else f"{name}_{number}"
         path = folder / f"{stem}{_SUFFIX[kind]}"
-        if not any(map(os.path.lexists, [path, *person_paths(path, 2, separate=True)])):
+        if _is_taken(path):
+            continue
+        lock = folder / f".{path.name}.lock"
+        try:
+            if not hold(lock):
+                continue
+            held.append(lock)
+        except OSError:  # there are no locks; what else is wrong, writing says
             break
-    return path
+        if not _is_taken(path):  # by whoever held the lock until now
+            break
+        release(held.pop())
+    try:
+        yield path
+    finally:
+        for lock in held:
+            release(lock)
+
+
+def _is_taken(path: Path) -> bool:
+    """Return whether there is a result of this name, of one person or several."""
+    # By their names, too: a disk may take capital and small letters for the same.
+    names = [path, *person_paths(path, 2, separate=True)]
+    return any(map(os.path.lexists, names)) or bool(files_of_people(path))
 
 
 def _write_motions(path: Path, collections: list[bpy.types.Collection]) -> list[Path]:

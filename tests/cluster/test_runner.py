@@ -132,7 +132,7 @@ def test_every_clip_has_its_outcome_and_a_second_run_captures_what_has_changed(
     assert found["b.mp4"][1] == "it is not a video"
     warnings = {e["file"]: e["report"]["warnings"] for e in report["files"] if "report" in e}
     assert warnings["a.mp4"] == []
-    assert "d.person2.npz is not part of this result" in warnings["below/d.mp4"][0]
+    assert "not part of this result: 'd.person2.npz';" in warnings["below/d.mp4"][0]
     outputs = ["a.glb", "a.npz", "below", "below/d.glb", "below/d.npz", "below/d.person2.npz"]
     assert files(folder) == sorted([*outputs, REPORT_NAME])
     assert (folder.parent / "out" / "below" / "d.npz").read_text("utf-8") == "result of d"

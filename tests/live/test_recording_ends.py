@@ -481,7 +481,8 @@ def test_a_motion_of_an_earlier_recording_of_more_people_is_named(
     earlier = tmp_path / "take.person2.npz"
     earlier.write_bytes(EARLIER)
     assert main(["live", str(SAMPLE), "--record", str(tmp_path / "take.npz")]) == 0
-    assert f"warning: {earlier.name} is not part of this result" in capfd.readouterr().err
+    said = capfd.readouterr().err
+    assert f"not part of this result: '{earlier.name}'; remove" in said
     assert earlier.read_bytes() == EARLIER
 
 

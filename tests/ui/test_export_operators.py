@@ -14,6 +14,7 @@ from scope.scope_addon.scene.build import BuildOptions
 from scope.scope_addon.scene.visibility import hide
 from scope.scope_addon.ui.capture_job import build_capture
 from scope.scope_addon.ui.captured_person import PERSON, captured_armature
+from scope.scope_addon.ui.export_operators import unused_path
 from scope.scope_addon.ui.live_job import live_rig
 from scope.solver.body_file import load_body
 
@@ -103,6 +104,44 @@ def test_what_the_view_layer_excludes_is_not_taken_for_the_other(both, which):
     assert not bpy.ops.scope.retarget.poll()
     with pytest.raises(UsageError, match="no rig of this scene's view layer is chosen"):
         live_rig(context.scene, load_body("scope"))
+
+
+@pytest.mark.parametrize(
+    ("which", "people", "left"),
+    [("SHOWN", 1, (1, 2, 3)), ("SHOWN", 2, (3,)), ("RIG", 2, (1, 2, 3))],
+)
+def test_files_of_an_earlier_number_of_people_stay_and_are_named(
+    standing, tmp_path, capfd, which, people, left
+):
+    scene = bpy.context.scene
+    contents = [(tmp_path / f"{k}.npz", standing.to_bytes()) for k in range(people)]
+    result = build_capture(scene, contents, "scope", "", Report(), BuildOptions())
+    scene.scope_retarget.rig = result.people[0].armature
+    for number in (1, 2, 3):
+        (tmp_path / f"walk.person{number}.bvh").write_text("earlier")
+    bpy.ops.scope.export(filepath=str(tmp_path / "walk.bvh"), format="BVH", which=which)
+    names = ", ".join(f"'walk.person{number}.bvh'" for number in left)
+    assert f"not part of this result: {names}; remove" in capfd.readouterr().out
+    for number in left:
+        assert (tmp_path / f"walk.person{number}.bvh").read_text("utf-8") == "earlier"
+
+
+def test_two_blenders_that_write_files_of_lists_to_one_folder_take_different_names(tmp_path):
+    capture = captured_with(motion_of(walk(0.1))).users_collection[0]
+    capture.name = "walk"
+    (tmp_path / "walk.person3.npz").write_text("mine")
+    (tmp_path / ".walk_2.npz.lock").mkdir()  # no lock of ours
+    with (
+        unused_path(tmp_path, capture, "NPZ") as own,
+        unused_path(tmp_path, capture, "NPZ") as others,
+        unused_path(tmp_path, capture, "TRC") as markers,
+    ):
+        assert [own.name, others.name, markers.name] == ["walk_3.npz", "walk_4.npz", "walk.trc"]
+        own.write_text("own")
+    with unused_path(tmp_path, capture, "NPZ") as later:
+        assert later.name == "walk_4.npz"
+    left = [".walk_2.npz.lock", "walk.person3.npz", "walk_3.npz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == left
 
 
 def test_the_cameras_of_a_capture_are_saved_as_a_calibration(standing, tmp_path):
