@@ -125,3 +125,12 @@ def test_a_worker_without_the_footage_does_not_tell_the_password(
     assert run(tmp_path) == 1
     assert "it has no folder memory://bucket/clips" in capsys.readouterr().err
     assert "SECRET" not in str(answers)
+
+
+def test_files_of_an_earlier_number_of_people_in_a_store_are_named(memory, tmp_path):
+    memory.pipe_file("/key:SECRET@bucket/clips/fine.mp4", b"clip")
+    memory.pipe_file("/key:SECRET@bucket/out/fine.person2.npz", b"earlier")
+    assert run(tmp_path) == 0
+    report = json.loads(memory.cat_file(f"/key:SECRET@bucket/out/{REPORT_NAME}"))
+    (warning,) = report["files"][0]["report"]["warnings"]
+    assert "not part of this result: 'fine.person2.npz';" in warning
