@@ -11,7 +11,7 @@ a mirror that merges the halves of a mouth only while it is closed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
@@ -21,14 +21,18 @@ from numpy.typing import NDArray
 from ...notices import Notice, notice
 from .. import actions
 from ..datablocks import changed
+from ..timing import current_frame_kept
 from .export_states import in_position, replaced_meshes
 
-# Modifiers whose effect depends on the pose or the time.
+# Modifiers whose effect depends on the pose or the time; after the Armature modifier, also those
+# whose effect depends on where the mesh is in its object.
 _MOVING = frozenset(
     ("BUILD", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DYNAMIC_PAINT", "EXPLODE", "HOOK")
     + ("LAPLACIANDEFORM", "LATTICE", "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "OCEAN")
     + ("SHRINKWRAP", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE")
 )
+_SAMPLES = 9  # frames in which the values of keyed and driven modifiers are compared
+_PLACED = frozenset(("ARRAY", "CAST", "MIRROR", "SCREW", "SIMPLE_DEFORM"))
 
 
 @contextmanager
@@ -46,11 +50,12 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
     frames = range(scene.frame_start, scene.frame_end + 1)
     modified: dict[bpy.types.Object, bpy.types.Mesh] = {}
     notices: list[Notice] = []
+    in_motion = _modifiers_in_motion(scene, list(shown))
     with in_position(scene.objects, "REST"):
         for obj, modifiers in shown.items():
             modified[obj], keys_left_out = _modified_mesh(scene, obj)
             values = {"file": file_name, "mesh": obj.name}
-            if moving := [m.name for m in modifiers if m.type in _MOVING]:
+            if moving := [m.name for m in modifiers if m in in_motion]:
                 notices.append(notice("modifiers_left_out", **values, modifiers=moving))
             if keys_left_out:
                 notices.append(notice("shape_keys_left_out", **values, keys=keys_left_out))
@@ -70,6 +75,35 @@ def modifiers_applied(scene: bpy.types.Scene, file_name: str) -> Iterator[list[N
 
 def _shown_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     return [m for m in obj.modifiers if m.show_viewport and m.type != "ARMATURE"]
+
+
+def _modifiers_in_motion(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]
+) -> set[bpy.types.Modifier]:
+    """Return the modifiers of objects whose effect is another one in every frame: by their kind,
+    by their place after the Armature modifier, or because they are keyed or driven.
+    """
+    found = set()
+    values: dict[tuple[bpy.types.Modifier, str], list[object]] = {}
+    for obj in objects:
+        kinds = [modifier.type for modifier in obj.modifiers]
+        drivers = obj.animation_data.drivers if obj.animation_data else ()
+        curves = [curve for curve in (*actions.fcurves(obj), *drivers) if curve.is_valid]
+        for position, modifier in enumerate(obj.modifiers):
+            if modifier.type in (_MOVING | _PLACED if "ARMATURE" in kinds[:position] else _MOVING):
+                found.add(modifier)
+            own = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+            for curve in curves:
+                if curve.data_path.startswith(own):
+                    values[modifier, curve.data_path] = []
+    with current_frame_kept(scene):
+        for frame in np.linspace(scene.frame_start, scene.frame_end, _SAMPLES) if values else ():
+            scene.frame_set(round(frame))
+            graph = bpy.context.evaluated_depsgraph_get()
+            for (modifier, path), seen in values.items():
+                value = modifier.id_data.evaluated_get(graph).path_resolve(path)
+                seen.append(np.ravel(value).tolist())
+    return found.union(modifier for (modifier, _), seen in values.items() if seen[1:] != seen[:-1])
 
 
 def _modified_mesh(

@@ -84,6 +84,40 @@ def test_a_modifier_that_moves_by_itself_is_said(tmp_path):
     assert "mouth" in assert_shows(tmp_path / "rig.fbx", shown).shape_keys.key_blocks
 
 
+def _moving(skin, how):
+    """Give the skin a modifier of which the file shows one frame alone."""
+    kind = "MIRROR" if how == "after the armature" else "DISPLACE"
+    modifier = skin.modifiers.new("Odd", kind)
+    if kind == "DISPLACE":
+        skin.modifiers.move(1, 0)
+    if how == "keyed":
+        for frame in (1, LAST):
+            modifier.strength = 0.3 * frame
+            modifier.keyframe_insert("strength", frame=frame)
+    elif how == "driven":
+        variable = modifier.driver_add("strength").driver.variables.new()
+        variable.type = "TRANSFORMS"
+        variable.targets[0].id = skin.parent
+        variable.targets[0].bone_target = skin.vertex_groups[0].name
+        skin.animation_data.drivers[0].driver.type = "SUM"
+
+
+@pytest.mark.parametrize(
+    ("how", "is_said"),
+    [("keyed", True), ("driven", True), ("after the armature", True), ("still", False)],
+)
+def test_a_modifier_whose_effect_changes_with_the_motion_is_said(tmp_path, how, is_said):
+    rig, skin = half_a_face()
+    skin.shape_key_clear()
+    _moving(skin, how)
+    bpy.context.scene.frame_set(1)
+    shown = [corners(skin, frame) for frame in (1, LAST)]
+    warnings = export(tmp_path / "rig.fbx", rig)
+    assert ["'Odd'" in each for each in warnings] == [True] * is_said
+    if not is_said:
+        assert_shows(tmp_path / "rig.fbx", shown)
+
+
 @pytest.mark.parametrize(("suffix", "has_other_key"), [(".glb", True), (".fbx", False)])
 def test_a_shape_key_with_which_modifiers_make_other_faces_is_left_out(
     tmp_path, suffix, has_other_key
