@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Float64Array, IndexArray
+from ..arrays import Float64Array
 from .bone_map import FINGERS
 from .rest_pose import RestPose
 
@@ -25,6 +25,8 @@ _WORDS = {
 # Bones of a hand that are not phalanges. A thumb's metacarpal moves, and counts as its first
 # phalanx.
 _NO_PHALANX = re.compile(r"end|nub|tip|site|master|palm|twist|pole|ik|target", re.IGNORECASE)
+# Likewise, anywhere in a name; a spring is no ring finger.
+_HELPERS = ("spring", "string", "jiggle", "helper", "physic", "collider", "socket")
 _METACARPAL = re.compile(r"carpal|\bmeta\b", re.IGNORECASE)
 _NUMBERED = re.compile(r"finger[ _.-]*(\d)", re.IGNORECASE)
 _PHALANGES = 3
@@ -83,14 +85,17 @@ def _by_name(rest: RestPose, below: list[int]) -> dict[str, list[int]]:
     numbered: dict[int, set[int]] = {}
     shared = [
         word
-        for words in _WORDS.values()
+        for words in (*_WORDS.values(), _HELPERS)
         for word in words
         if all(word in rest.names[i].lower() for i in below)
     ]
+    helpers = [word for word in _HELPERS if word not in shared]
     for i in below:
         name = rest.names[i].rsplit(":", 1)[-1]
         words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)
         if any(_NO_PHALANX.fullmatch(word) for word in words):
+            continue
+        if any(word in name.lower() for word in helpers):
             continue
         finger = _finger_of(name, shared)
         number = _NUMBERED.search(name)
@@ -100,7 +105,7 @@ def _by_name(rest: RestPose, below: list[int]) -> dict[str, list[int]]:
             numbered.setdefault(int(number.group(1)), set()).add(i)
     unnamed = [finger for finger in FINGERS if finger not in own]
     own |= {finger: numbered[n] for finger, n in zip(unnamed, sorted(numbered), strict=False)}
-    return {finger: _longest(rest.parents, bones) for finger, bones in own.items()}
+    return {finger: _longest(rest, bones) for finger, bones in own.items()}
 
 
 def _finger_of(name: str, shared: list[str]) -> str | None:
@@ -144,13 +149,7 @@ def _by_geometry(rest: RestPose, wrist: int, below: list[int]) -> dict[str, list
     return out
 
 
-def _longest(parents: IndexArray, bones: set[int]) -> list[int]:
-    """Return the longest chain of parents and children within ``bones``, from the top."""
-    best: list[int] = []
-    for i in sorted(bones):
-        chain = [i]
-        while int(parents[chain[0]]) in bones:
-            chain.insert(0, int(parents[chain[0]]))
-        if len(chain) > len(best):
-            best = chain
-    return best
+def _longest(rest: RestPose, bones: set[int]) -> list[int]:
+    """Return the longest chain from the top within ``bones``, without others between them."""
+    chains = [[bone for bone in rest.chains[last] if bone in bones] for last in sorted(bones)]
+    return max(chains, key=len)

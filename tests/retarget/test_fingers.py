@@ -63,6 +63,31 @@ def test_fingers_are_found_by_their_names(tool):
     assert find_fingers(RestPose(names, parents, heads), HAND) == expected(names)
 
 
+@pytest.mark.parametrize("above", [0, 1, 2, 3])
+@pytest.mark.parametrize(
+    ("rig", "helper"),
+    [("", "{finger}_Spring"), ("", "{finger}helper"), ("Spring_", "{finger}_Jiggle1")],
+)
+def test_helpers_among_the_bones_of_a_finger_are_no_phalanges(rig, helper, above):
+    """Each finger has a helper above the knuckle, between two phalanges or below the last one, and
+    another one that ends there.
+    """
+    names = ["hand_l"]
+    parents = [-1]
+    wanted = {}
+    for finger in FINGERS:
+        phalanges = [f"{rig}{finger}{k}_L" for k in (1, 2, 3)]
+        wanted |= {name: f"left_{finger}{k}" for k, name in enumerate(phalanges, 1)}
+        helper_name = rig + helper.format(finger=finger)
+        chain = [*phalanges[:above], helper_name, *phalanges[above:]]
+        parents += [0, *range(len(names), len(names) + len(chain) - 1)]
+        names += chain
+        parents.append(names.index(helper_name))
+        names.append(f"{helper_name}_b")
+    rest = RestPose(names, np.array(parents), np.zeros((len(names), 3)))
+    assert find_fingers(rest, HAND) == wanted
+
+
 @pytest.mark.parametrize("turn", [0.0, 3.0])
 def test_fingers_without_names_are_found_by_their_shape_in_any_order(turn):
     names, parents, heads = hand("b{finger}{k}", tuple("qwerz"))
