@@ -47,6 +47,7 @@ from .command_line.outputs import (
     confine,
     default_outputs,
     distinct_paths,
+    files_of_options,
     files_to_read,
     refuse_inputs,
     summary,
@@ -73,6 +74,7 @@ from .footage import display_text, files_of_footage, is_url, json_text
 from .installed import CAPTURE, check_installed, check_memory_limit
 from .job.clip_task import SHOWN_COMMAND, STOP_WITH_STDIN, Extras
 from .job.finished_clip import FINISHED_FILE, write_finished
+from .job.watched_footage import WatchedFiles, WatchedFootage
 from .options.capture import OFF
 from .output_paths import SUFFIXES, WITHOUT_SCENE
 from .parent import end_with_parent
@@ -326,6 +328,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     )
     check_blender(outputs)
     check_memory_limit(with_scene=any(path.suffix.lower() not in WITHOUT_SCENE for path in outputs))
+    named = WatchedFiles(files_of_options(vars(args)))
     body, options = body_and_options(args)
     options = with_window_seconds(options, args)
     # Imported here, so that --help and errors in the arguments are printed immediately.
@@ -335,7 +338,6 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
     from .capture.pipeline import capture
     from .capture.several_views.capture_views import capture_views
     from .job.unfinished import unfinished_capture
-    from .job.watched_footage import WatchedFootage
     from .report.capture_page import CapturedClip, write_capture_page
 
     confine(args, outputs)
@@ -358,7 +360,7 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
         else:
             observe_frames = lasting(unfinished.folder, args.windows_folder)
             result = capture(video, body, options, watched, observe_frames=observe_frames)
-        for each in (footage, *views):
+        for each in (named, footage, *views):
             each.check()
         progress("writing", 0, 0)
         with interrupted("some results may have been written already, each of them complete"):
@@ -391,7 +393,8 @@ def run_capture(args: argparse.Namespace) -> dict[str, Any]:
                     footage.watched(lambda i, n: progress("report", i, n), to_end=True),
                 )
                 written.append(args.report)
-            footage.check()
+            for each in (named, footage):
+                each.check()
             report = captured.as_json() | {"outputs": [str(path) for path in written]}
             if args.finished_file:
                 write_finished(args.finished_file, report)

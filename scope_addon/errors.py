@@ -36,7 +36,7 @@ class VideoError(InputError):
 
 
 class ChangedFootageError(VideoError):
-    """The footage was changed while it was read."""
+    """The footage, or a file that an option names, was changed while it was read."""
 
 
 class OfflineError(VideoError):

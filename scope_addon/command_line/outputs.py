@@ -87,6 +87,12 @@ def files_to_read(values: Mapping[str, Any]) -> list[Path]:
     for value in [*footage, *(views if isinstance(views, list) else ())]:
         if value is not None and not is_url(value):
             files += files_of_footage(Path(value))
+    return [*filter(os.path.isfile, files), *files_of_options(values)]
+
+
+def files_of_options(values: Mapping[str, Any]) -> list[Path]:
+    """Return the existing files that are read besides footage; see `files_to_read`."""
+    files: list[Path] = []
     for name in OTHER_INPUTS:
         value = values.get(name)
         for path in map(Path, value if isinstance(value, list) else [value] if value else []):

@@ -89,27 +89,34 @@ class JobRequest(LineRequest):
         :param code_version: differs between programs whose results may differ; see `code_version`.
         :raises OSError: the footage cannot be read.
         """
-        # Imported here, because Blender loads this module when it starts.
-        from ..capture.camera.calibration_tables import files_of_calibration
-
         options = [option for option in options_at(Place.WORKER) if option.decides_result]
         values = {option.name: self.values[option.name] for option in options}
         digest = hashlib.sha256(json.dumps([values, code_version], sort_keys=True).encode())
         for footage in (self.footage, *self.views):
             _add_file(digest, Path(footage))
+        for file in self.named_files():
+            _add_file(digest, file)
+        return digest.hexdigest()[:32]
+
+    def named_files(self) -> list[Path]:
+        """Return the existing files that options name and that decide the result; the worker
+        reports missing ones.
+        """
+        # Imported here, because Blender loads this module when it starts.
+        from ..capture.camera.calibration_tables import files_of_calibration
+
         named = [
-            values[option.name]
-            for option in options
-            if option.value_type is Path or option.name == "body"
+            self.values[option.name]
+            for option in options_at(Place.WORKER)
+            if option.decides_result and (option.value_type is Path or option.name == "body")
         ]
+        files: list[Path] = []
         for path in (Path(str(name)) for name in filter(None, named)):
             # A network's description lies next to it. The camera's name after a calibration's file
             # is among the values.
             beside = (path.with_suffix(".json"), *files_of_calibration(path))
-            for file in dict.fromkeys((path, *beside)):
-                if file.is_file():  # the worker reports a missing file
-                    _add_file(digest, file)
-        return digest.hexdigest()[:32]
+            files += [file for file in dict.fromkeys((path, *beside)) if file.is_file()]
+        return files
 
 
 def checked_values(values: Mapping[str, Any], place: Place) -> dict[str, Any]:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Footage that must stay the same while it is read, from the first picture of a capture to the last
-one of its overlay.
+one of its overlay; and files that its options name.
 """
 
 from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,24 @@ _INTERVAL_S = 2.0  # between two looks at the files
 # Of which the content is read; more of a video, or of all pictures together, is sampled.
 _MOST_BYTES = 1 << 30
 _LEAST_BYTES = 1 << 16  # of each picture
+
+
+class WatchedFiles:
+    """Files that options name, as they were at the beginning: some are read more than once, such as
+    a camera's path for its lens and for its poses.
+    """
+
+    def __init__(self, files: Iterable[Path]) -> None:
+        self._states = {file: _size_and_time(file) for file in files}
+
+    def check(self) -> None:
+        """Compare the files with what they were.
+
+        :raises ChangedFootageError: one was replaced, changed or removed.
+        """
+        for file, before in self._states.items():
+            if _size_and_time(file) != before:
+                raise _changed(file)
 
 
 class WatchedFootage:
@@ -67,11 +85,7 @@ class WatchedFootage:
         if has_grown:
             return
         if changed or len(files) != len(self._states):
-            which = changed[0] if changed else self._path
-            raise ChangedFootageError(
-                f"{which} was changed while it was read, so the results would mix both; "
-                "capture again"
-            )
+            raise _changed(changed[0] if changed else self._path)
 
     def _content_of(self, file: Path) -> bytes:
         digest = hashlib.sha256()
@@ -146,3 +160,19 @@ class WatchedFootage:
         now = state_of(file)
         is_longer = len(before) == len(now) and now[:2] == before[:2] and now[2:3] > before[2:3]
         return is_longer and self._grows != b"" and self._ends() == self._grows
+
+
+def _size_and_time(file: Path) -> tuple[int, ...]:
+    """Return those of a file; some file systems change its number by themselves. Empty if it cannot
+    be seen, which whoever reads it says.
+    """
+    try:
+        return state_of(file)[2:]
+    except OSError:
+        return ()
+
+
+def _changed(file: Path) -> ChangedFootageError:
+    return ChangedFootageError(
+        f"{file} was changed while it was read, so the results would mix both; capture again"
+    )

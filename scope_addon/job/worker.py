@@ -23,7 +23,7 @@ from ..temporary import discard, remove
 from .cache import cache_of
 from .request import WARM_UP, Commands, FormatsRequest, JobRequest, LiveRequest, PictureRequest
 from .unfinished import unfinished_capture
-from .watched_footage import WatchedFootage
+from .watched_footage import WatchedFiles, WatchedFootage
 
 _REMOVAL_ATTEMPTS = 20  # an attempt fails if a file is created during it
 # of a capture: with 5, drawing without a graphics card waits for it; compiling ahead of it has 19
@@ -132,6 +132,7 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
     # What several cameras show is not continued after a kill.
     folder = None if request.views else cache_of(job_folder)
     with unfinished_capture(folder, Path(request.footage)) as unfinished:
+        named = WatchedFiles(request.named_files())
         footage = [unfinished.footage, *(WatchedFootage(Path(view)) for view in request.views)]
         progress = reporter.progress
         for each in footage:
@@ -145,8 +146,8 @@ def _capture(request: JobRequest, job_folder: Path, reporter: Reporter) -> None:
             else:
                 observe_frames = lasting(unfinished.folder)
                 result = capture(request.footage, body, options, progress, watch, observe_frames)
-        for each in footage:
-            each.check()
+        for watched in (named, *footage):
+            watched.check()
         names = [f"person{i + 1}.npz" for i in range(len(result.motions))]
         reporter.progress("writing", 0, 0)
         for name, motion in zip(names, result.motions, strict=True):

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """No option that writes may name, by any path or link, what an argument or option reads."""
 
+import io
 import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from scope.scope_addon.cli import main
+from scope.scope_addon.capture import pipeline
+from scope.scope_addon.cli import SAMPLE, main
 from scope.scope_addon.command_line.outputs import FOOTAGE, OTHER_INPUTS, check_outputs
 from scope.scope_addon.errors import UsageError
+from scope.scope_addon.job import worker
+from scope.scope_addon.job.request import JobRequest
 
 RIG_WITH_TEXTURE = """
 import os, sys, bpy
@@ -204,3 +209,37 @@ def test_a_batch_replaces_no_picture_of_a_sequence_and_no_map_by_its_report(tmp_
     calibration.write_text(json.dumps(camera))
     assert main([*batch, "--calibration", str(calibration)]) == 2
     assert "scope-batch.json is the input itself" in capsys.readouterr().err
+
+
+LENS = {"intrinsics": [[1000, 0, 640], [0, 1000, 360], [0, 0, 1]], "size": [1280, 720]}
+CAMERA_PATH = LENS | {"times_s": [0.0], "world_from_camera": [np.eye(4).tolist()]}
+
+
+@pytest.mark.parametrize("way", ["in a shell", "in the panel"])
+@pytest.mark.parametrize(
+    ("option", "content"), [("calibration", LENS), ("camera_path", CAMERA_PATH)]
+)
+def test_a_file_of_an_option_that_is_replaced_during_a_capture_is_noticed(
+    tmp_path, capsys, monkeypatch, option, content, way
+):
+    """It is read more than once: the result would be of both files."""
+    file = tmp_path / "camera.json"
+    file.write_text(json.dumps(content))
+
+    def replace_file(*_, **__):
+        file.with_name("new").write_text(json.dumps(content | {"size": [1920, 1080]}))
+        file.with_name("new").replace(file)
+
+    monkeypatch.setattr(pipeline, "capture", replace_file)
+    if way == "in the panel":
+        request = JobRequest(str(SAMPLE), **{option: str(file)})
+        sent = io.StringIO()
+        assert worker.run(request, tmp_path, worker.Reporter(sent)) == 1
+        said = json.loads(sent.getvalue().splitlines()[-1])["message"]
+    else:
+        flag = f"--{option.replace('_', '-')}"
+        out = str(tmp_path / "out.npz")
+        assert main(["capture", str(SAMPLE), flag, str(file), "-o", out, "--quiet"]) == 1
+        said = capsys.readouterr().err.removeprefix("scope: ")
+    assert said.startswith(f"{file} was changed while it was read")
+    assert not list(tmp_path.glob("*.npz"))
